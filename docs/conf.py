@@ -17,7 +17,7 @@ author = "the contributors of task-hierarchy"
 release = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "mathml", "outside_links", "plain_docstrings",
-              "scenario_keys", "command_help"]
+              "command_help"]
 exclude_patterns = ["_build", "_ext"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-_NEAR = 0.6  # similarity of two names, 0 to 1, from which one is suggested
+_NEAR = 0.6   # similarity of two names, 0 to 1, from which one is suggested
+_LISTED = 15  # known names that a message lists; of more it has the nearest
 
 
 class HierarchyError(ValueError):
@@ -20,21 +21,32 @@ class HierarchyError(ValueError):
 
 
 class UnknownNameError(HierarchyError):
-    """An unknown name, with the most similar known one; `more` is a further sentence."""
+    """An unknown name, with the most similar known ones; `more` is a further sentence.
 
-    def __init__(self, what: str, name: str, known: Iterable[str], more: str = "") -> None:
+    `above` stands in front of the name, as the dotted section of a key does.
+    """
+
+    def __init__(self, what: str, name: object, known: Iterable[str], more: str = "",
+                 above: str = "") -> None:
         known = sorted(known)
-        near = [*_containing(str(name), known),
-                *difflib.get_close_matches(str(name), known, n=1, cutoff=_NEAR)]
-        hint = f"; did you mean {near[0]!r}?" if near else "."
-        super().__init__(f"unknown {what} {name!r}{hint} Known: {', '.join(known) or 'none'}."
+        near = nearest(name, known, 1, _NEAR)
+        hint = f"; did you mean {above + near[0]!r}?" if near else "."
+        said = (f"Known: {', '.join(known) or 'none'}." if len(known) <= _LISTED else
+                f"The nearest of {len(known)}: {', '.join(nearest(name, known))}.")
+        super().__init__(f"unknown {what} {f'{above}{name}'!r}{hint} {said}"
                          + (f" {more}" if more else ""))
 
 
-def _containing(name: str, known: Iterable[str]) -> list[str]:
-    """Return the names that contain a part of at least three letters, the shortest first."""
-    return sorted((one for one in known if name.lower() in one.lower()), key=len) \
-        if len(name) > 2 else []
+def nearest(name: object, known: Iterable[str], most: int = 5, similarity: float = 0.0
+            ) -> list[str]:
+    """Return the known names nearest to a name: those that contain it, then similar ones.
+
+    similarity : of two names, 0 to 1, from which one counts; upper and lower case are the same.
+    """
+    asked, by_key = str(name).casefold(), {one.casefold(): one for one in known}
+    containing = sorted((one for one in by_key if asked in one), key=len) if len(asked) > 2 else []
+    similar = difflib.get_close_matches(asked, by_key, n=most, cutoff=similarity)
+    return [by_key[one] for one in dict.fromkeys([*containing, *similar])][:most]
 
 
 def expect(what: str, value: object, kind: type, remedy: str) -> None:

@@ -13,6 +13,8 @@ from hierarchy.errors import HierarchyError, brief
 
 Array = NDArray[np.float64]
 Sizes = NDArray[np.int64]
+_TURNED = 1e-6       # of R R^T from the identity
+_ROUNDED = 1e-2      # the same, of a rotation that was written with few digits
 _NUMBERS = "biufO"  # kinds of numpy's types that are real numbers, or may be
 
 
@@ -26,6 +28,22 @@ def array_of(what: str, value: Any) -> Array:
         raise HierarchyError(f"{what} is not an array of numbers: {brief(value)}") from error
     kind = "real numbers: it is complex," if given.dtype.kind == "c" else "numbers:"
     raise HierarchyError(f"{what} is not an array of {kind} {brief(value)}")
+
+
+def check_rotation(what: str, rotation: ArrayLike) -> None:
+    """Raise a HierarchyError, with how far it is off, unless a matrix (3, 3) is a rotation."""
+    R = array_of(what, rotation)
+    if R.shape != (3, 3) or not np.isfinite(R).all():
+        raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), got {brief(rotation)}")
+    off = float(np.abs(R @ R.T - np.eye(3)).max())
+    if off > _TURNED:
+        rounded = ": write it with 8 digits" if off < _ROUNDED else ""
+        raise HierarchyError(f"{what}: not a rotation matrix: R R^T is {off:.2g} from the "
+                             f"identity, at most {_TURNED:g} is allowed{rounded}; got "
+                             f"{brief(R.tolist())}")
+    if np.linalg.det(R) < 0.0:
+        raise HierarchyError(f"{what}: not a rotation matrix but a reflection, of determinant -1; "
+                             f"got {brief(R.tolist())}")
 
 
 def readable(what: str, value: Any) -> Array:

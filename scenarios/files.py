@@ -1,4 +1,4 @@
-"""Files and folders: output is written whole or not at all, and a bad file is named."""
+"""Files and folders: output is written whole or not at all."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import platform
 import re
 import shutil
 import tempfile
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -209,27 +208,6 @@ def write_json(path: Path, data: Any) -> None:
     write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
 
 
-def read_toml(path: Path, what: str, error: type[HierarchyError]) -> dict[str, Any]:
-    """Return the content of a TOML file; raises `error`, naming the file, if it cannot be read.
-
-    `what` is the kind of file in the message, such as "scenario file".
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as cause:
-        raise error(f"{what} {str(path)!r} does not exist") from cause
-    except OSError as cause:
-        raise error(f"{what} {str(path)!r}: {cause.strerror}") from cause
-    except UnicodeDecodeError as cause:
-        raise error(f"{what} {str(path)!r} is not UTF-8 text") from cause
-    except tomllib.TOMLDecodeError as cause:  # its text gives line and column
-        raise error(f"{what} {str(path)!r}: {cause}") from cause
-    except RecursionError as cause:
-        raise error(f"{what} {str(path)!r} is nested too deep") from cause
-    except ValueError as cause:
-        raise error(f"{what} {str(path)!r} has an integer of thousands of digits") from cause
-
-
 def scenarios_in(folder: Path) -> dict[str, tuple[Path, str]]:
     """Return file and variant ("" for the file itself) of each scenario in a library, by name.
 
@@ -245,7 +223,7 @@ def scenarios_in(folder: Path) -> dict[str, tuple[Path, str]]:
 
 def slug(text: str) -> str:
     """Return a text as a name for a file or folder; different texts may have the same one."""
-    return re.sub(r"[^A-Za-z0-9._]+", "-", text).strip("-.") or "unnamed"
+    return re.sub(r"[^\w.]+", "-", text).strip("-.") or "unnamed"
 
 
 def _umask() -> int:

@@ -69,7 +69,8 @@ class Resolver(ABC):
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "solve" in vars(cls):
-            cls.solve = _with_checks(cls.solve)  # type: ignore[assignment,method-assign]
+            solve = cls.solve if cls.__module__.startswith("solvers.") else _judged(cls.solve)
+            cls.solve = _with_checks(solve)  # type: ignore[assignment,method-assign]
 
     def __post_init__(self) -> None:
         self._number("damping", 0.0, math.inf)
@@ -149,6 +150,22 @@ class Resolver(ABC):
 
 Solve = Callable[[Any, Hierarchy, Array | None], Resolution]
 _ARRAY, _FLOAT = np.ndarray, np.dtype(np.float64)
+
+
+def _judged(solve: Solve) -> Solve:
+    """Return the `solve` of a plugin, whose result is looked at: it is the user's code."""
+    @functools.wraps(solve)
+    def judged(self: Any, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        found: Any = solve(self, h, memory)
+        expect(f"resolver {self.name!r}: solve", found, Resolution, "return solvers.Resolution(x)")
+        x = found.x
+        if type(x) is not _ARRAY or x.dtype != _FLOAT or x.shape != (h.n,):
+            raise HierarchyError(f"resolver {self.name!r}: solve: x: expected an array of {h.n} "
+                                 f"floats, got {brief(x)}")
+        return found if np.isfinite(x).all() else Resolution(np.zeros(h.n),
+                                                             Status.NUMERICAL_FAILURE)
+
+    return judged
 
 
 def _with_checks(solve: Solve) -> Solve:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, UnknownNameError, expect_each
+from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
 from hierarchy.paths import Path
 from hierarchy.problem import Array
@@ -48,6 +49,7 @@ class Obstacle:
                                  f"size(s), got {list(self.size)}")
         if not np.isfinite(np.asarray(self.centre, dtype=float)).all():
             raise HierarchyError(f"{self.name}: centre {list(self.centre)} is not finite")
+        check_rotation(f"{self.name}: rotation", self.rotation)
 
     def packed(self) -> Array:
         """The obstacle as one row (16,) of the table for the kernels."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, brief
+from hierarchy.gate import check_rotation
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     drift_of_point,
@@ -29,19 +29,6 @@ from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Level, Task, along
-
-_TURNED = 1e-6  # of R R^T from the identity
-
-
-def check_rotation(what: str, rotation: ArrayLike) -> None:
-    """Raise a HierarchyError unless a matrix is a rotation (3, 3), or return None."""
-    try:
-        R = np.asarray(rotation, dtype=float)
-    except (TypeError, ValueError):
-        R = np.empty(0)
-    if R.shape != (3, 3) or not np.allclose(R @ R.T, np.eye(3), atol=_TURNED) or (
-            np.linalg.det(R) < 0.0):
-        raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), got {brief(rotation)}")
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import finite_numbers
+from hierarchy.gate import check_rotation
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import row_times, write_equality
 from hierarchy.problem import Array
@@ -34,7 +35,7 @@ from hierarchy.tasks.geometric import (
     turned_back,
     view_of,
 )
-from hierarchy.tasks.pose import check_rotation, rotation_vector
+from hierarchy.tasks.pose import rotation_vector
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hierarchy import HierarchyError, Robot, State
+from hierarchy import Robot, State
 from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.problem import Array
 from scenarios.cell.plants.ground import BALL
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.contacts import ContactSection
+from scenarios.config.errors import naming
 from scenarios.config.kinds.torque import TorqueSection
 
 _OFF = 0.002      # [m] of a point from the floor that is too far
@@ -28,14 +29,17 @@ def contacts_of(scenario: Scenario, robot: Robot) -> Contacts | None:
     """Return the contacts at level "torque", None at the others; raises ScenarioError."""
     if scenario.control.level != "torque":
         return None
-    try:
-        return Contacts(robot, [_contact(section, robot) for section in scenario.contacts])
-    except HierarchyError as error:
-        raise ScenarioError(f"contacts: {error}") from error
+    contacts = []
+    for i, section in enumerate(scenario.contacts):
+        with naming(f"contacts.{i}"):
+            contacts.append(_contact(section, robot))
+    with naming("contacts"):
+        return Contacts(robot, contacts)
 
 
 def _contact(section: ContactSection, robot: Robot) -> Contact:
-    frame = robot.frame(section.frame)
+    with naming("frame"):
+        frame = robot.frame(section.frame)
     if section.x is None or section.y is None:
         return Contact(frame, (section.offset,), section.friction, section.normal,
                        section.name or "", section.open, section.ramp, section.slides)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy import Robot, Stack, State
 from hierarchy.avoidance import Capsule, ControlPoint
 from hierarchy.paths import Still
 from hierarchy.problem import Array
@@ -12,6 +12,7 @@ from hierarchy.tasks import Position
 from hierarchy.tasks.mechanism import Mechanism, model_rows
 from scenarios.cell.contacts import on_contacts
 from scenarios.config import Scenario, ScenarioError
+from scenarios.config.errors import naming
 from scenarios.config.references import References
 from scenarios.config.robot import RobotSection, StartSection
 from solvers import make
@@ -34,6 +35,11 @@ def placed(scenario: Scenario) -> References:
 
 def make_robot(section: RobotSection) -> Robot:
     """Make the robot of a scenario, with the control points and capsules of the section."""
+    with naming("robot"):
+        return _made(section)
+
+
+def _made(section: RobotSection) -> Robot:
     robot = Robot.load(section.model, section.end_effector, section.base, section.locked,
                        section.root)
     if section.control_points is not None:
@@ -83,13 +89,11 @@ def _check_limits(robot: Robot, q: Array) -> None:
 
 def _state(robot: Robot, section: StartSection) -> State:
     mechanism = Mechanism(robot)
-    try:
+    with naming("start"):
         q = (robot.configuration(section.q) if section.q is not None else robot.rest
              if section.keyframe is None else robot.start(section.keyframe))
         q = mechanism.closed(robot.configuration(section.joints, q), section.joints)
         state = State.at(robot, q, section.v)
-    except HierarchyError as error:
-        raise ScenarioError(f"start: {error}") from error
     gap, where = mechanism.gap(q)
     if gap > _CLOSED:
         raise ScenarioError(f"start: {where}: the robot's mechanism stays open by {gap:.3g} (m or "

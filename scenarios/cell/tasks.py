@@ -33,6 +33,7 @@ from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection, SeparationSection
 from scenarios.config.control import ControlSection
+from scenarios.config.errors import naming
 from scenarios.config.references import References
 from scenarios.config.tasks import LimitsSection, Made
 
@@ -142,11 +143,9 @@ def _separation(section: SeparationSection, at: References, exact: bool) -> list
         tasks.append(Separation(sensed_points(at.robot), section.barrier(section.distance),
                                 len(section.obstacles) if exact else None))
     if (distance := section.self_collision) is not None:
-        try:
+        with naming("avoidance.self_collision"):
             tasks.append(SelfSeparation(at.robot.capsules, section.barrier(distance),
                                         at.pairs(distance)))
-        except HierarchyError as error:
-            raise ScenarioError(f"avoidance.self_collision: {error}") from error
     return tasks
 
 
@@ -182,10 +181,8 @@ def _reference(scenario: Scenario, at: References, posture: Task | None) -> Task
 
 def _made(section: Made, at: References) -> Task:
     """Make a task; raises ScenarioError, naming it, where it does not fit the robot."""
-    try:
+    with naming(f"task {section.title!r}"):
         return section.make(at)
-    except HierarchyError as error:
-        raise ScenarioError(f"task {section.title!r}: {error}") from error
 
 
 def _in_order(scenario: Scenario, tasks: list[Task]) -> list[Task]:
@@ -207,13 +204,11 @@ def _physics(scenario: Scenario, contacts: Contacts) -> list[Task]:
     "physics" has the equations of motion of a floating base and the contacts at rest, "limits" the
     torque limits and the forces that contacts can transmit. One that would be empty is left out.
     """
-    try:
+    with naming("forces"):
         motion = [ContactMotion(contacts, damping=scenario.forces.damping)] \
             if contacts.contacts else []
         dynamics = [BaseDynamics(contacts)] if contacts.robot.base == "floating" else []
         limits = _force_limits(scenario, contacts) if scenario.forces_in_stack else []
-    except HierarchyError as error:
-        raise ScenarioError(f"forces: {error}") from error
     return [Together(tasks, name) for tasks, name in (
         ([*dynamics, *motion], "physics"), (limits, "limits")) if tasks]
 

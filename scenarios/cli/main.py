@@ -70,7 +70,7 @@ def run_command(arguments: list[str]) -> int:
         from hierarchy.errors import HierarchyError
 
         if isinstance(error, HierarchyError):
-            return _wrong(str(error))
+            return _wrong(_with_its_file(str(error), arguments))
         if isinstance(error, OSError):
             return _fault(f"{error.filename}: {error.strerror}" if error.filename else
                           error.strerror or str(error))
@@ -350,15 +350,26 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
     from scenarios.cli import robot_check, scenario_check
     from scenarios.loop.first_tick import first_tick
 
+    robot_check.check_known(file)
     if robot_check.is_robot(file):
         robot = robot_check.look_at(file, changes or [])
         return print_json(robot_check.as_plain_data(*robot)) if as_json else print(
             robot_check.say(*robot))
-    robot_check.check_known(file)
     scenario = _load(file, changes, None)
     found = first_tick(scenario)
     return print_json(scenario_check.as_plain_data(scenario, found)) if as_json else print(
         scenario_check.say(scenario, found))
+
+
+@app.command("help")
+def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
+        metavar="KEY", help="A key of a scenario file, such as avoidance.obstacles.path, or a "
+                            "command. Default: all sections and commands.")] = None,
+          plugin: Plugins = None) -> None:
+    """Say what a key of a scenario file means."""
+    from scenarios.cli.help import print_help
+
+    print_help(context, what)
 
 
 @app.command()
@@ -393,6 +404,12 @@ def _given(error: typer.TyperException, arguments: list[str]) -> str:
     options = getattr(getattr(error, "param", None), "opts", ())
     given = [value for option, value in pairwise(arguments) if option in options]
     return f", got {given[-1]!r}" if given and repr(given[-1]) not in error.format_message() else ""
+
+
+def _with_its_file(text: str, arguments: list[str]) -> str:
+    """Put the file of a command that has one in front of an error that does not name it."""
+    files = [one for one in arguments if one.endswith(".toml") or ".toml:" in one]
+    return f"{files[0]}: {text}" if len(files) == 1 and files[0] not in text else text
 
 
 def _interrupted() -> int:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite
 from operator import itemgetter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tomli_w
-from pydantic import ValidationError
 
 from hierarchy import Robot, State, plugins
 from hierarchy.errors import UnknownNameError
@@ -19,7 +19,9 @@ from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.words import some
 from scenarios.config import ScenarioError, is_shipped, shipped, shipped_groups
 from scenarios.config.changes import change, parse_changes
+from scenarios.config.mistaken import WANTED, no_scenario
 from scenarios.config.robot import RobotSection
+from scenarios.config.validation import validated
 
 _ROUND = 4     # decimals of proposed positions [m]
 _TURNS = 50.0  # [rad] between limits of a joint beyond which they are taken for degrees
@@ -39,9 +41,12 @@ def _is_scenario(text: str) -> bool:
 
 
 def check_known(text: str) -> None:
-    """Raise UnknownNameError for a name that is neither a scenario's nor a robot's."""
-    if not (_is_scenario(text) or text in shipped_groups()):
-        raise UnknownNameError("scenario or robot", text, {*shipped(), *TABLES}, elsewhere(text))
+    """Raise a HierarchyError for what is neither a scenario nor a robot."""
+    if Path(text).is_dir() or Path(text).suffix == ".py":
+        raise no_scenario(text, shipped())
+    if not (_is_scenario(text) or is_robot(text) or text in shipped_groups()):
+        raise UnknownNameError("scenario or robot", text, {*shipped(), *TABLES},
+                               f"{elsewhere(text)} {WANTED}")
 
 
 def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robot]:
@@ -53,12 +58,7 @@ def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robo
         change(data, key, value)
     if unknown := [key for key in data if key != "robot"]:
         raise ScenarioError(f"--set {unknown[0]}: only keys of [robot] can be set for a robot")
-    try:
-        section = RobotSection.model_validate(data["robot"])
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise ScenarioError(f"robot.{where}: {first['msg']}, got {first['input']!r}") from error
+    section = validated(RobotSection, data["robot"], "robot")
     return section, make_robot(section)
 
 

@@ -18,6 +18,7 @@ from scenarios.cli.terminal import (
     troubles,
 )
 from scenarios.config import Scenario
+from scenarios.config.validation import doubtful_units
 from scenarios.loop.first_tick import contact_warnings
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import as_plain_data
@@ -30,7 +31,7 @@ from scenarios.recording.recording import Recording
 def run_scenario(scenario: Scenario, folder: Path, certify: bool, figures: bool,
                  as_json: bool) -> int:
     """Run a scenario, save and print the run, and return the exit code."""
-    for text in contact_warnings(scenario):
+    for text in (*doubtful_units(scenario), *contact_warnings(scenario)):
         print(f"hierarchy: warning: {text}", file=sys.stderr)
     with bar() as told:
         told_of_it = partial(told, str(scenario.make_resolver().label))

@@ -27,12 +27,16 @@ from scenarios.config.sections import (
 
 
 class RepulsionSection(Section):
-    """Magnitude of the repulsion, eq. (23); see hierarchy.avoidance.Repulsion."""
+    """Magnitude of the repulsion over the distance, eq. (23); see hierarchy.avoidance.Repulsion."""
 
     maximum: Positive
+    """Magnitude at distance zero, in [m/s^2] at acceleration level, [m/s] at velocity level."""
     reach: Length
+    """Distance at which the magnitude is nearly zero, rho."""
     shape: Positive
+    """Steepness of the magnitude over the distance, gamma; it has no unit."""
     scale: Positive = 2.0
+    """Factor of the distance; 2 is eq. (23), the authors' code has 3 (body), 1.5 (end effector)."""
 
     def make(self) -> Repulsion:
         """Return the law."""
@@ -40,16 +44,23 @@ class RepulsionSection(Section):
 
 
 class ObstacleSection(Section):
-    """An obstacle: shape, centre [m], sizes [m], rows of its rotation, and a path if it moves."""
+    """An obstacle: a shape at a place, or on a path."""
 
     tag: ClassVar[str] = "shape"
     shape: Literal["point", "sphere", "capsule", "box"] = "point"
+    """What it is; a list [x, y, z] in place of the table is a point."""
     centre: Point | None = None
+    """Its middle, for one that does not move."""
     radius: Length | None = None
+    """Of a sphere or a capsule."""
     half_length: Length | None = None
+    """Of a capsule: half the segment along its z axis, without the round ends."""
     half_lengths: tuple[Length, Length, Length] | None = None
+    """Of a box: half its sides along its x, y and z axes."""
     rotation: Rows3 = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    """Rows of the matrix from its axes to the world's."""
     path: PathSection | None = None
+    """Path of its middle, for one that moves."""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -80,16 +91,16 @@ Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(as_table)], ...]
 
 
 class VariationSection(Section):
-    """Random variation of obstacle paths, determined by `seed`.
-
-    Every waypoint moves by up to `spread` [m] in any direction; consecutive equal waypoints, at
-    which an obstacle rests, move together. Every time except the first shifts by up to the share
-    `timing` of half the shorter adjacent interval. Obstacles without waypoints do not change.
-    """
+    """Random variation of obstacle paths that have waypoints; other obstacles do not change."""
 
     seed: Count
+    """Seed of the variation."""
     spread: Distance = 0.05
+    """Largest displacement of a waypoint, in any direction; consecutive equal waypoints, at which
+    an obstacle rests, move together."""
     timing: Annotated[float, Field(strict=True, ge=0.0, lt=1.0)] = 0.1
+    """Largest shift of each time except the first, as a share of half the shorter interval beside
+    it."""
 
 
 def _varied(obstacle: ObstacleSection, variation: VariationSection,
@@ -134,7 +145,9 @@ def _shifted(times: Array, timing: float, random: np.random.Generator) -> Array:
 
 class _Avoiding(Section):
     obstacles: Obstacles
+    """What is to be avoided: tables, or points [x, y, z]."""
     variation: VariationSection | None = None
+    """Random variation of the obstacles' paths."""
 
     @property
     def placed(self) -> Obstacles:
@@ -154,30 +167,33 @@ class _Avoiding(Section):
 
 
 class AvoidanceSection(_Avoiding):
-    """Avoidance for the body and repulsion of the end effector, switched by Algorithm 1.
-
-    `place` = "null-space": the body's repulsion is no task. That of all control points within `far`
-    is added up as joint commands in the null-space term, and `near` has no effect, see
-    hierarchy.tasks.CumulatedRepulsion.
-
-    With `direction` = "mean" the direction is the mean (25)-(26) over the obstacles within `far` of
-    a control point, and within `end_effector` of the end effector.
-
-    `asked` [m] is the distance of body and end effector that metrics judge by, without effect on
-    the run; by default it is `near`, of the body.
-    """
+    """Avoidance for the body and repulsion of the end effector, switched by Algorithm 1."""
 
     kind: Literal["repulsion"] = "repulsion"
     dimension: Literal[1, 3] = 1
+    """Rows of the body's avoidance: 1 along the direction of the obstacle, or 3."""
     direction: Literal["nearest", "mean"] = "nearest"
+    """"nearest": away from the nearest obstacle. "mean": along the mean (25)-(26) over the
+    obstacles within `far` of a control point, and within `end_effector` of the end effector."""
     near: Distance
+    """Distance of the body below which its avoidance comes before the position, eps_1."""
     far: Distance
+    """Distance of the body below which it avoids at all, eps_2; at least `near`."""
     end_effector: Distance
+    """Distance of the end effector below which it is repelled, eps_ee."""
     body: RepulsionSection
+    """Repulsion of the body."""
     tip: RepulsionSection
+    """Repulsion of the end effector."""
     jacobian: Literal["exact", "published"] = "exact"
+    """"published": that of the published code, with its error."""
     place: Literal["stack", "null-space"] = "stack"
+    """"null-space": the body's repulsion is no task; that of all control points within `far` is
+    added up as joint commands in the null-space term, and `near` has no effect, see
+    hierarchy.tasks.CumulatedRepulsion."""
     asked: Length | None = None
+    """Distance of body and end effector that metrics judge by, without effect on the run; by
+    default `near`, of the body."""
 
     @model_validator(mode="after")
     def _areas_nested(self) -> Self:
@@ -210,10 +226,15 @@ class BarrierSection(Section):
     """How one-sided rows keep a distance, see hierarchy.avoidance.Barrier."""
 
     distance: Distance = 0.03
+    """Clearance to keep."""
     rate: Rate = 10.0
+    """Limit of the approach to the clearance: speed per distance that is left."""
     influence: Length = 0.3
+    """Distance beyond which there is no effect; above `distance`."""
     recovery: Speed = 0.2
+    """Speed of the retreat below the clearance, at most."""
     limit: Annotated[Positive, Unit("m/s^2")] = 50.0
+    """Acceleration of the retreat, at most."""
 
     def barrier(self, distance: float) -> Barrier:
         """Return the barrier of a distance [m] to keep; HierarchyError if it is out of range."""
@@ -223,19 +244,16 @@ class BarrierSection(Section):
 class SeparationSection(BarrierSection, _Avoiding):
     """Keep all control points and the end effector away from all obstacles, as one-sided rows.
 
-    `distance` [m] is the clearance and `rate` [1/s] limits the approach to it. Obstacles beyond
-    `influence` [m] have no effect. Below the clearance the robot retreats at up to `recovery` [m/s]
-    and `limit` [m/s^2]. `self_collision` [m] is the clearance between links that are not
-    neighbours, None for no self-collision avoidance. See hierarchy.avoidance.Barrier.
-
-    With control.stack = "set-based" only the clearances apply. With "smooth" rows act within
-    `buffer` [m] outside the clearance, and their rate toward its end is `rate` times what is
-    missing, at most `recovery`.
+    With control.stack = "set-based" only the clearances apply. With "smooth" the rate of the rows
+    toward the end of `buffer` is `rate` times what is missing, at most `recovery`. See
+    hierarchy.avoidance.Barrier.
     """
 
     kind: Literal["separation"]
     self_collision: Distance | None = None
+    """Clearance between links that are not neighbours; without it links may collide."""
     buffer: Length | None = None
+    """With control.stack = "smooth": width outside the clearance within which rows act."""
     obstacles: Obstacles = ()
 
     @model_validator(mode="after")

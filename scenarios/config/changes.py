@@ -6,13 +6,13 @@ every entry: `avoidance.obstacles.*.radius`. `--set`, sweeps and `[variation]` h
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from hierarchy.errors import brief, expect
+from hierarchy.errors import UnknownNameError, brief, expect
 from scenarios.config.distributions import flat
 from scenarios.config.errors import ScenarioError
+from scenarios.toml_text import parse
 
 
 class Tag(NamedTuple):
@@ -43,11 +43,11 @@ def parse_changes(changes: Sequence[str], what: str) -> dict[str, Any]:
 
 def _value(text: str, what: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        return parse(f"value = {text}", what, ScenarioError)["value"]
+    except ScenarioError:
         if text and all(c.isalnum() or c in "_-./" for c in text):
             return text  # a bare word needs no quotes on a command line
-        raise ScenarioError(f"{what}: {text[:60]!r} is not a TOML value") from error
+        raise
 
 
 def change(data: dict[str, Any], dotted: str, value: Any) -> None:
@@ -106,7 +106,7 @@ def within(data: Any, key: str, above: str, add: bool = False) -> Any:
     if not isinstance(data, dict):
         raise ValueError(f"{where} is missing" if data is None else f"{where} is not a table")
     if key not in data and not add and above != "control.options":
-        raise ValueError(f"{where} has no key {key!r}; it has {', '.join(data)}")
+        raise UnknownNameError("key", key, data, above=f"{above}." if above else "")
     return key
 
 

@@ -14,38 +14,43 @@ from scenarios.config.sections import (
     Point,
     Positive,
     Section,
+    TaskName,
     Time,
     Unit,
     Vector3,
 )
-from scenarios.config.tasks import TaskName
 
 Place = Annotated[Finite, Unit("m")]
 
 
 class ContactSection(Section):
-    """Points of `frame` that push on a rigid surface, see hierarchy.contacts.Contact.
-
-    `x` and `y` [m] are the sides of a sole from `offset` [m] on, without them it is that point. The
-    sole is across `up`, a direction in the frame: x is the frame's x axis as seen along `up`, or
-    its y axis if `up` is along x. `friction` is what the controller believes, `normal` the
-    direction in the world in which the surface pushes. In each interval of `open` [s] the contact
-    is lifted; for `ramp` [s] before, its load falls from what it carries, and after it, rises as
-    far as the robot's weight. A point that `slides` moves along its surface. The name defaults to
-    the frame's.
-    """
+    """Points of a frame that push on a rigid surface, see hierarchy.contacts.Contact."""
 
     frame: str
+    """Frame of the robot."""
     name: TaskName | None = None
+    """Its name in messages, tables and figures; by default the frame's."""
     x: tuple[Place, Place] | None = None
+    """Sides of a sole along its x axis, from `offset` on; without `x` and `y` the contact is that
+    point."""
     y: tuple[Place, Place] | None = None
+    """The same along its y axis."""
     offset: Point = (0.0, 0.0, 0.0)
+    """The point, or the middle of the sole, in the frame."""
     friction: Positive = 0.7
+    """Coefficient of friction that the controller believes."""
     normal: Vector3 = (0.0, 0.0, 1.0)
+    """Direction in the world in which the surface pushes."""
     up: Vector3 = (0.0, 0.0, 1.0)
+    """Direction in the frame across the sole: x is the frame's x axis as seen along it, or the
+    frame's y axis if it is along x."""
     open: tuple[tuple[Time, Time], ...] = ()
+    """Intervals in which the contact is lifted."""
     ramp: Time = 0.1
+    """Time before such an interval in which the load falls, and after it in which it rises as far
+    as the robot's weight."""
     slides: Flag = False
+    """Whether a point may move along its surface."""
 
     @model_validator(mode="after")
     def _is_a_sole_or_a_point(self) -> Self:
@@ -59,14 +64,16 @@ class ContactSection(Section):
 class ForcesSection(Section):
     """The contact forces that the stack allows, as one level with the torque limits.
 
-    Of each point: a friction pyramid with `faces`, and a normal force from `least` to `largest`
-    [N], None for no upper bound. The centre of pressure of a sole stays `edge` [m] inside it,
-    None for just inside. What velocity a contact has is damped by `damping` [1/s]. Like the rows
-    of [limits], these are in the stack if `limits.place` says so.
+    Like the rows of [limits], these are in the stack if `limits.place` says so.
     """
 
     faces: Literal[4, 8] = 4
+    """Faces of the friction pyramid of each point."""
     least: Force = 0.0
+    """Smallest normal force of each point."""
     largest: Annotated[Positive, Unit("N")] | None = None
+    """Largest normal force of each point; without it there is no upper bound."""
     edge: Annotated[float, Field(strict=True, gt=0.0), Unit("m")] | None = None
+    """How far inside a sole its centre of pressure stays; without it just inside."""
     damping: Gain = 20.0
+    """Of what velocity a contact has."""

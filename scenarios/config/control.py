@@ -22,35 +22,43 @@ class PolicySection(Section):
     with a fault. "use": send the answer, if there is one. If a tick has several problems, the most
     cautious action wins, in the order use, hold, brake, stop. At level "torque" braking sends the
     last good torques and a damping, the effort limit of a joint at its velocity limit; "stop" ends
-    the run at once.
-
-    The first four kinds are statuses of a resolver, see solvers.Status. not_finite: a measured
-    joint state is NaN or infinite or has a quaternion that is none, or a distance is NaN. stale: no
-    new measurement for more than `stale_after` [s]; before that, the last one is extrapolated from
-    the commands sent. overrun: the command is not ready `deadline` [s] after the start of the tick;
-    None for no deadline. inside: a point of the robot is on or inside an obstacle.
+    the run at once. The first four kinds are statuses of a resolver, see solvers.Status.
     """
 
     iteration_limit: AnswerPolicy = "brake"
+    """The resolver reached its largest number of iterations."""
     numerical_failure: BlindPolicy = "brake"
+    """The resolver has no usable answer."""
     backend_failure: AnswerPolicy = "brake"
+    """The solver behind the resolver failed."""
     inaccurate: AnswerPolicy = "brake"
+    """The answer does not reach the resolver's accuracy."""
     not_finite: BlindPolicy = "brake"
+    """A measured joint state is NaN or infinite or has a quaternion that is none, or a distance is
+    NaN."""
     stale: BlindPolicy = "brake"
+    """No new measurement for more than `stale_after`; before that, the last one is extrapolated
+    from the commands sent."""
     overrun: AnswerPolicy = "brake"
+    """The command is not ready at the `deadline`."""
     inside: AnswerPolicy = "brake"
+    """A point of the robot is on or inside an obstacle."""
     patience: Count = 10
+    """Ticks for which "hold" repeats a command."""
     stale_after: Time = 0.02
+    """Age from which a measurement is stale."""
     deadline: Span | None = None
+    """Time from the start of a tick until its command must be ready; without it there is no
+    deadline."""
 
 
 class ControlSection(Section):
     """How the tasks are resolved, and how often."""
 
     level: Literal["velocity", "acceleration", "torque"] = "acceleration"
-    """"torque": accelerations and contact forces are resolved together, and the command is the
-    joint torques that they take. The stack has the dynamics and [[contacts]] first, then torque
-    limits and [forces], then the joint limits."""
+    """What the command is. "torque": accelerations and contact forces are resolved together, and
+    the command is the joint torques that they take. The stack has the dynamics and [[contacts]]
+    first, then torque limits and [forces], then the joint limits."""
     stack: StackKind = "switched"
     """"switched": Algorithm 1 selects the tasks in the stack, all as equalities. With
     avoidance.kind = "separation" only the cone is left to select: limits and avoidance are first.
@@ -63,9 +71,13 @@ class ControlSection(Section):
     """Whether every tick is also resolved without the levels below the position, to measure
     whether they move the end effector; this is not part of the measured times."""
     period: Annotated[float, Field(strict=True, gt=0.0, le=1.0), Unit("s")] = 0.001
+    """Time from tick to tick."""
     duration: Span
+    """How long a run lasts."""
     jacobian_derivative: Literal["exact", "difference"] = "exact"
+    """How dJ/dt is found: "exact", or by the "difference" of two ticks."""
     resolver: str
+    """Its name, see `hierarchy list`, or that of a plugin."""
     options: dict[str, Any] = Field(default_factory=dict)
     """Settings of the resolver. A table in it with a resolver's name, such as
     `[control.options.tpm]`, applies to that resolver only, so that changing `resolver` is enough to
@@ -79,11 +91,13 @@ class ControlSection(Section):
     term in the robot's inertia M(q), at acceleration level that of operational-space control.
     "identity": in the plain sum of squares over the joints."""
     policy: PolicySection = PolicySection()
+    """The command in a tick with a problem."""
     transition: Literal["none", "blend"] = "none"
     """"blend": when the order of the stack or the active control point changes, the command moves
     from the old stack's to the new one's within `transition_time` [s], and a new task has its full
     effect only after that time. "none": it changes at once."""
     transition_time: Span = 0.02
+    """How long "blend" takes."""
 
     @model_validator(mode="after")
     def _makes_a_resolver(self) -> Self:

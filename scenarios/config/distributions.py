@@ -22,6 +22,7 @@ class Uniform(Section):
     """A number from a uniform distribution."""
 
     uniform: Annotated[tuple[Finite, Finite], AfterValidator(_in_order)]
+    """Lower and upper bound, in the unit of the key that varies."""
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return a number within the bounds."""
@@ -35,6 +36,7 @@ class Normal(Section):
     """A number from a normal distribution, given by mean and standard deviation."""
 
     normal: tuple[Finite, NotNegative]
+    """Mean and standard deviation, in the unit of the key that varies."""
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return a number; it is not bounded."""
@@ -48,6 +50,7 @@ class Choice(Section):
     """One of several values of any type, each equally likely."""
 
     choice: Annotated[tuple[Any, ...], Field(min_length=1)]
+    """The values, each equally likely."""
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return one of the values."""
@@ -59,12 +62,10 @@ class Choice(Section):
 
 
 class Around(Section):
-    """The scenario's own value, a number or an array, plus a uniform offset in each entry.
-
-    `around` is the largest offset, one for all entries or one for each.
-    """
+    """The scenario's own value, a number or an array, plus a uniform offset in each entry."""
 
     around: NotNegative | tuple[NotNegative, ...]
+    """Largest offset, one for all entries or one for each, in the unit of the key that varies."""
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return the own value with offsets; raises ValueError if it is not numeric."""
@@ -88,6 +89,7 @@ class Integers(Section):
     """An integer from the first to the last, both included; for seeds."""
 
     integers: Annotated[tuple[Whole, Whole], AfterValidator(_in_order)]
+    """First and last integer, both included."""
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return an integer of the range."""

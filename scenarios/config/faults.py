@@ -11,28 +11,33 @@ from scenarios.config.sections import Length, Point, Section, Span, Time
 
 
 class FaultSection(Section):
-    """A fault injected at `at` [s] for `duration` [s].
-
-    nan_position, nan_velocity: the measurement of `joint` (1, 2, ...; default all) is NaN.
-    nan_distance: the distance of `point` (control points 1, 2, ..., then the end effector; default
-    all) is NaN. stale: measured joints and distances are frozen. status: the resolver reports
-    `status`. overrun: the tick takes `takes` [s] longer. obstacle: a sphere of `radius` [m] appears
-    at `centre` [m], or where `place` on the body is at that time. no_frames: the camera takes no
-    images. dark_frames: its images have no readings.
-    """
+    """An injected fault."""
 
     kind: Literal["nan_position", "nan_velocity", "nan_distance", "stale", "status", "overrun",
                   "obstacle", "no_frames", "dark_frames"]
+    """"nan_position", "nan_velocity": the measurement of `joint` is NaN. "nan_distance": the
+    distance of `point` is NaN. "stale": measured joints and distances are frozen. "status": the
+    resolver reports `status`. "overrun": the tick takes longer. "obstacle": a sphere appears.
+    "no_frames": the camera takes no images. "dark_frames": its images have no readings."""
     at: Time
+    """When it begins."""
     duration: Span
+    """How long it lasts."""
     joint: Annotated[int, Field(strict=True, ge=1)] | None = None
+    """Number of a joint from 1; by default all."""
     point: Annotated[int, Field(strict=True, ge=1)] | None = None
+    """Number of a control point from 1, then of the end effector; by default all."""
     status: Literal["iteration_limit", "numerical_failure", "backend_failure",
                     "inaccurate"] | None = None
+    """What the resolver reports."""
     takes: Span | None = None
+    """By how much a tick takes longer."""
     centre: Point | None = None
+    """Middle of the sphere."""
     place: ControlPointSection | None = None
+    """Point of the body, in place of `centre`, where the sphere appears at that time."""
     radius: Length | None = None
+    """Radius of the sphere."""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -11,7 +11,7 @@ from pydantic import Field
 from scenarios.config.errors import ScenarioError
 from scenarios.config.sections import Section
 from scenarios.config.validation import validated
-from scenarios.files import read_toml
+from scenarios.toml_text import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library" / "groups"
 
@@ -20,7 +20,9 @@ class Group(Section):
     """The scenarios of a group, in the order in which they are compared."""
 
     title: str
+    """What the scenarios have in common, for lists."""
     scenarios: Annotated[tuple[str, ...], Field(min_length=1)]
+    """Names of shipped scenarios."""
 
 
 def shipped_groups() -> tuple[str, ...]:

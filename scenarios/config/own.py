@@ -51,6 +51,7 @@ class PartSection(Section):
 
     made_by: ClassVar[str]
     kind: str
+    """Which kind it is."""
 
     def made(self, robot: Robot, **given: Any) -> Any:
         """Call the maker with those of this `section`, `robot` and `given` that it takes."""

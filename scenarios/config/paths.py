@@ -9,7 +9,6 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from hierarchy.errors import HierarchyError
 from hierarchy.paths import (
     Blended,
     Ellipse,
@@ -21,7 +20,7 @@ from hierarchy.paths import (
     circle,
     line,
 )
-from scenarios.config.errors import ScenarioError
+from scenarios.config.errors import naming
 from scenarios.config.sections import (
     Angle,
     Count,
@@ -39,26 +38,25 @@ from scenarios.config.sections import (
 
 
 class JitterSection(Section):
-    """A smooth random motion of a path: at most `amplitude` [m] in each axis, up to `rate` [Hz].
-
-    The same `seed` gives the same motion.
-    """
+    """A smooth random motion of a path."""
 
     amplitude: Distance
+    """Largest displacement in each axis."""
     rate: Annotated[Positive, Unit("Hz")]
+    """Highest frequency of the motion."""
     seed: Count = 0
+    """Seed of the motion; the same one gives the same motion."""
 
 
 class _AnyPath(Section):
-    """What every path may have.
-
-    `out_of_reach`: spans of time [s] in which the robot cannot be on the path. The loop ignores
-    them; metrics say how the robot comes back.
-    """
+    """What every path may have."""
 
     of: ClassVar[Callable[..., Path]]
     jitter: JitterSection | None = None
+    """A random motion that is added to the path."""
     out_of_reach: tuple[tuple[Time, Time], ...] | None = None
+    """Spans of time in which the robot cannot be on the path. The loop ignores them; metrics say
+    how the robot comes back."""
 
     @model_validator(mode="after")
     def _spans_are_in_order(self) -> Self:
@@ -69,10 +67,8 @@ class _AnyPath(Section):
 
     def make(self) -> Path:
         """Return the path; raises ScenarioError where the values are no path."""
-        try:
+        with naming(f"path of kind {getattr(self, 'kind', '')!r}"):
             path, jitter = self._steady(), self.jitter
-        except HierarchyError as error:
-            raise ScenarioError(f"path of kind {getattr(self, 'kind', '')!r}: {error}") from error
         return path if jitter is None else Jittered(path, jitter.amplitude, jitter.rate,
                                                     jitter.seed)
 
@@ -84,22 +80,28 @@ class _AnyPath(Section):
 
 
 class StillSection(_AnyPath):
-    """A point that does not move, `position` [m]."""
+    """A point that does not move."""
 
     of: ClassVar[Callable[..., Path]] = Still
     kind: Literal["still"]
     position: Point
+    """Where the point is in the world."""
 
 
 class EllipseSection(_AnyPath):
-    """p(t) = centre + cosine cos(s) + sine sin(s) [m] with s = rate t + phase [rad]."""
+    """p(t) = centre + cosine cos(s) + sine sin(s), with s = rate t + phase."""
 
     kind: Literal["ellipse"]
     centre: Point
+    """Middle of the ellipse."""
     cosine: Point
+    """Half axis, from the centre to the point where s = 0."""
     sine: Point
+    """Half axis, from the centre to the point where s is a quarter turn."""
     rate: Annotated[Finite, Unit("rad/s")] = 1.0
+    """How fast s grows."""
     phase: Angle = 0.0
+    """s at the start."""
 
     def _steady(self) -> Path:
         if self.phase == 0.0:
@@ -111,16 +113,16 @@ class EllipseSection(_AnyPath):
 
 
 class WaypointsSection(_AnyPath):
-    """Points [m] at increasing times [s], at rest at each point.
-
-    With `blend` [s] it does not stop: it rounds each point in a curve of that duration and is
-    nearest to it half that time later, see hierarchy.paths.Blended.
-    """
+    """Straight lines between points, at rest at every point."""
 
     kind: Literal["waypoints"]
     times: tuple[Time, ...]
+    """Increasing times, one for each point."""
     points: tuple[Point, ...]
+    """The points."""
     blend: Span | None = None
+    """With it the path does not stop: it rounds each point in a curve of this duration and is
+    nearest to it half that time later, see hierarchy.paths.Blended."""
 
     def _steady(self) -> Path:
         return (Waypoints(self.times, self.points) if self.blend is None
@@ -128,34 +130,44 @@ class WaypointsSection(_AnyPath):
 
 
 class LineSection(_AnyPath):
-    """Straight from `start` to `end` [m] within `duration` [s], from `begin` [s] on."""
+    """Straight from one point to another, at rest at both."""
 
     of: ClassVar[Callable[..., Path]] = staticmethod(line)
     kind: Literal["line"]
     start: Point
+    """First point."""
     end: Point
+    """Last point."""
     duration: Span
+    """How long the motion takes."""
     begin: Time = 0.0
+    """When it begins."""
 
 
 class CircleSection(_AnyPath):
-    """A circle of `radius` [m] about `normal`; rate [rad/s], phase [rad]."""
+    """A circle."""
 
     of: ClassVar[Callable[..., Path]] = staticmethod(circle)
     kind: Literal["circle"]
     centre: Point
+    """Middle of the circle."""
     radius: Distance
+    """Its radius."""
     normal: Vector3 = (0.0, 0.0, 1.0)
+    """The direction across its plane, of any length."""
     rate: Annotated[Finite, Unit("rad/s")] = 1.0
+    """How fast the angle grows."""
     phase: Angle = 0.0
+    """Angle at the start."""
 
 
 class RecordedSection(_AnyPath):
-    """A recorded motion: a CSV `file` with t [s], x, y, z [m], relative to the scenario's file."""
+    """A recorded motion."""
 
     of: ClassVar[Callable[..., Path]] = Recorded.from_csv
     kind: Literal["recorded"]
     file: str
+    """CSV with the columns t [s], x, y, z [m]; relative to the scenario's file."""
 
 
 PathSection = Annotated[StillSection | LineSection | CircleSection | EllipseSection

@@ -12,21 +12,23 @@ from scenarios.config.sections import Count, NotNegative, Registered, Section, T
 
 
 class MeasurementSection(Section):
-    """Measurement of the joints, for either plant; with all values zero it is exact.
-
-    Normal noise with standard deviations `position_noise` [rad] and `velocity_noise` [rad/s],
-    determined by `seed`; position steps of `quantisation` [rad]; `delay` [s], a whole number of
-    periods. velocity = "measured" is a separate sensor, "differenced" the backward difference of
-    measured positions after a low-pass filter with time constant `filter_time` [s].
-    """
+    """Measurement of the joints; with all values zero it is exact."""
 
     position_noise: Annotated[NotNegative, Unit("rad")] = 0.0
+    """Standard deviation of the normal noise of positions."""
     velocity_noise: Annotated[NotNegative, Unit("rad/s")] = 0.0
+    """The same of velocities."""
     quantisation: Annotated[NotNegative, Unit("rad")] = 0.0
+    """Step of measured positions."""
     delay: Time = 0.0
+    """Age of what is measured, a whole number of periods."""
     seed: Count = 0
+    """Seed of the noise."""
     velocity: Literal["measured", "differenced"] = "measured"
+    """"measured": by a sensor of its own. "differenced": the backward difference of measured
+    positions after a low-pass filter."""
     filter_time: Time = 0.0
+    """Time constant of that filter; 0 for none."""
 
     @model_validator(mode="after")
     def _of_its_kind(self) -> Self:
@@ -43,17 +45,16 @@ class MeasurementSection(Section):
 
 
 class AnyPlant(PartSection):
-    """What every plant has.
-
-    With feedback = "commanded" the controller receives its own commands, integrated to a joint
-    position reference, instead of a measurement: it sees neither noise nor the real joints, as when
-    commands through FRI are integrated blindly. Both are stable with the letter's gains.
-    """
+    """What every plant has."""
 
     follows: ClassVar[bool] = False  # whether its state is what its commands add up to
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration", "torque")
     feedback: Literal["measured", "commanded"] = "measured"
+    """"commanded": the controller receives its own commands, integrated to a joint position
+    reference, instead of a measurement, as when commands through FRI are integrated blindly: it
+    sees neither noise nor the real joints. Both are stable with the letter's gains."""
     measurement: MeasurementSection = MeasurementSection()
+    """Errors of the measured joints."""
 
 
 @register("plants", "kinematic", shipped=True)

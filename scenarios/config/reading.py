@@ -8,15 +8,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError, UnknownNameError, file_path
+from hierarchy.errors import UnknownNameError, file_path
 from hierarchy.robots.names import in_package, is_file_name
 from scenarios.config.avoidance import as_table
 from scenarios.config.changes import change_all, laid_over, parse_changes
-from scenarios.config.errors import ScenarioError
-from scenarios.config.groups import load_group, shipped_groups
+from scenarios.config.errors import ScenarioError, naming
+from scenarios.config.mistaken import no_scenario
 from scenarios.config.scenario import Scenario
 from scenarios.config.validation import validated
-from scenarios.files import read_toml, scenarios_in
+from scenarios.files import scenarios_in
+from scenarios.toml_text import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library"
 _DEEPEST = 50  # files that may extend each other
@@ -66,6 +67,8 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     source = _found(file_path("load", name_or_path))
     path, what = source.path, str(source)
     data = _read_extended(source)
+    if "samples" in data:
+        raise ScenarioError(f"{what} is a sweep, to be run by `hierarchy sweep {path}`")
     if not isinstance(changes, Mapping):
         changes = parse_changes(changes, what="--set")
     _list_points_as_tables(data)
@@ -97,16 +100,14 @@ def _require_plugins(data: dict[str, Any], what: str) -> None:
     asked = data.get("plugins", [])
     if not isinstance(asked, list) or not all(isinstance(module, str) for module in asked):
         raise ScenarioError(f"{what}: plugins: expected a list of modules, got {asked!r}")
-    try:
+    with naming(what):
         plugins.require(asked)
-    except HierarchyError as error:
-        raise ScenarioError(f"{what}: {error}") from error
     if named := [*asked, *plugins.allowed()]:  # a run says what it needs
         data["plugins"] = list(dict.fromkeys(named))
 
 
 def _found(path: Path) -> Source:
-    """Return where a scenario is, given by name or file; raises ScenarioError for a group."""
+    """Return where a scenario is, given by name or file; raises ScenarioError if it is none."""
     file, colon, variant = str(path).rpartition(".toml:")
     if colon:
         return Source(Path(f"{file}.toml"), variant)
@@ -115,11 +116,7 @@ def _found(path: Path) -> Source:
     name = str(path)
     if is_shipped(name):
         return _library()[name.replace(":", "-", 1)]
-    if name in shipped_groups():
-        listed = ", ".join(load_group(name).scenarios)
-        raise ScenarioError(f"{name!r} is a group of scenarios, to be run by `hierarchy compare "
-                            f"{name}`; its scenarios are {listed}")
-    raise UnknownNameError("scenario", name, shipped())
+    raise no_scenario(name, shipped())
 
 
 def _read(source: Source) -> dict[str, Any]:
@@ -164,7 +161,7 @@ def _extended(base: Any, path: Path) -> Source:
     if is_shipped(base):
         return _found(Path(base))
     if Path(base).suffix != ".toml" and ".toml:" not in base:
-        raise ScenarioError(f"{path}: extends: {UnknownNameError('scenario', base, shipped())}")
+        raise ScenarioError(f"{path}: extends: {no_scenario(base, shipped())}")
     return _found(path.parent / base)
 
 

@@ -7,22 +7,35 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from hierarchy.robots.table import Base
-from scenarios.config.sections import Distance, Finite, Flag, JointValue, Point, Section
+from scenarios.config.sections import (
+    Distance,
+    Flag,
+    JointPosition,
+    JointValue,
+    JointVelocity,
+    Point,
+    Section,
+)
 
 
 class ControlPointSection(Section):
-    """A point on the body of `joint`, at `offset` [m] in the joint's frame."""
+    """A point on the body of a joint."""
 
     joint: str
+    """Joint that moves the body."""
     offset: Point
+    """Where the point is in the joint's frame."""
 
 
 class RobotPointSection(Section):
-    """A point on the body of `joint`, or fixed to `frame`, at `offset` [m] in that frame."""
+    """A point on the body of a joint, or fixed to a frame."""
 
     joint: str | None = None
+    """Joint that moves the body."""
     frame: str | None = None
+    """Frame, in place of a joint."""
     offset: Point = (0.0, 0.0, 0.0)
+    """Where the point is in that frame."""
 
     @model_validator(mode="after")
     def _is_somewhere(self) -> Self:
@@ -32,56 +45,67 @@ class RobotPointSection(Section):
 
 
 class CapsuleSection(Section):
-    """All points within `radius` [m] of the segment `start` to `end` [m], in the frame of `joint`.
-
-    Without a joint it is fixed to the base.
-    """
+    """All points within a radius of a segment."""
 
     joint: str | None = None
+    """Joint whose frame the capsule is in; without it it is fixed to the base."""
     start: Point
+    """First end of the segment."""
     end: Point
+    """Last end of the segment."""
     radius: Distance
+    """The radius."""
 
 
 class RobotSection(Section):
-    """Which robot: a name of `hierarchy list`, a URDF or MJCF file, or "package:name".
+    """Which robot, and what of it the scenario uses.
 
-    Packages are example_robot_data and robot_descriptions (extra `robots`). `base` defaults to that
-    of the model. `end_effector`, `control_points` and `capsules` default to the robot's table, or
-    for a file to the proposals of `hierarchy check FILE`. `locked` joints of a file are fixed at a
-    value [rad or m], as in [start], and removed. `root` is the body, or bodies, of an MJCF at which
-    the robot begins, by default each that has joints, except those that only float.
+    What a section omits is that of the robot's table, or for a file what `hierarchy check FILE`
+    proposes.
     """
 
     model: str
+    """A name of `hierarchy list`, a URDF or MJCF file, or "package:name" of example_robot_data or
+    robot_descriptions (extra `robots`)."""
     base: Base | None = None
+    """Whether the base is "fixed" or "floating"; by default that of the model."""
     end_effector: str | None = None
+    """Frame of [position] and [pointing]."""
     control_points: tuple[RobotPointSection, ...] | None = None
+    """Points whose distances to obstacles count, apart from the end effector."""
     capsules: tuple[CapsuleSection, ...] | None = None
+    """Shapes of the links, for self-collision and for removing the robot from images."""
     locked: dict[str, JointValue] = Field(default_factory=dict)
+    """Joints of a file that are fixed at a value, as in [start], and removed."""
     root: str | tuple[str, ...] = ()
+    """Body, or bodies, of an MJCF at which the robot begins; by default each that has joints,
+    except those that only float."""
 
 
 class StartSection(Section):
-    """The start: positions `q` [rad or m] and velocities `v` [rad/s or m/s].
+    """Where a run starts.
 
-    `q` has the values of all joints but a floating base, or all coordinates, and defaults to that
-    of the `keyframe` of an MJCF, or to the robot's own posture; `joints` override it by name. A
-    value is a number, the angle of a continuous joint too, [x, y, angle] of a planar one, a
-    rotation vector or quaternion [x, y, z, w] of a ball, location and either of a free one. Joints
-    that follow others, and those of closed chains, are moved to where the named ones let them be.
-    With `end_effector` [m] the start is the posture, reached from q, that puts the end effector
-    there. With `on_floor` a floating base is raised or lowered so that the lowest contact touches
-    the floor. A joint beyond its limits is an error unless `allow_outside_limits`.
+    A value of a joint is a number, the angle of a continuous joint too, [x, y, angle] of a planar
+    one, a rotation vector or quaternion [x, y, z, w] of a ball, location and either of a free one.
+    Joints that follow others, and those of closed chains, are moved to where the named ones let
+    them be.
     """
 
-    q: tuple[Finite, ...] | None = None
+    q: tuple[JointPosition, ...] | None = None
+    """Positions of all joints but a floating base, or all coordinates; by default those
+    of the `keyframe`, or the robot's own posture."""
     keyframe: str | None = None
+    """Keyframe of an MJCF, in place of `q`."""
     joints: dict[str, JointValue] = Field(default_factory=dict)
-    v: tuple[Finite, ...] | None = None
+    """Positions of joints by name, which override `q`."""
+    v: tuple[JointVelocity, ...] | None = None
+    """Velocities of all joints; by default zero."""
     end_effector: Point | None = None
+    """The start is the posture, reached from `q`, that puts the end effector there."""
     on_floor: Flag = False
+    """Whether a floating base is raised or lowered so that the lowest contact touches the floor."""
     allow_outside_limits: Flag = False
+    """Whether joints may start beyond their limits, which is an error otherwise."""
 
     @model_validator(mode="after")
     def _is_one_posture(self) -> Self:

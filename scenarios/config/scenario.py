@@ -7,7 +7,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import tomli_w
 from pydantic import Field, field_validator, model_validator
@@ -23,7 +23,7 @@ from scenarios.config.distributions import Parameters
 from scenarios.config.faults import FaultSection
 from scenarios.config.plant import KinematicSection, PlantKind
 from scenarios.config.robot import RobotSection, StartSection
-from scenarios.config.sections import Section
+from scenarios.config.sections import Name, Section
 from scenarios.config.sensor import ExactSection, SensorKind
 from scenarios.config.stacks import RIVALS, unfit
 from scenarios.config.tasks import (
@@ -48,34 +48,51 @@ OWN = "own"  # the spec of the resolver that a scenario names itself
 class Scenario(Section):
     """One scenario: a robot, a start, tasks, and how they are resolved.
 
-    Absent sections add no task. `tasks` are further tasks in order of priority, below limits,
-    avoidance, position and pointing. `damping` and `posture` are both the null-space term of
-    eq. (14), so only one of them may be given. `variation` has the distributions of dotted keys
-    from which `hierarchy compare --starts` samples; a single run ignores it. `plugins` are the
-    modules with the file's own kinds, resolvers and robots; they must be allowed from outside the
-    file, see hierarchy.plugins.
+    Absent sections add no task.
     """
 
-    name: Annotated[str, Field(max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    name: Name
+    """Name of the scenario, in lists and of its folders."""
     title: str = ""
+    """One line that says what it shows."""
     description: str = ""
+    """A paragraph about it."""
     plugins: tuple[str, ...] | None = None
+    """Modules with the file's own kinds, resolvers and robots; they must be allowed from outside
+    the file, see hierarchy.plugins."""
     robot: RobotSection
+    """Which robot."""
     start: StartSection = StartSection()
+    """Where a run starts."""
     control: ControlSection
+    """How the tasks are resolved, and how often."""
     plant: PlantKind = KinematicSection()
+    """What the commands move."""
     sensor: SensorKind = ExactSection()
+    """What measures the distances to obstacles."""
     position: PositionSection | None = None
+    """The end effector's position."""
     pointing: PointingSection | None = None
+    """The end effector's direction."""
     avoidance: AvoidanceKind | None = None
+    """Obstacles, and how to stay away from them."""
     limits: LimitsSection | None = None
+    """Joint limits."""
     damping: DampingSection | None = None
+    """Null-space term that damps joints; not with the null-space [posture]."""
     posture: PostureSection | None = None
+    """Null-space term or last task toward a posture."""
     tasks: tuple[ListedTask, ...] = ()
+    """Further tasks in order of priority, below limits, avoidance, position and pointing."""
     contacts: tuple[ContactSection, ...] = ()
+    """What touches the surroundings, at level "torque"."""
     forces: ForcesSection = ForcesSection()
+    """Which contact forces the stack allows."""
     faults: tuple[FaultSection, ...] = ()
+    """What goes wrong during a run."""
     variation: Parameters = Field(default_factory=dict)
+    """Distributions of dotted keys, from which `hierarchy compare --starts` samples; a single run
+    ignores them."""
 
     @field_validator("plugins")
     @classmethod

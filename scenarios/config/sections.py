@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError, core_schema
 
 from hierarchy import plugins
+from hierarchy.errors import UnknownNameError
 from hierarchy.plugins import Group
+from hierarchy.words import listed
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,9 @@ Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
 Count = Annotated[int, Field(strict=True, ge=0)]
 Whole = Annotated[int, Field(strict=True)]
 Flag = Annotated[bool, Field(strict=True)]
-JointValue = Finite | tuple[Finite, ...]  # see hierarchy.Robot.configuration
+JointPosition = Annotated[Finite, Unit("rad or m")]
+JointVelocity = Annotated[Finite, Unit("rad/s or m/s")]
+JointValue = JointPosition | tuple[JointPosition, ...]  # see hierarchy.Robot.configuration
 Vector3 = tuple[Finite, Finite, Finite]
 Rows3 = tuple[Vector3, Vector3, Vector3]
 Length = Annotated[Positive, Unit("m")]
@@ -44,6 +49,24 @@ Gain = Annotated[NotNegative, Unit("1/s")]
 Stiffness = Annotated[NotNegative, Unit("1/s^2")]
 Force = Annotated[NotNegative, Unit("N")]
 Point = Annotated[Vector3, Unit("m")]
+
+
+def _named(text: str) -> str:
+    if not re.fullmatch(r"[^\W_][\w.-]*", text):
+        raise ValueError("a name has letters, digits, \".\", \"_\" and \"-\", and begins with a "
+                         "letter or a digit")
+    return text
+
+
+def _titled(text: str) -> str:
+    if not re.fullmatch(r"[^\W\d_][\w -]*", text):
+        raise ValueError("a task's name has letters, digits, spaces, \"_\" and \"-\", and begins "
+                         "with a letter")
+    return text
+
+
+Name = Annotated[str, Field(max_length=100), AfterValidator(_named)]
+TaskName = Annotated[str, AfterValidator(_titled)]
 
 
 class Section(BaseModel):
@@ -66,7 +89,7 @@ class OneOf:
     """
 
     default: str | None = None
-    wants: ClassVar[str] = "expected a kind,"
+    wants: ClassVar[str] = "expected a table with a kind,"
 
     def sections(self, annotation: Any) -> tuple[type[Section], ...]:
         """Return the sections of all kinds."""
@@ -101,9 +124,10 @@ class OneOf:
         kind = self.kind_of(table) if isinstance(table, dict) else table
         found = self.find(source, kind) if isinstance(kind, str) and kind is not table else None
         if found is None:
-            got = "" if kind is None else f"; got {kind!r}"
-            raise PydanticCustomError("kind", f"{self.wants} {{kinds}}{{got}}", {
-                "kinds": ", ".join(map(repr, self.names(source))), "got": got})
+            names = self.names(source)
+            text = str(UnknownNameError("kind", kind, names)) if isinstance(kind, str) else (
+                f"{self.wants} {listed([repr(name) for name in names], 'or')}")
+            raise PydanticCustomError("kind", "{text}", {"text": text})
         return found.model_validate(table)
 
 

@@ -20,9 +20,9 @@ from scenarios.config.errors import ScenarioError
 from scenarios.config.own import OwnSection
 from scenarios.config.paths import PathSection
 from scenarios.config.sections import (
-    Finite,
     Flag,
     Gain,
+    JointPosition,
     JointValue,
     Length,
     NotNegative,
@@ -31,6 +31,7 @@ from scenarios.config.sections import (
     Registered,
     Section,
     Stiffness,
+    TaskName,
     Unit,
     Vector3,
 )
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
 
 Acceleration = Annotated[Positive, Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
-TaskName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_ -]*$")]
 
 
 class Made(Section):
@@ -78,11 +78,14 @@ class Made(Section):
 
 
 class TaskSection(Made):
-    """What most tasks have: gains of its error, in [1/s^2] and [1/s] (acceleration) and [1/s]."""
+    """What most tasks have: the gains of their error."""
 
     stiffness: Stiffness = 40.0
+    """Gain of the error at acceleration level."""
     damping: Gain = 20.0
+    """Gain of the error's rate at acceleration level."""
     gain: Gain = 10.0
+    """Gain of the error at velocity level."""
 
     @property
     def gains(self) -> tuple[float, float, float]:
@@ -91,14 +94,14 @@ class TaskSection(Made):
 
 
 class AlongSection(TaskSection):
-    """Follow `path`, or stay at the initial position without one, shifted by `offset` [m].
-
-    With `from_start` the path is relative to the initial position.
-    """
+    """Follow a path, or stay at the initial position without one."""
 
     path: PathSection | None = None
+    """Where the point is wanted over time."""
     offset: Point = (0.0, 0.0, 0.0)
+    """Shift of the path, or of the initial position."""
     from_start: Flag = False
+    """Whether the path is relative to the initial position."""
 
     @model_validator(mode="after")
     def _has_a_path_to_shift(self) -> Self:
@@ -144,15 +147,16 @@ class PositionTask(AlongSection):
 
 
 class PointingTask(TaskSection):
-    """The z axis of a frame on or in a cone (1 row).
-
-    `buffer` [deg] goes with control.stack = "smooth": an inequality acts within it inside the cone.
-    """
+    """The z axis of a frame on or in a cone (1 row)."""
 
     axis: Vector3
+    """Axis of the cone in the world, of any length."""
     alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0), Unit("deg")]
+    """Opening of the cone: angle of the z axis from `axis`."""
     rows: Rows = "inequality"
+    """"equality": on the cone. "inequality": within it."""
     buffer: Annotated[Positive, Unit("deg")] | None = None
+    """With control.stack = "smooth": width inside the cone within which an inequality acts."""
     stiffness: Stiffness = 5.0
     damping: Gain = 2.0
     gain: Gain = 5.0
@@ -178,11 +182,14 @@ class PointingTask(TaskSection):
 
 
 class PostureTask(TaskSection):
-    """All joints to a posture: the values of all joints, or all coordinates, as in `start.q`."""
+    """All joints to a posture."""
 
     unit: ClassVar[str] = "rad"
-    target: tuple[Finite, ...] | None = None
+    target: tuple[JointPosition, ...] | None = None
+    """Values of all joints, or all coordinates, as in `start.q`; by default the
+    start."""
     joints: dict[str, JointValue] = Field(default_factory=dict)
+    """Values of joints by name that override `target`."""
     stiffness: Stiffness = 10.0
     damping: Gain = 5.0
     gain: Gain = 1.0
@@ -207,68 +214,74 @@ class PositionSection(PositionTask):
 
 
 class PointingSection(PointingTask):
-    """The end effector's z axis at `alpha_d` [deg] from `axis`, or with "inequality" within it."""
+    """The end effector's z axis on a cone, or within it."""
 
     title: ClassVar[str] = "pointing"
     frame: ClassVar[str | None] = None
     rows: Rows = Field("inequality", alias="kind")
+    """"equality": on the cone. "inequality": within it."""
 
 
 class PostureSection(PostureTask):
-    """A posture [rad or m] as the null-space term, or with `role` = "task" as the last level."""
+    """A posture of all joints, below all tasks."""
 
     title: ClassVar[str] = "posture"
     role: Literal["null-space", "task"] = "null-space"
+    """"null-space": the null-space term of eq. (14). "task": the last level."""
 
 
 class LimitsSection(Section):
     """The robot's joint limits, as the first level of the stack.
 
-    With `place` = "guard" they are not in the stack: each command is clamped to them joint by
-    joint, regardless of the tasks, which works with every resolver. "either": in the stack if the
-    resolver handles bounds, otherwise a guard. "bounds": in the stack, above all else, as far as
-    they bound single unknowns: without torque limits and the limits of contact forces.
-
-    Position and velocity limits are those of the robot; `acceleration` [rad/s^2] is one value for
-    all joints or one each; `margin` [rad] shrinks the position limits; `horizon` [s] is how far
-    ahead they look, so that they act gradually, see hierarchy.limits: by default 0.05 s at level
-    "torque", and one tick elsewhere and if it is shorter than that. `torque` is the usable share of
-    the effort limits, None for no torque limit. At level "torque" no torque changes by more than
-    `torque_step` [N m] from one tick to the next. `base_speed` and `base_acceleration`, each
-    [linear, angular] in m, rad and s, limit a floating base; by default to 2 m/s and 3 rad/s, and
-    the largest `acceleration`; at level "torque", where only forces move it, not at all. With
-    `danger_reach` [m] joints that would move a control point toward an obstacle nearer than that
-    are slowed down, see hierarchy.tasks.DangerBounds.
+    Position and velocity limits are those of the robot.
     """
 
     acceleration: Acceleration | tuple[Acceleration, ...]
+    """Largest acceleration, one value for all joints or one each."""
     place: Literal["stack", "guard", "either", "bounds"] = "stack"
+    """"stack": above all tasks. "guard": not in the stack; each command is clamped to them joint by
+    joint, regardless of the tasks, which works with every resolver. "either": in the stack if the
+    resolver handles bounds, otherwise a guard. "bounds": in the stack, above all else, as far as
+    they bound single unknowns: without torque limits and the limits of contact forces."""
     margin: Annotated[NotNegative, Unit("rad")] = 0.0
+    """By which the position limits shrink, on both sides."""
     horizon: Annotated[NotNegative, Unit("s")] | None = None
+    """Time in which the sides come to a limit, see docs/theory/joint-limits.md; by default 0.05 s
+    at level "torque", and one tick elsewhere and if it is shorter than that."""
     danger_reach: Length | None = None
+    """Joints that would move a control point toward an obstacle nearer than this are slowed down,
+    see hierarchy.tasks.DangerBounds."""
     torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None
+    """Usable share of the effort limits; without it torques are not limited."""
     torque_step: Annotated[Positive, Unit("N m")] | None = None
+    """At level "torque": change of a torque from one tick to the next, at most."""
     base_speed: tuple[Positive, Positive] | None = None
+    """Linear [m/s] and angular [rad/s] speed of a floating base; by default 2 m/s and 3 rad/s, and
+    at level "torque", where only forces move it, none."""
     base_acceleration: tuple[Positive, Positive] | None = None
+    """Linear [m/s^2] and angular [rad/s^2] acceleration of a floating base; by default the largest
+    `acceleration`, and at level "torque" none."""
 
 
 class DampingSection(Section):
-    """Null-space term a = -D v, eq. (15): D = value I, or value M(q) with weight = "mass"."""
+    """Null-space term a = -D v, eq. (15)."""
 
     value: NotNegative
+    """D [1/s], or with weight = "mass" the factor of M(q)."""
     weight: Literal["identity", "mass"] = "identity"
+    """"identity": D = value I. "mass": D = value M(q)."""
 
 
 class Listed(Made):
-    """A task of `[[tasks]]`; its name defaults to its kind.
-
-    For the sake of the tasks below, each of its rows may `give` that much beyond its least miss, in
-    the unit of the rows: [1/s] or [1/s^2] times that of the task, or [N] of forces.
-    """
+    """A task of `[[tasks]]`."""
 
     name: TaskName | None = None
+    """Its name in messages, tables and figures; by default its kind."""
     give: NotNegative = 0.0
+    """By how much each of its rows may miss beyond its least miss for the sake of the tasks below,
+    in the unit of the rows: [1/s] or [1/s^2] times that of the task, or [N] of forces."""
     kind: str
+    """Which kind it is."""
 
     @property
     def title(self) -> str:  # type: ignore[override]

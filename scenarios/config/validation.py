@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
+from math import inf, tau
 from typing import Any, TypeVar, get_args
 
 from pydantic import ValidationError
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, brief
 from hierarchy.words import listed
 from scenarios.config.changes import Tag
 from scenarios.config.errors import ScenarioError
 from scenarios.config.sections import OneOf, Section, Unit, kinds_of
 
 Kind = TypeVar("Kind", bound=Section)
+_LARGEST = {  # that is not doubted, by unit
+    "m": (10.0, "lengths are in metres, not in millimetres"),
+    "rad": (tau, "angles are in radians, not in degrees")}
+_QUOTED = re.compile(r"'([^']*)'")
 _UNIONS = ("constrained-float", "float", "str")  # what pydantic calls the parts of one in a key
 
 
@@ -47,15 +53,32 @@ def sections_at(root: type[Section], path: Sequence[str]) -> list[type[Section]]
 def _said(root: type[Section], data: Any, error: Any) -> str:
     keys = [str(key) for key in error["loc"] if key not in _UNIONS
             and not str(key).startswith("tuple[")]
-    where = ".".join(keys) or "file"
+    where, found = ".".join(keys) or "file", error["input"]
     if error["type"] == "extra_forbidden":
         return _unknown(root, keys, _table(data, error["loc"][:-1]))
-    text = error["msg"].removeprefix("Value error, ")
-    if isinstance(error["input"], dict) or error["type"] == "kind":
+    text = _worded(error)
+    if not isinstance(found, dict) and _is_table(error, sections_at(root, keys)):
+        return f"{where}: expected one table, as below [{where}], got {brief(found)}"
+    if isinstance(found, dict) and error["type"] in ("tuple_type", "list_type"):
+        return f"{where}: expected a list: for tables write [[{where}]] above each, not [{where}]"
+    if isinstance(found, dict) or error["type"] in ("kind", "literal_error"):
         return f"{where}: {text}"
     unit = next((f" {unit.name}" for part in _annotations(root, keys)
                  for unit in _within(part, Unit)), "")
-    return f"{where}: {text}, got {error['input']!r}{unit}"
+    return f"{where}: {text}, got {found!r}{unit}"
+
+
+def _worded(error: Any) -> str:
+    """Return what pydantic says of a value, and of a choice the nearest one."""
+    if error["type"] == "literal_error" and (names := _QUOTED.findall(error["ctx"]["expected"])):
+        return str(UnknownNameError("value", error["input"], names))
+    return str(error["msg"]).removeprefix("Value error, ")
+
+
+def _is_table(error: Any, sections: Sequence[type[Section]]) -> bool:
+    """Whether an error is of something that should be a table, and is none."""
+    return error["type"] in ("model_type", "model_attributes_type") or (
+        error["type"] == "kind" and isinstance(error["input"], list) and bool(sections))
 
 
 def _unknown(root: type[Section], keys: list[str], table: dict[str, Any]) -> str:
@@ -71,7 +94,8 @@ def _unknown(root: type[Section], keys: list[str], table: dict[str, Any]) -> str
     beside = [section for section in beside if kind in kinds_of(section)] or beside
     known = dict.fromkeys(field.alias or key for section in beside
                           for key, field in section.model_fields.items())
-    return str(UnknownNameError("key", where, [".".join([*keys[:-1], key]) for key in known]))
+    return str(UnknownNameError("key", keys[-1], known,
+                                above="".join(f"{key}." for key in keys[:-1])))
 
 
 def _table(data: Any, path: Sequence[int | str]) -> dict[str, Any]:
@@ -107,3 +131,27 @@ def _within(annotation: Any, wanted: type) -> Iterator[Any]:
             return
         for part in parts:
             yield from _within(part, wanted)
+
+
+def doubtful_units(section: Section, above: str = "") -> Iterator[str]:
+    """Yield what stands in a section in another unit than its own, by its size."""
+    for name, field in type(section).model_fields.items():
+        key, value = f"{above}{field.alias or name}", getattr(section, name)
+        units = {unit.name for unit in _within((field.annotation, *field.metadata), Unit)}
+        for where, one in _leaves(value, key):
+            if isinstance(one, Section):
+                yield from doubtful_units(one, f"{where}.")
+            elif isinstance(one, float) and len(units) == 1:
+                largest, remark = _LARGEST.get(next(iter(units)), (inf, ""))
+                if largest < abs(one) < inf:
+                    yield f"{where} = {one:g} {units.pop()}: {remark}"
+                    break
+
+
+def _leaves(value: Any, key: str) -> Iterator[tuple[str, Any]]:
+    """Yield a value by its key, or what is in a list, by its numbers."""
+    if isinstance(value, list | tuple):
+        for i, one in enumerate(value):
+            yield from _leaves(one, f"{key}.{i}")
+    else:
+        yield key, value

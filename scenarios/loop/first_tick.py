@@ -14,6 +14,7 @@ from scenarios.cell.build import Cell
 from scenarios.cell.contacts import doubts
 from scenarios.config import Scenario
 from scenarios.config.references import inseparable_pairs
+from scenarios.config.validation import doubtful_units
 from scenarios.loop.controller import Controller
 from solvers import Status, explain, make
 from solvers.explain import is_missed
@@ -137,6 +138,7 @@ def _warnings(scenario: Scenario, distances: dict[str, float]) -> Iterator[str]:
         if 0.0 < getattr(task, "alpha_d", 0.0) < _NARROW:
             yield (f"{key}.alpha_d = {getattr(task, 'alpha_d', 0.0):g} deg: cones are in degrees; "
                    "all other angles are in radians")
+    yield from doubtful_units(scenario)
     for key, posture in {"posture": scenario.posture, **cones}.items():
         for i, value in enumerate(getattr(posture, "target", None) or ()):
             if abs(value) > tau:

@@ -73,7 +73,8 @@ def load_run(folder: str | Path) -> Recording:
     """
     path = file_path("load_run", folder)
     if not path.is_dir():
-        raise HierarchyError(f"run folder {path} does not exist")
+        what = "a file, not the folder of a run" if path.exists() else "no folder of a run"
+        raise HierarchyError(f"{path} is {what}; `hierarchy run SCENARIO` writes one")
     if not (path / "run.npz").exists():
         inside = sorted(file.parent for file in path.glob("*/*/run.npz"))
         hint = f"; it holds runs, such as {inside[0]}" if inside else ""

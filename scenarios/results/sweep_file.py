@@ -8,11 +8,12 @@ from typing import Annotated
 from pydantic import Field
 
 from hierarchy.errors import UnknownNameError
+from scenarios.config import is_shipped
 from scenarios.config.distributions import Parameters
 from scenarios.config.errors import ScenarioError
-from scenarios.config.sections import Section
+from scenarios.config.sections import Name, Section
 from scenarios.config.validation import validated
-from scenarios.files import read_toml
+from scenarios.toml_text import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library" / "sweeps"
 
@@ -27,7 +28,7 @@ class Sweep(Section):
     has those that `hierarchy compare` takes by default.
     """
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+    name: Name
     title: str = ""
     scenarios: Annotated[tuple[str, ...], Field(min_length=1)]
     resolvers: tuple[str, ...] = ()
@@ -51,7 +52,9 @@ def find(name_or_path: str | Path) -> Path:
     if Path(name_or_path).suffix == ".toml":
         return Path(name_or_path)
     if str(name_or_path) not in shipped_sweeps():
-        raise UnknownNameError("sweep", str(name_or_path), shipped_sweeps())
+        scenario = (f"{str(name_or_path)!r} is a scenario, for `hierarchy run` and `hierarchy "
+                    "compare`.") if is_shipped(str(name_or_path)) else ""
+        raise UnknownNameError("sweep", str(name_or_path), shipped_sweeps(), scenario)
     return LIBRARY / f"{name_or_path}.toml"
 
 
@@ -62,7 +65,10 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
     Raises ScenarioError, naming the file and the key, and UnknownNameError for an unknown name.
     """
     path = find(name_or_path)
-    sweep = validated(Sweep, read_toml(path, "sweep file", ScenarioError), str(path))
+    data = read_toml(path, "sweep file", ScenarioError)
+    if not {"scenarios", "samples"} & data.keys() and {"robot", "extends", "control"} & data.keys():
+        raise ScenarioError(f"{path} is a scenario, to be run by `hierarchy run {path}`")
+    sweep = validated(Sweep, data, str(path))
     return sweep.model_copy(update={"scenarios": tuple(
         str(path.parent.resolve() / name) if name.endswith(".toml") or ".toml:" in name else name
         for name in sweep.scenarios)})

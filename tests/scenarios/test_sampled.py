@@ -75,7 +75,7 @@ def made(folder):
     ("start.q = { arround = 0.1 }", {}, "parameters.start.q.arround: "),
     ("start.q = { around = [0.1, 0.2] }", {}, "parameters.start.q: scenario 'ellipse': around"),
     ("position.gain = { uniform = [2.0, 1.0] }", {}, "parameters.position.gain.uniform: "),
-    ("position.gian = { uniform = [1.0, 2.0] }", {}, "[position] has no key 'gian'"),
+    ("position.gian = { uniform = [1.0, 2.0] }", {}, "unknown key 'position.gian'; did you"),
     ("position.damping = { normal = [-9.0, 0.0] }", {}, "sample 0 of scenario 'ellipse'"),
 ])
 def test_a_wrong_file_is_refused_before_anything_is_run(parameters, changed, says, tmp_path,

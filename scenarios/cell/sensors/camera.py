@@ -11,14 +11,15 @@ from numpy.typing import ArrayLike
 from hierarchy import HierarchyError, State
 from hierarchy.avoidance import Capsule, Obstacles
 from hierarchy.avoidance.self_collision import pack_capsules
+from hierarchy.gate import check_rotation
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.errors import Image, expose
 from scenarios.cell.sensors.rendering import draw_scene
 from scenarios.config.kinds.camera import DepthErrors
 
+_UPRIGHT = 1e-6    # from 1, of a direction's vertical part: the image then has another x axis
 _ROUNDING = 1e-9   # [s] of times that are compared
-_SKEW = 1e-6       # tolerance of a rotation matrix
 
 
 @dataclass(frozen=True)
@@ -46,10 +47,7 @@ class Pinhole:
         for name, size in (("cx", self.width), ("cy", self.height)):
             if getattr(self, name) is None:
                 set_frozen(self, **{name: (size - 1) / 2})
-        R = np.asarray(self.rotation, dtype=float)
-        if R.shape != (3, 3) or not np.abs(R @ R.T - np.eye(3)).max() < _SKEW or (
-                np.linalg.det(R) < 0.0):
-            raise HierarchyError(f"camera: {R.tolist()} is not a rotation")
+        check_rotation("camera: rotation", self.rotation)
         if not np.isfinite(np.asarray(self.position, dtype=float)).all():
             raise HierarchyError(f"camera: position {self.position} is not finite")
 
@@ -87,7 +85,7 @@ def looking_at(position: ArrayLike, target: ArrayLike) -> Array:
     if length == 0.0:
         raise HierarchyError(f"camera: position and look_at are both {list(np.ravel(target))} m")
     forward /= length
-    upright = np.abs(forward[2]) < 1.0 - _SKEW
+    upright = np.abs(forward[2]) < 1.0 - _UPRIGHT
     right = np.cross(forward, (0.0, 0.0, 1.0) if upright else (0.0, 1.0, 0.0))
     right /= np.linalg.norm(right)
     return np.column_stack([right, np.cross(forward, right), forward])

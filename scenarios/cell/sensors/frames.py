@@ -24,7 +24,7 @@ from hierarchy.problem import Array
 from scenarios.cell.sensors.camera import Pinhole
 from scenarios.cell.sensors.errors import Image
 from scenarios.config.reading import LIBRARY
-from scenarios.files import read_toml
+from scenarios.toml_text import read_toml
 
 SHIPPED = LIBRARY / "frames"
 ABOUT = "frames.toml"

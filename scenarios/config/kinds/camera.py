@@ -33,51 +33,56 @@ WIDEST = 3.5  # [standard deviations] at which noise is clipped, so that it is b
 
 
 class ImageSection(AnySensor):
-    """What sources of depth images have; see scenarios.cell.sensors.depth_space.
-
-    A frame is available `latency` [s] after it was taken. Without a new frame for more than
-    `stale_after` [s] the camera is blind and `control.policy.stale` applies; frames with fewer
-    valid pixels than the share `least_readings` do not count. The robot's capsules, with a column
-    of height `foot` [m] below the base, are removed from the image with a `margin` [m]. Obstacles
-    are seen within `region` [m] of a point, by default the largest distance at which avoidance
-    acts. Obstacles extend `thin` [m] behind their surface, by default without bound. A pixel counts
-    if `support` of the nine around it agree within `band` [m].
-    """
+    """What sources of depth images have; see scenarios.cell.sensors.depth_space."""
 
     latency: Time = 0.0
+    """Time from taking a frame until it is available."""
     stale_after: Time = 0.2
+    """Time without a new frame after which the camera is blind and `control.policy.stale`
+    applies."""
     least_readings: Share = 0.1
+    """Share of valid pixels below which a frame does not count."""
     foot: Distance = FOOT  # type: ignore[misc]
+    """Height of the column below the base that is removed from the image with the robot's
+    capsules."""
     margin: Distance = 0.05
+    """Width around the capsules within which pixels are removed with the robot."""
     region: Length | None = None
+    """Distance from a point within which obstacles are seen; by default the largest at which
+    avoidance acts."""
     thin: Distance | None = None
+    """How far obstacles extend behind their surface; by default without bound."""
     support: Annotated[int, Field(strict=True, ge=1, le=9)] = 3
+    """Pixels of the nine around one that must agree for it to count."""
     band: Distance = 0.05
+    """Difference in depth up to which pixels agree."""
 
 
 class DepthErrors(Section):
-    """Errors of a depth reading z [m] of a simulated camera; the defaults resemble a Kinect.
-
-    `noise_floor` + `noise_growth` (z - `noise_from`)^2 is the standard deviation [m] of normal
-    noise, clipped at 3.5 times that. `rounding` = "step" rounds z to multiples of `step` [m],
-    "disparity" 1 / z to multiples of `step` [1/m], as a triangulating camera does; 0 for none.
-    Readings outside `near` to `far` [m] are missing, others with the probability `missing`, or
-    `missing_at_edges` where a neighbour is 5 cm nearer or farther. With the probability `outliers`
-    a frame has a square of up to `outlier_size` pixels to each side of a pixel with a random depth
-    before the true one.
-    """
+    """Errors of a depth reading z of a simulated camera; the defaults resemble a Kinect."""
 
     noise_floor: Distance = 1.2e-3
+    """Standard deviation of the normal noise of z at `noise_from`, clipped at 3.5 times that."""
     noise_growth: NotNegative = 1.9e-3
+    """Growth of that deviation with (z - noise_from)^2 [1/m]."""
     noise_from: Distance = 0.4
+    """Depth from which noise grows."""
     rounding: Literal["disparity", "step"] = "disparity"
+    """"step" rounds z to multiples of `step`, "disparity" 1 / z, as a triangulating camera does."""
     step: NotNegative = 2.85e-3
+    """Step of the rounding, in [m], or [1/m] of a disparity; 0 for none."""
     near: Distance = 0.5
+    """Depth below which readings are missing."""
     far: Annotated[float, Field(strict=True, gt=0.0), Unit("m")] = 5.0
+    """Depth above which readings are missing."""
     missing: Share = 0.002
+    """Probability of a missing reading."""
     missing_at_edges: Share = 0.3
+    """The same where a neighbour is 5 cm nearer or farther."""
     outliers: Share = 0.02
+    """Probability that a frame has a square with a random depth before the true one."""
     outlier_size: Count = 2
+    """Largest number of pixels from the middle of that square to its side."""
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:
@@ -124,39 +129,48 @@ class DepthErrors(Section):
 
 @register("sensors", "camera", shipped=True)
 class CameraSection(DepthErrors, ImageSection):
-    """A simulated depth camera that sees obstacles and robot; see scenarios.cell.sensors.camera.
-
-    Image size, focal lengths and centre [px], by default the middle; position [m]; a point [m] to
-    look at, or a rotation, which takes precedence: rows, whose columns are the camera's axes right,
-    down and forward in the world. `rate` [Hz] and `jitter` [s] of the frames; random `seed`;
-    `ideal` for no errors; `backdrop` [m], the depth
-    of a wall, 0 for none, which may leave too few readings; `point_radius` [m] of the balls that
-    represent points.
-    """
+    """A simulated depth camera that sees obstacles and robot; see scenarios.cell.sensors.camera."""
 
     made_by: ClassVar[str] = "scenarios.cell.sensors.images:camera"
     kind: Literal["camera"]
     width: Pixels = 640
+    """Columns of the image."""
     height: Pixels = 480
+    """Rows of the image."""
     fx: Annotated[Positive, Unit("px")] = 525.0
+    """Focal length, horizontally."""
     fy: Annotated[Positive, Unit("px")] = 525.0
+    """Focal length, vertically."""
     cx: Annotated[Finite, Unit("px")] | None = None
+    """Column of the optical axis, by default the middle."""
     cy: Annotated[Finite, Unit("px")] | None = None
+    """Row of the optical axis, by default the middle."""
     position: Point = (0.0, 2.0, 0.7)
+    """Where the camera is."""
     look_at: Point = (0.0, 0.3, 0.1)
+    """Point that it looks at."""
     rotation: Rows3 | None = None
+    """In place of `look_at`: rows of a matrix whose columns are the camera's axes right, down and
+    forward in the world."""
     rate: Annotated[Positive, Unit("Hz")] = 30.0
+    """Frames per second."""
     jitter: Time = 0.0
+    """Largest random shift of a frame; below 1 / rate."""
     seed: Count = 0
+    """Seed of errors and jitter."""
     ideal: Flag = False
+    """Whether readings have no errors."""
     far: Length = 5.0
+    """Depth above which readings are missing."""
     point_radius: Distance = 0.02
+    """Radius of the balls that stand for obstacles that are points."""
     backdrop: Distance = 4.0
+    """Depth of a wall behind everything, 0 for none, which may leave too few readings."""
 
 
 @register("sensors", "frames", shipped=True)
 class FramesSection(ImageSection):
-    """Depth images from a `folder` or a shipped set, with their camera and times.
+    """Depth images that were recorded, with their camera and times.
 
     See scenarios.cell.sensors.frames.
     """
@@ -165,3 +179,4 @@ class FramesSection(ImageSection):
     is_recorded: ClassVar[bool] = True
     kind: Literal["frames"]
     folder: str
+    """Folder of the images, relative to the scenario's file, or the name of a shipped set."""

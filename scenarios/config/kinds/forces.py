@@ -17,16 +17,15 @@ if TYPE_CHECKING:
 
 @register("tasks", "contact-force", shipped=True)
 class ListedForce(Listed):
-    """The force of a contact at `target`: its normal force, its force, or its wrench [N, N m].
-
-    One, three or six numbers, see hierarchy.tasks.ContactForce; at level "torque".
-    """
+    """The force of a contact at a value; at level "torque". See hierarchy.tasks.ContactForce."""
 
     unit: ClassVar[str] = "N"
     of_forces: ClassVar[bool] = True
     kind: Literal["contact-force"]
     contact: str
+    """Name of the contact."""
     target: tuple[Finite, ...]
+    """One number, the normal force [N]; three, the force [N]; or six, the wrench [N, N m]."""
 
     def make(self, at: References) -> Task:
         """Return the task."""

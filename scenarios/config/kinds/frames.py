@@ -30,18 +30,23 @@ if TYPE_CHECKING:
 
 @register("tasks", "position", shipped=True)
 class ListedPosition(Listed, PositionTask):
-    """The origin of `frame` along a path, by default its initial position, in some `axes`."""
+    """The origin of a frame along a path."""
 
     kind: Literal["position"]
     frame: str  # type: ignore[misc]
+    """Frame of the robot."""
     axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"  # type: ignore[misc]
+    """Axes of the world that count."""
 
 
 class _AlongPose(Listed, AlongSection):
     """The position and the rotation of a frame (6 rows)."""
 
     frame: str
+    """Frame of the robot."""
     rotation: Rows3 | None = None
+    """Rows of the wanted rotation matrix from the frame to the world; by default the initial
+    one."""
 
     def asked(self, at: References) -> tuple[Frame, Path, Array]:
         """Return the frame, its path, and its rotation, by default the initial one."""
@@ -56,7 +61,7 @@ class _AlongPose(Listed, AlongSection):
 
 @register("tasks", "pose", shipped=True)
 class ListedPose(_AlongPose):
-    """Origin and axes of `frame` (6 rows); `rotation` (rows) defaults to the initial one."""
+    """Origin and axes of a frame (6 rows)."""
 
     kind: Literal["pose"]
 
@@ -86,19 +91,22 @@ class ListedFrame(_AlongPose):
 
 @register("tasks", "pointing", shipped=True)
 class ListedPointing(PointingTask, Listed):
-    """The z axis of `frame` at `alpha_d` [deg] from `axis`, or with "inequality" at most that."""
+    """The z axis of a frame on a cone, or within it."""
 
     kind: Literal["pointing"]
     frame: str  # type: ignore[misc]
+    """Frame of the robot."""
 
 
 @register("tasks", "look-at", shipped=True)
 class ListedLookAt(Listed, TaskSection):
-    """The z axis of `frame` toward the point `target` [m] of the world (2 rows)."""
+    """The z axis of a frame toward a point of the world (2 rows)."""
 
     kind: Literal["look-at"]
     frame: str
+    """Frame of the robot."""
     target: Point
+    """The point."""
     stiffness: Stiffness = 20.0
     damping: Gain = 10.0
     gain: Gain = 5.0
@@ -116,18 +124,19 @@ class ListedLookAt(Listed, TaskSection):
 
 @register("tasks", "relative", shipped=True)
 class ListedRelative(Listed, TaskSection):
-    """The pose of `frame` in the axes of the frame `to` (6 rows), by default the initial one.
-
-    `position` [m] and `rotation` (rows) are those wanted; without `orientation` only the position
-    counts (3 rows).
-    """
+    """The pose of a frame in the axes of another one (6 rows, or 3)."""
 
     kind: Literal["relative"]
     frame: str
+    """Frame of the robot."""
     to: str
+    """The other frame."""
     position: Point | None = None
+    """Origin of `frame` in the axes of `to`; by default the initial one."""
     rotation: Rows3 | None = None
+    """Rows of the rotation matrix from `frame` to `to`; by default the initial one."""
     orientation: Flag = True
+    """Whether the orientation counts too."""
 
     @model_validator(mode="after")
     def _counts_its_rotation(self) -> Self:
@@ -154,17 +163,18 @@ class ListedRelative(Listed, TaskSection):
 
 @register("tasks", "manipulability", shipped=True)
 class ListedManipulability(Listed, TaskSection):
-    """The manipulability of `frame` at `least` or more (1 row); rows = "equality": at `least`.
-
-    `part` "position" counts the linear rows of its Jacobian, "pose" all six.
-    """
+    """The manipulability of a frame at a value or above it (1 row)."""
 
     unit: ClassVar[str] = ""
     kind: Literal["manipulability"]
     frame: str
+    """Frame of the robot."""
     least: NotNegative
+    """The value, in the unit of det(J J^T)^(1/2)."""
     part: Literal["position", "pose"] = "position"
+    """"position": of the linear rows of its Jacobian. "pose": of all six."""
     rows: Rows = "inequality"
+    """"inequality": at `least` or above. "equality": at `least`."""
     stiffness: Stiffness = 20.0
     damping: Gain = 10.0
     gain: Gain = 5.0

@@ -20,42 +20,44 @@ class ServoSection(Section):
     """The position servo of each joint of the physics plant.
 
     torque = k (reference - q) + c (its rate - v) + `gravity` times the gravity torque, within the
-    effort limits. k = m `bandwidth`^2 and c = 2 m `bandwidth` [rad/s], where m is the inertia of
-    the joint at the start, including the drive. The servo runs at `rate` [Hz] (or slightly faster,
-    a whole number of times per period) on linearly interpolated references. Without `feedforward`
-    the rate of the reference is ignored. The reference leads its joint by at most `lead` [rad], so
-    that a blocked arm does not rush to catch up.
+    effort limits. k = m `bandwidth`^2 and c = 2 m `bandwidth`, where m is the inertia of the joint
+    at the start, including the drive.
     """
 
     rate: Annotated[float, Field(strict=True, ge=200.0, le=10000.0), Unit("Hz")] = 1000.0
+    """Steps of the servo per second (or slightly more, a whole number per period) on linearly
+    interpolated references."""
     bandwidth: Bandwidth | tuple[Bandwidth, ...] = 80.0
+    """How fast a joint follows, one value for all joints or one each."""
     gravity: NotNegative = 1.0
+    """Share of the gravity torque that is compensated."""
     feedforward: Flag = True
+    """Whether the rate of the reference counts."""
     lead: Annotated[Positive, Unit("rad")] = 0.1
+    """How far the reference may lead its joint, so that a blocked arm does not rush to catch up."""
 
 
 class JointsSection(Section):
-    """Joints of the physics plant: one value for all or one each. Plausible, not identified.
-
-    friction [N m] is dry friction; damping [N m s/rad]; armature [kg m^2] is the inertia of motor
-    and gear at the joint.
-    """
+    """Joints of the physics plant: one value for all or one each. Plausible, not identified."""
 
     friction: Friction | tuple[Friction, ...] = 0.5
+    """Dry friction."""
     damping: Damping | tuple[Damping, ...] = 1.0
+    """Viscous friction."""
     armature: Inertia | tuple[Inertia, ...] = 0.3
+    """Inertia of motor and gear at the joint."""
 
 
 @register("plants", "mujoco", shipped=True)
 class PhysicsSection(AnyPlant):
-    """A robot in a physics simulation, under position servos (extra `sim`).
-
-    A joint more than `beyond_stop` [rad] beyond its position limit ends the run with a fault.
-    """
+    """A robot in a physics simulation, under position servos (extra `sim`)."""
 
     made_by: ClassVar[str] = "scenarios.cell.plants.physics:PhysicsArm"
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
     kind: Literal["mujoco"]
     beyond_stop: Annotated[Positive, Unit("rad")] = 0.2
+    """How far a joint may pass its position limit; beyond it the run ends with a fault."""
     servo: ServoSection = ServoSection()
+    """The servo of each joint."""
     joints: JointsSection = JointsSection()
+    """Friction and inertia of the joints."""

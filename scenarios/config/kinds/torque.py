@@ -26,16 +26,18 @@ _ROUNDING = 1e-9  # [s] of times
 
 
 class PushSection(Section):
-    """A force on the body of `joint`, at its centre of mass, from `at` for `duration` [s].
-
-    `force` [N] is horizontal, in the `direction` [deg] from the world's x axis toward its y axis.
-    """
+    """A horizontal force on a body, at its centre of mass."""
 
     joint: str
+    """Joint whose body is pushed."""
     force: Force
+    """Size of the force."""
     direction: Annotated[Finite, Unit("deg")] = 0.0
+    """From the world's x axis toward its y axis."""
     at: Time = 0.0
+    """When the push begins."""
     duration: Span = 0.1
+    """How long it lasts."""
 
     @property
     def vector(self) -> Array:
@@ -53,26 +55,31 @@ class PushSection(Section):
 class TorqueSection(AnyPlant):
     """A robot with torque motors in a physics simulation (extra `sim`).
 
-    Its [[contacts]] touch a floor, or table, at `height` [m] whose coefficient is `friction`;
-    `softness` [s] is the time constant of a contact. `joint_friction` [N m] is Coulomb's friction,
-    `armature` [kg m^2] the inertia of the drive of every joint beyond the robot's own, `delay` [s],
-    a whole number of periods, the time by which torques arrive late; the controller knows of none
-    of them. `pushes` disturb it. A robot whose centre of mass is `fall` [m] below its start, or
-    whose base has tilted by `tilt` [rad] from it, has fallen, which ends the run with a fault. So
-    does a joint more than `beyond_stop` [rad] beyond its position limit: joints have no stops in
-    the simulation.
+    Its [[contacts]] touch a floor, or table. The controller knows nothing of `joint_friction`,
+    `armature` and `delay`. Joints have no stops in the simulation.
     """
 
     made_by: ClassVar[str] = "scenarios.cell.plants.torque:TorqueRobot"
     levels: ClassVar[tuple[str, ...]] = ("torque",)
     kind: Literal["torque"]
     height: Annotated[Finite, Unit("m")] = 0.0
+    """Height of the floor."""
     friction: Positive = 0.7
+    """Coefficient of friction of the floor."""
     softness: Span = 0.005
+    """Time constant of a contact."""
     joint_friction: Annotated[NotNegative, Unit("N m")] = 0.0
+    """Coulomb's friction of every joint."""
     armature: Annotated[NotNegative, Unit("kg m^2")] = 0.0
+    """Inertia of the drive of every joint beyond the robot's own."""
     delay: Time = 0.0
+    """Time by which torques arrive late, a whole number of periods."""
     fall: Length = 0.2
+    """How far the centre of mass may sink below its start; beyond it the robot has fallen, which
+    ends the run with a fault."""
     tilt: Annotated[Positive, Unit("rad")] = 1.0
+    """How far the base may tilt from its start; beyond it the robot has fallen."""
     beyond_stop: Annotated[Positive, Unit("rad")] = 0.2
+    """How far a joint may pass its position limit; beyond it the run ends with a fault."""
     pushes: tuple[PushSection, ...] = ()
+    """Forces that disturb the robot."""

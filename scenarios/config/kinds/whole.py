@@ -9,7 +9,7 @@ from pydantic import Field
 from hierarchy.paths import Still
 from hierarchy.plugins import register
 from scenarios.config.avoidance import BarrierSection
-from scenarios.config.sections import Finite, Gain, Stiffness
+from scenarios.config.sections import Finite, Gain, JointPosition, Stiffness
 from scenarios.config.tasks import AlongSection, Listed, PostureTask, TaskSection
 
 if TYPE_CHECKING:
@@ -19,19 +19,21 @@ if TYPE_CHECKING:
 
 @register("tasks", "posture", shipped=True)
 class ListedPosture(Listed, PostureTask):
-    """All joints to `target` [rad or m], by default the start; `joints` override it by name."""
+    """All joints to a posture."""
 
     kind: Literal["posture"]
 
 
 @register("tasks", "coupling", shipped=True)
 class ListedCoupling(Listed, TaskSection):
-    """The sum of factor times position over `joints` at `value` [rad or m] (1 row)."""
+    """The sum of factor times position over some joints at a value (1 row)."""
 
     unit: ClassVar[str] = "rad"
     kind: Literal["coupling"]
     joints: Annotated[dict[str, Finite], Field(min_length=1)]
-    value: Finite = 0.0
+    """The factor of each joint, by name."""
+    value: JointPosition = 0.0
+    """The value of the sum."""
     stiffness: Stiffness = 100.0
 
     def make(self, at: References) -> Task:
@@ -43,10 +45,11 @@ class ListedCoupling(Listed, TaskSection):
 
 @register("tasks", "com", shipped=True)
 class ListedCentreOfMass(Listed, AlongSection):
-    """The centre of mass along some of the axes "x", "y", "z" of the world."""
+    """The centre of mass along a path."""
 
     kind: Literal["com"]
     axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
+    """Axes of the world that count."""
 
     def make(self, at: References) -> Task:
         """Return the task."""
@@ -60,11 +63,13 @@ class ListedCentreOfMass(Listed, AlongSection):
 
 @register("tasks", "momentum", shipped=True)
 class ListedMomentum(Listed):
-    """The linear or angular momentum of the whole robot to zero, with `damping` [1/s]."""
+    """The momentum of the whole robot to zero."""
 
     kind: Literal["momentum"]
     part: Literal["linear", "angular"] = "angular"
+    """Which of the two."""
     damping: Gain = 10.0
+    """Gain of the momentum."""
 
     @property
     def unit(self) -> str:  # type: ignore[override]
@@ -91,7 +96,7 @@ class _Apart(Listed):
 
 @register("tasks", "self-collision", shipped=True)
 class ListedSelfCollision(_Apart, BarrierSection):
-    """Links that are not neighbours, kept `distance` [m] apart; other keys as in [avoidance]."""
+    """Links that are not neighbours, kept apart."""
 
     kind: Literal["self-collision"]
 

@@ -1,0 +1,239 @@
+"""What every key of a scenario file means: for `hierarchy help`, and for the page of keys.
+
+Types, bounds, units and defaults are those that files are checked against; the meaning of a key is
+the text below it in its section.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import json
+import sys
+from collections.abc import Iterator
+from functools import cache
+from itertools import pairwise
+from textwrap import fill
+from typing import Any, NamedTuple
+
+from scenarios.config.scenario import Scenario
+from scenarios.config.sections import Section, kinds_of
+from scenarios.config.validation import sections_at
+
+_BOUNDS = (("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"), ("exclusiveMaximum", "<"))
+_TYPES = {"string": "text", "boolean": "true or false", "integer": "whole number",
+          "object": "table"}
+
+
+class Key(NamedTuple):
+    """A key of a section: what its value is, in which unit, by default, and what it means.
+
+    `below` has the schemas of the sections that its value may be.
+    """
+
+    name: str
+    value: str
+    unit: str
+    default: str
+    meaning: str
+    below: tuple[str, ...]
+
+
+def keys_of(section: type[Section]) -> list[Key]:
+    """Return the keys of a section, but not what says its kind if there is one choice."""
+    schemas = _schemas(section)
+    schema, meaning = schemas[section.__name__], _meanings(section)
+    return [Key(name, _value(value, schemas), _unit(value),
+                "must be given" if name in schema.get("required", ()) else _default(value),
+                meaning[name], tuple(dict.fromkeys(_below(value, schemas))))
+            for name, value in schema["properties"].items() if "const" not in value]
+
+
+def title_of(section: type[Section], place: str) -> str:
+    """Return the name of a section at a place, with its kind where there are several."""
+    kinds = kinds_of(section)
+    return f"{place} with kind = {json.dumps(kinds[0])}" if len(kinds) == 1 else place
+
+
+def about(section: type[Section]) -> str:
+    """Return what a section is."""
+    return inspect.cleandoc(section.__doc__ or "")
+
+
+def explained(dotted: str) -> list[str]:
+    """Return what a dotted key means, as lines for a terminal; none for an unknown key.
+
+    Entries of a list have numbers, or none, as in `avoidance.obstacles.path`.
+    """
+    path = [part for part in dotted.split(".") if not part.isdigit() and part != "*"]
+    found = list(dict.fromkeys(sections_at(Scenario, path)))
+    said: dict[tuple[str, ...], list[str]] = {}  # sections by what they say of the key
+    for owner in dict.fromkeys(sections_at(Scenario, path[:-1])):
+        for key in keys_of(owner):
+            if key.name == path[-1]:
+                said.setdefault(tuple(_lines(key)), []).append(
+                    title_of(owner, _bracketed(path[:-1])))
+    lines = [line for text, owners in said.items() for line in (*owners, *text)]
+    for section in found:
+        lines += ["", title_of(section, _bracketed(path)), *_paragraphs(section)]
+        for key in keys_of(section):
+            lines += _lines(key)
+    return lines
+
+
+def _bracketed(path: list[str]) -> str:
+    """Return a place as a file has it: [control], [[tasks]]."""
+    if not path:
+        return "top of the file"
+    dotted = f"[{'.'.join(path)}]"
+    return f"[{dotted}]" if any(
+        key.value.startswith("list") for owner in sections_at(Scenario, path[:-1])
+        for key in keys_of(owner) if key.name == path[-1]) else dotted
+
+
+def places_of(name: str) -> list[str]:
+    """Return the dotted keys with a last part; of those below several sections the first."""
+    return [f"{place.strip('[]')}.{key.name}".lstrip(".") for place, section in sections()
+            for key in keys_of(section) if key.name == name]
+
+
+def sections() -> Iterator[tuple[str, type[Section]]]:
+    """Yield every section with the place, "[control]", where its key is met first."""
+    by_name, waiting = _sections(), [("", "Scenario")]
+    met = {"Scenario"}
+    for place, name in waiting:  # grows on the way
+        yield place, by_name[name]
+        for key in keys_of(by_name[name]):
+            dotted = f"{place.strip('[]')}.{key.name}".lstrip(".")
+            new = [one for one in key.below if one not in met]
+            waiting += [(f"[[{dotted}]]" if key.value.startswith("list") else f"[{dotted}]", one)
+                        for one in new]
+            met |= set(new)
+
+
+def page() -> str:
+    """Return the tables of all keys as Markdown."""
+    places = {section.__name__: place for place, section in sections()}
+    parts = []
+    for place, section in sections():
+        head = title_of(section, f"`{place}`") if place else "Top of the file"
+        parts += [f"## {head}", "", _escaped(about(section)), "",
+                  "| key | value | unit | default | meaning |", "|---|---|---|---|---|"]
+        for key in keys_of(section):
+            value = ", ".join(f"`{one}`" for one in dict.fromkeys(
+                places[name] for name in key.below)) or key.value
+            parts.append("| " + " | ".join(
+                (f"`{key.name}`", _escaped(value), key.unit, key.default and f"`{key.default}`",
+                 _escaped(key.meaning))) + " |")
+        parts.append("")
+    return "\n".join(parts).replace("`must be given`", "must be given")
+
+
+def _escaped(text: str) -> str:
+    return text.replace("<", r"\<").replace("*", r"\*").replace("|", r"\|")
+
+
+def _lines(key: Key) -> Iterator[str]:
+    unit = f" [{key.unit}]" if key.unit else ""
+    default = key.default if key.default in ("", "must be given") else f"default {key.default}"
+    yield f"  {key.name}: {', '.join(filter(None, (f'{key.value}{unit}', default)))}"
+    if key.meaning:
+        yield fill(key.meaning, 88, initial_indent="      ", subsequent_indent="      ")
+
+
+def _paragraphs(section: type[Section]) -> Iterator[str]:
+    for text in about(section).split("\n\n"):
+        yield fill(text, 88, initial_indent="  ", subsequent_indent="  ")
+
+
+@cache
+def _schemas(section: type[Section]) -> dict[str, Any]:
+    """Return the JSON schemas of a section and of those below it, by the names of the classes."""
+    schema = section.model_json_schema()
+    return {**schema.get("$defs", {}), section.__name__: schema}
+
+
+@cache
+def _sections() -> dict[str, type[Section]]:
+    found, waiting = {}, [Section]
+    for section in waiting:  # grows on the way
+        found[section.__name__] = section
+        waiting += section.__subclasses__()
+    return found
+
+
+def _meanings(section: type[Section]) -> dict[str, str]:
+    """Return the text below each key, in the section or in what it derives from."""
+    found: dict[str, str] = {}
+    for base in reversed(section.__mro__):
+        if base.__module__ in sys.modules and issubclass(base, Section):
+            found |= _texts(base)
+    return {field.alias or name: found.get(name, "")
+            for name, field in section.model_fields.items()}
+
+
+@cache
+def _texts(section: type[Section]) -> dict[str, str]:
+    body = _bodies(section.__module__).get(section.__name__, [])
+    return {above.target.id: " ".join(str(below.value.value).split())
+            for above, below in pairwise(body)
+            if isinstance(above, ast.AnnAssign) and isinstance(above.target, ast.Name)
+            and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)}
+
+
+@cache
+def _bodies(module: str) -> dict[str, list[Any]]:
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except (OSError, TypeError):  # a plugin without a source
+        return {}
+    return {node.name: node.body for node in tree.body if isinstance(node, ast.ClassDef)}
+
+
+def _default(value: dict[str, Any]) -> str:
+    default = value.get("default")
+    return "" if default in (None, [], "") or isinstance(default, dict) else json.dumps(default)
+
+
+def _choices(value: dict[str, Any]) -> list[Any]:
+    several = value.get("anyOf") or value.get("oneOf") or []
+    return [one for one in several if one.get("type") != "null"]
+
+
+def _inside(value: dict[str, Any]) -> list[Any]:
+    """Return the schemas within a schema: of choices, of entries, of the values of a table."""
+    items, more = value.get("items"), value.get("additionalProperties")
+    return [*_choices(value), *value.get("prefixItems", []),
+            *([items] if items else []), *([more] if isinstance(more, dict) else [])]
+
+
+def _unit(value: dict[str, Any]) -> str:
+    """Return the units in a schema, those of entries too."""
+    own = [value["unit"]] if "unit" in value else [_unit(one) for one in _inside(value)]
+    return " or ".join(filter(None, dict.fromkeys(own)))
+
+
+def _below(value: dict[str, Any], schemas: dict[str, Any]) -> Iterator[str]:
+    name = value.get("$ref", "").rpartition("/")[2]
+    if name and "properties" in schemas[name]:
+        yield name
+        return
+    for one in _inside(schemas[name] if name else value):
+        yield from _below(one, schemas)
+
+
+def _value(value: dict[str, Any], schemas: dict[str, Any]) -> str:
+    """Return what a value may be, in words."""
+    if "$ref" in value:
+        schema = schemas[value["$ref"].rpartition("/")[2]]
+        return "table" if "properties" in schema else _value(schema, schemas)
+    if choices := _choices(value):
+        return " or ".join(dict.fromkeys(_value(one, schemas) for one in choices))
+    if "const" in value or "enum" in value:
+        return ", ".join(map(json.dumps, value.get("enum", [value.get("const")])))
+    if "prefixItems" in value:
+        return f"{len(value['prefixItems'])} × {_value(value['prefixItems'][0], schemas)}"
+    if value.get("type") == "array":
+        return f"list: {_value(value.get('items', {}), schemas)}"
+    bounds = "".join(f" {sign} {value[name]:g}" for name, sign in _BOUNDS if name in value)
+    return _TYPES.get(value.get("type", ""), "number") + bounds

@@ -1,0 +1,135 @@
+"""What a user reads who wrote something wrong: the place, the mend, the nearest name."""
+
+import numpy as np
+import pytest
+
+from hierarchy import Hierarchy, HierarchyError
+from hierarchy.gate import check_rotation
+from scenarios import load
+from scenarios.cli.main import run_command
+from scenarios.config.validation import doubtful_units
+from scenarios.toml_text import read_toml
+from solvers import Resolution, Resolver, Status
+
+
+@pytest.fixture
+def an_arm_hierarchy():
+    return Hierarchy.from_levels([(np.eye(7)[:3], np.ones(3))])
+
+
+@pytest.mark.parametrize(("line", "caret", "mend"), [
+    ('resolver == "hcod"', 11, "write one ="), ('resolver: "hcod"', 9, "write = between"),
+    ('resolver "hcod"', 10, "write key = value"), ("resolver =", 11, "write a value"),
+    ("resolver = hcod", 12, 'put text in quotes: "hcod"'),
+    ('resolver = "hcod', 17, "close the text with the quote"),
+    ("resolver = “hcod”", 12, 'straight quotes'), ("q = [1 2]", 8, "write a comma before this"),
+    ("q = [1, 2", 5, "close this ["), ("q = [1, 2\n\n[robot]", 5, "close this ["),
+    ("x = −1", 5, "write - for this minus sign"), ("x = .5", 5, "a digit before the point"),
+    ("x = 0.001 s", 11, "without unit"), ("x = 1,5", 6, "a decimal point as ."),
+    ("x = True", 5, "in lower case"), ("x = 1 // much", 7, "a comment begins with #"),
+    ("[robot", 7, "with ]"), ("[my robot]", 5, "in quotes"), ("größe = 1", 3, "in quotes"),
+    ('file = "C:\\models"', 13, "write / for each"), ("x = {a = 1,}", 12, "the comma before }"),
+    ("a = 1\na = 2", 1, "leave out one"), ("[a]\n[a]", 1, "[[name]]")])
+def test_a_slip_in_a_file_shows_line_caret_and_mend(line, caret, mend, tmp_path):
+    file = tmp_path / "slip.toml"
+    file.write_text(f"name = 'x'\n{line}\n", encoding="utf-8")
+    with pytest.raises(HierarchyError) as error:
+        read_toml(file, "scenario file", HierarchyError)
+    head, shown, pointer, told = str(error.value).splitlines()
+    assert "slip.toml', line " in head
+    assert shown.strip() in line.splitlines()
+    assert pointer.index("^") == caret + 3
+    assert mend in told
+
+
+def test_a_file_with_a_byte_order_mark_and_names_in_any_alphabet_is_read(tmp_path):
+    file = tmp_path / "größe.toml"
+    file.write_bytes('extends = "ellipse"\nname = "Größe-模型"\n'.encode("utf-8-sig"))
+    assert load(file).name == "Größe-模型"
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ("tasks=[{kind='postion'}]", "tasks.0: unknown kind 'postion'; did you mean 'position'?"),
+    ("control.level=torqe", "unknown value 'torqe'; did you mean 'torque'?"),
+    ("tasks={kind='pose'}", "tasks: expected a list: for tables write [[tasks]] above each"),
+    ("control=[{period=0.1}]", "control: expected one table, as below [control]"),
+    ("avoidance.zzz=1", "unknown key 'avoidance.zzz'. Known:"),
+    ("name='a b'", "a name has letters, digits")])
+def test_a_wrong_value_is_told_with_what_it_may_be(change, said):
+    with pytest.raises(HierarchyError) as error:
+        load("ellipse", [change])
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(("asked", "said"), [
+    ("elipse", "did you mean 'ellipse'? The nearest of "), ("m.urdf", "'m.urdf' is a robot"),
+    ("a.py", "to be run by `python a.py`"), (".", "'.' is a folder"), ("tpm", "is a resolver"),
+    ("kuka_lwr", "is a robot"), ("posture", "is a kind of task"),
+    ("ellipse-starts", "to be run by `hierarchy sweep ellipse-starts`")])
+def test_what_is_no_scenario_is_told_with_what_it_is(asked, said, capsys):
+    assert run_command(["run", asked]) == 2
+    text = capsys.readouterr().err
+    assert said in text
+    assert len(text) < 400
+
+
+def test_a_wrong_frame_is_told_with_file_and_key(tmp_path, capsys):
+    file = tmp_path / "mine.toml"
+    file.write_text('extends = "humanoid"\nname = "mine"\n[robot]\nend_effector = "left_fot"\n')
+    assert run_command(["check", str(file)]) == 2
+    assert "mine.toml: robot: unknown frame 'left_fot'; did you mean 'left_foot'?" in (
+        capsys.readouterr().err)
+
+
+def test_a_sweep_is_not_run_and_a_scenario_is_no_sweep(tmp_path, capsys):
+    sweep, one = tmp_path / "sweep.toml", tmp_path / "one.toml"
+    sweep.write_text("name = 's'\nscenarios = ['ellipse']\nsamples = 3\n")
+    one.write_text("extends = 'ellipse'\nname = 'one'\n")
+    for command, file, said in [("run", sweep, "is a sweep"), ("sweep", one, "is a scenario")]:
+        assert run_command([command, str(file)]) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_values_in_millimetres_are_doubted():
+    path = {"position.path": {"kind": "still", "position": [0.3, 0.0, 300.0]}}
+    assert list(doubtful_units(load("ellipse", path))) == [
+        "position.path.position.2 = 300 m: lengths are in metres, not in millimetres"]
+    assert not list(doubtful_units(load("ellipse")))
+
+
+def test_a_rotation_is_told_by_how_much_it_is_off():
+    c, s = np.cos(0.8).round(5), np.sin(0.8).round(5)
+    rounded = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+    with pytest.raises(HierarchyError, match=r"R R\^T is 1e-05 from the identity, .* 8 digits"):
+        check_rotation("task 'hand': rotation", rounded)
+    with pytest.raises(HierarchyError, match="a reflection"):
+        check_rotation("task 'hand': rotation", np.diag([1.0, 1.0, -1.0]))
+
+
+@pytest.mark.parametrize(("returned", "said"), [
+    (lambda h: np.zeros(h.n), "solve: expected a Resolution, got ndarray"),
+    (lambda h: 1.0, "got float 1.0; return solvers.Resolution(x)"),
+    (lambda h: Resolution(1.0), "solve: x: expected an array of 7 floats, got float 1.0"),
+    (lambda h: Resolution(np.zeros(3)), "expected an array of 7 floats")])
+def test_what_a_resolver_of_a_plugin_returns_is_judged(returned, said, an_arm_hierarchy):
+    class Mine(Resolver):
+        name = "mine"
+
+        def solve(self, h, memory=None):
+            return returned(h)
+
+    with pytest.raises(HierarchyError) as error:
+        Mine().solve(an_arm_hierarchy)
+    assert said in str(error.value)
+
+
+def test_a_nan_of_a_resolver_of_a_plugin_is_a_failure(an_arm_hierarchy):
+    class Mine(Resolver):
+        name = "mine"
+
+        def solve(self, h, memory=None):
+            return Resolution(np.full(h.n, np.nan))
+
+    found = Mine().solve(an_arm_hierarchy)
+    assert found.status is Status.NUMERICAL_FAILURE
+    assert (found.x == 0.0).all()
