@@ -47,7 +47,7 @@ def read_bvh(file: str | File) -> Motion:
     if not (frames > 0 and period > 0.0 and isfinite(period) and np.isfinite(values).all()):
         raise HierarchyError(f"{file}: expected frames of finite numbers and a positive time of a "
                              f"frame, got {frames} frames of {period} s")
-    return Motion(period * np.arange(frames), _positions(joints, values))
+    return Motion(np.arange(frames, dtype=np.float64) * period, _positions(joints, values))
 
 
 def _skeleton(words: Iterator[str]) -> list[_Joint]:
