@@ -1,0 +1,104 @@
+"""Motions of a skeleton from a BVH file: where each joint is in each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isfinite
+from pathlib import Path as File
+from typing import NamedTuple
+
+import numpy as np
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
+
+
+class Motion(NamedTuple):
+    """F frames of a skeleton: `times` (F,) [s], by joint `positions` (F, 3) in the file's unit.
+
+    Axes are those of the file, in most of them y up. The end of a limb is called "JOINT end".
+    """
+
+    times: Array
+    positions: dict[str, Array]
+
+
+class _Joint(NamedTuple):
+    name: str
+    parent: int
+    offset: tuple[float, ...]
+    channels: tuple[str, ...]
+
+
+def read_bvh(file: str | File) -> Motion:
+    """Read a BVH file; raises HierarchyError, naming the file, if it is none."""
+    try:
+        words = File(file).read_text(encoding="utf-8").split()
+    except (OSError, UnicodeDecodeError) as error:
+        raise HierarchyError(f"{file} cannot be read: {error}") from error
+    try:
+        at = words.index("MOTION")
+        joints = _skeleton(iter(words[1:at]))
+        frames, period = int(words[at + 2]), float(words[at + 5])  # Frames: F Frame Time: s
+        count = sum(len(joint.channels) for joint in joints)
+        values = np.array(words[at + 6:], dtype=float).reshape(frames, count)
+    except (ValueError, IndexError, StopIteration) as error:
+        raise HierarchyError(f"{file} is no BVH file: {error or 'it ends early'}") from error
+    if not (frames > 0 and period > 0.0 and isfinite(period) and np.isfinite(values).all()):
+        raise HierarchyError(f"{file}: expected frames of finite numbers and a positive time of a "
+                             f"frame, got {frames} frames of {period} s")
+    return Motion(np.arange(frames, dtype=np.float64) * period, _positions(joints, values))
+
+
+def _skeleton(words: Iterator[str]) -> list[_Joint]:
+    joints: list[_Joint] = []
+    open_: list[int] = []
+    for word in words:
+        if word in ("ROOT", "JOINT", "End"):
+            name, parent = next(words), open_[-1] if open_ else -1
+            if word == "End":
+                name = f"{joints[parent].name} end"
+            joints.append(_Joint(name, parent, (0.0, 0.0, 0.0), ()))
+        elif word == "{":
+            open_.append(len(joints) - 1)
+        elif word == "}":
+            open_.pop()
+        elif word == "OFFSET":
+            joints[-1] = joints[-1]._replace(offset=tuple(float(next(words)) for _ in range(3)))
+        elif word == "CHANNELS":
+            channels = tuple(next(words).lower() for _ in range(int(next(words))))
+            joints[-1] = joints[-1]._replace(channels=channels)
+        else:
+            raise ValueError(f"{word!r} is unknown there")
+    return joints
+
+
+def _positions(joints: list[_Joint], values: Array) -> dict[str, Array]:
+    """Return where each joint is, from its channels in the order of the file [deg]."""
+    frames, first = len(values), 0
+    turns, places = list[Array](), list[Array]()
+    for joint in joints:
+        turn, place = np.tile(np.eye(3), (frames, 1, 1)), np.tile(joint.offset, (frames, 1))
+        for channel in joint.channels:
+            value, axis = values[:, first], "xyz".index(channel[0])
+            if channel.endswith("position"):
+                place[:, axis] += value
+            else:
+                turn = turn @ _turned(axis, np.radians(value))
+            first += 1
+        if joint.parent >= 0:
+            place = places[joint.parent] + np.einsum("fij,fj->fi", turns[joint.parent], place)
+            turn = turns[joint.parent] @ turn
+        turns.append(turn)
+        places.append(place)
+    return {joint.name: place for joint, place in zip(joints, places, strict=True)}
+
+
+def _turned(axis: int, angle: Array) -> Array:
+    """Rotations (F, 3, 3) about one axis by angles (F,) [rad]."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R = np.tile(np.eye(3), (len(angle), 1, 1))
+    R[:, i, i] = R[:, j, j] = np.cos(angle)
+    R[:, j, i] = np.sin(angle)
+    R[:, i, j] = -R[:, j, i]
+    return R

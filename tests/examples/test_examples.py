@@ -1,0 +1,65 @@
+"""The examples run, and print what they promise: strict levels beside how it is done otherwise."""
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios import load, simulate
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+# Seconds of the run; at most this with strict levels, and at least that otherwise [mm, deg, ...].
+PROMISES = {
+    "humanoid": (3.0, 0.6, 10.0), "iiwa": (2.0, 0.3, 0.6), "mobile": (2.5, 0.5, 2.0),
+    "panda": (2.5, 0.1, 4.0), "policy": (1.5, 0.6, 100.0), "quadruped": (1.5, 1.0, 2.0),
+    "retarget": (0.3, 0.12, 1.0),
+    "so101": (1.6, 0.1, 10.0), "teleop": (1.5, 15.001, 100.0), "wall": (1.6, 0.01, 100.0)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROMISES)
+def test_an_example_keeps_what_it_promises_where_the_other_way_does_not(name, capsys):
+    duration, most, least = PROMISES[name]
+    strict, other = loaded(name).main(duration)
+    assert strict <= most
+    assert other >= least
+    assert len(capsys.readouterr().out.splitlines()) == 1
+
+
+EQUAL = ["control.resolver=weighted", "control.options.ratio=1", "control.damping=0"]
+
+
+@pytest.mark.slow
+def test_the_ur5_keeps_clear_of_the_ball_and_with_equal_weights_does_not():
+    strict, equal = (simulate(load(EXAMPLES / "ur5.toml", changes))
+                     for changes in ([], EQUAL))
+    assert min(strict["minimal_distance"].min(), strict["ee_distance"].min()) > 0.0499
+    assert equal["ee_distance"].min() < -0.05
+
+
+@pytest.mark.slow
+def test_two_hands_hold_their_tray_and_with_equal_weights_do_not():
+    strict, equal = (simulate(load(EXAMPLES / "tray.toml", ["control.duration=2", *changes]))
+                     for changes in ([], EQUAL))
+    apart = [np.linalg.norm(run["task_error_grip"][:, :3], axis=1).max()
+             for run in (strict, equal)]
+    assert apart[0] < 0.002
+    assert apart[1] > 0.05
+
+
+@pytest.mark.parametrize("name", PROMISES)
+def test_an_example_is_short_and_says_first_what_it_shows(name):
+    text = (EXAMPLES / f"{name}.py").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 80
+    assert re.match(r'"""[A-Z].*\n\nLevels: ', text)
+
+
+def loaded(name):
+    """The module of an example."""
+    spec = importlib.util.spec_from_file_location(f"example_{name}", EXAMPLES / f"{name}.py")
+    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
