@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmark.reproduce import claims
+from benchmark.reproduce.protocol import PROTOCOL
 from benchmark.reproduce.studies import BLOCKS, Rows
 from hierarchy.errors import HierarchyError
 from scenarios.measure.statistics import Paired, wilson
@@ -19,6 +21,12 @@ _NAMED = re.compile(r"\{(?P<study>[\w-]+) (?P<column>[\w.-]+)(?: (?P<metric>\w+)
                     r"(?: (?P<first>[\w.-]+))?\}")
 _CELL = re.compile(r"\{(?P<output>[^{}/]+)/(?P<table>[^{}/]+)/(?P<row>[^{}/]+)/(?P<place>\d+)\}")
 
+PROTOCOL_BLOCKS: dict[str, Callable[[], str]] = {
+    "protocol-letter": lambda: "\n".join(claims.asked(PROTOCOL, "letter")),
+    "protocol-own": lambda: "\n".join(claims.asked(PROTOCOL, "own")),
+    "protocol-untested": lambda: "\n".join(claims.untested(PROTOCOL)),
+}
+
 Statement = Sequence[Any]  # a text, and what decides it
 
 
@@ -27,6 +35,8 @@ def block(name: str, rows: Mapping[str, Rows], output: Callable[[str], str]) -> 
 
     output : returns what a command has printed.
     """
+    if name in PROTOCOL_BLOCKS:
+        return PROTOCOL_BLOCKS[name]()
     given = BLOCKS[name]
     if "items" in given:
         outputs = given.get("outputs", {})

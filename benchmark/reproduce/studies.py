@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmark.reproduce.ticks import METRICS, measured
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from scenarios.config import Scenario, load
@@ -127,14 +126,6 @@ def rows_of(study: Study, out: Path, workers: Workers, progress: Progress | None
     Raises what `compare_starts` raises.
     """
     command = f"hierarchy reproduce {study.name}"
-    if not study.columns:
-        known = METRICS["pairs" if study.pairs else "pivots"]
-        found, ended = measured(load(study.scenario).with_resolver(study.resolver), study.pairs,
-                                study.pivots, study.starts, SEED)
-        values = {column: {name: plain([one[column, name] for one in found]) for name in known}
-                  for column in study.names}
-        return Rows(study.name, command, study.starts, SEED, known, values,
-                    dict.fromkeys(values, ended))
     said = progress and (lambda name, done, total: progress(study.name, done, total))
     done = compare_starts([column.load() for column in study.columns], [OWN], study.starts, SEED,
                           out, workers=workers, progress=said, command=command)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import erfc, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,16 +140,65 @@ def best(columns: Mapping[str, Array], lower_is_better: bool) -> tuple[str, ...]
                if label != first}
     equal = [label for label, one in against.items() if one.equal]
     other = {label: one for label, one in against.items() if not one.equal}
-    if not other or not _all_told_apart([one.p for one in other.values()]):
+    if not other or max(holm([one.p for one in other.values()])) >= LEVEL:
         return ()
     if any((one.median < 0.0) == lower_is_better for one in other.values()):
         return ()
     return (first, *equal)
 
 
-def _all_told_apart(p: Sequence[float]) -> bool:
-    """Whether Holm's step-down procedure rejects chance for every one of the tests."""
-    return all(one < LEVEL / (len(p) - rank) for rank, one in enumerate(sorted(p)))
+@dataclass(frozen=True)
+class Effect:
+    """The shift of paired differences from zero: estimate, its 95 % interval, and a p-value."""
+
+    count: int
+    estimate: float
+    low: float
+    high: float
+    p: float
+
+
+def blocked(differences: Array, blocks: NDArray[np.int64]) -> Effect:
+    """Return the shift of differences (N,) whose signs are compared within blocks (N,) only.
+
+    The estimate is that of Hodges and Lehmann (1963), the median of all means of two differences
+    of a block; the test is the signed-rank test summed over blocks (normal approximation), and the
+    interval is the set of shifts that it does not reject. An infinite difference is the largest;
+    what is not a number, such as that of two infinite values, counts as zero.
+    """
+    apart = np.where(np.isnan(differences), 0.0, differences)
+    means, middle, square = [], 0.0, 0.0
+    for block in np.unique(blocks):
+        own = apart[blocks == block]
+        n = own.size
+        first, second = np.triu_indices(n)
+        with np.errstate(invalid="ignore"):
+            means.append(np.nan_to_num((own[first] + own[second]) / 2.0, nan=0.0, posinf=np.inf,
+                                       neginf=-np.inf))
+        middle += n * (n + 1) / 4.0
+        square += n * (n + 1) * (2 * n + 1) / 24.0
+    if not means:
+        return Effect(0, np.nan, np.nan, np.nan, 1.0)
+    ordered, deviation = np.sort(np.concatenate(means)), float(np.sqrt(square))
+    above = (ordered > 0.0).sum() + (ordered == 0.0).sum() / 2.0
+    p = erfc(max(abs(above - middle) - 0.5, 0.0) / deviation / sqrt(2.0))
+    k = max(int(middle - 1.96 * deviation), 0)
+    return Effect(apart.size, _middle(ordered), float(ordered[k]), float(ordered[-1 - k]), p)
+
+
+def _middle(ordered: Array) -> float:
+    """Return the median of sorted values, which may be infinite."""
+    low, high = ordered[(ordered.size - 1) // 2], ordered[ordered.size // 2]
+    return float(low if low == high else (low + high) / 2.0)
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Return p-values adjusted for their number by Holm's step-down procedure (1979)."""
+    adjusted, largest = [1.0] * len(p), 0.0
+    for rank, i in enumerate(sorted(range(len(p)), key=lambda i: p[i])):
+        largest = max(largest, min(1.0, (len(p) - rank) * p[i]))
+        adjusted[i] = largest
+    return adjusted
 
 
 def wilson(met: int, of: int) -> tuple[float, float]:

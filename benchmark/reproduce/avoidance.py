@@ -1,0 +1,82 @@
+"""How well a run does what its avoidance task asks, and how abruptly the repulsion turns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, final
+
+import numpy as np
+
+from hierarchy.problem import Array
+from hierarchy.state import State
+from scenarios.config import Scenario
+from scenarios.loop.controller import Controller
+from scenarios.loop.simulation import simulate
+from scenarios.measure.metric import Metric
+from scenarios.measure.metrics import measure
+from scenarios.recording.recording import Recording
+
+_FAR = 0.15               # [m] eps_2 of the letter: within it avoidance is asked for
+_TURN = np.cos(np.radians(5.0))  # of a direction in a tick, from which on it is abrupt
+
+
+@final
+class Repulsion:
+    """Follows the control point nearest to an obstacle in every tick; an Audit without signals.
+
+    errors : n^T (J a + dJ v) - r of (29) [m/s^2] in ticks in which the point is within eps_2.
+    jumps : how often the direction n of one point turned by more than 5 degrees in a tick.
+    """
+
+    def __init__(self) -> None:
+        self.errors, self.jumps = list[float](), 0
+        self._before: tuple[int, Array] | None = None
+
+    def look(self, tick: int, controller: Controller) -> None:
+        """Examine a tick."""
+        seen, state = controller.cell.sensor.measurement, controller.cell.state  # type: ignore[union-attr]
+        k = seen.active
+        if k < 0 or seen.distance[k] > _FAR:
+            self._before = None
+            return
+        n = np.array(seen.direction[k])
+        if self._before is not None and self._before[0] == k:
+            self.jumps += int(n @ self._before[1] < _TURN)
+        self._before = k, n
+        if controller.level == "acceleration":
+            point = controller.cell.robot.control_points[k]
+            self.errors.append(float(
+                n @ acceleration(state, point.joint, seen.points[k], controller.sent)
+                - seen.magnitude[k]))
+
+    def signals(self, recording: Recording) -> Mapping[str, Any]:
+        """Return nothing: the recording is that of the run."""
+        return {}
+
+
+def acceleration(state: State, joint: int, p: Array, a: Array) -> Array:
+    """Return the acceleration (3,) [m/s^2] of the point p (3,) [m] on a joint under a (n,)."""
+    moves = state.supports[joint]
+    v, w = np.split(state.J[:, moves] @ state.v[moves], 2)
+    dv, dw = np.split(state.J[:, moves] @ a[moves] + state.dJ[:, moves] @ state.v[moves], 2)
+    return np.asarray(dv + np.cross(dw, p) + np.cross(w, v + np.cross(w, p)))
+
+
+def measured(scenario: Scenario) -> tuple[Recording, tuple[Metric, ...]]:
+    """Return the recording of a run and its metrics, with those of this module."""
+    watch = Repulsion()
+    watched = [watch] if scenario.avoidance is not None and scenario.sensor.kind == "exact" else []
+    recording = simulate(scenario, audits=watched)
+    found = [*measure(recording).values(), *_rms(recording)]
+    if watched:
+        errors = float(np.sqrt(np.mean(np.square(watch.errors)))) if watch.errors else None
+        found += [Metric("avoidance_error_rms", "Error of the avoidance task, rms", errors, "m/s^2"),
+                  Metric("direction_jumps", "Abrupt turns of the repulsion", float(watch.jumps), "")]
+    return recording, tuple(found)
+
+
+def _rms(recording: Recording) -> list[Metric]:
+    """Return the root of the mean square of joint speed and acceleration, over joints and time."""
+    return [Metric(f"{key}_rms", f"Joint {key}, rms", float(np.sqrt(np.mean(np.square(
+        recording[signal])))) if recording.ticks else None, unit)
+        for key, signal, unit in (("speed", "v", "rad/s"), ("acceleration", "a", "rad/s^2"))]

@@ -1,0 +1,71 @@
+"""The blocks of pages about the protocol: its claims, and what was found about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from benchmark.reproduce.protocol import Claim, Protocol, Rows
+from benchmark.reproduce.verdicts import Found, judged, shown
+from scenarios.measure.statistics import probability
+
+
+def asked(protocol: Protocol, family: str) -> list[str]:
+    """Return a table of the claims of a family: words, what decides, smallest effect."""
+    lines = ["| claim | section, quotation | decided by | smallest effect |", "|---|---|---|---|"]
+    for one in protocol.claims:
+        if one.family == family:
+            said = f"{one.section}: “{one.quotation}”" if one.quotation else ""
+            lines.append(f"| {one.text} | {said} | {_decider(one)} | {_least(protocol, one)} |")
+    return lines if family == "letter" else _without(lines, 1)
+
+
+def untested(protocol: Protocol) -> list[str]:
+    """Return the letter's claims that runs do not decide, with the reason."""
+    return [f"- “{said}”: {why}." for said, why in protocol.untested.items()]
+
+
+def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
+    """Return a table of what was found about the claims of a family."""
+    lines = [f"| claim | effect [95 % interval] | {' | '.join(rows.layouts)} | Holm's p | verdict |",
+             "|---" * (4 + len(rows.layouts)) + "|"]
+    for one in judged(protocol, rows, family):
+        each = " | ".join(shown(one.claim, rows, effect) for effect in one.layouts)
+        lines.append(f"| {one.claim.text} | {shown(one.claim, rows, one.effect)} | {each} | "
+                     f"{probability(one.p)} | **{one.decided}** |")
+    return lines
+
+
+def faults(rows: Rows) -> list[str]:
+    """Return the columns that have runs which ended in a fault, and the reasons."""
+    total = rows.blocks.size
+    said = [f"`{column}` {total - int(rows.ended(column).sum())} of {total} "
+            f"({'; '.join(told)})" for column, told in rows.reasons[0].items()]
+    return [f"Runs that ended in a fault: {', '.join(said) or 'none'}. Of {len(rows.seeds)} seeds "
+            f"with {rows.starts} starts on each layout, run twice."]
+
+
+def counted(every: Sequence[Found]) -> dict[str, int]:
+    """Return how many claims have each verdict."""
+    names = [one.decided.partition(":")[0] for one in every]
+    return {name: names.count(name) for name in dict.fromkeys(names)}
+
+
+def _decider(claim: Claim) -> str:
+    if not claim.metric:
+        return f"share of runs of `{claim.of}` that reach their end"
+    if claim.rival:
+        word = "below" if claim.below else "above"
+        return f"`{claim.metric}` of `{claim.of}` {word} that of `{claim.rival}`"
+    bound = f"at least {claim.least:g}" if claim.most == float("inf") else f"at most {claim.most:g}"
+    return f"`{claim.metric}` of `{claim.of}` {bound}"
+
+
+def _least(protocol: Protocol, claim: Claim) -> str:
+    if not claim.rival:
+        return f"{100 * protocol.share:g} % of starts"
+    return f"{claim.matters:g}{' %' if claim.percent else ' (SI)' if claim.matters < 1 else ''}"
+
+
+def _without(lines: list[str], column: int) -> list[str]:
+    cells = [line.strip("|").split("|") for line in lines]
+    return [f"|{'|'.join(row[:column] + row[column + 1:])}|" for row in cells]

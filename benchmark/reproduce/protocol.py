@@ -1,0 +1,253 @@
+"""The protocol of `protocol.toml`: its columns, layouts and claims, and the runs that decide them."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmark.reproduce.avoidance import measured
+from hierarchy.problem import Array
+from scenarios.config import Scenario, load
+from scenarios.config.distributions import Value
+from scenarios.config.sampling import changed, drawn
+from scenarios.config.scenario import OWN
+from scenarios.files import make_folder, write_text
+from scenarios.results.run import Job, Outcome, digest, key_of, outcome
+from scenarios.results.sampled import Progress, Workers, complete
+from scenarios.results.store import Store
+
+ENDED = "reached_end"
+_DIGITS = 6  # kept of each value
+
+
+@dataclass(frozen=True)
+class Column:
+    """A scenario with changes at dotted keys, under a resolver."""
+
+    scenario: str
+    resolver: str = OWN
+    set: Mapping[str, Any] = field(default_factory=dict)
+
+    def load(self, layout: Mapping[str, Any], name: str) -> Scenario:
+        """Return the scenario on a layout, under a name."""
+        changes = {**layout, **self.set, "name": name}
+        return load(self.scenario, changes).with_resolver(self.resolver)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What is said of a column, and the smallest effect that matters; see protocol.toml."""
+
+    name: str
+    family: str
+    text: str
+    of: str
+    metric: str = ""
+    below: str = ""
+    above: str = ""
+    least: float = -np.inf
+    most: float = np.inf
+    percent: bool = False
+    matters: float = 0.0
+    section: str = ""
+    quotation: str = ""
+
+    @property
+    def rival(self) -> str:
+        """The column that it is compared with, "" for a bound."""
+        return self.below or self.above
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """Columns run on every layout from `starts` starts of each seed, and what is claimed of them.
+
+    noise : added to every sampled number when all is run again. level : of Holm's procedure.
+    share : of the starts from which a bound is to be kept. untested : what is not decided, and why.
+    """
+
+    layouts: Mapping[str, Mapping[str, Any]]
+    columns: Mapping[str, Column]
+    claims: tuple[Claim, ...]
+    seeds: tuple[int, ...]
+    starts: int
+    noise: float
+    level: float
+    share: float
+    untested: Mapping[str, str]
+
+    @classmethod
+    def read(cls, path: Path) -> Protocol:
+        """Return the protocol of a file."""
+        given = tomllib.loads(path.read_text(encoding="utf-8"))
+        return cls(given["layout"],
+                   {name: Column(**one) for name, one in given["column"].items()},
+                   tuple(Claim(name, **one) for name, one in given["claim"].items()),
+                   tuple(given["seeds"]), *(given[key] for key in (
+                       "starts", "noise", "level", "share", "untested")))
+
+    @property
+    def metrics(self) -> set[str]:
+        """The metrics that decide claims."""
+        return {claim.metric for claim in self.claims} - {""}
+
+
+PROTOCOL = Protocol.read(Path(__file__).with_suffix(".toml"))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What came of the runs: values[noisy][column][metric], by layout, seed and start.
+
+    A value is None where the run ended in a fault, which reasons[noisy][column] counts by its text,
+    or has no such metric. metrics : name to label, unit, and whether lower is better.
+    """
+
+    layouts: list[str]
+    seeds: list[int]
+    starts: int
+    metrics: dict[str, dict[str, Any]]
+    values: list[dict[str, dict[str, list[float | None]]]]
+    reasons: list[dict[str, dict[str, int]]]
+
+    @cached_property
+    def blocks(self) -> NDArray[np.int64]:
+        """The block of each run, of one layout and seed, (runs,)."""
+        return np.repeat(np.arange(len(self.layouts) * len(self.seeds)), self.starts)
+
+    def layout(self, name: str) -> NDArray[np.bool_]:
+        """Return which runs are on a layout, (runs,)."""
+        return self.blocks // len(self.seeds) == self.layouts.index(name)
+
+    def column(self, column: str, metric: str, noisy: int = 0) -> Array:
+        """Return a metric (runs,), at its worst where the run ended in a fault."""
+        worst = np.inf if self.metrics[metric]["lower"] else -np.inf
+        found = np.array(self.values[noisy][column][metric], dtype=float)
+        return np.where(np.isnan(found), worst, found)
+
+    def ended(self, column: str, noisy: int = 0) -> NDArray[np.bool_]:
+        """Return which runs reached their end, (runs,)."""
+        return np.array(self.values[noisy][column][ENDED]) == 1.0
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A run: with noise or without, its column and scenario, and what is sampled."""
+
+    noisy: int
+    column: str
+    scenario: Scenario
+    start: int
+    values: Mapping[str, Value]
+    key: str
+
+    def job(self) -> Job:
+        """Return the run for a process."""
+        text = changed(self.scenario, self.values, self.column).to_toml()
+        return Job(self.key, text, OWN, self.scenario.name, self.start, self.values)
+
+
+def run(protocol: Protocol, out: Path, workers: Workers, progress: Progress | None = None
+        ) -> Iterator[Rows]:
+    """Make the runs that `out` does not have, seed by seed; yield those of all seeds so far.
+
+    Each seed is run without and with noise. Raises what `scenarios.results.sampled.sweep` raises.
+    """
+    for count in range(1, len(protocol.seeds) + 1):
+        some = replace(protocol, seeds=protocol.seeds[:count])
+        runs, store = list(_runs(some)), Store(out)
+        with store.opened():
+            kept = store.outcomes()
+            complete([one.job() for one in runs if one.key not in kept], store, workers,
+                     f"seed {count} of {len(protocol.seeds)}", progress, work)
+            yield _rows(some, runs, store.outcomes())
+
+
+def _rows(protocol: Protocol, runs: Sequence[_Run], kept: Mapping[str, Outcome]) -> Rows:
+    values: list[dict[str, dict[str, list[float | None]]]] = [{}, {}]
+    reasons: list[dict[str, dict[str, int]]] = [{}, {}]
+    metrics: dict[str, dict[str, Any]] = {}
+    for one in runs:
+        found = kept[one.key]
+        of = values[one.noisy].setdefault(one.column, {})
+        of.setdefault(ENDED, []).append(float(found.reason is None))
+        if found.reason is not None:
+            told = reasons[one.noisy].setdefault(one.column, {})
+            told[_kind(found.reason)] = told.get(_kind(found.reason), 0) + 1
+        for name in sorted(protocol.metrics):
+            of.setdefault(name, []).append(_value(found, name))
+        metrics |= {metric.name: {"label": metric.label, "unit": metric.unit,
+                                  "lower": metric.lower_is_better is not False}
+                    for metric in found.metrics if metric.name in protocol.metrics}
+    return Rows(list(protocol.layouts), list(protocol.seeds), protocol.starts, metrics, values,
+                reasons)
+
+
+def work(job: Job) -> Outcome:
+    """Make a run in a process of the pool."""
+    return outcome(job, measured)
+
+
+def _value(found: Outcome, name: str) -> float | None:
+    value = next((one.value for one in found.metrics if one.name == name), None)
+    bad = found.reason is not None or value is None or not np.isfinite(value)
+    return None if bad else float(f"{value:.{_DIGITS}g}")
+
+
+def _kind(reason: str) -> str:
+    """Return a reason without its numbers, so that alike ones are counted together."""
+    return re.sub(r"\S*\d\S*", "#", reason)
+
+
+def _runs(protocol: Protocol) -> Iterator[_Run]:
+    versions = digest()
+    for noisy, (name, column), (layout, changes) in product(
+            (0, 1), protocol.columns.items(), protocol.layouts.items()):
+        scenario = column.load(changes, f"{name}-{layout}")
+        text = scenario.to_toml()
+        for seed, start in product(protocol.seeds, range(protocol.starts)):
+            values = drawn(scenario, scenario.variation, seed, start)
+            if noisy:
+                values = _with_noise(values, protocol.noise, (seed, start))
+            key = key_of(text + json.dumps(values), OWN, versions)
+            yield _Run(noisy, name, scenario, start, values, key)
+
+
+def _with_noise(values: Mapping[str, Value], noise: float, seed: tuple[int, int]
+                ) -> dict[str, Value]:
+    """Return values with normal noise on every number."""
+    random = np.random.default_rng(seed)
+
+    def moved(value: Any) -> Any:
+        if isinstance(value, list):
+            return [moved(one) for one in value]
+        return value + noise * random.standard_normal() if isinstance(value, float) else value
+
+    return {key: moved(value) for key, value in values.items()}
+
+
+def quick(protocol: Protocol) -> Protocol:
+    """Return the protocol with its first seed only."""
+    return replace(protocol, seeds=protocol.seeds[:1])
+
+
+def write(rows: Rows, path: Path) -> None:
+    """Write rows as JSON, a line for each metric of a column."""
+    make_folder(path.parent)
+    text = json.dumps(asdict(rows), indent=1)
+    write_text(path, re.sub(r"\[[^][{}]*\]", lambda found: " ".join(found[0].split()), text) + "\n")
+
+
+def read(path: Path) -> Rows:
+    """Return the rows of a file."""
+    return Rows(**json.loads(path.read_text(encoding="utf-8")))

@@ -1,0 +1,118 @@
+"""What runs say about the claims of the protocol: effect, interval, Holm's p, and a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmark.reproduce.protocol import Claim, Protocol, Rows
+from hierarchy.problem import Array
+from scenarios.measure.metric import Metric
+from scenarios.measure.statistics import Effect, blocked, holm, wilson
+
+SUPPORTED, CONTRADICTED = "supported", "contradicted"
+NEGLIGIBLE, UNDECIDED = "no effect that matters", "undecided"
+DIFFERS = "differs between layouts"
+
+
+@dataclass(frozen=True)
+class Found:
+    """What was found about a claim: the effect, in the claim's direction, on all layouts and each.
+
+    Of a bound it is the share of starts from which it is kept. p : after Holm. verdict : of the
+    runs without noise, and `again` of those with it.
+    """
+
+    claim: Claim
+    effect: Effect
+    layouts: tuple[Effect, ...]
+    p: float
+    verdict: str
+    again: str
+
+    @property
+    def decided(self) -> str:
+        """The verdict, which no noise may change."""
+        return (self.verdict if self.verdict == self.again else
+                f"{UNDECIDED}: with noise {self.again}")
+
+
+def judged(protocol: Protocol, rows: Rows, family: str) -> list[Found]:
+    """Return what was found about the claims of a family."""
+    claims = [one for one in protocol.claims if one.family == family]
+    first, second = (_judged(protocol, rows, claims, noisy) for noisy in (0, 1))
+    return [Found(claim, *found, again[-1])
+            for claim, found, again in zip(claims, first, second, strict=True)]
+
+
+def _judged(protocol: Protocol, rows: Rows, claims: Sequence[Claim], noisy: int
+            ) -> list[tuple[Effect, tuple[Effect, ...], float, str]]:
+    apart = [_apart(rows, claim, noisy) for claim in claims]
+    effects = [_effect(protocol, rows, claim, one, np.ones_like(one, dtype=bool))
+               for claim, one in zip(claims, apart, strict=True)]
+    layouts = [tuple(_effect(protocol, rows, claim, one, rows.layout(name))
+                     for name in rows.layouts) for claim, one in zip(claims, apart, strict=True)]
+    adjusted = holm([effect.p for effect in effects])
+    return [(effect, each, p, _verdict(protocol, claim, effect, each, p))
+            for claim, effect, each, p in zip(claims, effects, layouts, adjusted, strict=True)]
+
+
+def _apart(rows: Rows, claim: Claim, noisy: int) -> Array:
+    """Return by how much each start speaks for a claim; of a bound, whether it is kept."""
+    if not claim.metric:
+        return rows.ended(claim.of, noisy).astype(float)
+    found = rows.column(claim.of, claim.metric, noisy)
+    if not claim.rival:
+        return ((found >= claim.least) & (found <= claim.most)).astype(float)
+    rival = rows.column(claim.rival, claim.metric, noisy)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        apart = np.log(found / rival) if claim.percent else found - rival
+    apart = np.where(np.isinf(found) & np.isinf(rival), 0.0, apart)
+    return np.asarray(-apart if claim.below else apart)
+
+
+def _effect(protocol: Protocol, rows: Rows, claim: Claim, apart: Array, some: Array) -> Effect:
+    if claim.metric and claim.rival:
+        return blocked(apart[some], rows.blocks[some])
+    from scipy.stats import binomtest
+
+    met, of = int(apart[some].sum()), int(some.sum())
+    return Effect(of, met / of, *wilson(met, of), float(binomtest(met, of, protocol.share).pvalue))
+
+
+def _verdict(protocol: Protocol, claim: Claim, effect: Effect, layouts: Sequence[Effect],
+             p: float) -> str:
+    middle, matters = 0.0, claim.matters
+    if not (claim.metric and claim.rival):
+        middle = protocol.share
+    elif claim.percent:
+        matters = -np.log1p(-matters / 100.0) if claim.below else np.log1p(matters / 100.0)
+    low, high = effect.low - middle, effect.high - middle
+    if claim.rival and -matters < low and high < matters:
+        return NEGLIGIBLE
+    if p >= protocol.level or low < matters and high > -matters:
+        return UNDECIDED
+    sides = {bool(one.estimate > middle) for one in layouts}
+    return DIFFERS if len(sides) > 1 else SUPPORTED if low > 0.0 else CONTRADICTED
+
+
+def shown(claim: Claim, rows: Rows, effect: Effect) -> str:
+    """Return "estimate [low, high] unit" in the claim's own direction and unit."""
+    numbers = effect.estimate, effect.low, effect.high
+    if not claim.rival:
+        return "{:.1f} [{:.1f}, {:.1f}] % of starts".format(*(100.0 * one for one in numbers))
+    if claim.below:
+        numbers = -effect.estimate, -effect.high, -effect.low
+    if claim.percent:
+        middle, low, high = (100.0 * np.expm1(one) for one in numbers)
+        return f"{_signed(middle)} [{_signed(low)}, {_signed(high)}] %"
+    known = rows.metrics[claim.metric]
+    metric = [Metric(claim.metric, "", one, known["unit"]) for one in numbers]
+    middle, low, high = ("∞" if np.isinf(one.value or 0.0) else one.shown() for one in metric)
+    return f"{middle} [{low}, {high}] {metric[0].shown_unit}".strip()
+
+
+def _signed(percent: float) -> str:
+    return "+∞" if percent > 1e5 else f"{percent:+.1f}"
