@@ -13,7 +13,7 @@ change of the answer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 Solve = Callable[[Hierarchy], Array]
 
+_LARGEST = 3
 _NARROW = 2.0**-33  # width of the interval at which the bisection ends
 _STAYS = 0.1        # share of the change that stays in it if the optimum jumps
 _EXPLAINS = 0.5     # share of the change that is left, at most, without what explains it
@@ -74,19 +75,24 @@ class Jump:
         return f"{self.what} changed by {self.size:.3g} {self.unit}"
 
 
-def jumps(recording: Recording, count: int = 3, tick: int | None = None) -> list[Jump]:
-    """Return the `count` largest changes of a run's command, or that into one tick, with causes.
+def jumps(recording: Recording, tick: int | None = None,
+          least: Mapping[str, float] | None = None) -> list[Jump]:
+    """Return the three largest changes of a run's command, or that into one tick, with causes.
 
-    Raises HierarchyError for a tick that the run does not have, or the first.
+    `least` has, by its unit, the change from which on they are meant. Raises HierarchyError for a
+    tick that the run does not have, or the first.
     """
     if tick is not None and not 0 < tick < recording.ticks:
         raise HierarchyError(f"tick {tick}: the run has ticks 0 to {recording.ticks - 1}, and a "
                              "change needs the one before")
     step = np.nan_to_num(np.abs(np.diff(recording["command"], axis=0))).max(axis=1, initial=0.0)
-    ticks = (np.argsort(-step, kind="stable")[:count] + 1).tolist() if tick is None else [tick]
+    above = (least or {}).get(_UNITS[recording.scenario.control.level], 0.0)
+    ticks = [k + 1 for k in np.argsort(-step, kind="stable")[:_LARGEST] if step[k] > above]
+    if not ticks and tick is None:
+        return []
     cell = build(recording.scenario)
     rows = Rows(recording, cell)
-    return [_jump(recording, cell, rows, k) for k in ticks if tick or step[k - 1] > 0.0]
+    return [_jump(recording, cell, rows, int(k)) for k in (ticks if tick is None else [tick])]
 
 
 def _jump(recording: Recording, cell: Cell, rows: Rows, k: int) -> Jump:
