@@ -35,6 +35,7 @@ Solve = Callable[[Hierarchy], Array]
 _LARGEST = 3
 _NARROW = 2.0**-33  # width of the interval at which the bisection ends
 _STAYS = 0.1        # share of the change that stays in it if the optimum jumps
+_MAIN = 0.3         # the same if it jumps for no other reason; it may jump twice on the way
 _EXPLAINS = 0.5     # share of the change that is left, at most, without what explains it
 _MISSED = 1e-7      # of the size of its terms: a level beyond counts as missed
 _SAME = 1e-3        # of a miss: two answers that differ by more are not both optimal
@@ -142,9 +143,15 @@ def causes(before: Tick, after: Tick, solve: Solve) -> Iterator[Cause]:
     total = _apart(before.command(before.x), after.command(after.x))
     at, low, high = _bisected(before, after, solve)
     left = _apart(at.command(low), at.command(high))
+    if left <= _MAIN * total:
+        yield from _continuous(before, after, solve, total)
     if left > _STAYS * total:
-        yield _vertex(before, after, at.h, low, high)
-        return
+        kind, text = _vertex(before, after, at.h, low, high)
+        yield Cause(kind, f"{text}, {left:.3g} of the {total:.3g} apart")
+
+
+def _continuous(before: Tick, after: Tick, solve: Solve, total: float) -> Iterator[Cause]:
+    """Yield what moved most of the answer, and the levels that became met or missed."""
     yield from _moved(before, after, solve, total)
     for k, name in enumerate(before.h.names):
         missed = [is_missed(one.h, one.x, k, _MISSED) for one in (before, after)]
@@ -174,7 +181,7 @@ def _apart(command: Array, other: Array) -> float:
     return float(np.abs(command - other).max(initial=0.0))
 
 
-def between(before: Tick, after: Tick, share: float) -> Tick:
+def _between(before: Tick, after: Tick, share: float) -> Tick:
     """Return what lies between two ticks with the same rows; the answer is that before."""
     def mixed(old: Array, new: Array) -> Array:
         return np.where(np.isinf(new), new, (1.0 - share) * old + share * np.nan_to_num(new))
@@ -194,14 +201,14 @@ def _bisected(before: Tick, after: Tick, solve: Solve) -> tuple[Tick, Array, Arr
     command_low, command_high = before.command(x_low), after.command(x_high)
     while high - low > _NARROW:
         middle = 0.5 * (low + high)
-        tick = between(before, after, middle)
+        tick = _between(before, after, middle)
         x = solve(tick.h)
         command = tick.command(x)
         if _apart(command_low, command) >= _apart(command, command_high):
             high, x_high, command_high = middle, x, command
         else:
             low, x_low, command_low = middle, x, command
-    return between(before, after, low), x_low, x_high
+    return _between(before, after, low), x_low, x_high
 
 
 def _vertex(before: Tick, after: Tick, h: Hierarchy, low: Array, high: Array) -> Cause:
@@ -213,11 +220,11 @@ def _vertex(before: Tick, after: Tick, h: Hierarchy, low: Array, high: Array) ->
     pays = next((k for k in missed if gain[k] > _SAME * miss[k]), len(h.names))
     alike = [k for k in missed if k < pays]
     if not alike:
-        return Cause("other", "two answers to the same data that are not alike: one was not sent "
-                              "as it is, or depends on the tick before")
+        return Cause("other", "one of two answers to the same data was not sent as it is, or "
+                              "depends on the tick before: they are not alike")
     k = next((k for k in alike if gain[k] > noise[k]), alike[-1])
-    return Cause("vertex", f"{h.names[k]}, missed by {miss[k]:.3g}, sits at a vertex: two answers "
-                           f"to the same data differ by {gain[k]:.1g} in its miss")
+    return Cause("vertex", f"{h.names[k]}, missed by {miss[k]:.3g}, sits at a vertex: it gains "
+                           f"{gain[k]:.1g} by another answer to the same data")
 
 
 def _moved(before: Tick, after: Tick, solve: Solve, total: float) -> Iterator[Cause]:

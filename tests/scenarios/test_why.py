@@ -37,7 +37,8 @@ WIDE = ((-1.0, -1.0), (1.0, 1.0))
 def test_a_level_that_gains_nothing_by_another_corner_sits_at_a_vertex():
     """x1 is at 1; the least weight of x2 in the task decides which of its ends is chosen."""
     (text,) = said(tick(WIDE, ((1.0, -1e-6), 10.0)), tick(WIDE, ((1.0, 1e-6), 10.0)))
-    assert text.startswith("vertex: task, missed by 9, sits at a vertex")
+    assert text.startswith("vertex: task, missed by 9, sits at a vertex: it gains ")
+    assert text.endswith("by another answer to the same data, 1 of the 2 apart")
 
 
 def test_a_side_that_moves_is_named_with_what_is_left_without_it():
@@ -69,7 +70,7 @@ def test_levels_and_sides_that_come_and_go_are_all_that_is_said():
 def test_an_answer_that_the_resolver_does_not_give_is_not_blamed_on_the_rows():
     before = tick(WIDE, ((1.0, 0.0), 0.5))
     (text,) = said(before, before._replace(x=np.array([-0.9, 0.0])))
-    assert text.startswith("other: two answers to the same data that are not alike")
+    assert text.startswith("other: one of two answers to the same data was not sent as it is")
 
 
 @pytest.fixture(scope="module")
