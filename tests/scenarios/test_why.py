@@ -8,7 +8,8 @@ import pytest
 from hierarchy import Hierarchy, HierarchyError
 from scenarios import load, simulate
 from scenarios.cli.main import run_command
-from scenarios.measure.jumps import Tick, causes, jumps
+from scenarios.measure.causes import Tick, causes
+from scenarios.measure.jumps import jumps
 from scenarios.measure.run_folder import save
 from solvers import make
 
