@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
 from markupsafe import Markup
 
 from scenarios.draw.figures.palette import Look
+from scenarios.measure.happened import happened
 from scenarios.measure.partings import BOUND, partings
 from scenarios.measure.runs import table
 from scenarios.results.columns import flags
@@ -21,10 +21,12 @@ if TYPE_CHECKING:
 _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_violation_max",
           "moved_by_lower_max", "body_distance_min", "body_below_share", "ee_distance_min",
           "ee_below_share", "contact_ticks", "slip_max", "friction_margin_min",
-          "support_margin_min", "torque_limit_share", "torque_step_max", "joint_limit_excess",
-          "speed_max", "velocity_step_max", "command_step_max", "acceleration_max",
-          "stack_changes", "active_set_changes", "ticks_not_solved", "ticks_brake", "ticks_stop",
-          "ticks_late", "time_resolve_median", "time_resolve_p999", "time_tick_median")
+          "support_margin_min", "torque_limit_share", "torque_step_max", "torque_step_ticks",
+          "joint_limit_excess", "speed_max", "velocity_step_max", "velocity_step_ticks",
+          "command_step_max", "acceleration_max", "acceleration_step_max",
+          "acceleration_step_ticks", "stack_changes", "active_set_changes", "ticks_not_solved",
+          "ticks_brake", "ticks_stop", "ticks_late", "time_resolve_median", "time_resolve_p999",
+          "time_tick_median")
 
 
 class Cell(NamedTuple):
@@ -95,25 +97,19 @@ def _stopped(run: Run) -> str:
 
 
 def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
-    """Return the problems of every run: by kind, contacts and faults.
+    """Return what happened in every run: problems, contacts, large changes, faults.
 
+    That is the problem, the action taken or the reason, the number of ticks and the first time.
     Only the first row of a run has its label.
     """
-    return [(run.label if i == 0 else "", happened)
-            for run in runs for i, happened in enumerate(_happened(run))]
+    return [(run.label if i == 0 else "", row)
+            for run in runs for i, row in enumerate(_happened(run))]
 
 
 def _happened(run: Run) -> list[tuple[str, str, str, str]]:
-    """Return the problem, the action taken, the number of ticks and the first time."""
     recording = run.recording
-    found = []
-    if recording is not None:
-        t = recording["t"]
-        found = [(kind.replace("_", " "), action, str(len(ticks)), f"{t[ticks[0]]:.3f} s")
-                 for (kind, action), ticks in recording.troubles().items()]
-        touched = np.flatnonzero(recording.get("contacts", np.empty(0)))
-        if touched.size:
-            found.append(("contact", "–", str(touched.size), f"{t[touched[0]]:.3f} s"))
+    found = [] if recording is None else [
+        (what, why, str(ticks), f"{t:.3f} s") for what, why, ticks, t in happened(recording)]
     if run.fault:
         ended = f"{recording['t'][-1]:.3f} s" if recording and recording.ticks else "the start"
         found.append((f"fault: {run.fault}", "run stopped", "–", ended))

@@ -8,7 +8,8 @@ import pytest
 from hierarchy import Hierarchy, HierarchyError
 from scenarios import load, simulate
 from scenarios.cli.main import run_command
-from scenarios.measure.jumps import Tick, causes, jumps
+from scenarios.measure.causes import Tick, causes
+from scenarios.measure.jumps import jumps
 from scenarios.measure.run_folder import save
 from solvers import make
 
@@ -37,7 +38,8 @@ WIDE = ((-1.0, -1.0), (1.0, 1.0))
 def test_a_level_that_gains_nothing_by_another_corner_sits_at_a_vertex():
     """x1 is at 1; the least weight of x2 in the task decides which of its ends is chosen."""
     (text,) = said(tick(WIDE, ((1.0, -1e-6), 10.0)), tick(WIDE, ((1.0, 1e-6), 10.0)))
-    assert text.startswith("vertex: task, missed by 9, sits at a vertex")
+    assert text.startswith("vertex: task, missed by 9, sits at a vertex: it gains ")
+    assert text.endswith("by another answer to the same data, 1 of the 2 apart")
 
 
 def test_a_side_that_moves_is_named_with_what_is_left_without_it():
@@ -69,7 +71,7 @@ def test_levels_and_sides_that_come_and_go_are_all_that_is_said():
 def test_an_answer_that_the_resolver_does_not_give_is_not_blamed_on_the_rows():
     before = tick(WIDE, ((1.0, 0.0), 0.5))
     (text,) = said(before, before._replace(x=np.array([-0.9, 0.0])))
-    assert text.startswith("other: two answers to the same data that are not alike")
+    assert text.startswith("other: one of two answers to the same data was not sent as it is")
 
 
 @pytest.fixture(scope="module")
@@ -93,3 +95,20 @@ def test_a_tick_that_the_run_does_not_have_is_an_error(folder, capsys):
     assert "tick 999: the run has ticks 0 to 49" in capsys.readouterr().err
     with pytest.raises(HierarchyError, match="the run has ticks"):
         jumps(simulate(load("ellipse-hqp").with_changes({"control.duration": 0.002})), tick=0)
+
+
+def test_large_changes_are_among_the_events_of_report_and_replay(folder, monkeypatch):
+    from scenarios.draw.replay.page import html
+    from scenarios.measure import happened as module
+    from scenarios.measure.run_folder import load_run
+    from scenarios.measure.runs import Run
+    from scenarios.results.tables import events
+
+    recording = load_run(folder)
+    assert not list(module.happened(recording))
+    monkeypatch.setattr(module, "STEPS", {"rad/s^2": 1e-6})
+    one = next(module.happened(recording))
+    assert one.what.startswith("acceleration of ")
+    rows = events([Run(recording.scenario, "hqp", "hqp", recording)])
+    assert rows[0] == ("hqp", (one.what, one.why, "1", f"{one.t:.3f} s"))
+    assert f"{one.what}: {one.why}"[:60] in html({"hqp": recording}, "why")

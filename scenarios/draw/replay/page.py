@@ -12,6 +12,7 @@ from hierarchy.errors import HierarchyError
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.replay.data import fates, phrases, run_data
 from scenarios.measure.goals import goals
+from scenarios.measure.happened import happened
 from scenarios.scene import scene
 from scenarios.scene.pushes import key
 from scenarios.templates import render, resource
@@ -58,4 +59,6 @@ def _about(recording: Recording) -> dict[str, Any]:
     limits = getattr(scenario, "limits", None)
     return {"scenario": scenario.name, "title": scenario.title, "fault": recording.fault,
             "goals": [str(goal) for goal in goals(recording)], "level": scenario.control.level,
-            "limited": limits is not None}
+            "limited": limits is not None,
+            "events": [{"t": one.t, "text": f"{one.what}: {one.why}"}
+                       for one in happened(recording)]}

@@ -11,7 +11,8 @@ class Player {
     const get = id => document.getElementById(id);
     this.parts = Object.fromEntries(["space", "scrub", "time", "play", "speed", "legend", "modes",
       "names", "notice", "drawn", "stacks", "curves", "marks"].map(id => [id, get(id)]));
-    this.stacks = this.runs.map(run => new StackList(run, data, this.runs.length > 1));
+    this.stacks = this.runs.map(run => new StackList(run, data, this.runs.length > 1,
+      t => this.seek(t)));
     this.parts.stacks.append(...this.stacks.map(stack => stack.card));
     this.curves = new Curves(this.parts.curves, this.runs, data, t => this.seek(t));
     this.make_stage();

@@ -3,7 +3,7 @@
 const ROW = 26;  // px
 
 class StackList {
-  constructor(run, {fates, phrases}, several) {
+  constructor(run, {fates, phrases}, several, seek) {
     this.phrases = phrases;
     this.run = run;
     this.unknown = fates.unknown;
@@ -21,12 +21,21 @@ class StackList {
     this.note = element("p");
     const head = element("h2", {}, ...(several ? [sample(run)] : []), run.label, element("small", {}, run.scenario));
     this.card = element("article", {class: "card"}, head, this.goals, this.list, ...this.joint_row(),
-                        this.near, this.note);
+                        this.near, this.note, ...this.events(seek));
     const judged = !run.fate.values.includes(this.unknown);
     this.doubt = judged ? [] : ["Unknown where the rows cannot be reconstructed, for example after a change by hand."];
     this.note.hidden = judged && !run.fault;
     this.note.append(...this.doubt);
     this.frame = -1;
+  }
+
+  // What happened, and when; a click goes there.
+  events(seek) {
+    return this.run.events.map(({t, text}) => {
+      const button = element("button", {type: "button"}, `${t.toFixed(3)} s`);
+      button.addEventListener("click", () => seek(t));
+      return element("p", {class: "event"}, button, ` ${text}`);
+    });
   }
 
   joint_row() {
