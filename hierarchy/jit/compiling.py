@@ -13,6 +13,7 @@ import os
 import pickle
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -25,13 +26,17 @@ import numpy as np
 from llvmlite import binding
 from numba.core import caching, cgutils, event, types
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import _nrt_python
 from numba.extending import intrinsic
 
+from hierarchy.jit import ahead, recording
+
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
 _MAKERS = {"empty", "empty_like", "zeros", "zeros_like", "ones", "full", "eye", "copy", "array"}
 _DAMAGE = (pickle.UnpicklingError, EOFError, ValueError, AttributeError, ImportError, IndexError)
+_OWN = tuple(str(Path(__file__).with_name(name)) for name in ("compiling.py", "lanes.py"))
 _EVERY = 5.0  # [s] between two words on a compilation that goes on
 
 
@@ -86,20 +91,50 @@ def inlined(function: Kernel) -> Kernel:
     return _compiled(function, inline=True)
 
 
-class _Cached(CPUDispatcher):  # type: ignore[misc]
+class Cached(CPUDispatcher):  # type: ignore[misc]
     """A kernel that looks for its files when it is first needed; most are only compiled in."""
 
     cached_in: Path | None = None
+    kept = True  # on disk
+    ready: dict[Any, Any]  # entries for Python by types of arguments, compiled ahead
     _cache: Any
 
-    def compile(self, signature: Any) -> Any:
+    def entry(self, kinds: tuple[Any, ...]) -> Any:
+        """Return what Python calls with arguments of these types, compiled ahead or now."""
         with global_compiler_lock:
-            if self.cached_in is not None and isinstance(self._cache, caching.NullCache):
+            return self._ready(kinds) or self.compile(kinds)
+
+    def _ready(self, kinds: tuple[Any, ...]) -> Any:
+        if kinds not in self.ready and kinds not in self.overloads and ahead.parts():
+            found = ahead.find(self, kinds, source_digest(self))
+            if found is not None:
+                self.ready[kinds] = found
+                self._insert([kind._code for kind in kinds], found, False)
+        return self.ready.get(kinds)
+
+    def _compile_for_args(self, *arguments: Any, **named: Any) -> Any:
+        with global_compiler_lock, suppress(ValueError, NumbaError):
+            found = self._ready(tuple(map(numba.typeof, arguments)))
+            if found is not None:
+                return found
+        return super()._compile_for_args(*arguments, **named)
+
+    def add_overload(self, made: Any) -> None:
+        """Take code in; where there is an entry compiled ahead, only for kernels that call this."""
+        if made.signature.args in self.ready:
+            self.overloads[made.signature.args] = made
+        else:
+            super().add_overload(made)
+
+    def compile(self, signature: Any) -> Any:
+        """Return what Python calls, compiled now or on an earlier day, and kept."""
+        with global_compiler_lock:
+            if self.kept and self.cached_in and isinstance(self._cache, caching.NullCache):
                 self._cache = _cache(self.cached_in, self.py_func)
             return super().compile(signature)
 
 
-class _OnlyInlined(_Cached):
+class _OnlyInlined(Cached):
     """A kernel without an entry for Python, where a call would end the process."""
 
     def __call__(self, *arguments: Any) -> Any:
@@ -165,12 +200,15 @@ else:
 
 def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:
     allocates = _allocates(function)
+    if numba.config.DISABLE_JIT:
+        return recording.observed(function)
     kernel: Any = numba.njit(error_model="numpy", forceinline=inline, nogil=nogil, _nrt=allocates,
                              no_cpython_wrapper=inline, no_cfunc_wrapper=True)(function)
     if isinstance(kernel, CPUDispatcher):  # not with NUMBA_DISABLE_JIT=1
         files, constants = files_behind(function), constants_behind(function)
-        kernel.__class__ = _OnlyInlined if inline else _Cached
+        kernel.__class__ = _OnlyInlined if inline else Cached
         kernel.source_files, kernel.constants, kernel.allocates = files, constants, allocates
+        kernel.ready = {}
         kernel.cached_in = cache_folder() / _digest((__file__, *sorted(files)),
                                                     tuple(sorted(constants)))
     return kernel  # type: ignore[no-any-return]
@@ -207,6 +245,15 @@ def _called(function: Kernel) -> list[Any]:
 @cache
 def _digest(files: tuple[str, ...], constants: tuple[str, ...]) -> str:
     content = "\n".join((*map(digest_of, files), *constants, numba.__version__))
+    return hashlib.sha256(content.encode()).hexdigest()[:16]
+
+
+def source_digest(*functions: Any) -> str:
+    """Return a digest of all sources and constants behind functions, the same on every machine."""
+    plain = [getattr(function, "py_func", function) for function in functions]
+    files = frozenset[str]().union(*map(files_behind, plain))
+    constants = frozenset[str]().union(*map(constants_behind, plain))
+    content = "\n".join((*sorted(map(digest_of, (*files, *_OWN))), *sorted(constants)))
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
