@@ -16,12 +16,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, final
 
-import llvmlite.binding as llvm
 import numpy as np
-from numba import _dynfunc
-from numba.core import base
-from numba.core.environment import Environment
-from numba.core.types.containers import BaseTuple
+
+from hierarchy.jit.caching import register_symbols
+from hierarchy.jit.inside import Environment, llvm, load_helpers, make_function
+from hierarchy.jit.sources import described, source_digest
 
 FOLDER = Path(__file__).with_name("objects")
 NATIVE = "TASK_HIERARCHY_NATIVE"  # set: every kernel is compiled for this very processor
@@ -75,7 +74,8 @@ class Part:
     @cached_property
     def engine(self) -> Any:
         """The loaded object file; None if this numba or this Python lacks what it expects."""
-        base._load_global_helpers()
+        load_helpers()
+        register_symbols()
         if any(llvm.address_of_symbol(name) is None for name in self.externals):
             return None
         target = llvm.Target.from_triple(llvm.get_process_triple())
@@ -94,16 +94,16 @@ class Part:
         environment.consts.extend(map(np.dtype, entry.constants))
         place = self.engine.get_global_value_address(entry.environment)
         ctypes.c_void_p.from_address(place).value = id(environment)
-        return _dynfunc.make_function(module, kernel.__name__, kernel.__doc__ or "",
+        return make_function(module, kernel.__name__, kernel.__doc__ or "",
                                       address(entry.wrapper), environment, (self.engine,))
 
 
-def find(kernel: Any, kinds: tuple[Any, ...], digest: str) -> Any:
+def find(kernel: Any, kinds: tuple[Any, ...]) -> Any:
     """Return what Python calls for a kernel and the types of arguments; None if there is none."""
     for part in parts():
         known, entries = part.kernels.get(f"{kernel.__module__}.{kernel.__qualname__}", ("", {}))
         entry = entries.get(described(kinds))
-        if known == digest and entry is not None:
+        if entry is not None and known == source_digest(kernel):
             return part.function(entry, kernel)
     return None
 
@@ -121,15 +121,3 @@ def _suits() -> bool:
     features = llvm.get_host_cpu_features()
     return (llvm.get_process_triple().startswith("x86_64-unknown-linux")
             and all(features.get(name) for name in _FEATURES))
-
-
-def described(kinds: tuple[Any, ...]) -> str:
-    """Return types of arguments as text; classes of named tuples with their modules."""
-    return ", ".join(map(_described, kinds))
-
-
-def _described(kind: Any) -> str:
-    if not isinstance(kind, BaseTuple):
-        return str(kind)
-    of = getattr(kind, "instance_class", tuple)
-    return f"{of.__module__}.{of.__qualname__}({described(tuple(kind))})"

@@ -9,8 +9,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from hierarchy.jit.compiling import Kernel
 from hierarchy.jit.recording import note
+from hierarchy.jit.sources import Kernel
 
 
 def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callable[..., Any]:

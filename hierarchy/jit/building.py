@@ -11,14 +11,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding as llvm
 import numpy as np
-from numba.core import registry
-from numba.core.compiler_lock import global_compiler_lock
 
-from hierarchy.jit.ahead import PROCESSOR, Entry, Part, described
-from hierarchy.jit.compiling import Cached, source_digest
+from hierarchy.jit.ahead import PROCESSOR, Entry, Part
+from hierarchy.jit.dispatching import Cached
 from hierarchy.jit.exporting import hide, machine, object_code
+from hierarchy.jit.inside import global_compiler_lock, llvm, registry
+from hierarchy.jit.sources import described, source_digest
 
 ENVIRONMENT = {"NUMBA_CPU_NAME": PROCESSOR, "NUMBA_CPU_FEATURES": "",
                "NUMBA_DISABLE_INTEL_SVML": "1"}  # of a process that builds

@@ -10,15 +10,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, final
 
-import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
-from numba.core import cgutils, compiler, registry, types
-from numba.core.compiler_lock import global_compiler_lock
-from numba.extending import intrinsic
 from numba.np import arrayobj
 
-from hierarchy.jit.compiling import Kernel
+from hierarchy.jit.inside import (
+    cgutils,
+    compiler,
+    global_compiler_lock,
+    intrinsic,
+    llvm,
+    registry,
+    types,
+)
+from hierarchy.jit.sources import Kernel
 
 INTEGER, STATUS = types.int64, types.int32  # of arguments and results; a pointer is an INTEGER too
 

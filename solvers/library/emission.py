@@ -79,7 +79,7 @@ def check(resolvers: Sequence[str], target: str) -> None:
 
 def digest() -> str:
     """Return the digest of the kernels' sources as they are installed."""
-    from hierarchy.jit.compiling import source_digest
+    from hierarchy.jit.sources import source_digest
     from solvers.library.entries import solve_hcod
 
     return source_digest(solve_hcod)
