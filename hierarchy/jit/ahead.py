@@ -46,9 +46,11 @@ class Part:
 
     kernels : by name, the digest of its sources and its entries by types of arguments.
     externals : the names that the object file expects to find.
+    jobs : digest of what said which kernels are in it.
     """
 
     file: Path
+    jobs: str
     kernels: dict[str, tuple[str, dict[str, Entry]]]
     externals: tuple[str, ...]
 
@@ -56,16 +58,16 @@ class Part:
     def read(file: Path) -> Part:
         """Read the index beside an object file."""
         index = json.loads(file.with_suffix(".json").read_text())
-        return Part(file, {name: (digest, {kinds: Entry(wrapper, environment, tuple(constants))
-                                           for kinds, wrapper, environment, constants in entries})
-                           for name, (digest, entries) in index["kernels"].items()},
-                    tuple(index["externals"]))
+        kernels = {name: (digest, {kinds: Entry(wrapper, environment, tuple(constants))
+                                   for kinds, wrapper, environment, constants in entries})
+                   for name, (digest, entries) in index["kernels"].items()}
+        return Part(file, index["jobs"], kernels, tuple(index["externals"]))
 
     def write(self, code: bytes) -> None:
         """Write both files, the object first."""
         self.file.parent.mkdir(parents=True, exist_ok=True)
         self.file.write_bytes(code)
-        index = {"externals": self.externals,
+        index = {"jobs": self.jobs, "externals": self.externals,
                  "kernels": {name: (digest, [(kinds, *vars(entry).values())
                                              for kinds, entry in entries.items()])
                              for name, (digest, entries) in self.kernels.items()}}
@@ -119,5 +121,6 @@ def parts() -> tuple[Part, ...]:
 
 def _suits() -> bool:
     features = llvm.get_host_cpu_features()
-    return (llvm.get_process_triple().startswith("x86_64-unknown-linux")
+    triple = llvm.get_process_triple()
+    return (triple.startswith("x86_64") and "linux" in triple
             and all(features.get(name) for name in _FEATURES))

@@ -23,7 +23,7 @@ def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callabl
     dispatcher: Any = kernel
     if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT
         note(kernel, (*arguments, *then))
-        return partial(getattr(kernel, "py_func", kernel), *arguments)
+        return partial(getattr(kernel, "unnoted", kernel), *arguments)
     types = tuple(_type_of(value) for value in (*arguments, *then))
     entry = dispatcher.entry(types)
     return partial(entry, *arguments) if arguments else entry

@@ -28,15 +28,14 @@ Call = tuple[str, tuple[Any, ...]]  # the name of a kernel with its module, type
 
 
 @global_compiler_lock  # type: ignore[untyped-decorator]
-def build(file: Path, calls: Sequence[Call], say: Callable[[int], None]) -> None:
+def build(file: Path, jobs: str, calls: Sequence[Call], say: Callable[[int], None]) -> None:
     """Write an object file with these calls, and its index; `say` hears how many are compiled."""
     _without_machine_code()
     libraries: dict[Any, None] = {}
     kernels: dict[str, tuple[str, dict[str, Entry]]] = {}
     for count, (name, kinds) in enumerate(calls):
         say(count)
-        module, _, short = name.rpartition(".")
-        kernel: Any = getattr(import_module(module), short)
+        kernel = _kernel(name)
         kernel.compile(kinds)
         made = kernel.overloads[kinds]
         if (entry := _entry(made)) is not None:
@@ -46,7 +45,22 @@ def build(file: Path, calls: Sequence[Call], say: Callable[[int], None]) -> None
     whole = _linked(libraries, {name for one in entries for name in (one.wrapper, one.environment)})
     here = machine()
     code = object_code(whole, here.triple, here.processor, here.features)
-    Part(file, kernels, _externals(whole)).write(code)
+    Part(file, jobs, kernels, _externals(whole)).write(code)
+
+
+def is_current(file: Path, jobs: str) -> bool:
+    """Whether an object file was made by these jobs from the sources as they are."""
+    try:
+        part = Part.read(file)
+        return part.jobs == jobs and all(digest == source_digest(_kernel(name))
+                                         for name, (digest, _) in part.kernels.items())
+    except (OSError, ValueError, LookupError, ImportError, AttributeError):
+        return False
+
+
+def _kernel(name: str) -> Any:
+    module, _, short = name.rpartition(".")
+    return getattr(import_module(module), short)
 
 
 def _entry(made: Any) -> Entry | None:

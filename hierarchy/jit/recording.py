@@ -22,7 +22,7 @@ def begin() -> None:
     _calls = {}
 
 
-def noted() -> list[tuple[str, tuple[Any, ...]]]:
+def calls() -> list[tuple[str, tuple[Any, ...]]]:
     """Return the name and the types of arguments of each kernel that Python called."""
     return list(_calls or ())
 
@@ -35,19 +35,26 @@ def note(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
 
 
 def observed(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function whose calls are noted; the function itself if nothing is."""
+    """Return a function whose calls are noted; the function itself if nothing is.
+
+    Its `unnoted` runs the same, for whom has noted it.
+    """
     if _calls is None:
         return function
 
     @wraps(function)
-    def called(*arguments: Any) -> Any:
+    def unnoted(*arguments: Any) -> Any:
         global _depth
-        note(called, arguments)
         _depth += 1
         try:
             return function(*arguments)
         finally:
             _depth -= 1
 
-    called.py_func = function  # type: ignore[attr-defined]
-    return called
+    @wraps(function)
+    def noted(*arguments: Any) -> Any:
+        note(noted, arguments)
+        return unnoted(*arguments)
+
+    vars(noted).update(py_func=function, unnoted=unnoted)
+    return noted
