@@ -22,7 +22,7 @@ try:
     from numba.extending import intrinsic
 
     _ = (CPUDispatcher._insert, CPUDispatcher._compile_for_args, CPUDispatcher.add_overload,
-         CompileResult._reduce, CompileResult._rebuild, types.Type._code)
+         CompileResult._reduce, CompileResult._rebuild)
 except (ImportError, AttributeError) as error:
     raise ImportError(f"task-hierarchy works inside numba {_KNOWN}, not {numba.__version__}: "
                       f"{error}") from error

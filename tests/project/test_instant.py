@@ -31,7 +31,8 @@ def compiled(code, folder):
         env={**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(folder / "cache"),
              "NUMBA_CACHE_DIR": ""})
     assert done.returncode == 0, done.stderr
-    return sorted(path.name for path in (folder / "cache" / "task-hierarchy").rglob("*") if path.is_file())
+    kept = folder / "cache" / "task-hierarchy"
+    return sorted(path.name for path in kept.rglob("*") if path.is_file())
 
 
 def blocks(page, language):
