@@ -5,7 +5,7 @@
 # make stress  a resolver on a million generated problems, every answer certified; half an hour
 # make reproduce  the studies and timings behind the documents, written into the pages
 # make docs    build the documentation, any warning an error, and say where it is
-# make dist    build the wheel and the source archive, in dist/
+# make dist    build the wheels, with compiled kernels and without, and the source archive, in dist/
 # make clean   remove what the targets above made
 #
 # PYTHON=/path/to/python3 chooses the interpreter; otherwise the first suitable one is taken.
@@ -21,46 +21,57 @@ export OPENBLAS_NUM_THREADS := 1
 INSTALLED  := .venv/installed
 
 .DELETE_ON_ERROR:
-.PHONY: demo test quick bench stress reproduce docs dist clean set-up
+.PHONY: demo test quick bench stress reproduce docs dist clean set-up kernels
 
-demo: $(INSTALLED)
+demo: kernels
 	@rm -rf runs/demo
 	@$(BIN)/hierarchy compare ellipse --out runs/demo
 
-test: $(INSTALLED)
+test: kernels
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 	$(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
 
-quick: $(INSTALLED)
+quick: kernels
 	$(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal -m "not slow"
 
-bench: $(INSTALLED)
+bench: kernels
 	@$(BIN)/hierarchy bench
 	@$(BIN)/hierarchy bench peers
 
 COUNT    ?= 1000000
 RESOLVER ?= hcod
 
-stress: $(INSTALLED)
+stress: kernels
 	@$(BIN)/hierarchy bench stress --count $(COUNT) --resolver $(RESOLVER)
 
-reproduce: $(INSTALLED)
+reproduce: kernels
 	@$(BIN)/hierarchy reproduce
 
 docs: $(INSTALLED)
 	@$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs
 	@echo "Documentation: build/docs/index.html"
 
-dist: $(INSTALLED)
-	@rm -rf dist
+# A wheel for any machine, and one with the kernels for x86-64-v3: their object files refer to no
+# system library but libm.
+PLATFORM := --config-setting=--build-option=--plat-name=manylinux_2_17_x86_64
+
+dist: kernels
+	@rm -rf dist build
 	@$(BIN)/python -m build --no-isolation --outdir dist
+	@if [ -e hierarchy/jit/objects/solvers.o ]; then \
+	  $(BIN)/python -m build --no-isolation --wheel --outdir dist $(PLATFORM); fi
 
 clean:
-	rm -rf .venv build dist runs *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv build dist runs hierarchy/jit/objects *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
-set-up: $(INSTALLED)
+set-up: kernels
+
+# Kernels are compiled again when their sources have changed; without them each process compiles what
+# it calls, so that a failure stops nothing.
+kernels: $(INSTALLED)
+	-@$(BIN)/python -m scenarios.ahead
 
 # One set-up for all targets, repeated only when what is to be installed has changed.
 $(INSTALLED): pyproject.toml constraints.txt

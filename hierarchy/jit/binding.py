@@ -9,7 +9,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from hierarchy.jit.compiling import Kernel
+from hierarchy.jit.recording import note
+from hierarchy.jit.sources import Kernel
 
 
 def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callable[..., Any]:
@@ -21,10 +22,10 @@ def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callabl
     """
     dispatcher: Any = kernel
     if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT
-        return partial(kernel, *arguments)
+        note(kernel, (*arguments, *then))
+        return partial(getattr(kernel, "unnoted", kernel), *arguments)
     types = tuple(_type_of(value) for value in (*arguments, *then))
-    known = dispatcher.overloads.get(types)
-    entry = dispatcher.compile(types) if known is None else known.entry_point
+    entry = dispatcher.entry(types)
     return partial(entry, *arguments) if arguments else entry
 
 

@@ -6,20 +6,24 @@ a plain C entry that returns its error code instead, and nothing refers to Pytho
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, final
 
-import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
-from numba.core import cgutils, compiler, registry, types
-from numba.core.compiler_lock import global_compiler_lock
-from numba.extending import intrinsic
 from numba.np import arrayobj
 
-from hierarchy.jit.compiling import Kernel, constants_behind, digest_of, files_behind
+from hierarchy.jit.inside import (
+    cgutils,
+    compiler,
+    global_compiler_lock,
+    intrinsic,
+    llvm,
+    registry,
+    types,
+)
+from hierarchy.jit.sources import Kernel
 
 INTEGER, STATUS = types.int64, types.int32  # of arguments and results; a pointer is an INTEGER too
 
@@ -87,12 +91,19 @@ def hide(module: Any, visible: set[str]) -> None:
         codegen._tm, llvm.create_pipeline_tuning_options()))
 
 
-def source_digest(*functions: Kernel) -> str:
-    """Return a digest of all sources and constants behind functions, the same on every machine."""
-    files = frozenset[str]().union(*map(files_behind, functions))
-    constants = frozenset[str]().union(*map(constants_behind, functions))
-    content = "\n".join((*sorted(map(digest_of, files)), *sorted(constants)))
-    return hashlib.sha256(content.encode()).hexdigest()[:16]
+def object_code(module: Any, triple: str, processor: str, features: str) -> bytes:
+    """Return the object file of a module, with code that can be loaded anywhere in memory.
+
+    Raises
+    ------
+    RuntimeError : this llvmlite makes no code for the triple.
+    """
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    target = llvm.Target.from_triple(triple).create_target_machine(
+        cpu=processor, features=features, opt=3, reloc="pic", codemodel="default")
+    module.triple, module.data_layout = triple, str(target.target_data)
+    return bytes(target.emit_object(module))
 
 
 def _add(library: Any, name: str, entry: Entry) -> None:

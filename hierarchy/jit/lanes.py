@@ -7,9 +7,9 @@ from typing import Any
 import numba
 import numpy as np
 from llvmlite import ir
-from numba.core import cgutils, types
 from numba.core.errors import TypingError
-from numba.extending import intrinsic
+
+from hierarchy.jit.inside import cgutils, intrinsic, types
 
 _LANES = 8
 

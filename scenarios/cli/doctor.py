@@ -97,6 +97,10 @@ def _kernels() -> Iterator[Finding]:
     part, folder = "compiled kernels", cache_folder()
     jit = not numba.config.DISABLE_JIT
     yield Finding(part, "compiling", "on" if jit else "off: NUMBA_DISABLE_JIT is set", jit)
+    if folder is None:
+        yield Finding(part, "cache", "none: no home folder", None,
+                      "set NUMBA_CACHE_DIR to a writable folder")
+        return
     size = sum(_size(Path(parent, name)) for parent, _, names in os.walk(folder)
                for name in names) / 1e6
     can = os.access(next(path for path in (folder, *folder.parents) if path.exists()), os.W_OK)

@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 
@@ -79,7 +79,7 @@ def check(resolvers: Sequence[str], target: str) -> None:
 
 def digest() -> str:
     """Return the digest of the kernels' sources as they are installed."""
-    from hierarchy.jit.exporting import source_digest
+    from hierarchy.jit.sources import source_digest
     from solvers.library.entries import solve_hcod
 
     return source_digest(solve_hcod)
@@ -90,7 +90,7 @@ def emit(resolvers: Sequence[str], target: str, version: str) -> Emitted:
     import llvmlite.binding as llvm
 
     from hierarchy.jit import announce_compilation
-    from hierarchy.jit.exporting import compiles, hide, lowered, machine
+    from hierarchy.jit.exporting import compiles, hide, lowered, machine, object_code
     from solvers.library import entries
 
     if not compiles():
@@ -107,23 +107,11 @@ def emit(resolvers: Sequence[str], target: str, version: str) -> Emitted:
         triple, processor, features = here.triple, here.processor, here.features
     else:
         triple, processor, features = _TRIPLES[target], "generic", ""
-    return Emitted(_object(module, triple, processor, features), symbols,
-                   f"{triple}, {processor}", found)
-
-
-def _object(module: Any, triple: str, processor: str, features: str) -> bytes:
-    import llvmlite.binding as llvm
-
-    llvm.initialize_all_targets()
-    llvm.initialize_all_asmprinters()
     try:
-        target = llvm.Target.from_triple(triple)
+        code = object_code(module, triple, processor, features)
     except RuntimeError as error:
         raise HierarchyError(f"this llvmlite has no back end for {triple}: {error}") from error
-    machine = target.create_target_machine(cpu=processor, features=features, opt=3, reloc="pic",
-                                           codemodel="default")
-    module.triple, module.data_layout = triple, str(machine.target_data)
-    return bytes(machine.emit_object(module))
+    return Emitted(code, symbols, f"{triple}, {processor}", found)
 
 
 def _texts(texts: dict[str, str]) -> str:

@@ -53,7 +53,7 @@ def clean(tmp_path_factory):
         for top in {path.parts[0] for path in one.files} - {"..", "__pycache__"}:
             if not (site / top).exists():
                 (site / top).symlink_to(Path(one.locate_file(top)).resolve())
-    [wheel] = folder.glob("*.whl")
+    [wheel] = folder.glob("*-any.whl")
     run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index",
         "--quiet", "--disable-pip-version-check", wheel)
     return folder / "venv" / "bin"

@@ -1,0 +1,69 @@
+"""Kernels as Python calls them: compiled ahead, kept on disk, or compiled now."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from typing import Any
+
+import numba
+
+from hierarchy.jit.ahead import find
+from hierarchy.jit.caching import KernelCache
+from hierarchy.jit.inside import CPUDispatcher, NumbaError, global_compiler_lock
+
+if hasattr(os, "register_at_fork"):  # a child of a thread that waits would wait for ever
+    os.register_at_fork(before=global_compiler_lock.acquire,
+                        after_in_parent=global_compiler_lock.release,
+                        after_in_child=global_compiler_lock.release)
+
+
+class Cached(CPUDispatcher):  # type: ignore[misc]
+    """A kernel that looks for its files when it is first needed; most are only compiled in."""
+
+    kept = True  # on disk
+    ready: dict[Any, Any]  # entries for Python by types of arguments, compiled ahead
+    _cache: Any
+
+    def entry(self, kinds: tuple[Any, ...]) -> Any:
+        """Return what Python calls with arguments of these types, compiled ahead or now."""
+        with global_compiler_lock:
+            return self._ready(kinds) or self.compile(kinds)
+
+    def _ready(self, kinds: tuple[Any, ...]) -> Any:
+        if kinds not in self.ready and kinds not in self.overloads:
+            found = find(self, kinds)
+            if found is not None:
+                self.ready[kinds] = found
+                self._insert([kind._code for kind in kinds], found, False)
+        return self.ready.get(kinds)
+
+    def _compile_for_args(self, *arguments: Any, **named: Any) -> Any:
+        with global_compiler_lock, suppress(ValueError, NumbaError):
+            found = self._ready(tuple(map(numba.typeof, arguments)))
+            if found is not None:
+                return found
+        return super()._compile_for_args(*arguments, **named)
+
+    def add_overload(self, made: Any) -> None:
+        """Take code in; where there is an entry compiled ahead, only for kernels that call this."""
+        if made.signature.args in self.ready:
+            self.overloads[made.signature.args] = made
+        else:
+            super().add_overload(made)
+
+    def compile(self, signature: Any) -> Any:
+        """Return what Python calls, compiled now or on an earlier day, and kept."""
+        with global_compiler_lock:
+            if self.kept and not isinstance(self._cache, KernelCache):
+                self._cache = KernelCache(self.py_func)
+            return super().compile(signature)
+
+
+class OnlyInlined(Cached):
+    """A kernel without an entry for Python, where a call would end the process."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Raise a TypeError."""
+        raise TypeError(f"{self.py_func.__name__} is compiled into other kernels; "
+                        "Python calls what is `compiled`")

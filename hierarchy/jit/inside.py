@@ -1,0 +1,32 @@
+"""What this package takes from inside numba and llvmlite, beyond what their documents promise."""
+
+from __future__ import annotations
+
+import numba
+
+_KNOWN = "0.61 to 0.68"
+try:
+    import llvmlite.binding as llvm
+    from numba._dynfunc import make_function
+    from numba.core import cgutils, compiler, event, registry, types
+    from numba.core.base import _load_global_helpers as load_helpers
+    from numba.core.caching import NullCache
+    from numba.core.compiler import CompileResult
+    from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.environment import Environment
+    from numba.core.errors import NumbaError
+    from numba.core.registry import CPUDispatcher
+    from numba.core.runtime._nrt_python import c_helpers as nrt_helpers
+    from numba.core.serialize import dumps
+    from numba.core.types.containers import BaseTuple
+    from numba.extending import intrinsic
+
+    _ = (CPUDispatcher._insert, CPUDispatcher._compile_for_args, CPUDispatcher.add_overload,
+         CompileResult._reduce, CompileResult._rebuild)
+except (ImportError, AttributeError) as error:
+    raise ImportError(f"task-hierarchy works inside numba {_KNOWN}, not {numba.__version__}: "
+                      f"{error}") from error
+
+__all__ = ["BaseTuple", "CPUDispatcher", "CompileResult", "Environment", "NullCache", "NumbaError",
+           "cgutils", "compiler", "dumps", "event", "global_compiler_lock", "intrinsic", "llvm",
+           "load_helpers", "make_function", "nrt_helpers", "registry", "types"]

@@ -1,0 +1,67 @@
+"""What compiled code depends on: the text of the files behind a kernel, and the types it takes.
+
+What a file imports counts for all its kernels: a helper further down may use it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hierarchy.jit.inside import BaseTuple
+
+Kernel = Callable[..., Any]  # without annotations: its types are those of the first call
+_OWN = tuple(str(Path(__file__).with_name(f"{name}.py")) for name in (
+    "compiling", "lanes", "views"))  # these write code of their own
+
+
+def files_behind(function: Kernel) -> frozenset[str]:
+    """Return the files of a kernel and of all kernels that its file knows."""
+    behind = (getattr(known, "source_files", ()) for known in function.__globals__.values())
+    return frozenset({function.__code__.co_filename}).union(*behind)
+
+
+def constants_behind(function: Kernel) -> frozenset[str]:
+    """Return the numbers that a kernel's file knows, and those behind all kernels it knows."""
+    known = function.__globals__
+    behind = (getattr(value, "constants", ()) for value in known.values())
+    return frozenset(f"{name} = {value!r}" for name, value in known.items() if name.isupper()
+                     and isinstance(value, (int, float, np.integer))).union(*behind)
+
+
+def source_digest(*functions: Any) -> str:
+    """Return a digest of all sources and constants behind functions, the same on every machine.
+
+    It is "" if a file is not to be found: that of a cell of a notebook, or in an archive.
+    """
+    plain = [getattr(function, "py_func", function) for function in functions]
+    files = frozenset[str]().union(*map(files_behind, plain))
+    constants = frozenset[str]().union(*map(constants_behind, plain))
+    try:
+        content = "\n".join((*sorted(map(digest_of, (*files, *_OWN))), *sorted(constants)))
+    except OSError:
+        return ""
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+@cache
+def digest_of(file: str) -> str:
+    """Return the digest of one file."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+def described(kinds: tuple[Any, ...]) -> str:
+    """Return types of arguments as text; classes of named tuples with their modules."""
+    return ", ".join(map(_described, kinds))
+
+
+def _described(kind: Any) -> str:
+    if not isinstance(kind, BaseTuple):
+        return str(kind)
+    of = getattr(kind, "instance_class", tuple)
+    return f"{of.__module__}.{of.__qualname__}({described(tuple(kind))})"

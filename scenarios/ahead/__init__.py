@@ -1,0 +1,1 @@
+"""Kernels compiled when the package is built: the jobs that say which, and the command."""

@@ -1,0 +1,5 @@
+"""See `building`."""
+
+from scenarios.ahead.building import main
+
+main()

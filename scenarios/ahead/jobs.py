@@ -1,0 +1,88 @@
+"""What runs while kernels are recorded: each kind of call of the documents, once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+# Together they have every kind of task, sensor and plant of the shipped scenarios.
+_SCENARIOS = ("crawl", "dual-arm", "ellipse", "ellipse-3d", "ellipse-danger-bounds", "ellipse-hqp",
+              "ellipse-mass", "ellipse-nullspace", "ellipse-published", "ellipse-set-based",
+              "human", "humanoid", "reach-torque", "wipe")
+
+
+def _run(text: str, folder: Path) -> None:
+    """Make a run of a few ticks."""
+    from scenarios.cli.main import run_command
+
+    if run_command(["run", *text.split(), "--duration", "0.01", "--out", str(folder / "out")]) > 1:
+        raise SystemExit(f"hierarchy run {text} failed")
+
+
+def _arrays(_: Path) -> None:
+    """Solve hierarchies of plain arrays with every resolver, once and again from memory."""
+    from hierarchy import Hierarchy
+    from solvers import certify, explain, make, names
+    from solvers.resolver import Resolver
+
+    equal = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])])
+    limited = Hierarchy.from_levels([([[1, 0], [0, 1]], [-0.1] * 2, [0.1] * 2),
+                                     ([[1.0, 0.5]], [0.3])])
+    for name in names():
+        for damping in (0.0, 0.05):
+            resolver: Resolver = make(name, damping=damping)
+            problems = [equal] if resolver.handles == "equalities" else [equal, limited]
+            for h in problems:
+                result = resolver.solve(h)
+                resolver.solve(h, memory=result.memory)
+    result = make("hcod").solve(limited)
+    explain(limited, result)
+    certify(limited, result.x)
+
+
+def _robot(_: Path) -> None:
+    """Move a robot of seven joints within its limits, in one call."""
+    from hierarchy import Robot
+    from hierarchy.paths import Still
+    from hierarchy.tasks import Position, Posture
+    from solvers import solve_ik
+
+    robot = Robot.load("kuka_lwr")
+    hand = Position(robot.frame("end_effector"), Still([0.3, 0.5, 0.1]))
+    solve_ik(robot, [0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3], [hand, Posture((0.5,) * 7)],
+             limits=True, dt=0.01)
+
+
+def _batches(_: Path) -> None:
+    """Solve many hierarchies in one call."""
+    from solvers import make
+    from solvers.batch import Batch, solve
+
+    r: Any = np.random.default_rng(0)
+    A, b = r.normal(size=(3, 5, 7)), r.normal(size=(3, 5))
+    for name in ("tpm", "hcod"):
+        solve(Batch(A, b, b, sizes=np.array([3, 1, 1])), make(name))
+
+
+def _kept_factorised(_: Path) -> None:
+    """Change a stack that is kept factorised."""
+    from solvers.factorization import Factorization
+
+    r = np.random.default_rng(0)
+    hand, elbow, gaze = (r.normal(size=(m, 30)) for m in (3, 2, 2))
+    stack = Factorization([hand, elbow, gaze], names=["hand", "elbow", "gaze"])
+    stack.solve({"hand": [0.1, -0.2, 0.3], "elbow": [0.0, 0.1], "gaze": [0.2, 0.0]})
+    stack.swap("hand", "gaze")
+    stack.insert("limit", np.eye(30)[:1], at=0)
+    stack.delete("elbow")
+    stack.solve({"gaze": [0.2, 0.0], "limit": [0.0], "hand": [0.1, -0.2, 0.3]},
+                reference=np.ones(30))
+
+
+JOBS: dict[str, Callable[[Path], None]] = {
+    **{name: partial(_run, name) for name in _SCENARIOS},
+    "arrays": _arrays, "robot": _robot, "batches": _batches, "kept": _kept_factorised}

@@ -1,0 +1,64 @@
+"""With the object files of kernels, the documented commands compile nothing."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+from hierarchy.jit.ahead import parts
+from scenarios.ahead.building import is_current
+
+ROOT = Path(__file__).parents[2]
+pytestmark = [pytest.mark.slow,
+              pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _objects():
+    if not parts() or not is_current():
+        pytest.skip("the object files are not there, or older than the kernels: make set-up")
+
+
+def compiled(code, folder):
+    """What a program, in a new process, and all that it starts compile: it is kept in a cache."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], text=True, capture_output=True, cwd=folder, check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(folder / "cache"),
+             "NUMBA_CACHE_DIR": ""})
+    assert done.returncode == 0, done.stderr
+    kept = folder / "cache" / "task-hierarchy"
+    return sorted(path.name for path in kept.rglob("*") if path.is_file())
+
+
+def blocks(page, language):
+    return re.findall(rf"```{language}\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)
+
+
+def test_the_program_of_the_readme_compiles_nothing(tmp_path):
+    [program] = [block for block in blocks("README.md", "python") if "solve_ik" in block]
+    assert compiled(program, tmp_path) == []
+
+
+@pytest.mark.parametrize("command", [
+    "run ellipse --resolver recursive --set pointing.alpha_d=35 --duration 0.1",
+    "run ellipse --duration 0.1", "run human --duration 0.1", "run reach-torque --duration 0.01",
+    "compare ellipse ellipse-velocity --resolvers tpm,recursive,hqp,weighted --set "
+    "control.duration=0.02"])
+def test_commands_compile_nothing(tmp_path, command):
+    words = [*shlex.split(command), "--out", str(tmp_path / "out")]
+    code = f"from scenarios.cli.main import run_command\nassert run_command({words}) < 2"
+    assert compiled(code, tmp_path) == []
+
+
+def test_a_call_with_other_types_is_compiled_and_right(tmp_path):
+    code = ("import numpy as np\nfrom hierarchy.state import _copy_if_finite\n"
+            "q, v, to = np.ones(3, np.float32), np.ones(2), np.zeros(3)\n"
+            "assert _copy_if_finite(q, v, to, np.zeros(2)) == 1\n"
+            "assert to.tolist() == [1.0] * 3")
+    [name] = compiled(code, tmp_path)
+    assert "hierarchy.state._copy_if_finite" in name
