@@ -40,11 +40,18 @@ class Verdict:
 
     @property
     def end(self) -> str:
-        """How it ended: ran the whole time, stood, fell, or stopped."""
+        """How it ended: ran the whole time, stood, fell, or stopped; or how far it is."""
         if self.fault is None:
-            return f"{'stood' if self.stands else 'ran'} the whole {self.planned:.4g} s"
+            did = "stood" if self.stands else "ran"
+            return f"{did} the whole {self.planned:.4g} s" if self.seconds >= self.planned else (
+                f"{did} for {self.seconds:.2f} of {self.planned:.4g} s")
         how = "fell" if "fallen" in self.fault else "stopped"
         return f"{how} at {self.seconds:.2f} s of {self.planned:.4g} s: {self.fault}"
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """How it ended, and a line for each goal."""
+        return _sentence(self.end).removesuffix("."), *map(str, self.goals)
 
     def as_plain_data(self) -> dict[str, Any]:
         """Return the verdict for a JSON file."""
@@ -54,8 +61,9 @@ class Verdict:
 
 def verdict(recording: Recording, label: str = "") -> Verdict:
     """Return what a run came to."""
-    planned, facts = recording.scenario.control.duration, recording.facts
-    seconds = recording.ticks * recording.scenario.control.period
+    control, facts = recording.scenario.control, recording.facts
+    planned, seconds = control.duration, recording.ticks * control.period
+    seconds = planned if abs(seconds - planned) <= control.period else seconds  # whole ticks
     return Verdict(label, seconds, planned, recording.fault, facts.robot.base == "floating",
                    goals(recording), len({event.tick for event in recording.events}))
 

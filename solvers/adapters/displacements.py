@@ -153,7 +153,8 @@ class _Packed:
         lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
         given = [(name, _plain(G), _plain(h)) for name, G, h in limits]
         for name, G, h in given:
-            _check_fit(name, G, h, n)
+            if (*h.shape, n) != G.shape:
+                raise _unfit(name, G, h, n)
             row = int(write_limits(G, h, period, (lower, upper), self.A, self.lower, self.upper,
                                    row))
             if row == ODD:
@@ -168,7 +169,8 @@ class _Packed:
         """Write the rows of tasks that share a level; return the row after them."""
         row = self.rows
         for one in read:
-            _check_fit(label(one.task), one.J, one.e, self.A.shape[1])
+            if (*one.e.shape, self.A.shape[1]) != one.J.shape:
+                raise _unfit(label(one.task), one.J, one.e, self.A.shape[1])
             found = write_task(one.J, one.e, one.cost, one.gain / period, self.A, self.lower,
                                self.upper, row)
             if found == ODD:
@@ -259,10 +261,9 @@ def _read(task: Task, configuration: object, damped: bool, weighted: bool = True
     return _Read(task, J, e, cost, gain, lm * gain * gain * squared(cost, e) if lm else 0.0)
 
 
-def _check_fit(what: str, rows: Array, sides: Array, n: int) -> None:
-    """Raise a HierarchyError unless rows are (k, n) and their sides (k,): kernels do not look."""
-    if (*sides.shape, n) != rows.shape:
-        raise HierarchyError(f"{what}: {rows.shape} rows for {sides.shape} values and {n} unknowns")
+def _unfit(what: str, rows: Array, sides: Array, n: int) -> HierarchyError:
+    """Return the error of rows that are not (k, n) with sides (k,): kernels do not look."""
+    return HierarchyError(f"{what}: {rows.shape} rows for {sides.shape} values and {n} unknowns")
 
 
 def _plain(values: Any) -> Array:

@@ -7,7 +7,7 @@ from hand_made import recording
 from scenarios import load, simulate
 from scenarios.measure.goals import goals
 from scenarios.measure.runs import Run
-from scenarios.measure.verdict import lines, table, verdict, verdicts
+from scenarios.measure.verdict import Verdict, lines, table, verdict, verdicts
 
 
 def goal(name, fault=None, **signals):
@@ -108,6 +108,11 @@ def test_the_table_has_a_row_for_each_goal_and_a_cell_for_each_run():
     assert found[0].as_plain_data()["goals"][0]["flag"] == "left"
 
 
+def test_one_run_says_its_end_and_all_kept():
+    end, promises, _ = lines(verdicts([run("a")]))
+    assert (end, promises) == ("Ran for 0.01 of 4 s.", "Every promise was kept.")
+
+
 def test_many_that_broke_a_promise_are_named_up_to_three():
     found = [run(label, **joint([0, 0, 0, 0, 2.5])) for label in "abcd"]
     assert lines(verdicts(found))[1].startswith("Broken: joint limits by all, 0.5 rad at worst")
@@ -126,3 +131,9 @@ def test_what_a_scenario_asks_is_in_its_words(name, asked):
         pytest.importorskip("mujoco")
     found = {one.name: one.asked for one in goals(simulate(load(name, ["control.duration=0.02"])))}
     assert found.items() >= asked.items()
+
+
+def test_a_run_so_far_says_how_far_it_is():
+    run = Verdict("tpm", 1.2, 8.0, None, stands=False, goals=())
+    assert run.said == ("Ran for 1.20 of 8 s",)
+    assert Verdict("", 8.0, 8.0, None, stands=True, goals=()).end == "stood the whole 8 s"

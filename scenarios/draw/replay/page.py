@@ -11,8 +11,8 @@ from markupsafe import Markup
 from hierarchy.errors import HierarchyError
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.replay.data import fates, phrases, run_data
-from scenarios.measure.goals import goals
 from scenarios.measure.happened import happened
+from scenarios.measure.verdict import verdict
 from scenarios.scene import scene
 from scenarios.scene.pushes import key
 from scenarios.templates import render, resource
@@ -58,7 +58,7 @@ def _about(recording: Recording) -> dict[str, Any]:
     scenario = recording.scenario
     limits = getattr(scenario, "limits", None)
     return {"scenario": scenario.name, "title": scenario.title, "fault": recording.fault,
-            "goals": [str(goal) for goal in goals(recording)], "level": scenario.control.level,
+            "goals": list(verdict(recording).said), "level": scenario.control.level,
             "limited": limits is not None,
             "events": [{"t": one.t, "text": f"{one.what}: {one.why}"}
                        for one in happened(recording)]}

@@ -18,9 +18,9 @@ from scenarios.config.plant import KinematicSection
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import rehearsed, tick
-from scenarios.measure.goals import Goal, goals
 from scenarios.measure.judging import completed
 from scenarios.measure.run_folder import save
+from scenarios.measure.verdict import verdict
 from scenarios.recording.recording import Recording
 
 _HAND = 1.0     # [m/s] greatest speed of a dragged obstacle
@@ -56,7 +56,7 @@ class Live:
         offset = np.zeros((0, 3)) if self.obstacles is None else self.obstacles.offset
         self._wanted, self._changed = offset.copy(), np.zeros(self.ticks, dtype=np.bool_)
         self._offsets = np.zeros((self.ticks, *offset.shape))
-        self._goals: tuple[int, tuple[Goal, ...]] = 0, ()
+        self._goals: tuple[int, tuple[str, ...]] = 0, ()
 
     @property
     def t(self) -> float:
@@ -120,11 +120,12 @@ class Live:
         exact = self.begun.model_copy(update={"plant": KinematicSection()})
         return completed(recording, build(exact))
 
-    def goals(self) -> tuple[Goal, ...]:
-        """Return the goals of the run so far."""
+    def goals(self) -> tuple[str, ...]:
+        """Return how far the run is, or how it ended, and its goals so far, in a line each."""
         ticks = self.recorder.ticks
         if ticks != self._goals[0]:
-            self._goals = ticks, goals(self.recorder.finish(self.begun, None))
+            so_far = self.recorder.finish(self.begun, self.fault if self.over else None)
+            self._goals = ticks, verdict(so_far).said
         return self._goals[1]
 
     def save(self, folder: Path) -> Recording:

@@ -17,7 +17,7 @@ from scenarios.draw.viewer.playback import Playback, PlayButton, Requests, add_s
 from scenarios.draw.viewer.plots import Plots
 from scenarios.draw.viewer.server import add_dark, lay_floor, lay_out, look_at_all, right
 from scenarios.draw.viewer.stack_list import key_html, stack_html
-from scenarios.measure.goals import goals
+from scenarios.measure.verdict import verdict
 from scenarios.recording.recording import Recording
 from scenarios.scene import Scene, scene
 from scenarios.scene.pushes import key
@@ -41,7 +41,7 @@ class View:
         self.server, self.requests = server, Requests()
         self.scenes = {label: scene(recording, FRAMES) for label, recording in runs.items()}
         self.colours = colours(runs)
-        self._goals = {label: goals(recording) for label, recording in runs.items()}
+        self._goals = {label: verdict(recording).said for label, recording in runs.items()}
         self.lists: dict[str, str] = {}
         self.playback = Playback(float(min(one.t[0] for one in self.scenes.values())),
                                  float(max(one.t[-1] for one in self.scenes.values())))

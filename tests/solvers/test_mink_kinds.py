@@ -1,0 +1,74 @@
+"""Every kind of task, constraint and limit that mink has, on a floating robot with two arms."""
+
+import numpy as np
+import pytest
+
+from benchmark.studies.pink_examples import exact, least_squares
+from solvers import make
+from solvers.adapters import from_mink
+
+mink, mujoco = pytest.importorskip("mink"), pytest.importorskip("mujoco")
+
+DT = 0.01
+ARM = """
+<body name="{side}_upper" pos="0 {y} 0.3">
+  <joint name="{side}_a" axis="0 1 0" range="-2 2"/><geom name="{side}_g" type="capsule" size="0.03"
+   fromto="0 0 0 0.25 0 0"/>
+  <body name="{side}_fore" pos="0.25 0 0">
+    <joint name="{side}_b" axis="0 0 1" range="-2 2"/>
+    <joint name="{side}_c" axis="0 1 0" range="-2 2"/>
+    <geom name="{side}_h" type="capsule" size="0.03" fromto="0 0 0 0.25 0 0"/>
+    <site name="{side}_tip" pos="0.25 0 0"/>
+  </body>
+</body>"""
+ROBOT = f"""<mujoco><compiler angle="radian"/><worldbody>
+<body name="trunk" pos="0 0 1"><freejoint name="base"/>
+<geom type="box" size="0.1 0.2 0.3"/>{ARM.format(side="left", y=0.25)}
+{ARM.format(side="right", y=-0.25)}</body></worldbody></mujoco>"""
+
+
+@pytest.fixture
+def configuration():
+    model = mujoco.MjModel.from_xml_string(ROBOT)
+    q = mujoco.MjData(model).qpos.copy()
+    q[7:] = [0.3, -0.4, 0.6, 0.2, 0.5, 0.7]
+    return mink.Configuration(model, q=q)
+
+
+def tasks_of(configuration):
+    """Return a task of each kind, with its target away from where the robot is."""
+    model = configuration.model
+    hand = mink.FrameTask("left_tip", "site", 1.0, 0.3, gain=0.5, lm_damping=0.1)
+    hand.set_target(mink.SE3.from_translation(np.array([0.05, 0.02, -0.1]))
+                    @ configuration.get_transform_frame_to_world("left_tip", "site"))
+    mass = mink.ComTask(cost=[2.0, 1.0, 0.0])
+    mass.set_target(configuration.data.subtree_com[1] + 0.02)
+    apart = mink.RelativeFrameTask("right_tip", "site", "trunk", "body", 0.7, 0.1, gain=0.8)
+    apart.set_target(mink.SE3.from_translation(np.array([0.3, -0.1, 0.2])))
+    posture, still = mink.PostureTask(model, cost=0.1), mink.DampingTask(model, cost=0.05)
+    posture.set_target(model.qpos0)
+    return [hand, mass, apart, posture, still]
+
+
+@pytest.mark.parametrize("kinds", [(0,), (0, 1), (1, 2, 3), (2, 4), (0, 1, 2, 3, 4)])
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("damping", [1e-9, 1e-2])
+def test_one_level_is_the_minimum_of_minks_cost(configuration, kinds, held, damping):
+    model = configuration.model
+    tasks = [tasks_of(configuration)[i] for i in kinds]
+    limits = [mink.ConfigurationLimit(model),
+              mink.VelocityLimit(model, {f"{side}_{joint}": 0.8 for side in ("left", "right")
+                                         for joint in "abc"}),
+              mink.CollisionAvoidanceLimit(model, [(["left_h"], ["right_h"])])]
+    frozen = [mink.DofFreezingTask(model, dof_indices=[0, 5])] if held else []
+    h = from_mink.hierarchy(configuration, [tasks], DT, limits, frozen, damping=damping)
+    ours = make("hcod").solve(h).x
+    problem = mink.build_ik(configuration, tasks, DT, damping, limits, frozen)
+    A, b = least_squares(tasks, (), configuration, damping)
+    np.testing.assert_allclose(A.T @ A, problem.P, rtol=1e-9, atol=1e-12)
+    C, d = (problem.A, problem.b) if held else (np.empty((0, model.nv)), np.empty(0))
+    bounded = np.isfinite(problem.h)
+    x = exact(A, b, problem.G[bounded], problem.h[bounded], C, d, DT * ours) / DT
+    values = np.linalg.svd(A, compute_uv=False)
+    rounding = 2e-16 * (values[0] / values[-1]) ** 2  # what doubles can tell of this minimum
+    np.testing.assert_allclose(ours, x, atol=1e-7 + 10.0 * rounding)
