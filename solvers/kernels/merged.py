@@ -148,7 +148,8 @@ def _carve(work, m, n, levels):
 def _merge(s, A, lower, upper, sizes, strict, options, y):
     """Write the rows of all levels, those to merge times their weights and at moved sides."""
     first = ZERO
-    s.own[:] = 0.0
+    for c in range(s.own.size):
+        s.own[c] = 0.0
     for k in range(sizes.size):
         weight = options.weights[k] if k >= strict else 1.0
         for i in range(first, first + sizes[k]):
@@ -172,8 +173,8 @@ def _draw(s, m, x, mu):
     rows = m
     for c in range(x.size):
         if mu > 0.0 and s.own[c] == 0.0:
-            s.A[rows] = 0.0
-            s.A[rows, c] = mu
+            for e in range(x.size):
+                s.A[rows, e] = mu if e == c else 0.0
             s.lower[rows] = s.upper[rows] = mu * x[c]
             rows += 1
     return rows

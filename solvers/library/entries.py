@@ -161,10 +161,9 @@ def _merged(call, s):
     own, scale = call.work[:OWN + 2 * levels], call.work[OWN + 2 * levels:OWN + 3 * levels]
     _write_exact(call.settings, s)
     begun(call, merged_record(n, m))
-    scale[:] = 1.0
-    if s.scales != 0:
-        scale[:] = numbers_at(s.scales, levels)
+    given_scale = numbers_at(s.scales, levels if s.scales != 0 else ZERO)
     for k in range(levels):
+        scale[k] = given_scale[k] if s.scales != 0 else 1.0
         if not 0.0 < scale[k] < np.inf:
             return ZERO + INVALID
     if s.damping > 0.0:
