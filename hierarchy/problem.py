@@ -226,7 +226,8 @@ class Hierarchy:
         give = self._give
         if give is None:
             return []
-        return [k for k, (i, j) in enumerate(self._bounds()) if (give[i:j] > 0.0).any()]
+        rows = np.flatnonzero(give > 0.0)
+        return sorted(set((np.searchsorted(self._offsets, rows, side="right") - 1).tolist()))
 
     def _bounds(self) -> Iterator[tuple[int, int]]:
         """Yield the first row of each level and the one after its last."""

@@ -2,39 +2,74 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import accumulate, pairwise
 from typing import TypeVar
 
 import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
+from solvers.kernels.give import misses, relax
 from solvers.resolution import Resolution
 from solvers.status import Status
 
 _Kind = TypeVar("_Kind", bound=Resolution)
 
 
-def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy,
+def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy, levels: Sequence[int],
            memory: Array | None) -> _Kind:
-    """Return the answer of `solve` to h, level by level where rows may give.
+    """Return the answer of `solve` to h, whose `levels` may give.
 
-    For each level that gives, the levels down to it are resolved alone: their answer is the witness
-    of its least miss, (K, n) in `witnesses` for K such levels. Its rows then get that miss and what
-    they give as room, see `Hierarchy.relaxed`, and so all levels below. `memory` is that of the
-    last of these hierarchies, which has the rows of all levels. Without an answer for one of them
-    the resolution is that of the part.
+    The levels down to the last that gives are resolved alone: the answer is a witness of the least
+    miss of the first level that gives, (K, n) in `witnesses` for K such levels. Its rows then get
+    that miss and what they give as room, see `Hierarchy.relaxed`. For the next such level the same
+    answer is a witness if it meets the level; otherwise it is resolved again. Without an answer for
+    one of them the resolution is that of the part. `memory` is that of all these solves.
     """
-    witnesses, inaccurate = [], False
-    for level in h.giving:
-        found = solve(h.upper_part(level + 1), None)
-        if found.status not in (Status.SOLVED, Status.INACCURATE):
-            found.memory = None
-            return found
-        inaccurate |= found.status is Status.INACCURATE
+    (A, lower, upper, _), offsets, give = h.rows, h.offsets, h.give
+    lower, upper = lower.copy(), upper.copy()
+    whole = h.changed(lower=lower, upper=upper, give=None)
+    part = whole.upper_part(levels[-1] + 1)
+    before, after = _split(memory, 1 + len(levels)), list[Array | None]()
+    found, witnesses, inaccurate = None, [], False
+    for level in levels:
+        rows = int(offsets[level]), int(offsets[level + 1])
+        if found is None or misses(A, lower, upper, found.x, *rows):
+            found = solve(part, before[len(after)])
+            if found.status not in (Status.SOLVED, Status.INACCURATE):
+                found.memory = None
+                return found
+            after.append(found.memory)
+            inaccurate |= found.status is Status.INACCURATE
         witnesses.append(found.x)
-        h = h.relaxed(level, found.x)
-    found = solve(h, memory)
+        relax(A, lower, upper, give, found.x, *rows)
+    after += [None] * (len(levels) - len(after))
+    found = solve(whole, before[-1])
+    found.memory = _joined([*after, found.memory])
     found.witnesses = np.array(witnesses)
     if inaccurate and found.status is Status.SOLVED:
         found.status = Status.INACCURATE
     return found
+
+
+def _joined(memories: list[Array | None]) -> Array | None:
+    """Return memories one after the other, then the length of each; the last if that is not flat.
+
+    None if the last is none.
+    """
+    last = memories[-1]
+    if last is None or last.ndim != 1:
+        return last
+    lengths = [0.0 if memory is None else float(memory.size) for memory in memories]
+    return np.concatenate([*(memory for memory in memories if memory is not None), lengths])
+
+
+def _split(memory: Array | None, count: int) -> list[Array | None]:
+    """Return the memories that `_joined` has joined; another one is the last."""
+    alone: list[Array | None] = [*[None] * (count - 1), memory]
+    if memory is None or memory.ndim != 1 or memory.size < count:
+        return alone
+    ends = list(accumulate(memory[-count:].tolist(), initial=0.0))
+    if min(memory[-count:]) < 0.0 or ends[-1] != memory.size - count:
+        return alone
+    return [memory[int(i):int(j)] if j > i else None for i, j in pairwise(ends)]

@@ -182,9 +182,9 @@ def _with_checks(solve: Solve) -> Solve:
         try:
             if h.plain:
                 return solve(self, h, memory)
-            if h.giving:
+            if levels := h.giving:
                 refuse_give(self, h)
-                return giving(functools.partial(checked, self), h, memory)
+                return giving(functools.partial(checked, self), h, levels, memory)
             if h.metric is not None:
                 return in_metric(functools.partial(solve, self), h, memory)
             return solve(self, h, memory)

@@ -24,12 +24,15 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.kernels.batch import (
     batch_exact,
+    batch_merged,
     batch_saturation,
     batch_staircase,
     batch_without_bounds,
 )
+from solvers.kernels.merged import NOTHING, record_size
 from solvers.resolver import Resolver, make, refuse_inequality
 from solvers.resolvers.hcod import Hcod
+from solvers.resolvers.merged import Merged, refuse_safety_alone
 from solvers.resolvers.tpm import Tpm
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import run
@@ -136,7 +139,9 @@ class BatchResolution:
 
 def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = None,
           memory: Array | None = None) -> BatchResolution:
-    """Resolve all problems of a batch with `tpm` (the default) or `hcod`.
+    """Resolve all problems of a batch with `tpm` (the default), `hcod` or `merged`.
+
+    Scales of `merged` name levels "level 1" and so on.
 
     threads : most threads to use; None for the number of available cores.
     memory : (B, ...) of an earlier resolution by this resolver, or None; ignored if its shape does
@@ -150,24 +155,28 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     expect("solve: batch", batch, Batch, "make one with Batch.of([h, ...])")
     resolver = make("tpm") if resolver is None else resolver
     expect("solve: resolver", resolver, Resolver, "give make('tpm') or make('hcod')")
-    if not isinstance(resolver, (Tpm, Hcod)) or not resolver.strict:
-        raise HierarchyError(f"{resolver.label} resolves no batches; tpm and hcod do")
+    if not isinstance(resolver, Merged) and not (
+            isinstance(resolver, (Tpm, Hcod)) and resolver.strict):
+        raise HierarchyError(f"{resolver.label} resolves no batches; tpm, hcod and merged do")
     if threads is not None and threads < 1:
         raise HierarchyError(f"threads = {threads}, expected at least 1")
     batch = replace(batch)  # numpy lets its holder change the shape of an array: through the gate
     run = _Run(batch, resolver, cores() if threads is None else threads, memory)
+    if isinstance(resolver, Merged):
+        return run.by_merged(resolver)
     return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod()
 
 
 class _Run:
     """The arrays that the kernels write, and the choice of kernel for each problem."""
 
-    def __init__(self, batch: Batch, resolver: Tpm | Hcod, threads: int,
+    def __init__(self, batch: Batch, resolver: Tpm | Hcod | Merged, threads: int,
                  memory: Array | None) -> None:
         self.batch, self.resolver, self.threads = batch, resolver, threads
         count, rows, n = batch.A.shape
-        bounds = 0 if isinstance(resolver, Hcod) else n + len(batch.sizes)
-        shape = (count, bounds + 3 * rows + 3)
+        bounds = n + len(batch.sizes) if isinstance(resolver, Tpm) else 0
+        shape = (count, record_size(n, rows) if isinstance(resolver, Merged) else
+                 bounds + 3 * rows + 3)
         before = None if memory is None else readable("memory", memory)
         self.before = before if before is not None and before.shape == shape else None
         self.warm: NDArray[np.bool_] = np.zeros(count, dtype=bool)
@@ -175,7 +184,7 @@ class _Run:
             self.warm |= (self.before != 0.0).any(axis=1)
         self.x, self.codes = np.zeros((count, n)), np.zeros(count, dtype=np.int64)
         self.record = np.zeros(shape)
-        if self.before is not None and resolver.damping == 0.0:
+        if self.before is not None and (resolver.damping == 0.0 or isinstance(resolver, Merged)):
             self.record[:] = self.before
         self.settings = resolver._settings
 
@@ -222,6 +231,17 @@ class _Run:
         self._set_reference(everything)
         self._call(batch_exact, everything, self.x, self.codes, self.record, self.settings)
         return self._answer(self.record[:, -3] + self.record[:, -2], self.record)
+
+    def by_merged(self, resolver: Merged) -> BatchResolution:
+        """Resolve with the kernel of `merged`."""
+        everything = np.arange(len(self.batch))
+        names = tuple(f"level {k + 1}" for k in range(len(self.batch.sizes)))
+        self._set_reference(everything)
+        self._call(batch_merged, everything, self.x, self.codes, self.record,
+                   resolver._settings_for(names))
+        for p in np.flatnonzero(self.codes == NOTHING)[:1]:
+            refuse_safety_alone(self.batch[int(p)])
+        return self._answer(self.record[:, self.batch.A.shape[1]], self.record)
 
     def _set_reference(self, which: Indices) -> None:
         self.x[which] = self.batch.reference[which]

@@ -13,6 +13,7 @@ from __future__ import annotations
 from hierarchy.jit import unlocked
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy, work_size
+from solvers.kernels.merged import merged
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.status import SOLVED, TOO_SMALL
 
@@ -64,4 +65,15 @@ def batch_exact(problems, x, codes, records, settings, which, work):
         codes[p] = (solve_damped(A[p], lower[p], upper[p], sizes, x[p], record, settings, work)
                     if settings[DAMPING] > 0.0 else
                     solve_hierarchy(A[p], lower[p], upper[p], sizes, x[p], record, settings, work))
+    return SOLVED
+
+
+@unlocked
+def batch_merged(problems, x, codes, records, settings, which, work):
+    """Solve the problems `which` with the kernel of `merged`."""
+    A, lower, upper, sizes = problems
+    for p in which:
+        codes[p] = merged(A[p], lower[p], upper[p], sizes, x[p], records[p], settings, work)
+        if codes[p] == TOO_SMALL:
+            return TOO_SMALL
     return SOLVED

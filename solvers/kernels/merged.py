@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, inner_product
-from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy
+from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy, work_size
 from solvers.kernels.rows import ZERO
 from solvers.kernels.space import View, integers, matrix, vector
 from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
@@ -28,6 +28,7 @@ from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
 NOTHING = -1     # code: every level is strict
 BY_RULE = -1.0   # of strict levels: see `strict_levels`
 EXACT = 5        # settings of `Hcod` at the start; then those of `Options`
+OWN = 8          # settings before the weights
 
 
 class Options(NamedTuple):
@@ -35,8 +36,8 @@ class Options(NamedTuple):
 
     strict: View
     regularisation: View
-    weights: View
     step: View
+    weights: View
     caps: View
 
 
@@ -54,21 +55,42 @@ class Merged(NamedTuple):
 
 
 @compiled
-def solve_merged(A, lower, upper, sizes, x, record, settings, work):
+def record_size(n, m):
+    """Return the numbers of a record, see `merged`."""
+    return 4 * m + 3 * n + 4
+
+
+@inlined
+def merged_size(n, m, levels, damped):
+    """Return the numbers that a work space of `merged` needs."""
+    return (m + n) * (n + 2) + levels + n + work_size(n, m + n, levels, damped)
+
+
+@compiled
+def write_levels(settings, ratio, cap, scale):
+    """Write the weights and caps of levels with these scales (L,) behind the other settings."""
+    weight, levels = 1.0, scale.size
+    for k in range(levels - 1, -1, -1):
+        settings[OWN + k], settings[OWN + levels + k] = weight / scale[k], cap * scale[k]
+        weight *= ratio
+
+
+@compiled
+def merged(A, lower, upper, sizes, x, record, settings, work):
     """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
     record: y (m,), iterations, and the record of the exact kernel, (3 (m + n) + 3,); on entry that
-    of an earlier solve, or zeros. work: any contents. Returns the codes of `solve_hierarchy`, or
-    NOTHING if no level is left to merge.
+    of an earlier solve, or zeros. settings: those of `Hcod`, then `Options`. work: any contents.
+    Returns the codes of `solve_hierarchy`, or NOTHING if no level is left to merge.
     """
     (m, n), levels = A.shape, sizes.size
     options = _options(settings, levels)
     strict = strict_levels(lower, upper, sizes, options)
     if strict >= levels > 0:
         return ZERO + NOTHING
-    s, at = _carve(work, m, n, levels)
-    if at > work.size:
+    if merged_size(n, m, levels, settings[DAMPING] > 0.0) > work.size:
         return ZERO + TOO_SMALL
+    s, at = _carve(work, m, n, levels)
     y, inner = record[:m], record[m + 1:]
     _merge(s, A, lower, upper, sizes, strict, options, y)
     rows = _draw(s, m, x, options.regularisation)
@@ -77,7 +99,7 @@ def solve_merged(A, lower, upper, sizes, x, record, settings, work):
     inner = inner[:3 * rows + 3]
     code = _solve(s, rows, min(strict + 1, levels), x, inner, settings[:EXACT], work[at:])
     record[m] = inner[3 * rows] + inner[3 * rows + 1]
-    if code not in (NUMERICAL_FAILURE, TOO_SMALL):
+    if code != NUMERICAL_FAILURE:
         _carry(A, lower, upper, sizes, x, y, strict, options)
     return code
 
@@ -85,8 +107,8 @@ def solve_merged(A, lower, upper, sizes, x, record, settings, work):
 @inlined
 def _options(settings, levels):
     """Return the Options in an array of settings."""
-    rest = settings[EXACT:]
-    return Options(rest[0], rest[1], rest[2:2 + levels], rest[2 + levels], rest[3 + levels:])
+    return Options(settings[EXACT], settings[EXACT + 1], settings[EXACT + 2],
+                   settings[OWN:OWN + levels], settings[OWN + levels:])
 
 
 @compiled
@@ -126,7 +148,8 @@ def _carve(work, m, n, levels):
 def _merge(s, A, lower, upper, sizes, strict, options, y):
     """Write the rows of all levels, those to merge times their weights and at moved sides."""
     first = ZERO
-    s.own[:] = 0.0
+    for c in range(s.own.size):
+        s.own[c] = 0.0
     for k in range(sizes.size):
         weight = options.weights[k] if k >= strict else 1.0
         for i in range(first, first + sizes[k]):
@@ -150,8 +173,8 @@ def _draw(s, m, x, mu):
     rows = m
     for c in range(x.size):
         if mu > 0.0 and s.own[c] == 0.0:
-            s.A[rows] = 0.0
-            s.A[rows, c] = mu
+            for e in range(x.size):
+                s.A[rows, e] = mu if e == c else 0.0
             s.lower[rows] = s.upper[rows] = mu * x[c]
             rows += 1
     return rows

@@ -14,10 +14,12 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
 from hierarchy.jit.exporting import integers_at, numbers_at
+from solvers.kernels.merged import BY_RULE
 from solvers.kernels.rows import ZERO
 from solvers.kernels.space import View
 from solvers.library.sizes import SETTINGS, in_range, record_size, work_size
 from solvers.resolvers.hcod import Hcod
+from solvers.resolvers.merged import Merged
 from solvers.status import INACCURATE, ITERATION_LIMIT, SOLVED, TOO_SMALL
 
 REFUSED = 11  # a row of a kind that the resolver does not handle
@@ -27,10 +29,10 @@ INVALID = 12  # sizes that do not add up, a missing pointer, a setting out of ra
 N, M, LEVELS, A, LOWER, UPPER, SIZES, REFERENCE, PROBLEM = range(9)
 VALUES, SIZE, USED, WARM, ITERATIONS, ROW, RECORD = range(7)
 
-REALS, COUNTS = 6, 4  # fields of th_settings: numbers, then integers
+REALS, COUNTS = 10, 6  # fields of th_settings: numbers, then integers and an address
 DAMPING, THRESHOLD, RANK_TOLERANCE = Hcod.damping, Hcod.threshold, Hcod.rank_tolerance
 TOLERANCE, MAX_ITERATIONS = Hcod.tolerance, Hcod.max_iterations
-LARGEST_TOLERANCE, MOST_ITERATIONS, METHODS = 1e-3, 2**31, 4
+LARGEST_TOLERANCE, MOST_ITERATIONS, METHODS, LARGEST_RATIO = 1e-3, 2**31, 4, 1e6
 
 
 class Given(NamedTuple):
@@ -42,13 +44,20 @@ class Given(NamedTuple):
     tolerance: View
     isotropic: View
     largest: View
+    ratio: View
+    cap: View
+    step: View
+    regularisation: View
     max_iterations: View
     optimal: View
     miss: View
     method: View
+    strict_levels: View
+    scales: View
 
 
-DEFAULTS = Given(DAMPING, THRESHOLD, RANK_TOLERANCE, TOLERANCE, 0.0, inf, MAX_ITERATIONS, 0, 0, 0)
+DEFAULTS = Given(DAMPING, THRESHOLD, RANK_TOLERANCE, TOLERANCE, 0.0, inf, Merged.ratio, Merged.cap,
+                 Merged.step, Merged.regularisation, MAX_ITERATIONS, 0, 0, 0, int(BY_RULE), 0)
 
 
 class Call(NamedTuple):
@@ -122,7 +131,9 @@ def _in_range(settings):
             and 0.0 <= s.rank_tolerance < 1.0 and 0.0 < s.tolerance < LARGEST_TOLERANCE
             and 0.0 <= s.isotropic < np.inf and s.largest > 0.0
             and 1 <= s.max_iterations < MOST_ITERATIONS
-            and 0 <= s.optimal <= 1 and 0 <= s.miss <= 1 and 0 <= s.method < METHODS)
+            and 0 <= s.optimal <= 1 and 0 <= s.miss <= 1 and 0 <= s.method < METHODS
+            and 1.0 <= s.ratio < LARGEST_RATIO and 0.0 <= s.cap < np.inf and 0.0 < s.step <= 1.0
+            and 0.0 <= s.regularisation < np.inf and -1 <= s.strict_levels < MOST_ITERATIONS)
 
 
 @inlined
@@ -145,7 +156,8 @@ def given(settings):
     if settings == 0:
         return DEFAULTS
     a, b = numbers_at(settings, REALS), integers_at(settings + 8 * REALS, COUNTS)
-    return Given(a[0], a[1], a[2], a[3], a[4], a[5], b[0], b[1], b[2], b[3])
+    return Given(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], b[0], b[1], b[2],
+                 b[3], b[4], b[5])
 
 
 @inlined

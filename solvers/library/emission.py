@@ -20,7 +20,7 @@ from typing import final
 from hierarchy.errors import HierarchyError, UnknownNameError
 
 TARGETS = ("native", "x86_64", "aarch64")
-RESOLVERS = ("hcod", "tpm", "recursive", "sns")
+RESOLVERS = ("hcod", "tpm", "recursive", "sns", "merged")
 _TRIPLES = {"x86_64": "x86_64-unknown-linux-gnu", "aarch64": "aarch64-unknown-linux-gnu"}
 _WORKER = "import sys; from solvers.library.emission import work; work(*sys.argv[1:])"
 _TEXTS = ("th_version", "th_digest")

@@ -10,10 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
-from hierarchy.jit.exporting import INTEGER, STATUS, Entry
+from hierarchy.jit.exporting import INTEGER, STATUS, Entry, numbers_at
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.damped import damped_recursion
 from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy, verify_answer
+from solvers.kernels.merged import OWN, merged, write_levels
+from solvers.kernels.merged import record_size as merged_record
 from solvers.kernels.recursion import recursion
 from solvers.kernels.rows import ZERO
 from solvers.kernels.sns import sns
@@ -102,6 +104,15 @@ def solve_sns(problem, settings, record, x, work, size):
     return closed(call, code)
 
 
+def solve_merged(problem, settings, record, x, work, size):
+    """Solve like `Merged`, without damping."""
+    code = judged(problem, settings, record, x, work, size)
+    if code != SOLVED:
+        return np.int32(code)
+    call = opened(problem, record, x, work, size)
+    return closed(call, _merged(call, given(settings)))
+
+
 def violations_at(problem, x, norms):
     """Write like `Hierarchy.violations`; infinity where that is not finite."""
     code = judged_problem(problem)
@@ -164,6 +175,30 @@ def _hcod(call):
     return code
 
 
+@compiled
+def _merged(call, s):
+    """Solve like `Merged.solve`; INVALID with damping, or a scale that is not positive."""
+    (m, n), levels = call.A.shape, call.sizes.size
+    own, scale = call.work[:OWN + 2 * levels], call.work[OWN + 2 * levels:OWN + 3 * levels]
+    _write_exact(call.settings, s)
+    begun(call, merged_record(n, m))
+    given_scale = numbers_at(s.scales, levels if s.scales != 0 else ZERO)
+    for k in range(levels):
+        scale[k] = given_scale[k] if s.scales != 0 else 1.0
+        if not 0.0 < scale[k] < np.inf:
+            return ZERO + INVALID
+    if s.damping > 0.0:
+        return ZERO + INVALID
+    _write_exact(own, s)
+    own[5], own[6], own[7] = s.strict_levels, s.regularisation, s.step
+    write_levels(own, s.ratio, s.cap, scale)
+    record = call.values[:call.state[USED]]
+    code = merged(call.A, call.lower, call.upper, call.sizes, call.x, record, own,
+                  call.work[OWN + 3 * levels:])
+    call.state[ITERATIONS], call.state[WARM] = np.int64(record[m]), 1
+    return code
+
+
 @inlined
 def exactly(call, record):
     """Solve like `solve_exactly` of `hcod`."""
@@ -218,6 +253,7 @@ RESOLVERS = {
     "tpm": Entry(solve_tpm, 6, STATUS, NUMERICAL_FAILURE),
     "recursive": Entry(solve_recursive, 6, STATUS, NUMERICAL_FAILURE),
     "sns": Entry(solve_sns, 6, STATUS, NUMERICAL_FAILURE),
+    "merged": Entry(solve_merged, 6, STATUS, NUMERICAL_FAILURE),
 }
 ALWAYS = {"th_work_size": Entry(size_of_work, 3, INTEGER, -1),
           "th_record_size": Entry(size_of_record, 3, INTEGER, -1),

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from hierarchy.jit import inlined
 from solvers.kernels.exact import work_size as exact_size
+from solvers.kernels.merged import OWN, merged_size
+from solvers.kernels.merged import record_size as merged_record
 
 MOST = 1 << 20  # unknowns, rows or levels: with more the sizes could overflow
 SETTINGS = 6    # of a kernel
@@ -24,14 +26,15 @@ def in_range(n, m, levels):
 
 @inlined
 def record_size(n, m, levels):
-    """Return the size of the largest record, which is that of `tpm`."""
-    return n + levels + 3 * m + 3
+    """Return the size of the largest record, which is that of `tpm` or of `merged`."""
+    return max(n + levels + 3 * m + 3, merged_record(n, m))
 
 
 @inlined
 def work_size(n, m, levels):
     """Return the size of a work space that is enough for every resolver."""
-    return SETTINGS + max(exact_size(n, m, levels, True), recursive(n, m), saturation(n, m))
+    return SETTINGS + max(exact_size(n, m, levels, True), recursive(n, m), saturation(n, m),
+                          OWN + 3 * levels + merged_size(n, m, levels, False))
 
 
 @inlined

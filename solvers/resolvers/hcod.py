@@ -30,17 +30,18 @@ class ActiveSetResolution(Resolution):
     unfinished : the level at which the iteration limit was reached, or None.
     """
 
-    __slots__ = ()
+    __slots__ = ("record",)
 
     memory: Array
 
-    def __init__(self, x: Array, status: Status, memory: Array) -> None:
-        self.x, self.status, self.memory, self.witnesses = x, status, memory, None
+    def __init__(self, x: Array, status: Status, record: Array) -> None:
+        self.x, self.status, self.witnesses = x, status, None
+        self.memory = self.record = record
 
     @property
     def iterations(self) -> int:  # type: ignore[override]
         """Active sets tried, plus active-set steps level by level."""
-        return int(self.memory[-3] + self.memory[-2])
+        return int(self.record[-3] + self.record[-2])
 
     @property
     def active(self) -> NDArray[np.int8]:
@@ -61,11 +62,11 @@ class ActiveSetResolution(Resolution):
     def unfinished(self) -> int | None:
         """The level at which the iteration limit was reached."""
         limited = self.status is Status.ITERATION_LIMIT
-        return max(0, int(self.memory[-1])) if limited else None
+        return max(0, int(self.record[-1])) if limited else None
 
     def _part(self, which: int) -> Array:
-        m = (len(self.memory) - 3) // 3
-        part: Array = self.memory[which * m:(which + 1) * m]
+        m = (len(self.record) - 3) // 3
+        part: Array = self.record[which * m:(which + 1) * m]
         return part
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
-from solvers.kernels.merged import BY_RULE, NOTHING, solve_merged
+from solvers.kernels.merged import BY_RULE, NOTHING, merged, record_size, write_levels
 from solvers.resolver import Handles, Resolution, Resolver, register
 from solvers.resolvers.hcod import Hcod, warm_record
 from solvers.status import TOO_SMALL, Status
@@ -111,15 +111,13 @@ class Merged(Resolver):
     def _settings_for(self, names: tuple[str, ...]) -> Array:
         """Return the settings of the kernel for levels of these names."""
         if names not in self._known:
-            scales = dict(self.scales)
-            scale = np.array([scales.get(name, 1.0) for name in names])
-            strict = BY_RULE if self.strict_levels is None else self.strict_levels
-            self._known[names] = np.array([
+            scales, strict = dict(self.scales), self.strict_levels
+            self._known[names] = settings = np.array([
                 self.damping, self.threshold, self.rank_tolerance, self.tolerance,
-                self.max_iterations, strict, self.regularisation,
-                *self.ratio ** np.arange(len(names) - 1, -1, -1.0) / scale,
-                self.step,
-                *self.cap * scale])
+                self.max_iterations, BY_RULE if strict is None else strict, self.regularisation,
+                self.step, *np.empty(2 * len(names))])
+            write_levels(settings, self.ratio, self.cap,
+                         np.array([scales.get(name, 1.0) for name in names]))
         return self._known[names]
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> MergedResolution:
@@ -128,17 +126,22 @@ class Merged(Resolver):
         Raises HierarchyError if every level is strict, so that none is left to merge.
         """
         x, m = h.start(), h.m
-        record = warm_record(memory, 4 * m + 3 * h.n + 4)
+        record = warm_record(memory, record_size(h.n, m))
         A, lower, upper, sizes = h.rows
-        solve, settings = entry(solve_merged), self._settings_for(h.names)
+        solve, settings = entry(merged), self._settings_for(h.names)
         code = solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)
         while code == TOO_SMALL:
             WORKSPACE.double()
             code = solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)
         if code == NOTHING:
-            raise HierarchyError(f"merged: all levels stay strict ({', '.join(h.names)}) and none "
-                                 "is left to merge; set strict_levels, or use hcod")
+            refuse_safety_alone(h)
         return MergedResolution(x, Status(code), record, m)
+
+
+def refuse_safety_alone(h: Hierarchy) -> None:
+    """Raise a HierarchyError: every level of h is strict."""
+    raise HierarchyError(f"merged: all levels stay strict ({', '.join(h.names)}) and none is left "
+                         "to merge; set strict_levels, or use hcod")
 
 
 def _checked(scales: Mapping[str, float] | tuple[tuple[str, float], ...]

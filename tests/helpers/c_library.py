@@ -13,7 +13,7 @@ NUMBERS, INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int
 SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, INACCURATE = 0, 1, 2, 4
 TOO_SMALL, CONTRADICTION, REFUSED, INVALID = 8, 10, 11, 12
 CANARY = -3.14159e77
-NAMES = ("hcod", "tpm", "recursive", "sns")
+NAMES = ("hcod", "tpm", "recursive", "sns", "merged")
 
 
 class Problem(ctypes.Structure):
@@ -29,15 +29,18 @@ class Record(ctypes.Structure):
 
 class Settings(ctypes.Structure):
     _fields_ = [(name, ctypes.c_double) for name in (
-        "damping", "threshold", "rank_tolerance", "tolerance", "isotropic", "largest")] + [
-        (name, ctypes.c_int64) for name in (
-            "max_iterations", "optimal", "miss", "method")]
+        "damping", "threshold", "rank_tolerance", "tolerance", "isotropic", "largest", "ratio",
+        "cap", "step", "regularisation")] + [(name, ctypes.c_int64) for name in (
+            "max_iterations", "optimal", "miss", "method", "strict_levels")] + [
+        ("scales", NUMBERS)]
 
 
 def settings_of(**given):
     """Settings with the defaults of the header but for those given."""
     return Settings(**{"threshold": 0.1, "rank_tolerance": 1e-8, "tolerance": 1e-10,
-                       "largest": np.inf, "max_iterations": 1000, **given})
+                       "largest": np.inf, "ratio": 5.0, "cap": 1.0, "step": 0.1,
+                       "regularisation": 1e-3, "max_iterations": 1000, "strict_levels": -1,
+                       **given})
 
 
 def problem_of(h, **changed):

@@ -31,6 +31,9 @@ RESOLVERS = [
     ("recursive", {"method": "selective", "largest": 0.3}, {"method": 3, "largest": 0.3}),
     ("sns", {}, {}),
     ("sns", {"form": "optimal", "scales": "miss"}, {"optimal": 1, "miss": 1}),
+    ("merged", {}, {}),
+    ("merged", {"ratio": 3.0, "step": 1.0, "strict_levels": 1},
+     {"ratio": 3.0, "step": 1.0, "strict_levels": 1}),
 ]
 
 
@@ -58,7 +61,7 @@ def test_c_and_python_give_the_same_bits_on_the_reference_families(library, name
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["hcod", "tpm"])
+@pytest.mark.parametrize("name", ["hcod", "tpm", "merged"])
 def test_warm_sequences_give_the_same_bits(library, name):
     warm = 0
     for seed in range(12):

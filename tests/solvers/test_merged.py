@@ -135,3 +135,17 @@ def test_scales_divide_the_weight_of_their_level():
     h = Hierarchy.from_levels(rows, names=["hand", "posture"])
     x = solved(make("merged", ratio=2.0, scales={"hand": 2.0}, strict_levels=0, cap=0.0), h).x
     np.testing.assert_allclose(x, [0.5], atol=1e-5)
+
+
+def test_a_batch_gives_the_bits_of_single_solves_and_carries_their_memories():
+    from solvers.batch.stacked import Batch, solve
+
+    levels, resolver = arm(2), make("merged", scales={"level 4": 3.0})
+    hs = [with_targets(levels, targets(seed)) for seed in range(5)]
+    first = solve(Batch.of(hs), resolver)
+    again = solve(Batch.of(hs), resolver, memory=first.memory)
+    for h, x, memory, later in zip(hs, first.x, first.memory, again.x, strict=True):
+        one = solved(resolver, h)
+        assert one.x.tobytes() == x.tobytes()
+        assert one.memory.tobytes() == memory.tobytes()
+        assert solved(resolver, h, one.memory).x.tobytes() == later.tobytes()

@@ -81,13 +81,20 @@ typedef struct th_settings {
   double damping;         /* >= 0; 0 is off. With damping every solve is a cold start. */
   double threshold;       /* > 0, singular value below which damping starts */
   double rank_tolerance;  /* 0 to 1, share of a row below which it depends on the rows above */
-  double tolerance;       /* hcod, tpm: of violations, relative to their terms; up to 1e-3 */
+  double tolerance;       /* hcod, tpm, merged: of violations, relative to their terms; up to 1e-3 */
   double isotropic;       /* recursive, TH_CHIAVERINI: damping of all directions */
   double largest;         /* recursive, TH_SELECTIVE: largest step; INFINITY is no damping */
-  int64_t max_iterations; /* hcod, tpm: steps level by level, at least 1 */
+  double ratio;           /* merged: weight of a level over that of the level below, at least 1 */
+  double cap;             /* merged: most that a target moves, times the scale of its level */
+  double step;            /* merged: share of a miss by which it moves, above 0, at most 1 */
+  double regularisation;  /* merged: weight of unknowns that no merged row names alone */
+  int64_t max_iterations; /* hcod, tpm, merged: steps level by level, at least 1 */
   int64_t optimal;        /* sns: 1 for form = "optimal", 0 for "basic" */
   int64_t miss;           /* sns: 1 for scales = "miss", 0 for "target" */
   int64_t method;         /* recursive: one of th_method */
+  int64_t strict_levels;  /* merged: levels that stay strict; -1: the first run of levels with
+                             inequalities, and all levels above it */
+  const double *scales;   /* merged: (levels), the miss of each that counts as 1; NULL for 1 */
 } th_settings;
 
 typedef char th_has_pointers_of_64_bits[sizeof(void *) == 8 ? 1 : -1];
@@ -153,6 +160,14 @@ int th_solve_recursive(const th_problem *problem, const th_settings *settings, t
  * + 1): state of each unknown and share of each level as for tpm; sets of saturated unknowns tried. */
 int th_solve_sns(const th_problem *problem, const th_settings *settings, th_record *record,
                  double *x, double *work, int64_t work_size);
+@end
+@if merged
+/* Strict limits, one weighted level with a memory below them, which lives in the record: solve each
+ * tick from the one before. TH_INVALID with damping; TH_REFUSED where no level is left to merge.
+ * values (4 m + 3 n + 4): by how much the sides of each row move in the next solve; steps; states of
+ * rows as for hcod. */
+int th_solve_merged(const th_problem *problem, const th_settings *settings, th_record *record,
+                    double *x, double *work, int64_t work_size);
 @end
 
 #ifdef __cplusplus
