@@ -20,6 +20,7 @@ from PIL import Image
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacles
 from scenarios import load, simulate
+from scenarios.cell.scene import make_obstacles
 from scenarios.draw.figures.bodies import outline
 from scenarios.draw.figures.drawing import ALERT, INK, project, style
 from scenarios.recording.links import capsules, ends
@@ -67,7 +68,6 @@ def _of_scenario(name):
         found.append((run["q"], measured, run["t"]))
     scenario = run.scenario
     robot = Robot.load(HERE / scenario.robot.model if name == "ur5" else scenario.robot.model)
-    from scenarios.cell.scene import make_obstacles
     obstacles = make_obstacles(scenario.avoidance.placed) if scenario.avoidance else None
     return robot, found, obstacles
 
