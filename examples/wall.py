@@ -30,7 +30,7 @@ class Behind(Task):
 
     def error(self, state):
         """How far the point is beyond the limit (1,) [m]."""
-        return np.array([np.dot(self.normal, state.position(self.point.frame)) - self.limit])
+        return [np.dot(self.normal, state.position(self.point.frame)) - self.limit]
 
     def jacobian(self, state):
         """Of -normal . p (1, n)."""
