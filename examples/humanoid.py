@@ -27,20 +27,20 @@ TASKS = {"strict": [FEET, BALANCE, HAND, POSTURE],
 
 
 def run(kind, duration):
-    """Return the positions (T, 37) and how far a foot slides [mm]."""
-    q, memory, qs, slip = ROBOT.rest, None, [], 0.0
+    """Return the positions (T, 37) and how far a foot slides (T,) [mm]."""
+    q, memory, qs, slip = ROBOT.rest, None, [], []
     for t in np.arange(0.0, duration, DT):
         step = solve_ik(ROBOT, q, TASKS[kind], dt=DT, t=t, memory=memory)
         q, memory = ROBOT.integrate(q, DT * step.v), step.memory
         error = FEET.error(State.at(ROBOT, q)).reshape(2, 6)[:, :3]
-        slip = max(slip, 1e3 * float(np.linalg.norm(error, axis=1).max()))
+        slip.append(1e3 * np.linalg.norm(error, axis=1).max())
         qs.append(q)
-    return np.array(qs), slip
+    return np.array(qs), np.array(slip)
 
 
 def main(duration=5.0):
     """Reach both ways and print how far a foot slides."""
-    strict, one = (run(kind, duration)[1] for kind in TASKS)
+    strict, one = (run(kind, duration)[1].max() for kind in TASKS)
     print(f"a foot slides by {strict:.2f} mm with strict levels, "
           f"by {one:.0f} mm in one level")
     return strict, one

@@ -1,4 +1,4 @@
-"""An iiwa swings its elbow while its tool stays on a point: the seventh joint, and nothing else.
+"""An iiwa swings its elbow while its tool keeps its pose: what a seventh joint is for.
 
 Levels: joint limits > pose of the tool > the elbow goes from side to side.
 Beside it: the same tasks with weights 10 : 1 in place of levels.
@@ -26,19 +26,19 @@ SOLVE = {"strict": {}, "weights 10:1": {"resolver": make("weighted", ratio=10.0)
 
 
 def run(kind, duration):
-    """Return the joint positions (T, 7) and how far the tool moves [mm]."""
-    q, memory, qs, moved = START, None, [], 0.0
+    """Return the joint positions (T, 7) and how far the tool moves (T,) [mm]."""
+    q, memory, qs, moved = START, None, [], []
     for t in np.arange(0.0, duration, DT):
         step = solve_ik(ROBOT, q, TASKS, dt=DT, t=t, memory=memory, **SOLVE[kind])
         q, memory = ROBOT.integrate(q, DT * step.v), step.memory
-        moved = max(moved, 1e3 * float(np.linalg.norm(State.at(ROBOT, q).position(TOOL) - POINT)))
+        moved.append(1e3 * np.linalg.norm(State.at(ROBOT, q).position(TOOL) - POINT))
         qs.append(q)
-    return np.array(qs), moved
+    return np.array(qs), np.array(moved)
 
 
 def main(duration=6.3):
     """Swing the elbow both ways and print how far the tool moves."""
-    strict, weighted = (run(kind, duration)[1] for kind in SOLVE)
+    strict, weighted = (run(kind, duration)[1].max() for kind in SOLVE)
     print(f"the tool moves by {strict:.2f} mm with strict levels, "
           f"by {weighted:.1f} mm with weights 10:1")
     return strict, weighted

@@ -26,20 +26,20 @@ TASKS = {"strict": [UPRIGHT, CARRY, Posture(START)],
 
 
 def run(kind, duration):
-    """Return the joint positions (T, 7) and the largest tilt of the glass [deg]."""
-    q, memory, qs, tilt = START, None, [], 0.0
+    """Return the joint positions (T, 7) and the tilt of the glass (T,) [deg]."""
+    q, memory, qs, tilt = START, None, [], []
     for t in np.arange(0.0, duration, DT):
         step = solve_ik(ROBOT, q, TASKS[kind], dt=DT, t=t, memory=memory)
         q, memory = ROBOT.integrate(q, DT * step.v), step.memory
         down = -State.at(ROBOT, q).rotation(HAND)[2, 2]
-        tilt = max(tilt, float(np.degrees(np.arccos(min(down, 1.0)))))
+        tilt.append(np.degrees(np.arccos(min(down, 1.0))))
         qs.append(q)
-    return np.array(qs), tilt
+    return np.array(qs), np.array(tilt)
 
 
 def main(duration=5.0):
     """Carry the glass both ways and print how far it tilts."""
-    strict, one = (run(kind, duration)[1] for kind in TASKS)
+    strict, one = (run(kind, duration)[1].max() for kind in TASKS)
     print(f"the glass tilts by {strict:.2f} deg with strict levels, by {one:.0f} deg in one level")
     return strict, one
 

@@ -24,19 +24,19 @@ SOLVE = {"strict": {}, "weights 10:1": {"resolver": make("weighted", ratio=10.0)
 
 
 def run(kind, duration):
-    """Return the positions (T, 19) and how far a foot slides [mm]."""
-    q, memory, qs, slip = ROBOT.rest, None, [], 0.0
+    """Return the positions (T, 19) and how far a foot slides (T,) [mm]."""
+    q, memory, qs, slip = ROBOT.rest, None, [], []
     for t in np.arange(0.0, duration, DT):
         step = solve_ik(ROBOT, q, TASKS, dt=DT, t=t, memory=memory, **SOLVE[kind])
         q, memory = ROBOT.integrate(q, DT * step.v), step.memory
-        slip = max(slip, 1e3 * float(np.abs(STAND.error(State.at(ROBOT, q))).max()))
+        slip.append(1e3 * np.abs(STAND.error(State.at(ROBOT, q))).max())
         qs.append(q)
-    return np.array(qs), slip
+    return np.array(qs), np.array(slip)
 
 
 def main(duration=6.3):
     """Look around both ways and print how far the feet slide."""
-    strict, weighted = (run(kind, duration)[1] for kind in SOLVE)
+    strict, weighted = (run(kind, duration)[1].max() for kind in SOLVE)
     print(f"a foot slides by {strict:.2f} mm with strict levels, "
           f"by {weighted:.1f} mm with weights 10:1")
     return strict, weighted

@@ -40,27 +40,29 @@ START = ROBOT.rest + np.r_[path("Hips")(0.0)[0] - ROBOT.rest[:3], np.zeros(ROBOT
 
 
 def run(kind, duration):
-    """Return the positions (T, 37) and the farthest that a foot slides while it stands [mm]."""
+    """Return the positions (T, 37) and how far a standing foot slides (T,) [mm]."""
     (tasks, options), landed = WAYS[kind], {}
-    q, memory, qs, slip = START, None, [], 0.0
+    q, memory, qs, slip = START, None, [], []
     for t in np.arange(-0.3, duration, DT):  # 0.3 s to take up the first pose
         now = max(t, 0.0)
         step = solve_ik(ROBOT, q, tasks, dt=DT, t=now, memory=memory, **options)
         q, memory = ROBOT.integrate(q, DT * step.v), step.memory
         state = State.at(ROBOT, q)
+        slip.append(0.0)
         for side, sole in SOLES.items():
             here, still = state.position(f"{side}_foot"), np.linalg.norm(sole(now)[1]) < 1e-3
             if t > 0.0 and still:
-                slip = max(slip, 1e3 * np.linalg.norm(here - landed.setdefault(side, here)))
+                slid = 1e3 * np.linalg.norm(here - landed.setdefault(side, here))
+                slip[-1] = max(slip[-1], slid)
             else:
                 landed.pop(side, None)
         qs.append(q)
-    return np.array(qs), float(slip)
+    return np.array(qs), np.array(slip)
 
 
 def main(duration=2.4):
     """Walk each way and print how far the feet slide."""
-    strict, weighted, one = (run(kind, duration)[1] for kind in WAYS)
+    strict, weighted, one = (run(kind, duration)[1].max() for kind in WAYS)
     print(f"a standing foot slides by {strict:.2f} mm with strict levels, by {weighted:.1f} mm "
           f"with weights 10:1, by {one:.0f} mm in one level")
     return strict, one

@@ -24,20 +24,20 @@ TASKS = {"strict": [Position(TIP, PATH), POSE], "one level": [POSE]}
 
 
 def run(kind, duration):
-    """Return the joint positions (T, 5) and the largest distance of the tip from its path [mm]."""
-    q, memory, qs, error = START, None, [], 0.0
+    """Return the joint positions (T, 5) and how far the tip is from its path (T,) [mm]."""
+    q, memory, qs, error = START, None, [], []
     for t in np.arange(0.0, duration, DT):
         step = solve_ik(ROBOT, q, TASKS[kind], dt=DT, t=t, memory=memory)
         q, memory = ROBOT.integrate(q, DT * step.v), step.memory
         missed = PATH(t + DT)[0] - State.at(ROBOT, q).position(TIP)
-        error = max(error, 1e3 * float(np.linalg.norm(missed)))
+        error.append(1e3 * np.linalg.norm(missed))
         qs.append(q)
-    return np.array(qs), error
+    return np.array(qs), np.array(error)
 
 
 def main(duration=3.2):
     """Draw the circle both ways and print how far the tip is from it."""
-    strict, one = (run(kind, duration)[1] for kind in TASKS)
+    strict, one = (run(kind, duration)[1].max() for kind in TASKS)
     print(f"the tip leaves its circle by {strict:.2f} mm with position first, "
           f"by {one:.0f} mm with the pose as one level")
     return strict, one

@@ -115,13 +115,13 @@ class Task(ABC):
 
     def reference_velocity(self, state: State) -> Array:
         """Reference of the task velocity at velocity level: (m,)."""
-        return self.desired_velocity(state) + self.gain * self.error(state)
+        return self.desired_velocity(state) + self.gain * np.asarray(self.error(state))
 
     def reference_acceleration(self, state: State) -> Array:
         """Reference of the task acceleration at acceleration level: (m,)."""
         rate = self.desired_velocity(state) - self.jacobian(state) @ state.v
         return (self.desired_acceleration(state) + self.damping * rate
-                + self.stiffness * self.error(state))
+                + self.stiffness * np.asarray(self.error(state)))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:

@@ -12,6 +12,8 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 
+_CHANNELS = tuple(axis + kind for kind in ("position", "rotation") for axis in "xyz")
+
 
 class Motion(NamedTuple):
     """F frames of a skeleton: `times` (F,) [s], by joint `positions` (F, 3) in the file's unit.
@@ -67,6 +69,8 @@ def _skeleton(words: Iterator[str]) -> list[_Joint]:
             joints[-1] = joints[-1]._replace(offset=tuple(float(next(words)) for _ in range(3)))
         elif word == "CHANNELS":
             channels = tuple(next(words).lower() for _ in range(int(next(words))))
+            if wrong := [name for name in channels if name not in _CHANNELS]:
+                raise ValueError(f"channel {wrong[0]!r} is unknown")
             joints[-1] = joints[-1]._replace(channels=channels)
         else:
             raise ValueError(f"{word!r} is unknown there")

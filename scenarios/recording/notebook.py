@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib import import_module
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -48,7 +49,13 @@ def curves(t: NDArray[Any], signals: Mapping[str, NDArray[Any]],
     """Return a figure with one panel per signal, a curve for each of its numbers."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8.0, 1.0 + 1.8 * len(signals)), layout="constrained")
+    class Shown(Figure):
+        def _repr_png_(self) -> bytes:  # a notebook asks for it; without pyplot it shows no figure
+            png = BytesIO()
+            self.savefig(png, format="png")
+            return png.getvalue()
+
+    figure = Shown(figsize=(8.0, 1.0 + 1.8 * len(signals)), layout="constrained")
     axes = figure.subplots(len(signals), 1, sharex=True, squeeze=False)[:, 0]
     for ax, (name, signal) in zip(axes, signals.items(), strict=True):
         lines = ax.plot(t, signal.reshape(len(t), -1), linewidth=0.9)

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hierarchy import State
 from scenarios import load, simulate
+from scenarios.cell.build import build
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Seconds of the run; at most this with strict levels, and at least that otherwise [mm, deg, ...].
@@ -33,10 +35,14 @@ EQUAL = ["control.resolver=weighted", "control.options.ratio=1", "control.dampin
 
 
 @pytest.mark.slow
-def test_the_ur5_keeps_clear_of_the_ball_and_with_equal_weights_does_not():
+def test_the_ur5_keeps_clear_of_the_ball_and_of_itself_and_with_equal_weights_does_not():
     strict, equal = (simulate(load(EXAMPLES / "ur5.toml", changes))
                      for changes in ([], EQUAL))
     assert min(strict["minimal_distance"].min(), strict["ee_distance"].min()) > 0.0499
+    cell = build(strict.scenario)
+    links = [cell.stack["self-separation"].distances(State.at(cell.robot, q)).min()
+             for q in strict["q"][::20]]
+    assert 0.0349 < min(links) < 0.036  # and it comes so near
     assert equal["ee_distance"].min() < -0.05
 
 

@@ -77,13 +77,13 @@ def _body(ax: Axes, robot: RobotFacts, q: Array, aside: Array) -> None:
     light, dark = (np.array([int(c[i:i + 2], 16) for i in (1, 3, 5)]) / 255
                    for c in (_LIGHT, _DARK))
     flat = _flat(segments)
-    shapes = [Polygon(aside + _outline(flat[i, 0], flat[i, 1], links[i].radius)) for i in order]
+    shapes = [Polygon(aside + outline(flat[i, 0], flat[i, 1], links[i].radius)) for i in order]
     ax.add_collection(PatchCollection(
         shapes, facecolors=[light + shade[i] * (dark - light) for i in order],
         edgecolors="white", linewidths=0.6))
 
 
-def _outline(start: Array, end: Array, radius: float) -> Array:
+def outline(start: Array, end: Array, radius: float) -> Array:
     """Return the outline (N, 2) of a capsule seen from the side: two half circles."""
     along = np.arctan2(*(end - start)[::-1])
     angles = np.concatenate([along - np.pi / 2 + _AROUND, along + np.pi / 2 + _AROUND])
