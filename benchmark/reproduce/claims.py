@@ -26,8 +26,9 @@ def untested(protocol: Protocol) -> list[str]:
 
 def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
     """Return a table of what was found about the claims of a family."""
-    lines = [f"| claim | effect [95 % interval] | {' | '.join(rows.layouts)} | Holm's p | verdict |",
-             "|---" * (4 + len(rows.layouts)) + "|"]
+    head = ["claim", "effect [95 % interval]", *rows.layouts, "Holm's p", "verdict"]
+    lines = [f"| {' | '.join(head)} |",
+             "|---" * len(head) + "|"]
     for one in judged(protocol, rows, family):
         each = " | ".join(shown(one.claim, rows, effect) for effect in one.layouts)
         lines.append(f"| {one.claim.text} | {shown(one.claim, rows, one.effect)} | {each} | "

@@ -12,6 +12,7 @@ from hierarchy.problem import Array
 from scenarios.config.plant import AnyPlant
 from scenarios.config.sections import (
     Finite,
+    Flag,
     Force,
     Length,
     NotNegative,
@@ -56,11 +57,13 @@ class TorqueSection(AnyPlant):
     Its [[contacts]] touch a floor, or table, at `height` [m] whose coefficient is `friction`;
     `softness` [s] is the time constant of a contact. `joint_friction` [N m] is Coulomb's friction,
     `armature` [kg m^2] the inertia of the drive of every joint beyond the robot's own, `delay` [s],
-    a whole number of periods, the time by which torques arrive late; the controller knows of none
-    of them. `pushes` disturb it. A robot whose centre of mass is `fall` [m] below its start, or
-    whose base has tilted by `tilt` [rad] from it, has fallen, which ends the run with a fault. So
-    does a joint more than `beyond_stop` [rad] beyond its position limit: joints have no stops in
-    the simulation.
+    a whole number of periods, the time by which torques arrive late, `joint_damping` [N m s/rad]
+    viscous friction, `bandwidth` [Hz] that of the motors' torques, without which they follow at
+    once; the controller knows of none of them. With `self_collision` the robot's capsules touch
+    one another, except neighbours and those that overlap at the start. `pushes` disturb it. A robot
+    whose centre of mass is `fall` [m] below its start, or whose base has tilted by `tilt` [rad]
+    from it, has fallen, which ends the run with a fault. So does a joint more than `beyond_stop`
+    [rad] beyond its position limit, where it has a stop if there are `stops`.
     """
 
     made_by: ClassVar[str] = "scenarios.cell.plants.torque:TorqueRobot"
@@ -71,7 +74,11 @@ class TorqueSection(AnyPlant):
     softness: Span = 0.005
     joint_friction: Annotated[NotNegative, Unit("N m")] = 0.0
     armature: Annotated[NotNegative, Unit("kg m^2")] = 0.0
+    joint_damping: Annotated[NotNegative, Unit("N m s/rad")] = 0.0
     delay: Time = 0.0
+    bandwidth: Annotated[Positive, Unit("Hz")] | None = None
+    stops: Flag = True
+    self_collision: Flag = False
     fall: Length = 0.2
     tilt: Annotated[Positive, Unit("rad")] = 1.0
     beyond_stop: Annotated[Positive, Unit("rad")] = 0.2
