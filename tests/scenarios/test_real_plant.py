@@ -1,4 +1,4 @@
-"""What a robot with torque motors does not know of its own drives: bandwidth, stops, touching links."""
+"""Drives, stops and touching links of a robot with torque motors, and whether it stands."""
 
 from types import SimpleNamespace
 
