@@ -66,7 +66,7 @@ def block(name: str, stored: Stored, output: Callable[[str], str]) -> str:
         return "\n".join(fronts.table(stored.points, of))
     if rows is None:
         return _NOTHING
-    return "\n".join(claims.faults(rows) if what == "faults" else
+    return "\n".join(claims.faults(PROTOCOL, rows) if what == "faults" else
                      claims.found(PROTOCOL, rows, of))
 
 
@@ -78,8 +78,9 @@ def _items(given: Mapping[str, Any], rows: Rows | None, output: Callable[[str], 
         return texts
     if rows is None:
         return [_NOTHING]
-    known = {one.claim.name: one for one in every(rows)}
-    return [_CLAIM.sub(lambda named: said(known[named["name"]], rows), text) for text in texts]
+    known = {one.claim.name: said(one, rows) for one in every(rows)}
+    known["progress"] = claims.progress(PROTOCOL, rows)
+    return [_CLAIM.sub(lambda named: known[named["name"]], text) for text in texts]
 
 
 def every(rows: Rows) -> list[Found]:

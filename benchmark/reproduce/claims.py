@@ -36,13 +36,18 @@ def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
     return lines
 
 
-def faults(rows: Rows) -> list[str]:
-    """Return the columns that have runs which ended in a fault, and the reasons."""
+def progress(protocol: Protocol, rows: Rows) -> str:
+    """Return how much of the protocol has been run."""
+    return (f"Run so far: {len(rows.seeds)} of {len(protocol.seeds)} seeds, {rows.starts} of "
+            f"{protocol.starts} starts on each of {len(rows.layouts)} arms, without and with noise.")
+
+
+def faults(protocol: Protocol, rows: Rows) -> list[str]:
+    """Return how much of the protocol has been run, and which columns have runs with a fault."""
     total = rows.blocks.size
     said = [f"`{column}` {total - int(rows.ended(column).sum())} of {total} "
             f"({'; '.join(told)})" for column, told in rows.reasons[0].items()]
-    return [f"Runs that ended in a fault: {', '.join(said) or 'none'}. Of {len(rows.seeds)} seeds "
-            f"with {rows.starts} starts on each layout, run twice."]
+    return [f"{progress(protocol, rows)} Runs that ended in a fault: {', '.join(said) or 'none'}."]
 
 
 def counted(every: Sequence[Found]) -> dict[str, int]:
