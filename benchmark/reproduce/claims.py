@@ -39,7 +39,8 @@ def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
 def progress(protocol: Protocol, rows: Rows) -> str:
     """Return how much of the protocol has been run."""
     return (f"Run so far: {len(rows.seeds)} of {len(protocol.seeds)} seeds, {rows.starts} of "
-            f"{protocol.starts} starts on each of {len(rows.layouts)} arms, without and with noise.")
+            f"{protocol.starts} starts on each of {len(rows.layouts)} arms, without and with "
+            "noise.")
 
 
 def faults(protocol: Protocol, rows: Rows) -> list[str]:
