@@ -152,8 +152,8 @@ def read(path: Path) -> list[Point]:
 def table(points: Sequence[Point], name: str) -> list[str]:
     """Return the table of a front: settings, scenes that did not fail, medians of the test."""
     front = FRONTS[name]
-    lines = [f"| {name} | settings | stood | {' | '.join(f'`{one}`' for one in front.minimised)} |",
-             "|---" * (3 + len(front.minimised)) + "|"]
+    head = [name, "settings", "without a fault", *(f"`{one}`" for one in front.minimised)]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for one in points:
         if one.front == name:
             settings = ", ".join(f"{key.split('.', 1)[1]} = {x:g}"
