@@ -1,6 +1,6 @@
 """Every number of the documents' findings, made anew and written into them.
 
-`studies.toml` says what is run from sampled starts, and which blocks of the pages are made from it;
-`studies` runs and keeps them, `ticks` measures single ticks, `blocks` makes Markdown, `pages` puts
-blocks and outputs of commands in place.
+`protocol` makes the runs that `protocol.toml` asks for, `verdicts` judges its claims, `fronts`
+tunes and tests methods, `claims` and `blocks` make Markdown, `pages` puts blocks and outputs of
+commands in place.
 """

@@ -70,8 +70,9 @@ def measured(scenario: Scenario) -> tuple[Recording, tuple[Metric, ...]]:
     found = [*measure(recording).values(), *_rms(recording)]
     if watched:
         errors = float(np.sqrt(np.mean(np.square(watch.errors)))) if watch.errors else None
-        found += [Metric("avoidance_error_rms", "Error of the avoidance task, rms", errors, "m/s^2"),
-                  Metric("direction_jumps", "Abrupt turns of the repulsion", float(watch.jumps), "")]
+        found += [
+            Metric("avoidance_error_rms", "Error of the avoidance task, rms", errors, "m/s^2"),
+            Metric("direction_jumps", "Abrupt turns of the repulsion", float(watch.jumps), "")]
     return recording, tuple(found)
 
 

@@ -26,8 +26,9 @@ def untested(protocol: Protocol) -> list[str]:
 
 def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
     """Return a table of what was found about the claims of a family."""
-    lines = [f"| claim | effect [95 % interval] | {' | '.join(rows.layouts)} | Holm's p | verdict |",
-             "|---" * (4 + len(rows.layouts)) + "|"]
+    head = ["claim", "effect [95 % interval]", *rows.layouts, "Holm's p", "verdict"]
+    lines = [f"| {' | '.join(head)} |",
+             "|---" * len(head) + "|"]
     for one in judged(protocol, rows, family):
         each = " | ".join(shown(one.claim, rows, effect) for effect in one.layouts)
         lines.append(f"| {one.claim.text} | {shown(one.claim, rows, one.effect)} | {each} | "
@@ -35,13 +36,19 @@ def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
     return lines
 
 
-def faults(rows: Rows) -> list[str]:
-    """Return the columns that have runs which ended in a fault, and the reasons."""
+def progress(protocol: Protocol, rows: Rows) -> str:
+    """Return how much of the protocol has been run."""
+    return (f"Run so far: {len(rows.seeds)} of {len(protocol.seeds)} seeds, {rows.starts} of "
+            f"{protocol.starts} starts on each of {len(rows.layouts)} arms, without and with "
+            "noise.")
+
+
+def faults(protocol: Protocol, rows: Rows) -> list[str]:
+    """Return how much of the protocol has been run, and which columns have runs with a fault."""
     total = rows.blocks.size
     said = [f"`{column}` {total - int(rows.ended(column).sum())} of {total} "
             f"({'; '.join(told)})" for column, told in rows.reasons[0].items()]
-    return [f"Runs that ended in a fault: {', '.join(said) or 'none'}. Of {len(rows.seeds)} seeds "
-            f"with {rows.starts} starts on each layout, run twice."]
+    return [f"{progress(protocol, rows)} Runs that ended in a fault: {', '.join(said) or 'none'}."]
 
 
 def counted(every: Sequence[Found]) -> dict[str, int]:

@@ -1,6 +1,6 @@
 """The marks of pages, and what is put between them.
 
-    <!-- reproduce: NAME -->  a block of `studies.toml`, up to  <!-- end of NAME -->
+    <!-- reproduce: NAME -->  a block, see `blocks`, up to  <!-- end of NAME -->
     <!-- measured: hierarchy bench tick -->  what a command prints
     <!-- measured: hierarchy bench resolvers --fresh 1 | EQ7, fresh .. Times of -->
     <!-- measured: table of hierarchy bench resolvers --seconds 0.2 -->
@@ -26,13 +26,12 @@ from collections.abc import Mapping
 from itertools import dropwhile, takewhile
 from pathlib import Path
 
-from benchmark.reproduce.blocks import block
-from benchmark.reproduce.studies import Rows
+from benchmark.reproduce.blocks import Stored, block
 from hierarchy.errors import HierarchyError
 from scenarios.files import make_folder, slug, write_text
 
 ROOT = Path(__file__).parents[2]
-RESULTS, OUTPUT = "docs/results", "docs/results/output"
+OUTPUT = "docs/results/output"
 _COLUMNS = "100"  # of the terminal that a command writes to
 _CODE = ("hierarchy", "solvers", "scenarios", "benchmark")
 _MADE = re.compile(r"(<!-- reproduce: (?P<name>[\w-]+) -->\n).*?(<!-- end of \w[\w-]* -->)",
@@ -97,14 +96,14 @@ def file_of(command: str, root: Path) -> Path:
     return make_folder(root / OUTPUT) / f"{slug(command)}.txt"
 
 
-def fill(root: Path, rows: Mapping[str, Rows]) -> tuple[list[Path], list[str]]:
+def fill(root: Path, stored: Stored) -> tuple[list[Path], list[str]]:
     """Fill the pages of a checkout; return those that changed, and why others cannot be filled."""
     changed, lacking = [], []
     for name in marked(root):
         path = root / name
         text = path.read_text(encoding="utf-8")
         try:
-            made = filled(text, root, name, rows)
+            made = filled(text, root, name, stored)
         except HierarchyError as error:
             lacking.append(str(error))
             continue
@@ -114,11 +113,11 @@ def fill(root: Path, rows: Mapping[str, Rows]) -> tuple[list[Path], list[str]]:
     return changed, lacking
 
 
-def filled(text: str, root: Path, page: str, rows: Mapping[str, Rows]) -> str:
+def filled(text: str, root: Path, page: str, stored: Stored) -> str:
     """Return a page with what is between its marks made anew.
 
-    Raises HierarchyError, naming the page, for an unknown block, a study without rows, or an output
-    that is missing or lacks the lines asked for.
+    Raises HierarchyError, naming the page, for an unknown block, or an output that is missing
+    or lacks the lines asked for.
     """
     def output(command: str) -> str:
         try:
@@ -129,10 +128,10 @@ def filled(text: str, root: Path, page: str, rows: Mapping[str, Rows]) -> str:
 
     def made(match: re.Match[str]) -> str:
         try:
-            return f"{match[1]}{block(match['name'], rows, output).rstrip()}\n{match[3]}"
+            return f"{match[1]}{block(match['name'], stored, output).rstrip()}\n{match[3]}"
         except KeyError as error:
-            raise HierarchyError(f"{page}: block {match['name']!r}: there is no block, or no rows "
-                                 f"of study, {error}") from None
+            raise HierarchyError(f"{page}: block {match['name']!r}: there is no block or "
+                                 f"claim {error}") from None
 
     def shown(found: re.Match[str]) -> str:
         said = output(found["command"])

@@ -1,4 +1,4 @@
-"""The protocol of `protocol.toml`: its columns, layouts and claims, and the runs that decide them."""
+"""The protocol of `protocol.toml`: columns, layouts, claims, and the runs that decide them."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class Rows:
 
     def layout(self, name: str) -> NDArray[np.bool_]:
         """Return which runs are on a layout, (runs,)."""
-        return self.blocks // len(self.seeds) == self.layouts.index(name)
+        return np.asarray(self.blocks // len(self.seeds) == self.layouts.index(name))
 
     def column(self, column: str, metric: str, noisy: int = 0) -> Array:
         """Return a metric (runs,), at its worst where the run ended in a fault."""
@@ -137,24 +137,39 @@ class Rows:
 
     def ended(self, column: str, noisy: int = 0) -> NDArray[np.bool_]:
         """Return which runs reached their end, (runs,)."""
-        return np.array(self.values[noisy][column][ENDED]) == 1.0
+        return np.asarray(np.array(self.values[noisy][column][ENDED]) == 1.0)
 
 
 @dataclass(frozen=True)
-class _Run:
-    """A run: with noise or without, its column and scenario, and what is sampled."""
+class Run:
+    """A run: a scenario, what is sampled, and the key by which it is found again."""
 
-    noisy: int
-    column: str
     scenario: Scenario
     start: int
     values: Mapping[str, Value]
     key: str
 
+    @classmethod
+    def of(cls, scenario: Scenario, start: int, values: Mapping[str, Value], text: str = "") -> Run:
+        """Return a run; `text` is that of the scenario, which takes time to make."""
+        sampled = (text or scenario.to_toml()) + json.dumps(values)
+        return cls(scenario, start, values, key_of(sampled, OWN, digest()))
+
     def job(self) -> Job:
         """Return the run for a process."""
-        text = changed(self.scenario, self.values, self.column).to_toml()
+        text = changed(self.scenario, self.values, self.scenario.name).to_toml()
         return Job(self.key, text, OWN, self.scenario.name, self.start, self.values)
+
+
+def made(runs: Sequence[Run], out: Path, workers: Workers, progress: Progress | None = None
+         ) -> dict[str, Outcome]:
+    """Make the runs that a folder does not have; return all of it by key. Raises as `sweep`."""
+    store = Store(out)
+    with store.opened():
+        kept = store.outcomes()
+        complete([one.job() for one in runs if one.key not in kept], store, workers, out.name,
+                 progress, work)
+        return store.outcomes()
 
 
 def run(protocol: Protocol, out: Path, workers: Workers, progress: Progress | None = None
@@ -165,24 +180,21 @@ def run(protocol: Protocol, out: Path, workers: Workers, progress: Progress | No
     """
     for count in range(1, len(protocol.seeds) + 1):
         some = replace(protocol, seeds=protocol.seeds[:count])
-        runs, store = list(_runs(some)), Store(out)
-        with store.opened():
-            kept = store.outcomes()
-            complete([one.job() for one in runs if one.key not in kept], store, workers,
-                     f"seed {count} of {len(protocol.seeds)}", progress, work)
-            yield _rows(some, runs, store.outcomes())
+        runs = list(_runs(some))
+        yield _rows(some, runs, made([one for *_, one in runs], out, workers, progress))
 
 
-def _rows(protocol: Protocol, runs: Sequence[_Run], kept: Mapping[str, Outcome]) -> Rows:
+def _rows(protocol: Protocol, runs: Sequence[tuple[int, str, Run]],
+          kept: Mapping[str, Outcome]) -> Rows:
     values: list[dict[str, dict[str, list[float | None]]]] = [{}, {}]
     reasons: list[dict[str, dict[str, int]]] = [{}, {}]
     metrics: dict[str, dict[str, Any]] = {}
-    for one in runs:
+    for noisy, column, one in runs:
         found = kept[one.key]
-        of = values[one.noisy].setdefault(one.column, {})
+        of = values[noisy].setdefault(column, {})
         of.setdefault(ENDED, []).append(float(found.reason is None))
         if found.reason is not None:
-            told = reasons[one.noisy].setdefault(one.column, {})
+            told = reasons[noisy].setdefault(column, {})
             told[_kind(found.reason)] = told.get(_kind(found.reason), 0) + 1
         for name in sorted(protocol.metrics):
             of.setdefault(name, []).append(_value(found, name))
@@ -209,8 +221,8 @@ def _kind(reason: str) -> str:
     return re.sub(r"\S*\d\S*", "#", reason)
 
 
-def _runs(protocol: Protocol) -> Iterator[_Run]:
-    versions = digest()
+def _runs(protocol: Protocol) -> Iterator[tuple[int, str, Run]]:
+    """Yield the runs with whether they have noise, and their column."""
     for noisy, (name, column), (layout, changes) in product(
             (0, 1), protocol.columns.items(), protocol.layouts.items()):
         scenario = column.load(changes, f"{name}-{layout}")
@@ -219,8 +231,7 @@ def _runs(protocol: Protocol) -> Iterator[_Run]:
             values = drawn(scenario, scenario.variation, seed, start)
             if noisy:
                 values = _with_noise(values, protocol.noise, (seed, start))
-            key = key_of(text + json.dumps(values), OWN, versions)
-            yield _Run(noisy, name, scenario, start, values, key)
+            yield noisy, name, Run.of(scenario, start, values, text)
 
 
 def _with_noise(values: Mapping[str, Value], noise: float, seed: tuple[int, int]

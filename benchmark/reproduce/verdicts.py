@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmark.reproduce.protocol import Claim, Protocol, Rows
 from hierarchy.problem import Array
@@ -73,7 +74,8 @@ def _apart(rows: Rows, claim: Claim, noisy: int) -> Array:
     return np.asarray(-apart if claim.below else apart)
 
 
-def _effect(protocol: Protocol, rows: Rows, claim: Claim, apart: Array, some: Array) -> Effect:
+def _effect(protocol: Protocol, rows: Rows, claim: Claim, apart: Array,
+            some: NDArray[np.bool_]) -> Effect:
     if claim.metric and claim.rival:
         return blocked(apart[some], rows.blocks[some])
     from scipy.stats import binomtest
@@ -92,7 +94,7 @@ def _verdict(protocol: Protocol, claim: Claim, effect: Effect, layouts: Sequence
     low, high = effect.low - middle, effect.high - middle
     if claim.rival and -matters < low and high < matters:
         return NEGLIGIBLE
-    if p >= protocol.level or low < matters and high > -matters:
+    if p >= protocol.level or (low < matters and high > -matters):
         return UNDECIDED
     sides = {bool(one.estimate > middle) for one in layouts}
     return DIFFERS if len(sides) > 1 else SUPPORTED if low > 0.0 else CONTRADICTED

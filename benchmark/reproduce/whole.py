@@ -1,73 +1,56 @@
-"""Run the studies and the commands, store what came of them, and write the pages."""
+"""Make the runs of the protocol and the outputs of commands, store them, and write the pages."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from time import perf_counter
 
-from benchmark.reproduce import pages, studies
-from benchmark.reproduce.blocks import judged, statements
-from benchmark.reproduce.studies import STUDIES, Rows, rows_of
+from benchmark.reproduce import fronts, pages, protocol
+from benchmark.reproduce.blocks import POINTS, ROWS, Stored, every, said
+from benchmark.reproduce.fronts import FRONTS
+from benchmark.reproduce.protocol import PROTOCOL, Rows
 from hierarchy.errors import HierarchyError, UnknownNameError
-from hierarchy.words import counted
 from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json, shown
 from scenarios.files import make_folder, reason, write_text
 from scenarios.results.sampled import Workers
 
-_QUICK = 10  # with --quick, one in so many starts, but never fewer than two
+NAME, TUNED = "protocol", "fronts"  # of the runs
+PICTURE = "docs/images/fronts.png"
 
 
-def fill() -> int:
+def fill(root: Path | None = None) -> int:
     """Write the pages of the checkout from the rows and outputs that are stored."""
-    written, lacking = pages.fill(pages.ROOT, studies.read(pages.ROOT / pages.RESULTS))
+    root = root or pages.ROOT
+    written, lacking = pages.fill(root, Stored.read(root))
     print(*map(shown, written), sep="\n")
     return _lacking(lacking)
 
 
-@dataclass
-class _Made:
-    """What has been made so far, and the files it was written to as it ended."""
-
-    out: Path
-    root: Path | None  # of the checkout whose pages are written
-    rows: dict[str, Rows] = field(default_factory=dict)
-    files: dict[Path, None] = field(default_factory=dict)
-    lacking: list[str] = field(default_factory=list)
-
-    def add(self, found: Rows | None, command: str = "", printed: str = "") -> None:
-        """Store rows or an output, and write the pages."""
-        folder = self.root and self.root / pages.RESULTS
-        if found is not None:
-            self.rows[found.study] = found
-            self.files |= {studies.write(found, one): None for one in (self.out, folder) if one}
-        elif self.root:
-            file = pages.file_of(command, self.root)
-            write_text(file, printed)
-            self.files[file] = None
-        if self.root and folder:
-            changed, self.lacking = pages.fill(self.root, studies.read(folder))
-            self.files |= dict.fromkeys(changed)
-
-
 def run(names: list[str], out: Path, quick: bool = False, workers: int | None = None,
         as_json: bool = False, root: Path | None = None) -> int:
-    """Run studies and commands; unless `quick`, write the pages; print the statements' verdicts."""
+    """Make runs and outputs; unless `quick`, write the pages as they end; print the verdicts."""
     begun, root = perf_counter(), root or pages.ROOT
-    some, asked = chosen(names, root)
-    if quick and not some:
-        raise HierarchyError(f"--quick runs studies, and {', '.join(asked)} has the output of "
+    runs, asked = chosen(names, root)
+    if quick and NAME not in runs:
+        raise HierarchyError(f"--quick makes runs, and {', '.join(asked)} has the output of "
                              "commands; leave --quick out")
-    made = _Made(make_folder(out), None if quick else root)
+    make_folder(out)
+    rows, lacking = None, list[str]()
     try:
-        for found in ran(some, out, quick, workers):
-            made.add(found)
+        for rows in _ran(out / NAME, quick, workers) if NAME in runs else ():
+            if not quick:
+                protocol.write(rows, root / ROWS)
+                lacking = pages.fill(root, Stored.read(root))[1]
+        if TUNED in runs and not quick:
+            tuned(out / TUNED, Workers(workers), root)
+            lacking = pages.fill(root, Stored.read(root))[1]
         for command, printed in () if quick else outputs(asked, root, out / "output"):
-            made.add(None, command, printed)
+            write_text(pages.file_of(command, root), printed)
+            lacking = pages.fill(root, Stored.read(root))[1]
     except OSError as error:
         why = (f"{error.filename or 'a file'} cannot be written: {reason(error)}"
                if error.strerror else str(error))
@@ -76,34 +59,37 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
     except KeyboardInterrupt:
         _say("hierarchy: interrupted; the same command continues from here")
         return INTERRUPTED
-    _report(made, of_pages(asked, root) if quick else {}, as_json)
+    if rows is not None:
+        _report(rows, as_json)
     _say(f"{minutes(perf_counter() - begun)} in all")
-    return _lacking(made.lacking)
+    return _lacking(lacking)
+
+
+def tuned(out: Path, workers: Workers, root: Path, names: Sequence[str] = tuple(FRONTS)) -> None:
+    """Tune and test the methods of fronts; store the points, and draw them."""
+    with bar("runs") as progress:
+        points = [one for some in fronts.run(names, out, workers, progress) for one in some]
+    fronts.write(points, root / POINTS)
+    fronts.figure(points).savefig(root / PICTURE, dpi=120)
 
 
 def chosen(names: list[str], root: Path) -> tuple[list[str], list[str]]:
-    """Return studies, and pages with commands, by name; all without names. See UnknownNameError."""
+    """Return the kinds of runs that are asked for, and pages with commands; all without names.
+
+    Raises UnknownNameError.
+    """
     known = pages.marked(root)
     for name in names:
-        if name not in STUDIES and name not in known:
-            raise UnknownNameError("study or page", name, (*STUDIES, *known))
-    return ([name for name in STUDIES if name in names or not names],
+        if name not in (NAME, TUNED, *known):
+            raise UnknownNameError("page", name, (NAME, TUNED, *known))
+    return ([name for name in (NAME, TUNED) if name in names or not names],
             [name for name in known if name in names or not names])
 
 
-def ran(names: list[str], out: Path, quick: bool, workers: int | None) -> Iterator[Rows]:
-    """Run studies and yield the rows of each as it ends; runs that `out` has are not repeated."""
+def _ran(out: Path, quick: bool, workers: int | None) -> Iterator[Rows]:
     with bar("runs") as progress:
-        for count, name in enumerate(names, 1):
-            study = STUDIES[name]
-            if quick:
-                study = replace(study, starts=max(2, study.starts // _QUICK))
-            _say(f"{name} (study {count} of {len(names)}): {study.title}, "
-                 f"{counted(len(study.names), 'column')} from {study.starts} starts")
-            begun = perf_counter()
-            found = rows_of(study, out / name, Workers(workers), progress)
-            _say(f"  {minutes(perf_counter() - begun)}")
-            yield found
+        yield from protocol.run(protocol.quick(PROTOCOL) if quick else PROTOCOL, out,
+                                Workers(workers), progress)
 
 
 def outputs(asked: list[str], root: Path, out: Path) -> Iterator[tuple[str, str]]:
@@ -111,7 +97,8 @@ def outputs(asked: list[str], root: Path, out: Path) -> Iterator[tuple[str, str]
 
     Those whose output `out` has are not repeated, and those that fail are left out.
     """
-    found = of_pages(asked, root)
+    found = dict.fromkeys(command for page in asked for command in
+                          pages.commands((root / page).read_text(encoding="utf-8")))
     for count, command in enumerate(found, 1):
         _say(f"command {count} of {len(found)}: {command} ...")
         begun = perf_counter()
@@ -122,15 +109,6 @@ def outputs(asked: list[str], root: Path, out: Path) -> Iterator[tuple[str, str]
             continue
         _say(f"  {minutes(perf_counter() - begun)}")
         yield command, printed
-
-
-def of_pages(asked: list[str], root: Path) -> dict[str, list[str]]:
-    """Return the commands in pages, each with the pages that its output stands in."""
-    found: dict[str, list[str]] = {}
-    for page in asked:
-        for command in pages.commands((root / page).read_text(encoding="utf-8")):
-            found.setdefault(command, []).append(page)
-    return found
 
 
 def minutes(seconds: float) -> str:
@@ -144,20 +122,14 @@ def _lacking(lacking: list[str]) -> int:
     return 0
 
 
-def _report(made: _Made, left: dict[str, list[str]], as_json: bool) -> None:
-    """Print the statements with their verdicts, the files, and the commands that were left out."""
-    files = [shown(path) for path in made.files]
-    every = [(text, study, *judged(rows, decides)) for study, rows in made.rows.items()
-             for text, decides in statements(study)]
+def _report(rows: Rows, as_json: bool) -> None:
+    """Print the claims with what was found and the verdicts."""
     if as_json:
-        return print_json({"files": files, "not_made": left, "claims": [
-            dict(zip(("text", "study", "found", "verdict"), one, strict=True)) for one in every]})
-    for text, _, found, verdict in every:
-        print(f"{verdict:>20}  {text}\n{'':22}{found}")
-    print("", *files, sep="\n")
-    if left:
-        print("\nNot made with --quick, because they have no starts to take a tenth of:")
-        print(*(f"  {command} ({', '.join(pages)})" for command, pages in left.items()), sep="\n")
+        return print_json([{"claim": one.claim.name, "text": one.claim.text, "p": one.p,
+                            "found": said(one, rows), "verdict": one.decided}
+                           for one in every(rows)])
+    for one in every(rows):
+        print(f"{one.decided}: {one.claim.text}\n    {said(one, rows)}")
 
 
 def _say(line: str) -> None:

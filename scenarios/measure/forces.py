@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.config.kinds.forces import ListedForce
-from scenarios.measure.metric import Array, Criteria, Metric, known, largest, least, register
+from scenarios.measure.metric import (
+    Array,
+    Criteria,
+    Metric,
+    known,
+    largest,
+    least,
+    register,
+    true,
+)
 from scenarios.measure.safety import steps
 
 if TYPE_CHECKING:
@@ -17,6 +26,9 @@ if TYPE_CHECKING:
 
 _LOAD = 1.0        # [N] from which a contact counts as loaded
 _AT_LIMIT = 0.999  # share of a torque limit that counts as being at it
+_BEYOND = 0.01     # [rad] by which a joint may press into its stop
+REST = 2.0         # [s] at the end of a run in which a robot is to stand at rest
+CALM, SUNK = 0.2, 0.05  # largest joint speed [rad/s], and [m] below its start, of one that does
 
 
 @register("forces")
@@ -80,7 +92,31 @@ def _torques(recording: Recording) -> Iterator[Metric]:
         yield metric("com_drop_max", "Centre of mass below its start, max",
                      float(height[0] - height.min()), "m")
         moved = np.linalg.norm((recording["com"][-1] - recording["com"][0])[:2])
+        stands = standing(recording)
+        if stands is not None:
+            yield metric("stands_at_rest", f"Stands at rest in the last {REST:g} s",
+                         float(stands), "", False,
+                         note=f"joints below {CALM:g} rad/s, less than {SUNK:g} m below its start")
         yield metric("com_travel", "Centre of mass from start to end", float(moved), "m", None)
+
+
+def standing(recording: Recording) -> bool | None:
+    """Return whether a robot stands at rest in the last REST of its run; None if that is too short.
+
+    Its joints are slower than CALM and within their limits, its centre of mass is less than SUNK
+    below the start and inside the support polygon. A run that ends in a fault does not.
+    """
+    scenario, t = recording.scenario, recording["t"]
+    pushed = max((push.at + push.duration for push in getattr(scenario.plant, "pushes", ())),
+                 default=0.0)
+    if scenario.control.duration < pushed + REST or not recording.ticks:
+        return None
+    last = t > scenario.control.duration - REST
+    q, height = true(recording, "q")[last], recording["com"][:, 2]
+    beyond = np.maximum(q - recording["joint_upper"], recording["joint_lower"] - q)
+    return recording.fault is None and bool(
+        np.abs(true(recording, "v")[last]).max() < CALM and beyond.max() < _BEYOND
+        and height[0] - height[last].min() < SUNK and (recording["support_margin"][last] > 0).all())
 
 
 def _levels(recording: Recording) -> Iterator[Metric]:

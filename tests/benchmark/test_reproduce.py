@@ -1,93 +1,39 @@
-"""Studies, statements about them, and the pages that have what came of them."""
+"""Pages that have what came of runs and commands."""
 
-import json
 import re
 import shutil
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from benchmark.reproduce import pages, whole
-from benchmark.reproduce.blocks import judged, statements
-from benchmark.reproduce.studies import BLOCKS, STUDIES, Rows, Study, plain, read, rows_of
-from benchmark.reproduce.ticks import DAMPED, LARGEST, LEFT
+from benchmark.reproduce import pages, protocol, whole
+from benchmark.reproduce.blocks import ROWS, Stored, cell
+from benchmark.reproduce.protocol import PROTOCOL, Rows
 from hierarchy.errors import HierarchyError
-from scenarios.config import shipped
-from scenarios.results.sampled import Workers
 
 ROOT = Path(__file__).parents[2]
 PAGES = pages.marked(ROOT)
-
-
-def rows(**columns):
-    """Rows of a study with one metric, the largest speed."""
-    starts = len(next(iter(columns.values())))
-    values = {name: {"speed_max": list(some)} for name, some in columns.items()}
-    return Rows("study", "a command", starts, 1,
-                {"speed_max": {"label": "Joint speed, max", "unit": "rad/s"}}, values,
-                dict.fromkeys(columns, starts))
-
-
-def verdict(found, **decides):
-    return judged(found, {"metric": "speed_max", **decides})[1]
-
-
-def test_a_comparison_is_true_reversed_or_not_told():
-    low = np.linspace(1.0, 2.0, 16)
-    mixed = low + np.where(np.arange(16) % 2, 0.1, -0.1)
-    found = rows(a=low, b=low + 0.5, c=mixed, d=low)
-    assert verdict(found, of="b", above="a") == "true"
-    assert verdict(found, of="b", below="a") == "reversed"
-    assert verdict(found, of="c", below="a") == "not distinguishable"
-    assert verdict(found, of="d", below="a") == "the same"
-    assert verdict(rows(a=[1.0], b=[None]), of="b", above="a") == "not decided"
-    assert judged(found, {"metric": "speed_max", "of": "b", "above": "a"})[0] == (
-        "2.000 [1.750, 2.250] rad/s against 1.500 [1.250, 1.750] rad/s; "
-        "higher in 16 of 16, p < 0.001")
-
-
-def test_a_bound_is_kept_from_every_start_from_some_or_from_none():
-    found = rows(a=[1.0, 2.0, 3.0, 4.0])
-    for most, expected in ((4.0, "true"), (3.5, "not from every start"), (0.5, "false")):
-        assert verdict(found, of="a", most=most) == expected
-    assert verdict(found, of="a", least=1.5) == "not from every start"
-    assert "kept from 3 of 4 (30 to 95 %)" in judged(found, {
-        "metric": "speed_max", "of": "a", "most": 3.5})[0]
-
-
-def test_every_statement_names_a_column_of_its_study():
-    for study in STUDIES.values():
-        for _, decides in statements(study.name):
-            named = {decides[key] for key in ("of", "below", "above") if key in decides}
-            assert named <= set(study.names)
-    assert {one.get("study") for one in BLOCKS.values()} - {None} == set(STUDIES)
-
-
-@pytest.mark.parametrize("study", [study for study in STUDIES.values() if study.columns],
-                         ids=lambda study: study.name)
-def test_every_column_is_a_scenario_of_its_own_name(study):
-    for column in study.columns:
-        assert column.scenario in shipped()
-        assert column.load().name == column.name
-        assert column.load().variation
+STORED = Stored.read(ROOT)
 
 
 @pytest.mark.parametrize("name", PAGES)
 def test_a_page_has_what_its_rows_and_commands_say(name):
     text = (ROOT / name).read_text(encoding="utf-8")
-    assert pages.filled(text, ROOT, name, read(ROOT / pages.RESULTS)) == text
+    assert pages.filled(text, ROOT, name, STORED) == text
 
 
-def test_an_unknown_block_or_metric_is_named(tmp_path):
-    for name in ("other", "blend"):
-        with pytest.raises(HierarchyError, match=rf"page\.md: block '{name}'"):
-            pages.filled(f"<!-- reproduce: {name} -->\n<!-- end of {name} -->", tmp_path,
-                         "page.md", {})
-    with pytest.raises(HierarchyError, match="'speed_min'"):
-        rows(a=[1.0]).column("a", "speed_min")
+def test_every_output_that_is_stored_stands_in_a_page():
+    asked = {pages.file_of(found["command"], ROOT).name for name in PAGES
+             for found in pages._OUTPUT.finditer((ROOT / name).read_text(encoding="utf-8"))}
+    assert {"README.md", "docs/results/problems.md", "docs/results/loops.md"} <= set(PAGES)
+    assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == asked
+
+
+def test_an_unknown_block_is_named(tmp_path):
+    with pytest.raises(HierarchyError, match=r"page\.md: block 'other'"):
+        pages.filled("<!-- reproduce: other -->\n<!-- end of other -->", tmp_path, "page.md",
+                     STORED)
 
 
 BENCH = """\
@@ -109,7 +55,7 @@ def page(mark, inside=""):
 
 def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
     pages.file_of("python a.py", tmp_path).write_text(BENCH)
-    fill = partial(pages.filled, root=tmp_path, page="page.md", rows={})
+    fill = partial(pages.filled, root=tmp_path, page="page.md", stored=STORED)
     assert fill(page("python a.py")) == page("python a.py", f"```\n{BENCH}```\n")
     mark = "python a.py | INEQ7 .. Times of"
     assert fill(page(mark, "old\n")) == page(
@@ -118,6 +64,35 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
                        (page("python a.py | EQ8 .. EQ9"), r"no line of the output .* with 'EQ8'")):
         with pytest.raises(HierarchyError, match=says):
             fill(text)
+
+
+def test_a_table_gets_the_medians_of_its_rows_and_columns(tmp_path):
+    pages.file_of("hierarchy bench resolvers", tmp_path).write_text(BENCH)
+    table = "| | EQ7 [us] | INEQ7 | notes |\n|---|---|---|---|\n{}"
+    old = "| `hcod`, warm | 9 | 9 | kept |\n| `hqp` | 9 | 9 | too |\n"
+    new = "| `hcod`, warm | 1.9 | – | kept |\n| `hqp` | – | 1443 | too |\n"
+    mark = "table of hierarchy bench resolvers"
+    assert pages.filled(page(mark, table.format(old)), tmp_path, "page.md", STORED) == page(
+        mark, table.format(new))
+
+
+def test_a_finding_names_a_number_that_was_printed():
+    assert cell(BENCH, {"table": "INEQ7", "row": "hqp proxqp", "place": "2"}) == "1945"
+    alike = "title\nsns 10   1  2\nsns      3  4\n\nsns 5 6\n"
+    assert cell(alike, {"table": "title", "row": "sns", "place": "1"}) == "3"
+    with pytest.raises(HierarchyError, match="no row 'sns' below 'EQ7'"):
+        cell(BENCH, {"table": "EQ7", "row": "sns", "place": "1"})
+
+
+def test_a_command_is_run_once_for_the_same_code(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text("print('one  ')\nprint('Numbers: runs/a')\n")
+    assert pages.run("python script.py", tmp_path, tmp_path / "out") == "one\n"
+    script.write_text("print('two')\n")
+    assert pages.run("python script.py", tmp_path, tmp_path / "out") == "one\n"
+    (tmp_path / "benchmark").mkdir()
+    (tmp_path / "benchmark" / "new.py").write_text("")
+    assert pages.run("python script.py", tmp_path, tmp_path / "out") == "two\n"
 
 
 def test_a_command_that_fails_leaves_the_others(tmp_path, capsys):
@@ -132,13 +107,20 @@ def test_a_command_that_fails_leaves_the_others(tmp_path, capsys):
     assert whole.minutes(2467.4) == "41:07 min"
 
 
+def test_runs_and_pages_are_chosen_by_name():
+    assert whole.chosen([], ROOT) == (["protocol", "fronts"], PAGES)
+    assert whole.chosen(["docs/batch.md", "protocol"], ROOT) == (["protocol"], ["docs/batch.md"])
+    with pytest.raises(HierarchyError, match=r"'docs/view\.md'"):
+        whole.chosen(["docs/view.md"], ROOT)
+
+
 @pytest.fixture
 def documents(tmp_path):
     """A checkout that has documents only."""
     for name in PAGES:
         (tmp_path / name).parent.mkdir(exist_ok=True, parents=True)
         shutil.copy(ROOT / name, tmp_path / name)
-    shutil.copytree(ROOT / pages.RESULTS, tmp_path / pages.RESULTS, dirs_exist_ok=True)
+    shutil.copytree(ROOT / "docs/results", tmp_path / "docs/results", dirs_exist_ok=True)
     return tmp_path
 
 
@@ -152,17 +134,18 @@ def ending_with(error, *ended):
 @pytest.mark.parametrize(("error", "code", "said"), [
     (KeyboardInterrupt(), 130, "the same command continues from here"),
     (OSError(28, "No space left on device", "out/a"), 1, "out/a cannot be written: No space left")])
-def test_a_study_that_has_ended_is_stored_whatever_ends_the_command(
+def test_a_seed_that_has_ended_is_stored_whatever_ends_the_command(
         error, code, said, documents, monkeypatch, capsys):
-    old = read(documents / pages.RESULTS)["blend"]
-    new = replace(old, values={name: {metric: [9.0] * old.starts for metric in values}
-                               for name, values in old.values.items()})
-    monkeypatch.setattr(whole, "ran", ending_with(error, new))
-    assert whole.run(["blend", "letter"], documents / "out", root=documents) == code
+    column = {name: {"reached_end": [1.0] * 3, **{metric: [1.0] * 3 for metric in PROTOCOL.metrics}}
+              for name in PROTOCOL.columns}
+    metrics = {name: {"label": name, "unit": "", "lower": True} for name in PROTOCOL.metrics}
+    new = Rows([*PROTOCOL.layouts], [1], 1, metrics, [column, column],
+               [{"letter": {"it fell": 1}}, {}])
+    monkeypatch.setattr(whole, "_ran", ending_with(error, new))
+    assert whole.run(["protocol"], documents / "out", root=documents) == code
     assert said in capsys.readouterr().err
-    assert read(documents / "out") == {"blend": new}
-    assert read(documents / pages.RESULTS)["blend"] == new
-    assert "9.000" in (documents / "docs/results/loops.md").read_text()
+    assert protocol.read(documents / ROWS) == new
+    assert "it fell" in (documents / "docs/results/loops.md").read_text()
 
 
 def test_an_output_is_written_as_its_command_ends(documents, monkeypatch):
@@ -173,30 +156,14 @@ def test_an_output_is_written_as_its_command_ends(documents, monkeypatch):
     assert "```\nten\n```" in (documents / "docs/batch.md").read_text()
 
 
-def test_quick_lists_the_commands_that_it_does_not_run(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(whole, "ran", lambda *_: iter([rows(a=[1.0])]))
-    assert whole.run([], tmp_path, True, 1, as_json=True) == 0
-    made = json.loads(capsys.readouterr().out)
-    assert made["not_made"]["hierarchy bench tick"] == ["docs/results/problems.md"]
-    with pytest.raises(HierarchyError, match=r"--quick runs studies, and docs/batch\.md has"):
+def test_a_page_that_cannot_be_filled_does_not_keep_others_from_it(documents):
+    page = documents / "docs/results/loops.md"
+    page.write_text(page.read_text() + "<!-- reproduce: other -->\n<!-- end of other -->\n")
+    changed, lacking = pages.fill(documents, STORED)
+    assert changed == []
+    assert [why.partition(":")[0] for why in lacking] == ["docs/results/loops.md"]
+
+
+def test_quick_needs_runs(tmp_path):
+    with pytest.raises(HierarchyError, match=r"--quick makes runs, and docs/batch\.md has"):
         whole.run(["docs/batch.md"], tmp_path, True, 1)
-
-
-@pytest.mark.slow
-def test_what_is_measured_in_ticks_is_stored_for_each_start(tmp_path, monkeypatch):
-    scenario = tmp_path / "short.toml"
-    scenario.write_text('extends = "ellipse"\nname = "short"\n[control]\nduration = 0.1\n')
-    common = {"title": "a title", "scenario": str(scenario), "resolver": "tpm", "starts": 2}
-    for study in (Study("pairs", pairs={"recursive": ("tpm", "recursive")}, **common),
-                  Study("pivots", pivots=("avoidance",), **common)):
-        found = rows_of(study, tmp_path / "none", Workers())
-        assert found.ended == dict.fromkeys(study.names, 2)
-        if study.pairs:
-            assert (found.column("recursive", LARGEST) < 1e-9).all()
-        else:
-            assert (found.column("avoidance", DAMPED) == 1.0).all()
-            one, other = found.column("avoidance", LEFT)
-            assert 0.0 < one < 1.0
-            assert 0.0 < other < 1.0
-            assert one != other
-    assert plain(np.array([np.inf, 1.0])) == [None, 1.0]

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 from rank_cases import CASES, build
 
-from benchmark.studies import edits
 from hierarchy import HierarchyError
 from solvers import Status, certify, make, problems
 from solvers.factorization import Factorization
@@ -192,12 +191,6 @@ def test_a_mistake_is_named_and_changes_nothing(mistake, text):
 
 
 # -- the benchmark ---------------------------------------------------------------------------------
-
-def test_the_benchmark_of_edits_has_a_row_for_every_edit_and_size():
-    rows = edits.run(seconds=0.0, joints=(7, 20), levels=(3,)).rows["edits"]
-    assert len({row["what"] for row in rows}) == len(rows) / 2 == 10
-    assert all(row["median_us"] > 0.0 for row in rows)
-
 
 # -- any sequence of edits that hypothesis can think of --------------------------------------------
 

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from hierarchy import Robot, State
+from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules, pairs_of_tree
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.problem import Array
 from scenarios.cell.plants.mjcf import Element, add, add_body, axes, begin
@@ -15,23 +16,26 @@ from scenarios.config import ScenarioError
 from scenarios.config.kinds.torque import TorqueSection
 
 _LEAST = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
+_SKIN = 0.3             # friction of a link on another
 _THICKNESS = 0.01    # [m] half of that of a sole
 _SLIDING = 0.15      # [s] time constant of the friction of what slides
 BALL = 0.001         # [m] radius of a point that touches
 
 
-def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: float) -> str:
-    """Return the scene of a robot whose `contacts` touch a horizontal floor.
+def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: float, q: Array
+             ) -> str:
+    """Return the scene of a robot at q (nq,) whose `contacts` touch a horizontal floor.
 
     A sole is a box in the place of its corners, a point a small ball; nothing else touches
-    anything. Bodies are named "body JOINT", geometries by their contacts. Actuators are the torques
-    of the actuated joints. What the robot couples or closes are equalities. Raises ScenarioError
-    unless each joint, but for that of a floating base, turns about or slides along one axis.
+    anything, except capsules with `floor.self_collision`. Bodies are named "body JOINT", geometries
+    by their contacts. Actuators are the torques of the actuated joints. What the robot couples or
+    closes are equalities. Raises ScenarioError unless each joint, but for that of a floating base,
+    turns about or slides along one axis.
     """
     root, world = begin(robot, timestep, cone="elliptic", integrator="Euler", tolerance=1e-12,
                         iterations="200")
     add(world, "geom", type="plane", name="the floor", size=(20, 20, 1), pos=(0, 0, floor.height))
-    elements, pairs = _bodies(world, robot, floor), add(root, "contact")
+    elements, pairs = _bodies(world, robot, floor, q), add(root, "contact")
     for contact in contacts.contacts:
         add(elements[contact.frame.joint], "geom", name=contact.name, contype="0",
             conaffinity="0", **_shape(contact))
@@ -41,6 +45,8 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
         add(pairs, "pair", geom1="the floor", geom2=contact.name, condim="3",
             friction=(floor.friction, floor.friction, 0, 0, 0), solref=(floor.softness, 1.0),
             solreffriction=(along, 1.0))
+    if floor.self_collision:
+        _capsules(elements, pairs, robot, q)
     _equalities(root, robot, elements, timestep)
     actuator = add(root, "actuator")
     for name, limit in zip(robot.velocity_names[robot.actuated:],
@@ -50,7 +56,23 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _bodies(world: Element, robot: Robot, floor: TorqueSection) -> list[Element]:
+def _capsules(elements: list[Element], contact: Element, robot: Robot, q: Array) -> None:
+    """Add the capsules of a robot at q (nq,), and the pairs that may touch later."""
+    for capsule in robot.capsules:
+        same = capsule.start == capsule.end
+        place: dict[str, Any] = {"pos": capsule.start} if same else {
+            "fromto": (*capsule.start, *capsule.end)}
+        add(elements[capsule.joint], "geom", name=f"capsule {capsule.name}", contype="0",
+            conaffinity="0", type="sphere" if same else "capsule", size=capsule.radius, **place)
+    pairs = np.array(pairs_of_tree(robot.capsules, robot.parents), dtype=np.int64).reshape(-1, 2)
+    seen = measure_capsules(State.at(robot, q).placements, *pack_capsules(robot.capsules), pairs)
+    for i, j in pairs[seen[:, 0] > 0.0]:
+        names = (f"capsule {robot.capsules[k].name}" for k in (i, j))
+        add(contact, "pair", **dict(zip(("geom1", "geom2"), names, strict=True)), condim="3",
+            friction=(_SKIN, _SKIN, 0, 0, 0))
+
+
+def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> list[Element]:
     of_joint, own, elements = _axes(robot), robot.model.armature, [world]
     for i, body in enumerate(robot.bodies()):
         element = add_body(elements[body.parent], body, _LEAST)
@@ -59,8 +81,13 @@ def _bodies(world: Element, robot: Robot, floor: TorqueSection) -> list[Element]
             add(element, "joint", type="free", armature=own[0])
             continue
         kind, axis, v = of_joint[i + 1]
-        add(element, "joint", name=body.name, type=kind, axis=axis,
-            armature=own[v] + floor.armature, frictionloss=floor.joint_friction)
+        # A joint that starts beyond its limit has its stop there.
+        k = robot.coordinates[v]
+        range_ = min(robot.lower[k], q[k]), max(robot.upper[k], q[k])
+        stop = {"limited": "true", "range": range_} if (
+            floor.stops and np.isfinite(range_).all()) else {}
+        add(element, "joint", name=body.name, type=kind, axis=axis, damping=floor.joint_damping,
+            armature=own[v] + floor.armature, frictionloss=floor.joint_friction, **stop)
     return elements
 
 

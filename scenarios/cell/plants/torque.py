@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from math import acos, ceil, cos, pi, sin
+from math import acos, ceil, cos, exp, pi, sin
 from typing import Any
 
 import numpy as np
@@ -47,7 +47,7 @@ class TorqueRobot:
         self._section = section = section or TorqueSection(kind="torque")
         self._period, self._steps = period, ceil(period / _STEP - _ROUNDING)
         self.model = mujoco.MjModel.from_xml_string(
-            on_floor(robot, contacts, section, period / self._steps))
+            on_floor(robot, contacts, section, period / self._steps, q))
         self.data = mujoco.MjData(self.model)
         self._floating = robot.base == "floating"
         self.q, self.v = q.copy(), np.zeros(robot.n) if v is None else v.copy()
@@ -60,7 +60,11 @@ class TorqueRobot:
         self._write()
         mujoco.mj_forward(self.model, self.data)
         delay = whole_periods(section.delay, period, "plant.delay")
-        self._waiting = deque([State.at(robot, q).bias_effort()[robot.actuated:]] * delay)
+        # The share by which a motor's torque nears the one asked for in a step of the simulation.
+        self._share = 1.0 if section.bandwidth is None else 1.0 - exp(
+            -2.0 * pi * section.bandwidth * period / self._steps)
+        self.data.ctrl[:] = State.at(robot, q).bias_effort()[robot.actuated:]
+        self._waiting = deque([np.array(self.data.ctrl)] * delay)
         self._pushes = [(push, self._body(push), push.vector) for push in section.pushes]
         self._time, self._height = 0.0, float(self.data.subtree_com[0][2])
         self._stops = Stops(robot, q, section.beyond_stop)
@@ -78,7 +82,7 @@ class TorqueRobot:
         Motors cut them off at their limits.
         """
         self._waiting.append(np.array(command))
-        self.data.ctrl[:] = self._waiting.popleft()
+        torques = self._waiting.popleft()
         before = self.v.copy()
         self.data.xfrc_applied[:] = 0.0
         self._push[:] = 0.0
@@ -87,6 +91,7 @@ class TorqueRobot:
                 self.data.xfrc_applied[body, :3] += force
                 self._push += force
         for _ in range(self._steps):
+            self.data.ctrl[:] = (1.0 - self._share) * self.data.ctrl + self._share * torques
             self._mujoco.mj_step(self.model, self.data)
         self._time += self._period
         self._read()

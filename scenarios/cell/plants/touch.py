@@ -51,7 +51,9 @@ class Touch:
         for i in range(data.ncon):
             contact = data.contact[i]
             first = self._of_geom.get(contact.geom1)
-            c = self._of_geom[contact.geom2] if first is None else first
+            c = self._of_geom.get(contact.geom2) if first is None else first
+            if c is None:  # two links of the robot
+                continue
             self._force_of(self._model, data, i, self._wrench)
             force = contact.frame.reshape(3, 3).T @ self._wrench[:3]
             self.force[c] += force if first is None else -force

@@ -12,6 +12,7 @@ from hierarchy.problem import Array
 from scenarios.config.plant import AnyPlant
 from scenarios.config.sections import (
     Finite,
+    Flag,
     Force,
     Length,
     NotNegative,
@@ -56,7 +57,7 @@ class TorqueSection(AnyPlant):
     """A robot with torque motors in a physics simulation (extra `sim`).
 
     Its [[contacts]] touch a floor, or table. The controller knows nothing of `joint_friction`,
-    `armature` and `delay`. Joints have no stops in the simulation.
+    `joint_damping`, `armature`, `delay` and `bandwidth`.
     """
 
     made_by: ClassVar[str] = "scenarios.cell.plants.torque:TorqueRobot"
@@ -72,8 +73,17 @@ class TorqueSection(AnyPlant):
     """Coulomb's friction of every joint."""
     armature: Annotated[NotNegative, Unit("kg m^2")] = 0.0
     """Inertia of the drive of every joint beyond the robot's own."""
+    joint_damping: Annotated[NotNegative, Unit("N m s/rad")] = 0.0
+    """Viscous friction of every joint."""
     delay: Time = 0.0
     """Time by which torques arrive late, a whole number of periods."""
+    bandwidth: Annotated[Positive, Unit("Hz")] | None = None
+    """Bandwidth of the motors' torques; without it they follow at once."""
+    stops: Flag = True
+    """Whether joints have a stop at their position limit."""
+    self_collision: Flag = False
+    """Whether the robot's capsules touch one another, except neighbours and those that overlap at
+    the start."""
     fall: Length = 0.2
     """How far the centre of mass may sink below its start; beyond it the robot has fallen, which
     ends the run with a fault."""

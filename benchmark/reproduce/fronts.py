@@ -1,0 +1,184 @@
+"""Fronts of methods that are tuned with one budget on training scenes, and tested on others."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from benchmark.reproduce.protocol import Run, made
+from hierarchy.problem import Array
+from scenarios.config import load
+from scenarios.config.sampling import drawn
+from scenarios.draw.figures.palette import looks
+from scenarios.files import make_folder, write_json
+from scenarios.measure.metric import shown
+from scenarios.results.run import Outcome
+from scenarios.results.sampled import Progress, Workers
+
+
+@dataclass(frozen=True)
+class Method:
+    """A resolver with settings, and bounds of those that are free, at dotted keys."""
+
+    resolver: str
+    set: Mapping[str, Any] = field(default_factory=dict)
+    free: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def trials(self, count: int, seed: int) -> list[dict[str, float]]:
+        """Return the settings to try: Sobol's points, evenly in the logarithm of each."""
+        if not self.free:
+            return [{}]
+        from scipy.stats.qmc import Sobol
+
+        points = Sobol(len(self.free), seed=seed).random(count)
+        low, high = np.log(np.array(list(self.free.values()), dtype=float)).T
+        values = np.exp(low + points * (high - low))
+        return [{key: float(f"{x:.3g}") for key, x in zip(self.free, row, strict=True)}
+                for row in values]
+
+
+@dataclass(frozen=True)
+class Front:
+    """What is run, minimised and needed, and the methods; see fronts.toml."""
+
+    scenario: str
+    minimised: Sequence[str]
+    method: Mapping[str, Mapping[str, Any]]
+    needs: str = ""
+    plant: str = ""
+
+
+@dataclass(frozen=True)
+class Point:
+    """Settings of a method on the front of its training, and what came of them.
+
+    training, test : median of each metric over scenes, infinite where half of them fail; kept :
+    test scenes that did not fail.
+    """
+
+    front: str
+    method: str
+    settings: dict[str, float]
+    training: list[float]
+    test: list[float]
+    kept: int
+    units: list[str]
+
+
+GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+FRONTS = {name: Front(**given) for name, given in GIVEN["front"].items()}
+
+
+def run(names: Sequence[str], out: Path, workers: Workers, progress: Progress | None = None
+        ) -> Iterator[list[Point]]:
+    """Tune and test the methods of each front; yield its points. Runs that `out` has are kept."""
+    for name in names:
+        front, found = FRONTS[name], list[Point]()
+        for label, given in front.method.items():
+            method = Method(**given)
+            trials = method.trials(GIVEN["trials"], GIVEN["seed"])
+            training = _scores(front, method, trials, (GIVEN["seed"], GIVEN["training"]),
+                               (out / name, workers, progress))
+            best = [k for k in range(len(trials)) if not dominated(training[0], k)]
+            chosen = [trials[k] for k in best]
+            tested = _scores(front, method, chosen, (GIVEN["seed"] + 1, GIVEN["test"]),
+                             (out / name, workers, progress))
+            found += [Point(name, label, trials[k], training[0][k].tolist(),
+                            tested[0][i].tolist(), tested[1][i], tested[2])
+                      for i, k in enumerate(best)]
+        yield found
+
+
+def _scores(front: Front, method: Method, trials: Sequence[Mapping[str, float]],
+            scenes: tuple[int, int], where: tuple[Path, Workers, Progress | None]
+            ) -> tuple[Array, list[int], list[str]]:
+    """Return the medians (trials, metrics), scenes kept by each trial, and units."""
+    seed, count = scenes
+    runs = []
+    for settings in trials:
+        scenario = load(front.scenario, GIVEN["plant"].get(front.plant, {})).with_resolver(
+            method.resolver).with_changes({**method.set, **settings})
+        runs += [Run.of(scenario, start, drawn(scenario, scenario.variation, seed, start))
+                 for start in range(count)]
+    kept = made(runs, *where)
+    outcomes = [kept[one.key] for one in runs]
+    values = np.array([_values(front, one) for one in outcomes]).reshape(len(trials), count, -1)
+    units = {one.name: one.unit for outcome in outcomes for one in outcome.metrics}
+    with np.errstate(invalid="ignore"):
+        middle = np.sort(values, axis=1)[:, count // 2]
+    return (middle, np.isfinite(values).all(axis=2).sum(axis=1).tolist(),
+            [units.get(name, "") for name in front.minimised])
+
+
+def _values(front: Front, outcome: Outcome) -> list[float]:
+    found = {one.name: one.value for one in outcome.metrics}
+    if outcome.reason is not None or (front.needs and not found.get(front.needs)):
+        return [np.inf] * len(front.minimised)
+    return [np.inf if (value := found.get(name)) is None else float(f"{value:.6g}")
+            for name in front.minimised]
+
+
+def dominated(scores: Array, k: int) -> bool:
+    """Return whether another row of scores (N, m) is nowhere worse than row k, once better."""
+    better = (scores <= scores[k]).all(axis=1) & (scores < scores[k]).any(axis=1)
+    return bool(better.any())
+
+
+def write(points: Sequence[Point], path: Path) -> None:
+    """Write points as JSON; infinite values are null."""
+    make_folder(path.parent)
+    write_json(path, [{**asdict(one), "training": _plain(one.training), "test": _plain(one.test)}
+                      for one in points])
+
+
+def _plain(values: Sequence[float]) -> list[float | None]:
+    return [value if np.isfinite(value) else None for value in values]
+
+
+def read(path: Path) -> list[Point]:
+    """Return the points of a file."""
+    return [Point(**{**one, **{key: [np.inf if x is None else x for x in one[key]]
+                               for key in ("training", "test")}})
+            for one in json.loads(path.read_text(encoding="utf-8"))]
+
+
+def table(points: Sequence[Point], name: str) -> list[str]:
+    """Return the table of a front: settings, scenes that did not fail, medians of the test."""
+    front = FRONTS[name]
+    head = [name, "settings", "without a fault", *(f"`{one}`" for one in front.minimised)]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    for one in points:
+        if one.front == name:
+            settings = ", ".join(f"{key.split('.', 1)[1]} = {x:g}"
+                                 for key, x in one.settings.items())
+            cells = [shown(x, unit) if np.isfinite(x) else "failed"
+                     for x, unit in zip(one.test, one.units, strict=True)]
+            lines.append(f"| {one.method} | {settings or '–'} | {one.kept} of {GIVEN['test']} | "
+                         f"{' | '.join(cells)} |")
+    return lines
+
+
+def figure(points: Sequence[Point]) -> Figure:
+    """Return the fronts as tested: second metric over first, the third as the mark's size."""
+    names = list(dict.fromkeys(one.front for one in points))
+    fig = Figure(figsize=(4.0 * len(names), 3.4), layout="constrained")
+    style = looks(dict.fromkeys(one.method for one in points))
+    for ax, name in zip(fig.subplots(1, len(names), squeeze=False)[0], names, strict=True):
+        for method in dict.fromkeys(one.method for one in points if one.front == name):
+            own = [one.test for one in points if (one.front, one.method) == (name, method)
+                   and np.isfinite(one.test).all()]
+            if own:
+                x, y, z = np.array(own).T[:3]
+                ax.scatter(x, y, s=20.0 + 40.0 * np.log1p(z), label=method, alpha=0.7,
+                           color=style[method].colour)
+        first, second, third = FRONTS[name].minimised[:3]
+        ax.set(xscale="log", yscale="log", title=name, xlabel=first, ylabel=second)
+        ax.legend(title=f"size: {third}", fontsize=7, title_fontsize=7)
+    return fig

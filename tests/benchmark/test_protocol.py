@@ -1,0 +1,126 @@
+"""The protocol of the studies in closed loop: its rules on rows whose answer is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmark.reproduce import claims, protocol, verdicts
+from benchmark.reproduce.avoidance import acceleration, measured
+from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
+from hierarchy import Robot, State
+from scenarios import load
+from scenarios.measure.statistics import blocked, holm
+from scenarios.results.sampled import Workers
+
+LAYOUTS, SEEDS, STARTS = ["a", "b"], [1, 2], 25
+SIZE = len(LAYOUTS) * len(SEEDS) * STARTS
+
+
+def rows(noisy=None, **columns):
+    values = [{name: {"speed_max": [float(one) if np.isfinite(one) else None for one in some],
+                      "reached_end": list(np.isfinite(some).astype(float))}
+               for name, some in run.items()} for run in (columns, {**columns, **(noisy or {})})]
+    about = {"speed_max": {"label": "Joint speed, max", "unit": "rad/s", "lower": True}}
+    return Rows(LAYOUTS, SEEDS, STARTS, about, values, [{}, {}])
+
+
+def verdict(found, **claim):
+    of = Claim("one", "own", "a text", "x", "speed_max", **claim)
+    return verdicts.judged(replace(PROTOCOL, claims=(of,)), found, "own")[0]
+
+
+@pytest.fixture
+def chance():
+    return np.random.default_rng(5)
+
+
+def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters(chance):
+    y = chance.uniform(1.0, 2.0, SIZE)
+    x = 0.8 * y * np.exp(0.05 * chance.standard_normal(SIZE))
+    for matters, expected in ((5.0, "supported"), (20.0, "undecided"),
+                              (40.0, "no effect that matters")):
+        found = verdict(rows(x=x, y=y), below="y", percent=True, matters=matters)
+        assert found.decided == expected
+    assert found.p < 1e-6
+    assert verdict(rows(x=x, y=y), above="y", percent=True, matters=5.0
+                   ).decided == "contradicted"
+    assert verdicts.shown(found.claim, rows(x=x, y=y), found.effect).startswith("-19.8 [")
+
+
+def test_layouts_that_disagree_and_noise_that_changes_a_verdict_are_said(chance):
+    y = np.ones(SIZE)
+    x = y + np.repeat([-0.5, 0.1], SIZE // 2) + 0.01 * chance.standard_normal(SIZE)
+    mostly = np.where(np.arange(SIZE) < 60, -0.5, 0.02) + y
+    assert verdict(rows(x=x, y=y), below="y").decided in ("differs between layouts", "undecided")
+    assert verdict(rows(x=mostly, y=y), below="y").layouts[1].estimate < 0.0
+    low = y - 0.5
+    assert verdict(rows({"x": y + 0.5}, x=low, y=y), below="y").decided == (
+        "undecided: with noise contradicted")
+
+
+def test_a_run_that_ends_in_a_fault_has_the_worst_value():
+    y, x = np.ones(SIZE), np.full(SIZE, np.inf)
+    assert verdict(rows(x=x, y=y), above="y", matters=0.1).decided == "supported"
+    assert verdict(rows(x=x, y=x), above="y", matters=0.1).decided == "no effect that matters"
+    assert verdict(rows(x=x), most=5.0).decided == "contradicted"
+    assert verdict(rows(x=y), most=5.0).decided == "supported"
+
+
+def test_the_blocked_test_is_wilcoxons_in_one_block_and_ignores_shifts_between_blocks(chance):
+    scipy = pytest.importorskip("scipy.stats")
+    apart = chance.standard_normal(40) + 0.3
+    found = blocked(apart, np.zeros(40, dtype=int))
+    assert found.p == pytest.approx(scipy.wilcoxon(apart, method="asymptotic").pvalue, rel=0.05)
+    assert found.low < found.estimate < found.high
+    shifted = blocked(apart - found.low - 1e-9, np.zeros(40, dtype=int))
+    assert shifted.p == pytest.approx(0.05, abs=0.01)
+    assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+
+
+def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
+    layout = PROTOCOL.layouts["lwr"]
+    for name, column in PROTOCOL.columns.items():
+        assert column.load(layout, name).variation
+    for claim in PROTOCOL.claims:
+        assert {claim.of, claim.rival} - {""} <= set(PROTOCOL.columns)
+        assert bool(claim.quotation) == (claim.family == "letter")
+    assert len(claims.asked(PROTOCOL, "own")) > 5
+
+
+def test_the_acceleration_of_a_point_is_its_second_difference(chance):
+    robot = Robot.load("kuka_lwr")
+    point = robot.control_points[6]
+    q, v, a = chance.standard_normal((3, 7))
+
+    def place(t):
+        state = State.at(robot, q + v * t + a * t * t / 2.0)
+        R = state.placements[point.joint, :9].reshape(3, 3).T
+        return R @ point.offset + state.placements[point.joint, 9:]
+
+    h = 1e-4
+    expected = (place(h) - 2.0 * place(0.0) + place(-h)) / h**2
+    found = acceleration(State.at(robot, q, v), point.joint, place(0.0), a)
+    assert found == pytest.approx(expected, abs=1e-5)
+
+
+def test_undamped_the_avoidance_task_is_met():
+    changes = {"control.duration": 0.3, "control.options.damping": 0.0}
+    metrics = {one.name: one.value for one in measured(load("ellipse", changes))[1]}
+    assert metrics["avoidance_error_rms"] < 1e-9
+
+
+@pytest.mark.slow
+def test_runs_are_resumed_and_noise_is_small(tmp_path):
+    short = {"lwr": {**PROTOCOL.layouts["lwr"], "control.duration": 0.02}}
+    some = replace(PROTOCOL, layouts=short, seeds=(1,), starts=2,
+                   columns={name: PROTOCOL.columns[name] for name in ("letter", "hqp")})
+    (first,) = protocol.run(some, tmp_path, Workers(1))
+    file = tmp_path / "runs" / "all.csv"
+    before = file.stat().st_size
+    (second,) = protocol.run(some, tmp_path, Workers(1))
+    assert (first, before) == (second, file.stat().st_size)
+    exact, noisy = (first.column("letter", "speed_max", k) for k in (0, 1))
+    assert exact == pytest.approx(noisy, rel=1e-4)
+    protocol.write(first, tmp_path / "rows.json")
+    assert protocol.read(tmp_path / "rows.json") == first
