@@ -186,7 +186,7 @@ def bar():
     yield lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGINT)
 
 scenarios.cli.progress.bar = bar
-from scenarios.cli.main import main
+from scenarios.cli.start import main
 main()
 """
 
@@ -217,7 +217,7 @@ def add_and_interrupt(written, i, run):
     os.kill(os.getpid(), signal.SIGTERM)
 
 comparing._Written.add = add_and_interrupt
-from scenarios.cli.main import main
+from scenarios.cli.start import main
 main()
 """
 
@@ -257,7 +257,7 @@ def test_an_error_in_the_page_costs_no_run_and_says_where_they_are(tmp_path, mon
 
 def test_figures_do_not_depend_on_the_users_matplotlib(tmp_path):
     (tmp_path / "matplotlibrc").write_text("text.usetex: True\nsavefig.bbox: tight\n")
-    command = [sys.executable, "-m", "scenarios.cli.main", "run", "ellipse", "--figures", *SHORT]
+    command = [sys.executable, "-m", "scenarios.cli.start", "run", "ellipse", "--figures", *SHORT]
     settings = {**os.environ, "MPLBACKEND": "no-such-backend"}
     for out, more in (("a", {}), ("b", {"MATPLOTLIBRC": str(tmp_path)})):
         subprocess.run([*command, "--out", out], cwd=tmp_path, env={**settings, **more}, check=True)
