@@ -46,7 +46,7 @@ def claim(folder: str | Path) -> Path:
     with named(f"output folder {folder}"):
         path.parent.mkdir(parents=True, exist_ok=True)
         with suppress(FileNotFoundError):
-            if next(os.scandir(path), None):  # raises for a loop of links, a name too long
+            if os.listdir(path):  # noqa: PTH208 - raises for a loop of links, a name too long
                 raise OutputError(f"output folder {folder} exists and is not empty; "
                                   "choose another, or remove it first")
         lock(path)
