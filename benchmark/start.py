@@ -117,7 +117,7 @@ def beginnings() -> Iterator[Cost]:
             ("python -c pass", None, "-c", "pass"),
             ("import scenarios", None, "-c", "import scenarios"),
             ("import hierarchy, solvers", None, "-c", "import hierarchy, solvers"),
-            ("hierarchy --help", 0.5, "-m", "scenarios.cli.main", "--help"),
+            ("hierarchy --help", 0.5, "-m", "scenarios.cli.start", "--help"),
             ("first solve, kernels cached", 0.6, "-c", _SOLVE),
             ("first tick of ellipse, cached", None, "-c", _TICK),
             (f"hierarchy {' '.join(_SHORT)}", 1.5, "-c", _COMMAND, *_SHORT),
@@ -161,7 +161,7 @@ def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
 def memory(folder: Path) -> list[Cost]:
     """Return the peak memory [MB] of processes."""
     _say("memory")
-    command = ["-m", "scenarios.cli.main", "run", "ellipse", "--duration", "2", "--out",
+    command = ["-m", "scenarios.cli.start", "run", "ellipse", "--duration", "2", "--out",
                str(folder / "run")]
     costs = [Cost("hierarchy run ellipse --duration 2", _run(command).memory, "MB", 300.0)]
     if find_spec("distributed") is not None:

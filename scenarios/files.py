@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import glob
+import hashlib
 import itertools
 import json
 import os
@@ -18,6 +19,7 @@ from typing import Any, TextIO
 
 from hierarchy.errors import HierarchyError
 
+_NAME = 200  # bytes of a name: file systems take 255, and hidden files beside it add theirs
 _VARIANT = re.compile(r"(?m)^\[variants\.([\w-]+)\]")
 
 
@@ -39,15 +41,18 @@ def claim(folder: str | Path) -> Path:
     OutputError : it holds something, is no folder, its parent cannot be written, or another process
         is going to write it.
     """
-    path = Path(folder).expanduser().resolve()
+    path = _absolute(folder)
     with named(f"output folder {folder}"):
         path.parent.mkdir(parents=True, exist_ok=True)
-        if path.exists() and any(path.iterdir()):
-            raise OutputError(f"output folder {folder} exists and is not empty; "
-                              "choose another, or remove it first")
+        with suppress(FileNotFoundError):
+            if os.listdir(path):  # noqa: PTH208 - raises for a loop of links, a name too long
+                raise OutputError(f"output folder {folder} exists and is not empty; "
+                                  "choose another, or remove it first")
         lock(path)
-        for left in path.parent.glob(f".{glob.escape(path.name)}.????????.partial"):
+        for left in path.parent.glob(f"{glob.escape(_hidden(path))}.????????.partial"):
             shutil.rmtree(left)
+        Path(tempfile.mkdtemp(prefix=f"{_hidden(path)}.", suffix=".partial",
+                              dir=path.parent)).rmdir()  # what `whole` will need
     return path
 
 
@@ -85,7 +90,17 @@ def unlock(path: Path) -> None:
 
 
 def _lock_file(path: Path) -> Path:
-    return path.with_name(f".{path.name}.lock")
+    return path.with_name(f"{_hidden(path)}.lock")
+
+
+def _hidden(path: Path) -> str:
+    """Return the beginning of the names of hidden files beside a path, cut to leave room."""
+    return f".{os.fsdecode(os.fsencode(path.name)[:_NAME])}"
+
+
+def _absolute(path: str | Path) -> Path:
+    """Return a path without links; one in a loop of links stays, and cannot be opened."""
+    return Path(os.path.realpath(Path(path).expanduser()))
 
 
 def _locked(stream: TextIO) -> bool:
@@ -125,10 +140,10 @@ def whole(folder: str | Path) -> Iterator[Path]:
 
     Whatever interrupts the writing leaves nothing behind. `folder` must be new or empty.
     """
-    path = Path(folder).expanduser().resolve()
+    path = _absolute(folder)
     path.parent.mkdir(parents=True, exist_ok=True)
     with named(path):
-        partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial",
+        partial = Path(tempfile.mkdtemp(prefix=f"{_hidden(path)}.", suffix=".partial",
                                         dir=path.parent))
     try:
         with named(path):
@@ -194,7 +209,7 @@ def make_folder(folder: Path) -> Path:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file in UTF-8, whole or not at all."""
-    write_bytes(path, text.encode("utf-8"))
+    write_bytes(path, text.encode("utf-8", "backslashreplace"))  # paths may not be UTF-8
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -222,8 +237,14 @@ def scenarios_in(folder: Path) -> dict[str, tuple[Path, str]]:
 
 
 def slug(text: str) -> str:
-    """Return a text as a name for a file or folder; different texts may have the same one."""
-    return re.sub(r"[^\w.]+", "-", text).strip("-.") or "unnamed"
+    """Return a text as a name for a file or folder; different texts may have the same one.
+
+    A long one ends in a digest.
+    """
+    name = re.sub(r"[^\w.]+", "-", text).strip("-.") or "unnamed"
+    digest, whole = hashlib.sha256(name.encode()).hexdigest(), name.encode()
+    return name if len(whole) <= _NAME else (
+        f"{whole[:_NAME - 9].decode(errors='ignore')}-{digest[:8]}")
 
 
 def _umask() -> int:

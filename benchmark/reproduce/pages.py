@@ -81,7 +81,7 @@ def _printed(command: str, root: Path, out: Path) -> str:
     program, *arguments = shlex.split(command)
     line = [sys.executable, *arguments]
     if program == "hierarchy":
-        line = [sys.executable, "-m", "scenarios.cli.main", *arguments, "--out", str(out)]
+        line = [sys.executable, "-m", "scenarios.cli.start", *arguments, "--out", str(out)]
     done = subprocess.run(line, cwd=root, env=os.environ | {"COLUMNS": _COLUMNS}, text=True,
                           stdout=subprocess.PIPE, check=False)
     if done.returncode:

@@ -8,7 +8,6 @@ SIGTERM or SIGHUP.
 
 from __future__ import annotations
 
-import signal
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -44,28 +43,15 @@ app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.add_typer(problems, name="problems")
 
 
-def _end(*_: object) -> None:
-    raise KeyboardInterrupt  # what is made so far is kept
-
-
-def main() -> None:
-    """Run the command line and exit with its code."""
-    for name in ("SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _end)
-    sys.exit(run_command(sys.argv[1:]))
-
-
 def run_command(arguments: list[str]) -> int:
     """Run a command line and return its exit code; errors become one line on stderr."""
     try:
         code = app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False)
-        return int(code or 0) if code != INTERRUPTED else _interrupted()
+        return int(code or 0) if code != INTERRUPTED else interrupted()
     except typer.TyperException as error:
         return _wrong(f"{error.format_message()}{_given(error, arguments)}")
     except (KeyboardInterrupt, typer.Abort):
-        return _interrupted()
+        return interrupted()
     except Exception as error:
         from hierarchy.errors import HierarchyError
 
@@ -412,7 +398,8 @@ def _with_its_file(text: str, arguments: list[str]) -> str:
     return f"{files[0]}: {text}" if len(files) == 1 and files[0] not in text else text
 
 
-def _interrupted() -> int:
+def interrupted() -> int:
+    """Say that the command was interrupted, and return its exit code."""
     print("hierarchy: interrupted", file=sys.stderr)
     return INTERRUPTED
 
@@ -428,7 +415,3 @@ def _wrong(text: str) -> int:
 
 
 benchmarks.register(app)
-
-
-if __name__ == "__main__":
-    main()

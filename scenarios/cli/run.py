@@ -22,7 +22,7 @@ from scenarios.config.validation import doubtful_units
 from scenarios.loop.first_tick import contact_warnings
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import as_plain_data
-from scenarios.measure.run_folder import save
+from scenarios.measure.run_folder import kept
 from scenarios.measure.runs import Run
 from scenarios.measure.verdict import verdict
 from scenarios.recording.recording import Recording
@@ -36,7 +36,8 @@ def run_scenario(scenario: Scenario, folder: Path, certify: bool, figures: bool,
     with bar() as told:
         told_of_it = partial(told, str(scenario.make_resolver().label))
         recording = simulate(scenario, progress=told_of_it, certified=certify)
-    save(recording, folder)
+    if lost := kept(recording, folder):
+        return exit_code(lost)
     if figures:
         redraw([folder])
     if as_json:

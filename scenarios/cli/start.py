@@ -1,17 +1,54 @@
-"""The entry of the command `hierarchy`: Ctrl-C ends it quietly while it is still importing."""
+"""The entry of the command `hierarchy`: what has to be set before anything large is imported."""
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 
 
 def main() -> None:
     """Run the command line and exit with its code."""
-    before = signal.signal(signal.SIGINT, signal.SIG_DFL)
-    from scenarios.cli.main import main as run
+    _open_streams()
+    # Until then signals end the command at once, as process 1 too, which has no default for them.
+    handled = [number for name in ("SIGINT", "SIGTERM", "SIGHUP")
+               if (number := getattr(signal, name, None)) is not None
+               and signal.getsignal(number) is not signal.SIG_IGN]
+    for number in handled:
+        signal.signal(number, _exit if os.getpid() == 1 else signal.SIG_DFL)
+    from scenarios.cli.main import interrupted, run_command
 
-    signal.signal(signal.SIGINT, before)
-    run()
+    asked: list[int] = []
+
+    def end(number: int, _: object) -> None:
+        asked.append(number)
+        raise KeyboardInterrupt  # what is made so far is kept
+
+    for number in handled:
+        signal.signal(number, end)
+    try:
+        sys.exit(run_command(sys.argv[1:]))
+    except Exception:
+        if not asked:
+            raise
+        sys.exit(interrupted())  # callbacks of LLVM drop the interruption, and compiling breaks
+
+
+def _open_streams() -> None:
+    """Give closed standard streams nowhere to go, and replace what a terminal cannot show."""
+    opened = os.open(os.devnull, os.O_RDWR)
+    while opened < 3:  # the lowest free number, which a file would otherwise get
+        os.set_inheritable(opened, True)
+        opened = os.dup(opened)
+    os.close(opened)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: PTH123, SIM115
+        getattr(sys, name).reconfigure(errors="replace")
+
+
+def _exit(number: int, _: object) -> None:
+    os._exit(128 + number)
 
 
 if __name__ == "__main__":

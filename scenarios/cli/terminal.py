@@ -141,5 +141,7 @@ def exit_code(fault: str | None) -> int:
 
 def shown(path: Path) -> str:
     """Return a path relative to the current folder, if it is below it."""
-    path = path.resolve()
-    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except (OSError, ValueError):  # the current folder has gone, or is elsewhere
+        return str(path)

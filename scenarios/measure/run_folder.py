@@ -6,6 +6,7 @@ import dataclasses
 import json
 import os
 import platform
+import tempfile
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from pydantic import TypeAdapter
 from hierarchy.archives import read_arrays
 from hierarchy.errors import HierarchyError, expect, file_path
 from scenarios.config import load
-from scenarios.files import whole, write_json
+from scenarios.files import OutputError, whole, write_json
 from scenarios.measure import metrics
 from scenarios.measure.verdict import verdict
 from scenarios.recording.depth_view import DepthView
@@ -39,6 +40,19 @@ def save(recording: Recording, folder: str | Path) -> Path:
         write_json(partial / "metrics.json", metrics.as_plain_data(recording)
                    | verdict(recording).as_plain_data())
     return Path(folder)
+
+
+def kept(recording: Recording, folder: Path) -> str | None:
+    """Save a run, where `folder` cannot be written in the system's temporary folder.
+
+    Returns None, or why and where.
+    """
+    try:
+        save(recording, folder)
+    except OutputError as error:
+        other = save(recording, Path(tempfile.mkdtemp(prefix="hierarchy-")) / "run")
+        return f"{error}; the run is in {other}"
+    return None
 
 
 def write(recording: Recording, folder: Path) -> None:

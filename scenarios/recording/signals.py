@@ -143,4 +143,4 @@ _TABLE = (
 )
 for _signal in _TABLE:
     plugins.register("signals", _signal.name, shipped=True)(_signal)
-__doc__ += "\n" + described()
+__doc__ = f"{__doc__}\n{described()}"

@@ -18,7 +18,7 @@ from scenarios.config.scenario import OWN
 from scenarios.files import OutputError, claim, make_folder, unlock, write_json, write_text
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
-from scenarios.measure.run_folder import save, versions
+from scenarios.measure.run_folder import kept, versions
 from scenarios.measure.runs import Run
 from scenarios.recording.recording import Recording
 from scenarios.results import pool
@@ -118,8 +118,9 @@ class _Written:
             try:
                 self._write(self._folder, found)
             except Exception as error:  # of the disk, a style of matplotlib, a user's figure
+                apart = "".join(f"; {run.label}: {run.error}" for run in found.runs if run.error)
                 raise PageError(f"the page cannot be made: {type(error).__name__}: {error}; the "
-                                f"runs are in {found.folder}") from error
+                                f"runs are in {found.folder}{apart}") from error
         return found
 
     def _found(self) -> Comparison:
@@ -208,11 +209,10 @@ def recorded(scenario: Scenario, folder: Path | None,
             write_text(make_folder(folder) / "scenario.toml", scenario.to_toml())
         return None, f"{type(error).__name__}: {error}"
     try:
-        if folder is not None:
-            save(recording, folder)
+        lost = None if folder is None else kept(recording, folder)
     except (OSError, OutputError) as error:
         return recording, f"not saved: {error}"
-    return recording, None
+    return recording, lost
 
 
 def _timed(run: Run) -> Recording | None:

@@ -177,7 +177,7 @@ def bar():
     yield lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGINT)
 
 scenarios.cli.progress.bar = bar
-from scenarios.cli.main import main
+from scenarios.cli.start import main
 from scenarios.draw.figures import letter
 main()
 """
@@ -209,7 +209,7 @@ def add_and_interrupt(written, i, run):
     os.kill(os.getpid(), signal.SIGTERM)
 
 comparing._Written.add = add_and_interrupt
-from scenarios.cli.main import main
+from scenarios.cli.start import main
 from scenarios.draw.figures import letter
 main()
 """

@@ -229,7 +229,7 @@ def add_and_die(store, job, outcome):
     os.kill(os.getpid(), signal.SIGKILL)
 
 Store.add = add_and_die
-from scenarios.cli.main import main
+from scenarios.cli.start import main
 main()
 """
 
