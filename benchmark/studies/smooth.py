@@ -50,7 +50,7 @@ def run(starts: int = 16, seed: int = 14, scenarios: str = SCENARIOS,
     return Report("Torques from tick to tick", [Section("", tables)], {"smooth": rows})
 
 
-def _row(results: Results, label: str) -> dict[str, object]:
+def _row(results: Results, label: str) -> Row:
     """Return what is shown of a resolver; runs that fall count only as such."""
     ended = np.array([reason is None for run, reason in zip(
         results.runs, results.reasons, strict=True) if run.label == label])
