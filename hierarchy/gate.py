@@ -42,8 +42,8 @@ def check_rotation(what: str, rotation: ArrayLike) -> None:
     if off > _TURNED:
         rounded = ": write it with 8 digits" if off < _ROUNDED else ""
         raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), but R R^T is "
-                             f"{off:.2g} from the identity, at most {_TURNED:g} is allowed{rounded}; got "
-                             f"{brief(R.tolist())}")
+                             f"{off:.2g} from the identity, at most {_TURNED:g} is allowed"
+                             f"{rounded}; got {brief(R.tolist())}")
     if np.linalg.det(R) < 0.0:
         raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), but it is a "
                              f"reflection, of determinant -1; got {brief(R.tolist())}")
