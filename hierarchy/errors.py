@@ -33,7 +33,7 @@ class UnknownNameError(HierarchyError):
         hint = f"; did you mean {above + near[0]!r}?" if near else "."
         said = (f"Known: {', '.join(known) or 'none'}." if len(known) <= _LISTED else
                 f"The nearest of {len(known)}: {', '.join(nearest(name, known))}.")
-        super().__init__(f"unknown {what} {f'{above}{name}'!r}{hint} {said}"
+        super().__init__(f"unknown {what} {f'{above}{name}' if above else name!r}{hint} {said}"
                          + (f" {more}" if more else ""))
 
 

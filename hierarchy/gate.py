@@ -32,18 +32,21 @@ def array_of(what: str, value: Any) -> Array:
 
 def check_rotation(what: str, rotation: ArrayLike) -> None:
     """Raise a HierarchyError, with how far it is off, unless a matrix (3, 3) is a rotation."""
-    R = array_of(what, rotation)
+    try:
+        R = array_of(what, rotation)
+    except HierarchyError:
+        R = np.empty(0)
     if R.shape != (3, 3) or not np.isfinite(R).all():
         raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), got {brief(rotation)}")
     off = float(np.abs(R @ R.T - np.eye(3)).max())
     if off > _TURNED:
         rounded = ": write it with 8 digits" if off < _ROUNDED else ""
-        raise HierarchyError(f"{what}: not a rotation matrix: R R^T is {off:.2g} from the "
-                             f"identity, at most {_TURNED:g} is allowed{rounded}; got "
-                             f"{brief(R.tolist())}")
+        raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), but R R^T is "
+                             f"{off:.2g} from the identity, at most {_TURNED:g} is allowed"
+                             f"{rounded}; got {brief(R.tolist())}")
     if np.linalg.det(R) < 0.0:
-        raise HierarchyError(f"{what}: not a rotation matrix but a reflection, of determinant -1; "
-                             f"got {brief(R.tolist())}")
+        raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), but it is a "
+                             f"reflection, of determinant -1; got {brief(R.tolist())}")
 
 
 def readable(what: str, value: Any) -> Array:

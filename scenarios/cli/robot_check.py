@@ -21,12 +21,19 @@ from scenarios.config import ScenarioError, is_shipped, shipped, shipped_groups
 from scenarios.config.changes import change, parse_changes
 from scenarios.config.mistaken import WANTED, no_scenario
 from scenarios.config.robot import RobotSection
+from scenarios.config.sections import Section
 from scenarios.config.validation import validated
 
 _ROUND = 4     # decimals of proposed positions [m]
 _TURNS = 50.0  # [rad] between limits of a joint beyond which they are taken for degrees
 _LEVEL = 0.02  # [m] between frames that are at the same height
 _UNITS = {"rad": "rad, rad/s, N m", "m": "m, m/s, N"}
+
+
+class _OfRobot(Section):
+    """The part of a scenario that a robot has."""
+
+    robot: RobotSection
 
 
 def is_robot(text: str) -> bool:
@@ -58,7 +65,7 @@ def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robo
         change(data, key, value)
     if unknown := [key for key in data if key != "robot"]:
         raise ScenarioError(f"--set {unknown[0]}: only keys of [robot] can be set for a robot")
-    section = validated(RobotSection, data["robot"], "robot")
+    section = validated(_OfRobot, data, repr(model)).robot
     return section, make_robot(section)
 
 

@@ -155,9 +155,10 @@ def _schemas(section: type[Section]) -> dict[str, Any]:
 
 @cache
 def _sections() -> dict[str, type[Section]]:
-    found, waiting = {}, [Section]
+    found: dict[str, type[Section]] = {}
+    waiting = [Section]
     for section in waiting:  # grows on the way
-        found[section.__name__] = section
+        found.setdefault(section.__name__, section)  # those of plugins have the name of their base
         waiting += section.__subclasses__()
     return found
 

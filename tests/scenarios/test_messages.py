@@ -102,7 +102,7 @@ def test_a_rotation_is_told_by_how_much_it_is_off():
     rounded = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
     with pytest.raises(HierarchyError, match=r"R R\^T is 1e-05 from the identity, .* 8 digits"):
         check_rotation("task 'hand': rotation", rounded)
-    with pytest.raises(HierarchyError, match="a reflection"):
+    with pytest.raises(HierarchyError, match="a reflection, of determinant -1"):
         check_rotation("task 'hand': rotation", np.diag([1.0, 1.0, -1.0]))
 
 
