@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import typer
@@ -52,7 +53,7 @@ def run(starts: int = 16, seed: int = 14, scenarios: str = SCENARIOS,
     return Report("Torques from tick to tick", [Section("", tables, _WORDS)], {"smooth": rows})
 
 
-def _row(results: Results, label: str) -> dict[str, object]:
+def _row(results: Results, label: str) -> dict[str, Any]:
     """Return what is shown of a resolver; runs that fall count only as such."""
     ended = np.array([reason is None for run, reason in zip(
         results.runs, results.reasons, strict=True) if run.label == label])
