@@ -19,6 +19,7 @@ from solvers.qp.programs import slack_program
 from solvers.qp.refinement import Rows
 from solvers.resolver import Handles, Resolution, Resolver, register
 from solvers.resolvers.hcod import Hcod, warm_record
+from solvers.resolvers.merged import Merged
 from solvers.status import SOLVED, TOO_SMALL, UNPROVED, Status
 from solvers.workspace import WORKSPACE, run
 
@@ -121,8 +122,7 @@ class Weighted(Resolver):
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h, starting from the row states of an earlier resolution if given."""
         if self.strict_levels:
-            return Hcod(rank_tolerance=self.rank_tolerance, damping=self.damping,
-                        threshold=self.threshold).solve(self.merged(h), memory)
+            return self._below(h.names).solve(h, memory)
         x = h.start()
         record = warm_record(memory, 2 * h.m + 1)
         settings = self._settings_for(len(h.names))
@@ -135,15 +135,20 @@ class Weighted(Resolver):
             return self._continued(h, settings, record)
         return WeightedResolution(x, Status(code), int(record[-1]), record)
 
-    def merged(self, h: Hierarchy) -> Hierarchy:
-        """Return h with its levels below `strict_levels` as one, rows times their weights."""
-        above = min(self.strict_levels, len(h.sizes))
-        weight = self._weights(len(h.sizes))
-        weight[:above] = 1.0
-        rows = np.repeat(weight, h.sizes)
-        return h.changed(A=h.A * rows[:, None], lower=h.lower * rows, upper=h.upper * rows,
-                         sizes=[*h.sizes[:above], h.sizes[above:].sum()],
-                         names=(*h.names[:above], "weighted"))
+    def _below(self, names: tuple[str, ...]) -> Merged:
+        """Return what resolves levels of these names below `strict_levels`: without a memory."""
+        if names not in self._merging:
+            weights = self._weights(len(names))
+            self._merging[names] = Merged(
+                ratio=1.0, scales=dict(zip(names, (1.0 / weights).tolist(), strict=True)), cap=0.0,
+                strict_levels=max(0, min(self.strict_levels, len(names) - 1)), regularisation=0.0,
+                rank_tolerance=self.rank_tolerance, damping=self.damping, threshold=self.threshold)
+        return self._merging[names]
+
+    @cached_property
+    def _merging(self) -> dict[tuple[str, ...], Merged]:
+        """Cache of `_below`."""
+        return {}
 
     def _weights(self, levels: int) -> Array:
         if self.weights is None:
