@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,23 +25,34 @@ def _run(text: str, folder: Path) -> None:
 
 def _arrays(_: Path) -> None:
     """Solve hierarchies of plain arrays with every resolver, once and again from memory."""
-    from hierarchy import Hierarchy
     from solvers import certify, explain, make, names
-    from solvers.resolver import Resolver
 
-    equal = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])])
-    limited = Hierarchy.from_levels([([[1, 0], [0, 1]], [-0.1] * 2, [0.1] * 2),
-                                     ([[1.0, 0.5]], [0.3])])
-    for name in names():
-        for damping in (0.0, 0.05):
-            resolver: Resolver = make(name, damping=damping)
-            problems = [equal] if resolver.handles == "equalities" else [equal, limited]
-            for h in problems:
-                result = resolver.solve(h)
-                resolver.solve(h, memory=result.memory)
-    result = make("hcod").solve(limited)
-    explain(limited, result)
-    certify(limited, result.x)
+    for h, handled in _hierarchies():
+        for name in names():
+            for damping in (0.0, 0.05):
+                resolver: Any = make(name, damping=damping)
+                if resolver.handles in handled:
+                    result = resolver.solve(h)
+                    resolver.solve(h, memory=result.memory)
+        result = make("hcod").solve(h)
+        explain(h, result)
+        certify(h, result.x)
+
+
+def _hierarchies() -> Iterator[tuple[Any, tuple[str, ...]]]:
+    """Yield hierarchies, each with what a resolver must be able to handle."""
+    from hierarchy import Hierarchy
+
+    yield Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])]), (
+        "equalities", "bounds", "inequalities", "activations")
+    yield Hierarchy.from_levels([([[1, 0], [0, 1]], [-0.1] * 2, [0.1] * 2), ([[1.0, 0.5]], [0.3])]
+                                ), ("bounds", "inequalities")
+    r = np.random.default_rng(0)
+    for _ in range(20):  # some need the second ways of a resolver
+        A, b = r.normal(size=(3, 3, 6)), r.normal(size=(3, 3))
+        A[1, 2] = 2.0 * A[1, 0]
+        yield Hierarchy.from_levels([(A[0], b[0] - 1.0, b[0]), (A[1], b[1]),
+                                     (A[2], b[2] - 0.1, b[2])]), ("inequalities",)
 
 
 def _robot(_: Path) -> None:

@@ -82,7 +82,7 @@ def digest() -> str:
     from hierarchy.jit.sources import source_digest
     from solvers.library.entries import solve_hcod
 
-    return source_digest(solve_hcod)
+    return source_digest(solve_hcod)[:16]
 
 
 def emit(resolvers: Sequence[str], target: str, version: str) -> Emitted:
