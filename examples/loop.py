@@ -12,11 +12,10 @@ import argparse
 
 import numpy as np
 
-from hierarchy import Robot, Stack, State
 from hierarchy.loop import Loop
 from hierarchy.paths import Ellipse
 from hierarchy.tasks import JointLimits, Position, Posture
-from solvers import Resolution, make
+from task_hierarchy import Resolution, Robot, Stack, State, make
 
 PERIOD = 0.002
 START = np.array([0.0, 0.6, 0.0, -1.4, 0.0, 0.8, 0.0])
