@@ -35,11 +35,35 @@ with open(sys.argv[1], "w") as file:
     json.dump(spent, file)
 sys.exit(os.waitstatus_to_exitcode(status))"""
 _SOLVE = """\
+import sys
 import numpy as np
 from hierarchy import Hierarchy
-from solvers import make
+from solvers import certify, make
 h = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])])
-make("tpm").solve(h)"""
+sys.exit(not certify(h, make(sys.argv[1]).solve(h).x).certified)"""
+_PEERS = {  # first answers of other packages, for those that are installed
+    "daqp": """\
+import daqp, numpy as np
+one = np.eye(3)
+daqp.solve(one, np.zeros(3), one, np.ones(3), -np.ones(3), np.zeros(3, dtype=np.int32))""",
+    "pink": """\
+import pinocchio as pin
+from pink import Configuration, solve_ik
+from pink.tasks import FrameTask
+model = pin.buildSampleModelManipulator()
+arm = Configuration(model, model.createData(), pin.neutral(model))
+hand = FrameTask(model.frames[-1].name, 1.0, 1.0)
+hand.set_target_from_configuration(arm)
+solve_ik(arm, [hand], 0.01, solver="daqp")""",
+    "mink": """\
+import mink, mujoco
+arm = mink.Configuration(mujoco.MjModel.from_xml_string(
+    "<mujoco><worldbody><body name='hand'><joint name='a'/><geom size='.1'/></body></worldbody>"
+    "</mujoco>"))
+hand = mink.FrameTask("hand", "body", 1.0, 1.0)
+hand.set_target_from_configuration(arm)
+mink.solve_ik(arm, [hand], 0.01, "daqp")""",
+}
 _TICK = """\
 from scenarios.config import load
 from scenarios.loop.controller import Controller
@@ -118,7 +142,10 @@ def beginnings() -> Iterator[Cost]:
             ("import scenarios", None, "-c", "import scenarios"),
             ("import hierarchy, solvers", None, "-c", "import hierarchy, solvers"),
             ("hierarchy --help", 0.5, "-m", "scenarios.cli.start", "--help"),
-            ("first solve, kernels cached", 0.6, "-c", _SOLVE),
+            *((f"first answer of {name}, verified, kernels cached", 0.6, "-c", _SOLVE, name)
+              for name in ("hcod", "tpm")),
+            *((f"first answer of {name}", None, "-c", code) for name, code in _PEERS.items()
+              if find_spec(name)),
             ("first tick of ellipse, cached", None, "-c", _TICK),
             (f"hierarchy {' '.join(_SHORT)}", 1.5, "-c", _COMMAND, *_SHORT),
             ("the same with --figures", None, "-c", _COMMAND, *_SHORT, "--figures")):
@@ -130,16 +157,18 @@ def beginnings() -> Iterator[Cost]:
 
 
 def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
-    """Run ten ticks of ellipse without cached kernels; also return each kernel's own seconds.
+    """Ask hcod and run ten ticks of ellipse without cached kernels; also each kernel's own seconds.
 
     Raises
     ------
     RuntimeError : the process failed.
     """
-    _say("ellipse, empty cache")
-    done = _run(["-c", _COMPILE], NUMBA_CACHE_DIR=str(cache))
+    _say("hcod and ellipse, empty caches")
+    first = _run(["-c", _SOLVE, "hcod"], NUMBA_CACHE_DIR=str(cache / "hcod"))
+    done = _run(["-c", _COMPILE], NUMBA_CACHE_DIR=str(cache / "ellipse"))
     own = own_seconds(json.loads(done.said.splitlines()[-1]))
-    return [Cost("ellipse, empty cache", done.seconds, "s", None, done.processor),
+    return [Cost("first answer of hcod, empty cache", first.seconds, "s", None, first.processor),
+            Cost("ellipse, empty cache", done.seconds, "s", None, done.processor),
             Cost(f"compilation of {len(own)} kernels", sum(own.values()), "s")], own
 
 

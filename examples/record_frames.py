@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from hierarchy import HierarchyError
 from scenarios.cell.build import build
 from scenarios.cell.sensors.camera import DepthCamera
 from scenarios.cell.sensors.frames import ABOUT, INTRINSICS
 from scenarios.config import load
 from scenarios.loop.simulation import simulate
 from scenarios.recording.recording import Recording
+from task_hierarchy import HierarchyError
 
 _MILLIMETRE = 1e-3
 

@@ -19,10 +19,9 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from hierarchy import Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position, Posture, model_rows
-from solvers import Status, make
+from task_hierarchy import Robot, Stack, State, Status, make
 
 
 class TaskHierarchyNode(Node):

@@ -103,6 +103,14 @@ def file_path(what: str, value: object) -> Path:
     return Path(value)
 
 
+def missing(error: ModuleNotFoundError, extra: str) -> ModuleNotFoundError:
+    """Return an error that also says which line installs a module that is not there."""
+    ours = str(error.name).partition(".")[0] in ("hierarchy", "solvers", "scenarios")
+    remedy = f": pip install 'task-hierarchy[{extra}]'"
+    return ModuleNotFoundError(f"{error}{'' if ours or 'pip install' in str(error) else remedy}",
+                               name=error.name)
+
+
 def brief(value: object) -> str:
     """Return the type of a value and the value itself, in at most 80 characters."""
     text = " ".join(repr(value).split())

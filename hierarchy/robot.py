@@ -8,7 +8,13 @@ from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-import pinocchio as pin
+
+try:
+    import pinocchio as pin
+except ModuleNotFoundError as error:
+    from hierarchy.errors import missing
+
+    raise missing(error, "robots") from None
 from numpy.typing import ArrayLike
 
 from hierarchy import plugins

@@ -9,7 +9,13 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
+
+try:
+    import pinocchio as pin
+except ModuleNotFoundError as error:
+    from hierarchy.errors import missing
+
+    raise missing(error, "robots") from None
 from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 

@@ -26,7 +26,12 @@ _HOME = {"Comparison": "measure.comparison", "Recording": "recording.recording",
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(f"scenarios.{_HOME[name]}"), name)
+    try:
+        value = globals()[name] = getattr(import_module(f"scenarios.{_HOME[name]}"), name)
+    except ModuleNotFoundError as error:
+        from hierarchy.errors import missing
+
+        raise missing(error, "scenarios") from None
     return value
 
 

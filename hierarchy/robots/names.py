@@ -14,7 +14,7 @@ from hierarchy.errors import RobotError, UnknownNameError
 PACKAGES = ("example_robot_data", "robot_descriptions")
 _SUFFIXES = (".urdf", ".xml", ".mjcf",  # and those that are refused with what to give instead
              ".xacro", ".sdf", ".world", ".toml", ".dae", ".stl", ".obj", ".mjb", ".usd", ".usda")
-_REMEDY = "pip install 'task-hierarchy[robots]'"
+_REMEDY = "pip install 'task-hierarchy[descriptions]'"
 
 
 def in_package(model: str) -> bool:

@@ -6,12 +6,17 @@ import os
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from time import perf_counter
 from typing import final
 
+from packaging.requirements import Requirement
+
 _PACKAGE = "task-hierarchy"
+_CORE = (None, "robots", "scenarios")  # extras without which there is no command
+_MODULES = {"pin": "pinocchio", "pillow": "PIL"}  # that are not called as their package
 _PROBLEMS = 20      # generated problems for the self-test
 _MET = 1e-6         # largest difference between strict resolvers, relative to 1 + |x|
 
@@ -52,28 +57,42 @@ def doctor_command(as_json: bool) -> int:
 
 def examine() -> Iterator[Finding]:
     """Run all checks."""
-    yield from _versions()
-    yield from _extras()
-    yield from _backends()
-    yield from _kernels()
-    yield from _tests()
+    for part in (_versions, _extras, _backends, _kernels, _tests):
+        try:
+            yield from part()
+        except Exception as error:  # a broken installation may raise anything
+            yield Finding("errors", part.__name__.strip("_"), f"{type(error).__name__}: {error}",
+                          False)
 
 
 def _versions() -> Iterator[Finding]:
     yield Finding("versions", "python", sys.version.split()[0], sys.version_info >= (3, 11))
     yield Finding("versions", _PACKAGE, version(_PACKAGE))
-    for package, extra in _required():
-        if extra is None:
-            there = _version(package)
-            yield Finding("versions", package, there or "missing", there is not None,
-                          "" if there else f"pip install {package}")
+    for one, extra in _required():
+        if extra in _CORE and one.name != _PACKAGE:
+            yield _imported(one)
+
+
+def _imported(one: Requirement) -> Finding:
+    """Compare a package as it is imported with what is asked for; its metadata may be another's."""
+    there = _version(one.name)
+    if there is None:
+        return Finding("versions", one.name, "missing", False, f"pip install {one.name}")
+    module = import_module(_MODULES.get(one.name, one.name.replace("-", "_")))
+    loaded = getattr(module, "__version__", there)
+    if isinstance(loaded, str) and loaded != there:
+        return Finding("versions", one.name, f"{loaded} in {module.__file__}, not the {there} that "
+                       "is installed", False, "remove it from the path")
+    asked = Requirement(str(one).partition(";")[0]).specifier
+    return Finding("versions", one.name, there, well := asked.contains(there, prereleases=True),
+                   "" if well else f"pip install '{one.name}{asked}'")
 
 
 def _extras() -> Iterator[Finding]:
     extras: dict[str, list[str]] = {}
-    for package, extra in _required():
-        if extra not in (None, "dev") and not package.startswith(_PACKAGE):
-            extras.setdefault(str(extra), []).append(package)
+    for one, extra in _required():
+        if extra not in (*_CORE, "dev") and not one.name.startswith(_PACKAGE):
+            extras.setdefault(str(extra), []).append(one.name)
     for extra, packages in extras.items():
         missing = [package for package in packages if _version(package) is None]
         there = ", ".join(f"{package} {_version(package)}" for package in packages
@@ -157,14 +176,14 @@ def _short_run() -> tuple[str, bool]:
     return f"{run.ticks} ticks of ellipse, median {median:.0f} us", run.fault is None
 
 
-def _required() -> Iterator[tuple[str, str | None]]:
+def _required() -> Iterator[tuple[Requirement, str | None]]:
     """Yield every dependency, and the extra it belongs to (None for a required one)."""
-    from packaging.requirements import Requirement
-
     for line in requires(_PACKAGE) or ():
         one = Requirement(line)
         _, extra, name = str(one.marker or "").rpartition('extra == "')
-        yield one.name, name.rstrip('"') if extra else None
+        name = name.rstrip('"')
+        if not one.marker or one.marker.evaluate({"extra": name}):
+            yield one, name if extra else None
 
 
 def _version(package: str) -> str | None:

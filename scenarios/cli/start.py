@@ -16,8 +16,12 @@ def main() -> None:
                and signal.getsignal(number) is not signal.SIG_IGN]
     for number in handled:
         signal.signal(number, _exit if os.getpid() == 1 else signal.SIG_DFL)
-    from scenarios.cli.main import interrupted, run_command
+    try:
+        from scenarios.cli.main import interrupted, run_command
+    except ModuleNotFoundError as error:
+        from hierarchy.errors import missing
 
+        sys.exit(f"hierarchy: error: {missing(error, 'scenarios')}")
     asked: list[int] = []
 
     def end(number: int, _: object) -> None:

@@ -67,7 +67,7 @@ def backend_of(name: str) -> Backend:
         raise UnknownNameError("backend of hqp", name, BACKENDS)
     backend = BACKENDS[name]
     if not installed(name):
-        where = "task-hierarchy" if backend.core else "task-hierarchy[qp]"
+        where = "task-hierarchy[scenarios]" if backend.core else "task-hierarchy[qp]"
         raise HierarchyError(f"hqp: backend {name!r} is not installed; pip install {where}")
     return backend
 

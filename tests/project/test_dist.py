@@ -33,7 +33,9 @@ def needed(package, extras=(), found=None):
         one = Requirement(line)
         if one.marker and not any(one.marker.evaluate({"extra": e}) for e in ("", *extras)):
             continue
-        if one.name not in found:
+        if one.name == package:
+            needed(package, one.extras, found)
+        elif one.name not in found:
             found[one.name] = distribution(one.name)
             needed(one.name, one.extras, found)
     return found
@@ -49,7 +51,7 @@ def clean(tmp_path_factory):
     venv.create(folder / "venv", with_pip=False, symlinks=True)
     python = folder / "venv" / "bin" / "python"
     site = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
-    for one in needed("task-hierarchy").values():
+    for one in needed("task-hierarchy", ("scenarios",)).values():
         for top in {path.parts[0] for path in one.files} - {"..", "__pycache__"}:
             if not (site / top).exists():
                 (site / top).symlink_to(Path(one.locate_file(top)).resolve())

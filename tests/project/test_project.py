@@ -86,7 +86,7 @@ def test_a_program_with_arrays_only_does_not_load_pinocchio(statement):
     assert done.stdout == "False\n"
 
 
-@pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])
+@pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios", "task_hierarchy"])
 def test_what_a_package_says_it_exports_is_there(package):
     module = import_module(package)
     assert set(module.__all__) <= set(dir(module))

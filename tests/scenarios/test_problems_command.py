@@ -30,7 +30,7 @@ def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, capsys, 
     assert run_command(["problems", "export", "all", "--count", "1", "--no-answers",
                         "--out", str(tmp_path)]) == 0
     assert ("left out: singular-panda, which needs example-robot-data: pip install "
-            "'task-hierarchy[robots]'") in capsys.readouterr().err
+            "'task-hierarchy[descriptions]'") in capsys.readouterr().err
 
 
 def test_every_family_of_the_generators_has_a_place():

@@ -1,0 +1,43 @@
+"""Install the lowest or the newest versions of all ranges, run each size, and print what ran.
+
+`python .ci/versions.py lowest|newest`, in fresh environments under the temporary folder.
+"""
+
+import re
+import subprocess
+import sys
+import tempfile
+import tomllib
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def lowest():
+    """Return the lower bound of each range, its last number free (`>=2.0` may have no 2.0)."""
+    extras = PROJECT["optional-dependencies"]
+    asked = [*PROJECT["dependencies"], *extras["robots"], *extras["scenarios"]]
+    bounds = (re.match(r"([\w.-]+)>=([\d.]+)", one) for one in asked)
+    return [f"{found[1]}=={found[2]}.*" for found in bounds if found]
+
+
+def run(which, size):
+    """Install one size in a fresh environment and use it; raises CalledProcessError."""
+    with tempfile.TemporaryDirectory() as folder:
+        venv.create(folder, with_pip=True, symlinks=True)
+        python = Path(folder, "bin", "python")
+        limits = Path(folder, "limits.txt")
+        limits.write_text("\n".join(lowest() if which == "lowest" else []))
+        asked = f"{ROOT}[{size}]" if size != "arrays" else str(ROOT)
+        subprocess.run([python, "-m", "pip", "install", "--quiet", "--upgrade", "--constraint",
+                        limits, asked], check=True)
+        subprocess.run([python, "-m", "pip", "freeze"], check=True)
+        subprocess.run([python, "-P", ROOT / ".ci" / "sizes.py", size], check=True, cwd=folder)
+
+
+if __name__ == "__main__":
+    for size in ("arrays", "robots", "scenarios"):
+        print(f"== {sys.argv[1]}, {size}", flush=True)
+        run(sys.argv[1], size)
