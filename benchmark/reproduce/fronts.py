@@ -152,7 +152,7 @@ def read(path: Path) -> list[Point]:
 def table(points: Sequence[Point], name: str) -> list[str]:
     """Return the table of a front: settings, scenes that did not fail, medians of the test."""
     front = FRONTS[name]
-    head = [name, "settings", "without a fault", *(f"`{one}`" for one in front.minimised)]
+    head = [name, "settings", "did not fail", *(f"`{one}`" for one in front.minimised)]
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for one in points:
         if one.front == name:
