@@ -152,7 +152,7 @@ def read(path: Path) -> list[Point]:
 def table(points: Sequence[Point], name: str) -> list[str]:
     """Return the table of a front: settings, scenes that did not fail, medians of the test."""
     front = FRONTS[name]
-    head = [name, "settings", "without a fault", *(f"`{one}`" for one in front.minimised)]
+    head = [name, "settings", "did not fail", *(f"`{one}`" for one in front.minimised)]
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for one in points:
         if one.front == name:
@@ -179,6 +179,9 @@ def figure(points: Sequence[Point]) -> Figure:
                 ax.scatter(x, y, s=20.0 + 40.0 * np.log1p(z), label=method, alpha=0.7,
                            color=style[method].colour)
         first, second, third = FRONTS[name].minimised[:3]
-        ax.set(xscale="log", yscale="log", title=name, xlabel=first, ylabel=second)
+        shares = [np.isfinite(one.test).all() for one in points if one.front == name]
+        ax.set(title=f"{name}: {sum(shares)} of {len(shares)} settings did not fail", xlabel=first,
+               ylabel=second)
+        ax.title.set_fontsize(9)
         ax.legend(title=f"size: {third}", fontsize=7, title_fontsize=7)
     return fig
