@@ -63,7 +63,7 @@ def test_fresh_problems_are_timed_and_reported_apart(few):
     rows = found.rows["resolvers"]
     assert {(row["family"], row["origin"], row["problems"]) for row in rows} == {
         (name, origin, count) for name in ("EQ7", "INEQ7")
-        for origin, count in (("known", 2), ("fresh", 4))}
+        for origin, count in (("known", 1), ("fresh", 4))}
     assert {row["entrant"] for row in rows} == {NUMPY, HIERARCHICAL, "hcod", "hcod warm"}
     assert all(row["wrong"] == 0 for row in rows if row["entrant"] in ("hcod", "hcod warm"))
     assert [table.title for table in found.sections[1].tables] == ["EQ7, fresh", "INEQ7, fresh"]

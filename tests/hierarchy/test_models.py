@@ -341,12 +341,6 @@ def test_arms_of_example_robot_data_are_read_with_their_meshes(name, joints, end
 
 
 @pytest.mark.usefixtures("example_robot_data")
-def test_an_unknown_name_comes_with_the_nearest():
-    with pytest.raises(UnknownNameError, match="did you mean 'panda'"):
-        Robot.load("example_robot_data:pandda")
-
-
-@pytest.mark.usefixtures("example_robot_data")
 def test_the_panda_follows_its_ellipse_within_its_limits():
     from scenarios import load, simulate
 

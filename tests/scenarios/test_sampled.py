@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections import Counter
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 import psutil
@@ -22,8 +21,7 @@ from scenarios.config.sampling import changed, drawn
 from scenarios.measure import metrics
 from scenarios.measure.statistics import wilson
 from scenarios.results import cluster, pool
-from scenarios.results.columns import Results, verdict
-from scenarios.results.plan import Planned, plan
+from scenarios.results.plan import plan
 from scenarios.results.run import Job, Outcome, outcome
 from scenarios.results.sampled import compare_starts, sweep
 from scenarios.results.store import FullError, Store, read
@@ -331,15 +329,6 @@ def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_sa
         assert f"worst/{name.name}" in page
         again = metrics.measure(simulate(load(name)))
         assert again[metric.name].value == metric.value
-
-
-def test_what_was_not_met_in_every_run_is_counted_by_column():
-    runs = [Planned("a", label, Job("", "", label, sample=sample))
-            for sample in range(4) for label in ("tpm", "weighted")]
-    excess = np.array([1.0 if run.label == "weighted" and run.job.sample else 0.0 for run in runs])
-    found = Results(tuple(runs), (None,) * 8, {}, {"joint_limit_excess": excess})
-    assert "Kept the joint limits: tpm 4 of 4, weighted 1 of 4" in verdict(found)[0]
-    assert found.share(replace(found.criteria()[-1]), "weighted").met == 1
 
 
 @pytest.mark.parametrize(("met", "of", "low", "high"), [

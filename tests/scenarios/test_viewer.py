@@ -12,7 +12,6 @@ from scenarios.cli.main import run_command
 from scenarios.config import load
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.moment import Became, Watched, of_scene
-from scenarios.draw.viewer.playback import Playback
 from scenarios.draw.viewer.stack_list import stack_html
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
@@ -46,17 +45,6 @@ def server():
 
 
 # Time
-
-
-def test_time_stands_until_it_is_played_and_stops_at_the_end():
-    playback = Playback(1.0, 3.0, speed=2.0)
-    playback.advance(0.5)
-    assert playback.t == 1.0
-    playback.play()
-    playback.advance(0.5)
-    assert (playback.t, playback.playing) == (2.0, True)
-    playback.advance(9.0)
-    assert (playback.t, playback.playing) == (3.0, False)
 
 
 # The moment that is drawn

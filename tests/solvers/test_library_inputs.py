@@ -23,11 +23,6 @@ def box():
                                   (np.eye(3), np.zeros(3))])
 
 
-def sizes_of(*sizes):
-    """A pointer to sizes of levels; ctypes keeps the array alive."""
-    return (c.ctypes.c_int64 * len(sizes))(*sizes)
-
-
 @pytest.mark.parametrize(("said", "told"), [("'in a.o:' 'no symbol x'", "no symbol x"), ("", "")])
 def test_the_last_line_of_a_linker_that_fails_is_told(tmp_path, monkeypatch, said, told):
     compiler = tmp_path / "cc"
@@ -81,10 +76,12 @@ def test_a_lower_side_above_the_upper_is_a_status(library, name):
 @pytest.mark.parametrize("wrong", [
     {"n": 0}, {"n": -3}, {"n": 2**40}, {"m": -1}, {"m": 6}, {"m": 2**62}, {"levels": -1},
     {"levels": 2}, {"levels": 2**33}, {"A": None}, {"lower": None}, {"upper": None},
-    {"sizes": None}, {"sizes": sizes_of(3, 2, 3)}, {"sizes": sizes_of(9, -1, -1)},
-    {"sizes": sizes_of(2**62, 2**62, 7 - 2**63)}], ids=str)
+    {"sizes": None}, {"sizes": (3, 2, 3)}, {"sizes": (9, -1, -1)},
+    {"sizes": (2**62, 2**62, 7 - 2**63)}], ids=str)
 def test_sizes_that_do_not_add_up_are_invalid(library, name, wrong):
     h = box()
+    if isinstance(wrong.get("sizes"), tuple):
+        wrong = {"sizes": (c.ctypes.c_int64 * 3)(*wrong["sizes"])}
     memory = library.memory(h)
     assert library.call(name, c.problem_of(h, **wrong), memory) == c.INVALID
     assert memory.untouched
