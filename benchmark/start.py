@@ -137,18 +137,19 @@ def beginnings() -> Iterator[Cost]:
 
     The minimum of several repetitions counts, since other load can only add to it.
     """
-    for what, most, *arguments in (
-            ("python -c pass", None, "-c", "pass"),
-            ("import scenarios", None, "-c", "import scenarios"),
-            ("import hierarchy, solvers", None, "-c", "import hierarchy, solvers"),
-            ("hierarchy --help", 0.5, "-m", "scenarios.cli.start", "--help"),
-            *((f"first answer of {name}, verified, kernels cached", 0.6, "-c", _SOLVE, name)
-              for name in ("hcod", "tpm")),
-            *((f"first answer of {name}", None, "-c", code) for name, code in _PEERS.items()
-              if find_spec(name)),
-            ("first tick of ellipse, cached", None, "-c", _TICK),
-            (f"hierarchy {' '.join(_SHORT)}", 1.5, "-c", _COMMAND, *_SHORT),
-            ("the same with --figures", None, "-c", _COMMAND, *_SHORT, "--figures")):
+    cases: list[tuple[str, float | None, list[str]]] = [
+        ("python -c pass", None, ["-c", "pass"]),
+        ("import scenarios", None, ["-c", "import scenarios"]),
+        ("import hierarchy, solvers", None, ["-c", "import hierarchy, solvers"]),
+        ("hierarchy --help", 0.5, ["-m", "scenarios.cli.start", "--help"]),
+        *((f"first answer of {name}, verified, kernels cached", 0.6, ["-c", _SOLVE, name])
+          for name in ("hcod", "tpm")),
+        *((f"first answer of {name}", None, ["-c", code]) for name, code in _PEERS.items()
+          if find_spec(name)),
+        ("first tick of ellipse, cached", None, ["-c", _TICK]),
+        (f"hierarchy {' '.join(_SHORT)}", 1.5, ["-c", _COMMAND, *_SHORT]),
+        ("the same with --figures", None, ["-c", _COMMAND, *_SHORT, "--figures"])]
+    for what, most, arguments in cases:
         _say(what)
         _run(arguments)  # fills the caches of files, bytecode and kernels
         done = [_run(arguments) for _ in range(_REPEATED)]
