@@ -165,8 +165,10 @@ def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
     RuntimeError : the process failed.
     """
     _say("hcod and ellipse, empty caches")
-    first = _run(["-c", _SOLVE, "hcod"], NUMBA_CACHE_DIR=str(cache / "hcod"))
-    done = _run(["-c", _COMPILE], NUMBA_CACHE_DIR=str(cache / "ellipse"))
+    first = _run(["-c", _SOLVE, "hcod"], TASK_HIERARCHY_NATIVE="1",
+                 NUMBA_CACHE_DIR=str(cache / "hcod"))
+    done = _run(["-c", _COMPILE], TASK_HIERARCHY_NATIVE="1",
+                NUMBA_CACHE_DIR=str(cache / "ellipse"))
     own = own_seconds(json.loads(done.said.splitlines()[-1]))
     return [Cost("first answer of hcod, empty cache", first.seconds, "s", None, first.processor),
             Cost("ellipse, empty cache", done.seconds, "s", None, done.processor),

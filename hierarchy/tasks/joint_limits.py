@@ -28,16 +28,14 @@ class JointLimits(JointRows):
     base; below, n stands for that number. Positions and velocities are limited by the limits of
     `robot`, `margin` [rad or m] is kept from each position limit, `acceleration` [rad/s^2 or m/s^2]
     is one number or (n,), `period` [s] is that of the control loop. For what is guaranteed from
-    which initial state see `hierarchy.limits`. A continuous joint has no position limits. At
-    velocity level the acceleration is that of the commands: a step from `State.commanded`. With a
-    `horizon` [s] of many periods the sides change slowly, see there.
+    which initial state, and for `horizon` [s], see `hierarchy.limits`. A continuous joint has no
+    position limits. At velocity level the acceleration is that of the commands.
 
     With `base_speed` or `base_acceleration`, (linear, angular) in [m, rad, s], a floating base has
     rows too, the first six. What is not given is then the speed limit of the robot, or the largest
     `acceleration`. Leave them out for a base that only contact forces move.
 
-    Raises HierarchyError if a limit is invalid, the margin leaves no room, or a fixed base has a
-    speed.
+    Raises HierarchyError for an invalid limit, no room, or a fixed base with a speed.
     """
 
     robot: Robot

@@ -17,7 +17,7 @@ _ANY = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 def register(app: typer.Typer) -> None:
     """Add `bench` and `reproduce`; without a checkout they say what they need."""
-    if (_ROOT / "benchmark" / "reproduce" / "studies.toml").is_file():
+    if (_ROOT / "benchmark" / "commands.py").is_file():
         if str(_ROOT) not in sys.path:
             sys.path.insert(0, str(_ROOT))  # before another's package of the same name
         app.add_typer(import_module("benchmark.commands").bench, name="bench")

@@ -36,7 +36,8 @@ def sequences(seed: int) -> Iterator[list[tuple[Hierarchy, Array]]]:
     A run that falls before its ticks is left out, and one with a tick that has no certified answer,
     or two.
     """
-    base, run = load(SCENARIO).with_changes({"limits.horizon": 0.0}), 0  # as the set was recorded
+    base, run = load(SCENARIO).with_changes(
+        {"limits.horizon": 0.0, "plant.stops": False}), 0  # as the set was recorded
     while True:
         values = drawn(base, base.variation, seed, run)
         chance = np.random.default_rng([seed, run])

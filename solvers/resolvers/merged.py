@@ -51,19 +51,15 @@ class Merged(Resolver):
 
     The levels of the tasks become one weighted level below the strict ones, so x moves no faster
     than the data where the strict optimum jumps. What a task misses moves its target in the next
-    solve, by at most `cap`: where all rests, upper levels are met as under strict priorities.
-    docs/theory/merged.md has the bounds. The memory is a working set and y, for solves in a row
-    on data that change little; without a memory this is a weighted sum.
+    solve, by at most `cap`: where all rests, upper levels are met as under strict priorities, see
+    docs/theory/merged.md. Without a memory this is a weighted sum.
 
     ratio : weight of a level over that of the level below; the lowest level has weight 1.
     scales : by name of a level, the miss [unit of its rows] that counts as 1; 1 where not given.
-    cap : most that a target moves, times the scale of its level; 0 for no memory. The lowest level
-        has none.
+    cap : most that a target moves, times the scale of its level; not in the lowest level.
     step : share of a miss, at most 1, by which the target moves in the next solve.
-    strict_levels : number of levels that stay strict; None for the rule: the first run of levels
-        with inequalities, and all levels above it.
-    regularisation : weight of |x - reference|, for unknowns that no row of a merged level names
-        alone, as those of a posture do; 0 for none.
+    strict_levels : levels that stay strict; None: the first run of inequalities, and all above.
+    regularisation : weight of |x - reference|, for unknowns that no merged row names alone.
     tolerance, max_iterations : as in `hcod`, which solves.
     """
 

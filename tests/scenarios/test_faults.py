@@ -144,9 +144,9 @@ def test_the_command_line_says_what_happened_and_fails_only_where_the_run_ended(
 
 
 @pytest.mark.parametrize(("fault", "said"), [
-    ("{kind='nan_positon', at=1, duration=1}", "faults.0.kind: Input should be"),
+    ("{kind='nan_positon', at=1, duration=1}", "faults.0.kind: unknown value"),
     ("{kind='status', at=1, duration=1}", "'status' needs status"),
-    ("{kind='status', at=1, duration=1, status='solved'}", "faults.0.status: Input should be"),
+    ("{kind='status', at=1, duration=1, status='solved'}", "faults.0.status: unknown value"),
     ("{kind='stale', at=1, duration=1, joint=3}", "'stale' takes no joint"),
     ("{kind='overrun', at=1, duration=1}", "'overrun' needs takes"),
     ("{kind='obstacle', at=1, duration=1, radius=0.1}", "either a centre or a place"),

@@ -101,7 +101,8 @@ def test_the_sizes_that_the_library_states_are_enough(library, n, sizes):
     h = Hierarchy.from_levels(rows, np.zeros(n))
     for name, _, settings in RESOLVERS:
         status, left = library.solve(name, h, c.settings_of(**settings))
-        assert status in (c.SOLVED, c.INACCURATE, c.ITERATION_LIMIT)
+        merged = name == "merged"  # which has nothing to merge in some of these
+        assert status in (c.SOLVED, c.INACCURATE, c.ITERATION_LIMIT, *[c.REFUSED] * merged)
         assert np.isfinite(left.answer).all()
 
 
