@@ -71,7 +71,7 @@ def test_a_resolver_with_bounds_alone_keeps_those_of_single_joints_above_all_els
     ({"contacts__0__normal": [0.0, 0.0, 0.0]}, "contacts.0: contact 'left_foot': normal .* is no"),
     ({"contacts__0__x": [0.16, 0.16]}, "contacts.0: contact 'left_foot': 4 points on one line"),
     ({"forces__least": 400.0, "forces__largest": 300.0}, "forces: .* no normal force is pushing"),
-    ({"robot__model": "kuka_lwr"}, "contacts.0: frame: unknown frame 'left_foot'. Known: end_effector"),
+    ({"robot__model": "kuka_lwr"}, "contacts.0: frame: unknown frame 'left_foot'. Known: end"),
     ({"start__on_floor": True, "contacts": []}, "start.on_floor needs a floating base and"),
     ({"forces__edge": 0.2}, "forces: .*margin 0.2 m of contact 'left_foot'"),
     ({"plant__pushes__0__joint": "trunk"}, "plant.pushes: .*'trunk'"),
