@@ -137,7 +137,8 @@ def _all() -> dict[str, Family]:
 
 FAMILIES = _all()
 """The families by name."""
-_NEEDS = {**dict.fromkeys(("singular-panda", "singular-romeo"), ("example-robot-data", "descriptions")),
+_NEEDS = {**dict.fromkeys(("singular-panda", "singular-romeo"),
+                          ("example-robot-data", "descriptions")),
           **dict.fromkeys(_SIMULATED, ("mujoco", "sim"))}
 """Distribution and extra of this project that a family needs."""
 

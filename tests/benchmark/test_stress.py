@@ -77,7 +77,7 @@ def problem():
     return Hierarchy.from_levels(levels, reference=np.ones(5))
 
 
-@pytest.mark.parametrize("way", [stress.RAISED, stress.NOT_FINITE, stress.WRONG])
+@pytest.mark.parametrize("way", [stress.RAISED, stress.WRONG])
 def test_each_way_to_fail_is_told_from_the_others_and_shrunk_to_its_core(way):
     def fails(h):
         return stress.outcome(Wrong(way), h)[0] == way

@@ -292,7 +292,7 @@ def test_a_package_that_is_missing_is_named_with_its_extra(package, monkeypatch)
     monkeypatch.setattr(names, "distribution", absent)
     monkeypatch.setitem(sys.modules, "robot_descriptions", None)
     monkeypatch.setitem(sys.modules, "robot_descriptions._descriptions", None)
-    with pytest.raises(RobotError, match=r"pip install 'task-hierarchy\[robots\]'"):
+    with pytest.raises(RobotError, match=r"pip install 'task-hierarchy\[descriptions\]'"):
         Robot.load(f"{package}:panda")
 
 
