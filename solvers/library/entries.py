@@ -136,8 +136,8 @@ def verify_x(problem, settings, record, x, work, size):
         both[c] = call.x[c]
         both[n + c] = call.reference[c] if call.reference.size > 0 else 0.0
     states, first = call.work[2 * n:2 * n + m], used - 3 * m - 3
+    known = first == 0 or first == n + call.sizes.size
     for i in range(m):  # without a record of `hcod` or `tpm` no inequality acts
-        known = first == 0 or first == n + call.sizes.size
         states[i] = call.values[first + i] if known else 0.0
     return np.int32(verify_answer(call.A, call.lower, call.upper, call.sizes, both, states,
                                   call.settings, call.work[2 * n + m:]))

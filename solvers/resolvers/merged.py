@@ -16,8 +16,8 @@ from hierarchy.records import set_frozen
 from solvers.kernels.merged import BY_RULE, NOTHING, merged, record_size, write_levels
 from solvers.resolver import Handles, Resolution, Resolver, register
 from solvers.resolvers.hcod import Hcod, warm_record
-from solvers.status import TOO_SMALL, Status
-from solvers.workspace import WORKSPACE, entry
+from solvers.status import Status
+from solvers.workspace import entry, run
 
 
 @final
@@ -123,12 +123,7 @@ class Merged(Resolver):
         """
         x, m = h.start(), h.m
         record = warm_record(memory, record_size(h.n, m))
-        A, lower, upper, sizes = h.rows
-        solve, settings = entry(merged), self._settings_for(h.names)
-        code = solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)
-        while code == TOO_SMALL:
-            WORKSPACE.double()
-            code = solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)
+        code = run(entry(merged), *h.rows, x, record, self._settings_for(h.names))
         if code == NOTHING:
             refuse_safety_alone(h)
         return MergedResolution(x, Status(code), record, m)

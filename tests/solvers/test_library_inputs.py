@@ -57,6 +57,8 @@ def test_spoilt_data_give_the_bits_and_statuses_of_python(library):
         for name in c.NAMES:
             for damped in ({}, *[{"damping": 0.1}] * (name != "merged")):
                 c.check_same(library, (name, damped, damped), h)
+        status, _ = library.solve("merged", h, c.settings_of(damping=0.1))
+        assert status == c.INVALID  # which C has without damping only
 
 
 @pytest.mark.slow
