@@ -30,8 +30,9 @@ rounding:
 - Acceleration level: a joint that can keep its position limit only by reversing within a tick (it
   is up to A T^2 / 8 from viable) keeps it as well, unless that breaks another limit.
 - The acceleration limit holds from every initial state, always.
-- Faster than `velocity`: the speed falls by A T per tick until it is within the limit. A slower
-  joint never gets faster than `velocity`.
+- Faster than `velocity`: the speed falls by A T per tick until it is within the limit, with a
+  horizon H by T/H of what it is beyond it, if that is less. A slower joint never gets faster than
+  `velocity`.
 - Too fast to stop: the joint brakes with the full A, as far as `velocity` and the other position
   limit allow; it exceeds its limit by what v^2 / (2 A) and the ticks make unavoidable.
 - Beyond a position limit: outward speed is braked in the same manner; then the joint returns at
@@ -151,9 +152,10 @@ def box(q, v, limits, i, acceleration):
     """Return the least and the greatest command of joint i, which has q and v."""
     L, U, V, A, T = limits[0, i], limits[1, i], limits[2, i], limits[3, i], limits[4, i]
     H = limits[5, i]
-    low, up = widest(q, v, (L, U, V, A, T), acceleration)
     if not H > T:
-        return low, up
+        return widest(q, v, (L, U, V, A, T), acceleration)
+    # A joint beyond its speed limit returns in H, not in a tick.
+    low, up = widest(q, v, (L, U, max(V, abs(v) - (abs(v) - V) * T / H), A, T), acceleration)
     least, most = next_velocities(q + v * H if acceleration else q, L, U, V, A, H)     # (c)
     if acceleration:
         least, most = (least - v) / H, (most - v) / H

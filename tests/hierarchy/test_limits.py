@@ -270,16 +270,19 @@ PERIODS = pytest.mark.parametrize("period", [0.01, 0.05] if PLAIN else [1e-4, 2e
 
 @pytest.mark.slow
 @LEVELS
-@pytest.mark.parametrize("seed", [6, 7])
-def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, seed):
+@pytest.mark.parametrize(("seed", "ticks"), [(6, 0), (7, 0), (6, 10)])
+def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, seed, ticks):
+    """A joint that is too fast loses A T in a tick; with a horizon, T/H of the excess."""
     rng = np.random.default_rng(seed)
     limits, T = random_limits(rng, JOINTS)
     middle = np.clip(0.0, np.maximum(limits[0], -9.0), np.minimum(limits[1], 9.0))
     q, v = middle + rng.normal(0, 2, JOINTS), rng.normal(0, 1, JOINTS) * 10 ** rng.uniform(-3, 1)
-    ride = Ride(q, v, limits, T, level, adversary(rng, JOINTS, TICKS))
+    ride = Ride(q, v, limits, T, level, adversary(rng, JOINTS, TICKS), ticks * T)
     ride.keeps_acceleration(limits)
     speed = np.abs(np.vstack([v, ride.v]))
-    allowed = np.maximum(limits[2], speed[:-1] - limits[3] * T)
+    too_fast = np.maximum(speed[:-1] - limits[2], 0.0)
+    less = np.minimum(limits[3] * T, too_fast / ticks if ticks else np.inf)
+    allowed = np.maximum(limits[2], speed[:-1] - less)
     assert (speed[1:] <= allowed * (1 + SPEED)).all(), "too fast, and not getting slower"
 
 
