@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from scenarios.measure.runs import Run
+    from scenarios.results.columns import Results
 
 _WIDTH = 80   # columns of a terminal
 _NAMES = 26   # columns of it for the names of metrics
@@ -80,6 +81,28 @@ def print_table(runs: list[Run]) -> None:
              ] if len(found) == 1 else []
     print_columns(dict.fromkeys(run.title for run in runs), "", [run.label for run in runs], rows,
                   ["", *map(str, partings(runs)), *flags(runs), *lines(found), *goals])
+
+
+def print_samples(name: str, results: Results) -> None:
+    """Print the verdict, success rates, and the spread of each metric by resolver."""
+    from rich.text import Text
+
+    from scenarios.results.columns import compared, summary, verdict
+
+    rows = [(one.label, [Text(str(results.share(one, label))) for label in results.labels])
+            for one in results.criteria()]
+    for metric in results.shown():
+        best = results.best(metric)
+        cells = []
+        for label in results.labels:
+            text = Text(summary(results, metric, label) + "* "[label not in best],
+                        "bold" if label in best else "")
+            said = compared(results, metric, label)
+            cells.append(text.append(f"\n{said} ", "not bold dim") if said else text)
+        rows.append((f"{metric.label} [{metric.shown_unit}]" if metric.shown_unit else
+                     metric.label, cells))
+    print_columns([f"{name}: {results.samples} samples, paired", *verdict(results)],
+                  "median [quartiles]", results.labels, rows)
 
 
 def print_columns(above: Iterable[str], corner: str, labels: Sequence[str],
