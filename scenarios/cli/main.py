@@ -81,7 +81,7 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
     from hierarchy.tasks import TASKS
     from scenarios.config import load, shipped, shipped_groups
     from scenarios.config.groups import load_group
-    from scenarios.results.sweep_file import load_sweep, shipped_sweeps
+    from scenarios.results.plan import load_sweep, shipped_sweeps
 
     entries = {"scenarios": {name: load(name).title for name in shipped()},
                "groups": {name: load_group(name).title for name in shipped_groups()},

@@ -210,8 +210,8 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
     Run the same command again to resume an interrupted sweep.
     """
     asked = workers_of(workers, scheduler, part)
+    from scenarios.results.plan import load_sweep
     from scenarios.results.sampled import sweep as make
-    from scenarios.results.sweep_file import load_sweep
 
     folder = out if out is not None else Path("runs") / f"sweep-{load_sweep(file).name}"
     return _sampled(partial(make, file, folder, workers=asked), folder, as_json)

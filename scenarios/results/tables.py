@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from markupsafe import Markup
 
 from scenarios.draw.figures.palette import Look
-from scenarios.measure.happened import happened
+from scenarios.measure.jumps import happened
 from scenarios.measure.partings import BOUND, partings
 from scenarios.measure.runs import table
 from scenarios.results.columns import flags

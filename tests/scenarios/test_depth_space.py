@@ -15,8 +15,8 @@ from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
-from scenarios.cell.sensors.exact import ExactDistances
 from scenarios.cell.sensors.frames import RecordedFrames
+from scenarios.cell.sensors.sensor import ExactDistances
 from scenarios.config import ScenarioError
 from scenarios.config.kinds.camera import DepthErrors
 from scenarios.draw.figures.depth import depth_figure

@@ -17,8 +17,8 @@ from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import lines, verdicts
 from scenarios.recording.recording import Event
-from scenarios.results.commands import run_command
 from scenarios.results.page import comparison_page as page
+from scenarios.results.page import run_command
 
 LETTER = "tpm-published"
 

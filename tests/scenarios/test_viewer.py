@@ -18,8 +18,8 @@ from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import simulate, tick
 from scenarios.measure.judging import judge
 from scenarios.measure.run_folder import load_run
+from scenarios.recording.fate import Fate
 from scenarios.scene import scene
-from scenarios.scene.levels import Fate
 
 LIMITED = load("ellipse-limits", ["control.duration=0.6"])
 

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from hierarchy.errors import HierarchyError
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.replay.data import fates, phrases, run_data
-from scenarios.measure.happened import happened
+from scenarios.measure.jumps import happened
 from scenarios.measure.verdict import verdict
 from scenarios.scene import scene
 from scenarios.scene.pushes import key
