@@ -79,10 +79,11 @@ def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str,
     from scenarios.draw.replay import html
 
     recordings: dict[str, Recording] = {one.label: one.recording for one in shown}
-    document, rate = html(recordings, name, rate=_FASTEST, embedded=True), _FASTEST
+    happenings = {one.label: one.runs[0].happened for one in shown}
+    document, rate = html(recordings, name, happenings, rate=_FASTEST, embedded=True), _FASTEST
     if len(document) > most_bytes:
         rate = max(_SLOWEST, float(int(_FASTEST * most_bytes / len(document))))
-        document = html(recordings, name, rate=rate, embedded=True)
+        document = html(recordings, name, happenings, rate=rate, embedded=True)
     return document, rate
 
 

@@ -19,9 +19,8 @@ from scenarios.files import slug
 from scenarios.measure.metrics import Metric
 from scenarios.measure.run_folder import versions
 from scenarios.results import curves
-from scenarios.results.columns import Results, compared, flags, summary, verdict
+from scenarios.results.columns import Results, flags, rows, verdict
 from scenarios.results.plan import Plan, Planned
-from scenarios.results.tables import Cell, Groups
 from scenarios.templates import render, resource
 
 _FAILURES = 20  # reasons listed
@@ -86,7 +85,7 @@ def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, A
         "more_failures": max(0, len(failures) - _FAILURES), "spreads": _spreads(name, results),
         "worst": [(metrics, of_key[key], *_again(of_key[key], folder))
                   for key, metrics in worst.items()],
-        "numbers": _numbers(results), "looks": looks(results.labels),
+        "numbers": rows(results), "looks": looks(results.labels),
         "heads": {label: [("quiet", text)] if text else [] for label, text in marked.items()}}
 
 
@@ -112,14 +111,3 @@ def _spreads(name: str, results: Results) -> list[tuple[Metric, str, Markup]]:
              svg(curves.spread(results, metric), f"{name}: {metric.label}"))
             for metric in results.shown()
             if np.nanmin(results.values[metric.name]) < np.nanmax(results.values[metric.name])]
-
-
-def _numbers(results: Results) -> Groups:
-    """Return the spread of each metric under each resolver, by group."""
-    found: dict[str, list[tuple[str, str, list[Cell]]]] = {}
-    for metric in results.shown():
-        best = results.best(metric)
-        found.setdefault(metric.group, []).append((metric.label, metric.shown_unit, [
-            Cell(summary(results, metric, label), "best" if label in best else "",
-                 more=compared(results, metric, label)) for label in results.labels]))
-    return found

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
 from scenarios.draw.figures.palette import Look
-from scenarios.measure.jumps import happened
 from scenarios.measure.partings import BOUND, partings
 from scenarios.measure.runs import table
 from scenarios.results.columns import flags
 from scenarios.templates import render
 
 if TYPE_CHECKING:
-    from scenarios.measure.runs import Row, Run
+    from scenarios.measure.runs import Run
 
 # The most important metrics; the others are folded away.
 _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_violation_max",
@@ -29,18 +28,6 @@ _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_v
           "time_tick_median")
 
 
-class Cell(NamedTuple):
-    """A cell of a table: `kind` is "best", "out" or "", `more` a second line."""
-
-    text: str
-    kind: str = ""
-    note: str = ""
-    more: str = ""
-
-
-Groups = Mapping[str, Sequence[tuple[str, str, Sequence[Cell]]]]  # rows: label, unit, cells
-
-
 def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     """Return the metrics with the best of each row marked; minor ones are folded away."""
     rows = table(runs, details=False)
@@ -49,8 +36,7 @@ def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     marked = flags({run.label: run.scenario for run in runs})
     heads = {run.label: [(kind, text) for kind, text in (
         ("alert", _stopped(run)), ("quiet", marked[run.label])) if text] for run in runs}
-    return render("results/measured.html", heads=heads, looks=looks, first=_grouped(first, runs),
-                  rest=_grouped(rest, runs), count=len(rest),
+    return render("results/measured.html", heads=heads, looks=looks, first=first, rest=rest,
                   said=_marks(runs)) if rows else Markup()
 
 
@@ -75,19 +61,6 @@ def _marks(runs: Sequence[Run]) -> str:
         if detour else "")
 
 
-def _grouped(rows: Sequence[Row], runs: Sequence[Run]) -> Groups:
-    """Return rows with their cells, by group."""
-    out = [run.fault is not None for run in runs]
-    groups = dict.fromkeys(row.group for row in rows)
-    return {group: [(row.label, row.unit, _cells(row, out)) for row in rows if row.group == group]
-            for group in groups}
-
-
-def _cells(row: Row, out: Sequence[bool]) -> list[Cell]:
-    return [Cell(cell, "best" if i in row.best else "out" if out[i] else "", note)
-            for i, (cell, note) in enumerate(zip(row.cells, row.notes, strict=True))]
-
-
 def _stopped(run: Run) -> str:
     if run.fault is None:
         return ""
@@ -108,8 +81,7 @@ def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
 
 def _happened(run: Run) -> list[tuple[str, str, str, str]]:
     recording = run.recording
-    found = [] if recording is None else [
-        (what, why, str(ticks), f"{t:.3f} s") for what, why, ticks, t in happened(recording)]
+    found = [(what, why, str(ticks), f"{t:.3f} s") for what, why, ticks, t in run.happened]
     if run.fault:
         ended = f"{recording['t'][-1]:.3f} s" if recording and recording.ticks else "the start"
         found.append((f"fault: {run.fault}", "run stopped", "–", ended))
