@@ -39,6 +39,8 @@ class Live:
     HierarchyError and has no effect. `over` is set after the last tick or after one with a `fault`.
     """
 
+    _moment: Moment
+
     def __init__(self, scenario: Scenario) -> None:
         if scenario.faults:
             raise ScenarioError(f"scenario {scenario.name!r}: a live run injects no [[faults]]")
