@@ -18,7 +18,7 @@ from scenarios.draw.figures.palette import Look, looks
 from scenarios.draw.figures.picture import picture
 from scenarios.measure.motions import Motion, motions
 from scenarios.measure.verdict import lines, table, verdicts
-from scenarios.results import charts, tables
+from scenarios.results import sections
 from scenarios.templates import render, resource
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def comparison_page(comparison: Comparison, planned: int = 0) -> str:
     """
     groups = comparison.groups()
     with drawing.styled(drawing.SCREEN):
-        sections = [_group(comparison, name, runs) for name, runs in groups.items()]
+        articles = [_group(comparison, name, runs) for name, runs in groups.items()]
     ends = {name: lines(verdicts(runs))[0] for name, runs in groups.items()}
     return str(render("results/page.html", title=f"{', '.join(groups)}: a comparison",
                       style=resource("results/style.css"), script=resource("results/page.js"),
@@ -120,7 +120,7 @@ def comparison_page(comparison: Comparison, planned: int = 0) -> str:
                       about_rows=_about_rows(comparison), file="",
                       contents=ends if len(ends) > 1 else {},
                       count=in_words(len(groups)).capitalize(),
-                      sampled=comparison.sampled(_STARTS), groups=sections,
+                      sampled=comparison.sampled(_STARTS), groups=articles,
                       refused=comparison.refused, command=comparison.command,
                       versions=comparison.versions))
 
@@ -145,15 +145,15 @@ def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
     judged = verdicts(runs)
     room = min(_REPLAY_BYTES, _REPLAYS_BYTES // len(comparison.groups()))
     moved = {"replay": replay(name, found, room),
-             "panels": charts.multiples(name, found, look),
-             "overlays": charts.overlays(name, runs, found, look)} if found else {}
+             "panels": sections.multiples(name, found, look),
+             "overlays": sections.overlays(name, runs, found, look)} if found else {}
     return render("results/group.html", name=name, looks=look, verdict=lines(judged),
                   goals=table(judged),
                   **_about(name, runs), **_picture(name, found, look),
                   **{"replay": "", "panels": "", "overlays": "", **moved},
-                  numbers=tables.numbers(runs, look), stack=charts.stack(name, runs, look),
-                  partings=tables.parted(runs), commands=commands(comparison, runs),
-                  settings=tables.settings(runs))
+                  numbers=sections.numbers(runs, look), stack=sections.stack(name, runs, look),
+                  partings=sections.parted(runs), commands=commands(comparison, runs),
+                  settings=sections.settings(runs))
 
 
 def _about(name: str, runs: Sequence[Run]) -> dict[str, Any]:

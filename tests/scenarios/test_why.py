@@ -102,7 +102,7 @@ def test_large_changes_are_among_the_events_of_report_and_replay(folder, monkeyp
     from scenarios.measure import jumps as module
     from scenarios.measure.run_folder import load_run
     from scenarios.measure.runs import Run
-    from scenarios.results.tables import events
+    from scenarios.results.sections import events
 
     recording = load_run(folder)
     assert not list(module.happened(recording))
