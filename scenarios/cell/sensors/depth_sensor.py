@@ -18,7 +18,7 @@ from scenarios.cell.sensors.errors import Image
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.cell.sensors.pixels import ObstacleImage
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
-from scenarios.config.kinds.camera import CameraSection, DepthErrors, FramesSection, ImageSection
+from scenarios.config.kinds.camera import CameraSection, FramesSection, ImageSection
 
 _ROUNDING = 1e-9  # [s] of times that are compared
 
@@ -51,10 +51,10 @@ class DepthSensor:
     the time the source took to make the image, which is not part of the control loop.
     """
 
-    def __init__(self, source: Source, space: DepthSpace, stale_after: float = 0.2,
-                 least_readings: float = 0.1, exact: ExactDistances | None = None) -> None:
-        self.source, self.space, self.stale_after = source, space, stale_after
-        self.least_readings = least_readings
+    def __init__(self, section: ImageSection, source: Source, space: DepthSpace,
+                 exact: ExactDistances | None = None) -> None:
+        self.source, self.space = source, space
+        self.stale_after, self.least_readings = section.stale_after, section.least_readings
         self.points: tuple[ControlPoint, ...] = space.points
         self.measurement, self.obstacles = space.measurement, source.obstacles
         self.reading: Image | None = None
@@ -131,11 +131,8 @@ def camera(section: CameraSection, robot: Robot, exact: ExactDistances,
                 else np.array(section.rotation))
     pinhole = Pinhole(section.width, section.height, section.fx, section.fy, section.cx,
                       section.cy, section.position, rotation)
-    errors = DepthErrors.none(section.near, section.far) if section.ideal else section
     capsules = _capsules(robot, section.foot)
-    source = DepthCamera(pinhole, exact.obstacles, capsules, errors, rate=section.rate,
-                         jitter=section.jitter, latency=section.latency, seed=section.seed,
-                         point_radius=section.point_radius, backdrop=section.backdrop or inf)
+    source = DepthCamera(section, pinhole, exact.obstacles, capsules)
     return _sensor(section, source, capsules, exact, asked, exact)
 
 
@@ -149,11 +146,9 @@ def frames(section: FramesSection, robot: Robot, exact: ExactDistances,
 
 def _sensor(section: ImageSection, source: Source, capsules: tuple[Capsule, ...],
             exact: ExactDistances, asked: Asked, checked: ExactDistances | None) -> DepthSensor:
-    space = DepthSpace(source.pinhole, exact.points, capsules, section.region or asked.region,
-                       margin=section.margin, thin=inf if section.thin is None else section.thin,
-                       support=section.support, band=section.band, mean_within=asked.mean_within,
-                       body=asked.body, tip=asked.tip, pairs=exact.measurement.pairs is not None)
-    return DepthSensor(source, space, section.stale_after, section.least_readings, checked)
+    space = DepthSpace(section, source.pinhole, exact.points, capsules, asked,
+                       exact.measurement.pairs is not None)
+    return DepthSensor(section, source, space, checked)
 
 
 def _capsules(robot: Robot, foot: float) -> tuple[Capsule, ...]:
