@@ -20,10 +20,10 @@ from PIL import Image
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacles
 from scenarios import load, simulate
-from scenarios.cell.scene import make_obstacles
+from scenarios.cell.sensors.sensor import make_obstacles
 from scenarios.draw.figures.bodies import outline
 from scenarios.draw.figures.drawing import ALERT, INK, project, style
-from scenarios.recording.links import capsules, ends
+from scenarios.recording.tree import capsules, ends
 
 HERE = Path(__file__).parent
 OUT = HERE.parent / "docs" / "images" / "examples"

@@ -25,7 +25,7 @@ def main() -> None:
     """Run each scenario and copy its figures into the documents."""
     for name, pictures in PICTURES.items():
         with tempfile.TemporaryDirectory() as folder:
-            write_all(simulate(load(name)), Path(folder))
+            write_all([simulate(load(name))], Path(folder))
             for stem, image in pictures.items():
                 with Image.open(Path(folder, f"{stem}.png")) as drawn:
                     drawn.convert("RGB").quantize(255).save(IMAGES / f"{image}.png", optimize=True)

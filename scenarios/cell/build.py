@@ -14,13 +14,12 @@ from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
 from hierarchy.tasks import JointLimits, Pointing, Position
-from scenarios.cell.order import Order
-from scenarios.cell.plant import plant_of
 from scenarios.cell.plants import Plant
+from scenarios.cell.plants.plant import plant_of
 from scenarios.cell.robot import placed
-from scenarios.cell.scene import sensor_of
 from scenarios.cell.sensors import Sensor
-from scenarios.cell.stacked import stacked
+from scenarios.cell.sensors.sensor import sensor_of
+from scenarios.cell.stacked import Order, stacked
 from scenarios.cell.tasks import tasks_of
 from scenarios.config import Scenario
 from scenarios.config.references import References

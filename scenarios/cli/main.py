@@ -11,33 +11,24 @@ from __future__ import annotations
 import sys
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from scenarios.cli import benchmarks, completion, options
+from scenarios.cli import benchmarks, runs
+from scenarios.cli import shown as showing
 from scenarios.cli.options import (
     INTERRUPTED,
-    PORT,
     AsJson,
-    Browser,
     Changes,
-    Duration,
-    Out,
-    Part,
     Plugins,
-    Port,
-    Scheduler,
-    Workers,
+    complete_scenarios,
+    listed_in,
+    loaded,
     output,
 )
 from scenarios.cli.problems import problems
-from scenarios.cli.terminal import first_line, print_json, print_list, shown
-
-if TYPE_CHECKING:
-    from scenarios.config import Scenario
-
-_LONG = 50  # characters of a change in a title
+from scenarios.cli.terminal import exit_code, first_line, print_json, print_list, shown
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.add_typer(problems, name="problems")
@@ -58,10 +49,10 @@ def run_command(arguments: list[str]) -> int:
         if isinstance(error, HierarchyError):
             return _wrong(_with_its_file(str(error), arguments))
         if isinstance(error, OSError):
-            return _fault(f"{error.filename}: {error.strerror}" if error.filename else
+            return exit_code(f"{error.filename}: {error.strerror}" if error.filename else
                           error.strerror or str(error))
         if isinstance(error, RuntimeError) and type(error).__module__.startswith("scenarios."):
-            return _fault(str(error))  # a page that cannot be made, a cluster that is lost
+            return exit_code(str(error))  # a page that cannot be made, a cluster that is lost
         raise
 
 
@@ -89,8 +80,8 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
     from hierarchy.robots.table import in_words
     from hierarchy.tasks import TASKS
     from scenarios.config import load, shipped, shipped_groups
-    from scenarios.config.groups import load_group
-    from scenarios.results.sweep_file import load_sweep, shipped_sweeps
+    from scenarios.config.names import load_group
+    from scenarios.results.plan import load_sweep, shipped_sweeps
 
     entries = {"scenarios": {name: load(name).title for name in shipped()},
                "groups": {name: load_group(name).title for name in shipped_groups()},
@@ -110,198 +101,9 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
         print_list(what, named)
 
 
-@app.command()
-def run(scenario: Annotated[str, typer.Argument(
-            help="Name of a scenario, or a scenario file.", autocompletion=completion.scenarios)],
-        resolver: Annotated[str | None, typer.Option(
-            "--resolver", metavar="SPEC", autocompletion=completion.resolvers,
-            help="Use another resolver: name, or name:setting=value:setting=value.")] = None,
-        changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
-        out: Out = None, certify: Annotated[bool, typer.Option(
-            "--certify", help="Certify the answer of every tick; not part of the measured times.")
-            ] = False,
-        figures: Annotated[bool, typer.Option(
-            "--figures", help="Also draw the run's figures, like `hierarchy figures`.")
-            ] = False, as_json: AsJson = False,
-        live: Annotated[bool, typer.Option(
-            "--live", help="Show the run in the browser and change it interactively; needs the "
-                           "extra `view`.")] = False,
-        speed: Annotated[float | None, typer.Option(
-            "--speed", metavar="X", min=0.01, max=100.0,
-            help="With --live: real-time factor. Default: 1.")] = None,
-        wait: Annotated[bool, typer.Option(
-            "--wait/--no-wait", help="With --live: start when a browser has opened the page, or "
-            "at once.")] = True,
-        port: Port = PORT, browser: Browser = True) -> int:
-    """Run a scenario, measure it, and save the run."""
-    if live and (certify or figures or as_json):
-        raise typer.BadParameter("cannot be combined with --certify, --figures or --json",
-                                 param_hint="--live")
-    if speed is not None and not live:
-        raise typer.BadParameter("needs --live", param_hint="--speed")
-    chosen = _load(scenario, changes, duration)
-    if resolver is not None:
-        chosen = chosen.with_resolver(resolver)
-    from scenarios.files import claim, next_free
-
-    name = f"{chosen.name}-{chosen.control.resolver}"
-    folder = claim(out if out is not None else next_free(Path("runs") / name))
-    if live:
-        from scenarios.cli.view import live_command
-
-        return live_command(chosen, folder, port, speed or 1.0, browser, wait)
-    from scenarios.cli.run import run_scenario
-
-    return run_scenario(chosen, folder, certify, figures, as_json)
-
-
-@app.command()
-def compare(scenarios: Annotated[list[str], typer.Argument(
-                help="Names of scenarios or groups, or scenario files.",
-                autocompletion=completion.compared)],
-            resolvers: Annotated[str | None, typer.Option(
-                "--resolvers", metavar="SPEC,SPEC,...", autocompletion=completion.resolvers,
-                help="Resolvers: name, or name:setting=value; or own, that of each scenario. "
-                     "Default: all suitable ones; own for a group.")] = None,
-            changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
-            out: Out = None, starts: Annotated[int | None, typer.Option(
-                "--starts", metavar="N", min=2, help="Compare over N starts sampled from each "
-                "scenario's [variation].")] = None,
-            seed: Annotated[int, typer.Option(
-                "--seed", metavar="S", min=0, help="With --starts: seed of the samples.")] = 0,
-            workers: Workers = None, scheduler: Scheduler = None, part: Part = None,
-            as_json: AsJson = False) -> int:
-    """Run scenarios under several resolvers and report.
-
-    With --starts every resolver gets the same sampled starts, and the report gives statistics; run
-    the same command again to resume an interrupted comparison.
-    """
-    if starts is None and (seed or scheduler or part):
-        raise typer.BadParameter("needs --starts", param_hint="--seed, --scheduler, --part")
-    from scenarios.config import members, shipped_groups
-    from scenarios.config.scenario import OWN
-
-    chosen = [_load(name, changes, duration) for name in members(scenarios)]
-    grouped = any(name in shipped_groups() for name in scenarios)
-    specs = _split(resolvers) if resolvers is not None else [OWN] if grouped else None
-    if starts is not None:
-        from scenarios.cli.sweep import starts_command
-
-        return starts_command(chosen, specs, starts, seed, out,
-                              options.workers(workers, scheduler, part), as_json)
-    from scenarios.cli.compare import compare_scenarios
-    from scenarios.files import next_free
-
-    name = scenarios[0] if grouped else chosen[0].name
-    folder = out if out is not None else next_free(Path("runs") / f"compare-{name}")
-    return compare_scenarios(chosen, specs, folder, as_json, workers)
-
-
-@app.command()
-def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
-                                              autocompletion=completion.sweeps)],
-          out: Annotated[Path | None, output(
-              "Output folder, new or of a sweep to resume. Default: runs/sweep-NAME.")] = None,
-          plugin: Plugins = None, workers: Workers = None, scheduler: Scheduler = None,
-          part: Part = None, as_json: AsJson = False) -> int:
-    """Run scenarios with sampled parameters.
-
-    Run the same command again to resume an interrupted sweep.
-    """
-    from scenarios.cli.sweep import sweep_command
-
-    return sweep_command(file, out, options.workers(workers, scheduler, part), as_json)
-
-
-@app.command()
-def view(folders: Annotated[list[Path], typer.Argument(
-             metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
-         side_by_side: Annotated[bool, typer.Option(
-             "--side-by-side/--overlay", help="Placement of several runs.")] = True,
-         plugin: Plugins = None,
-         port: Port = PORT, browser: Browser = True) -> int:
-    """Show finished runs in the browser.
-
-    In 3D and as curves; needs the extra `view`.
-    """
-    from scenarios.cli.view import view_command
-
-    return view_command(folders, port, side_by_side, browser)
-
-
-@app.command()
-def export(folder: Annotated[Path, typer.Argument(
-               metavar="RUN", help="Run folder of `hierarchy run`.")],
-           format: Annotated[str, typer.Option(
-               "--format", metavar="FORMAT", help="mcap. Tables of other formats: "
-               "load_run(RUN).to_dataframe() in Python.")] = "mcap",
-           out: Annotated[Path | None, output(
-               "A new file. Default: run.mcap in RUN.", "FILE")] = None,
-           plugin: Plugins = None,
-           as_json: AsJson = False) -> None:
-    """Export a run as MCAP, with a layout for Foxglove.
-
-    Needs the extra `export`.
-    """
-    from scenarios import load_run
-    from scenarios.export import export as write
-
-    files = [shown(path) for path in write(load_run(folder), out or folder / f"run.{format}")]
-    if as_json:
-        return print_json({"files": files})
-    print(*files, sep="\n")
-
-
-@app.command()
-def replay(folders: Annotated[list[Path], typer.Argument(
-               metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
-           out: Annotated[Path | None, output(
-               "HTML file to write. Default: RUN/replay.html.", "FILE")] = None,
-           rate: Annotated[float, typer.Option(
-               "--rate", metavar="HZ", help="Frames per second.")] = 30.0,
-           plugin: Plugins = None) -> int:
-    """Write runs as one HTML file that plays without a server."""
-    from scenarios.cli.replay import replay_command
-
-    return replay_command(folders, out, rate)
-
-
-@app.command()
-def why(folder: Annotated[Path, typer.Argument(
-            metavar="RUN", help="Run folder of `hierarchy run`.")],
-        tick: Annotated[int | None, typer.Option(
-            "--tick", metavar="N", help="The change into this tick. Default: the three largest.")
-            ] = None,
-        plugin: Plugins = None, as_json: AsJson = False) -> None:
-    """Say why the command of a run jumped: torque, acceleration or speed.
-
-    Bisects between the rows of two ticks.
-    """
-    from scenarios.cli.why import why_command
-
-    return why_command(folder, tick, as_json)
-
-
-@app.command()
-def figures(folders: Annotated[list[Path], typer.Argument(
-                metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")],
-            style: Annotated[str, typer.Option(
-                "--style", metavar="STYLE",
-                help="screen: SVG and PNG. paper: PDF, one column of a journal wide.")] = "screen",
-            out: Annotated[Path | None, output(
-                "Output folder, new or empty. Default: the run's folder.")] = None,
-            plugin: Plugins = None,
-            as_json: AsJson = False) -> None:
-    """Draw a run's figures again, for screen or paper.
-
-    Several runs are drawn together, as parts (a), (b), ... of the letter's figures.
-    """
-    from scenarios.cli.figures import redraw
-
-    files = [shown(file) for file in redraw(folders, style, out)]
-    if as_json:
-        return print_json({"files": files})
-    print(*files, sep="\n")
+for _command in (runs.run, runs.compare, runs.sweep, showing.view, showing.export, showing.replay,
+                 showing.why, showing.figures):
+    app.command()(_command)
 
 
 @app.command()
@@ -313,21 +115,40 @@ def library(out: Annotated[Path, output("Folder of the library: new or empty, or
             target: Annotated[str, typer.Option(
                 "--target", metavar="TARGET", help="native, x86_64 (any) or aarch64 (any).")
                 ] = "native",
-            compare_: Annotated[bool, typer.Option(
+            check: Annotated[bool, typer.Option(
                 "--check", help="Write nothing: compare the kernels of the library in the folder "
                                 "with those installed.")] = False,
             as_json: AsJson = False) -> int:
     """Write the resolvers as a C library: the same kernels, without Python."""
-    from scenarios.cli.library import check_command, library_command
+    from dataclasses import asdict
 
-    if compare_:
-        return check_command(out, as_json)
-    return library_command(out, _split(resolvers), target, as_json)
+    from scenarios.files import claim, whole
+    from solvers.library import differs, write
+
+    if check:
+        difference = differs(out)
+        if as_json:
+            print_json({"folder": shown(out), "same": not difference, "difference": difference})
+            return int(bool(difference))
+        if not difference:
+            print(f"{shown(out)}: same kernels as installed")
+        return exit_code(f"{shown(out)}: {difference}" if difference else None)
+    folder = claim(out)
+    with whole(folder) as partial:
+        made = write(partial, listed_in(resolvers), target)
+    if as_json:
+        print_json({"folder": shown(folder), **asdict(made)})
+        return 0
+    print(f"for {made.machine}; kernels {made.digest}",
+          *(shown(folder / name) for name in made.files), sep="\n")
+    if made.shared:
+        print(f"no shared library: {made.shared}")
+    return 0
 
 
 @app.command()
 def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file or name.",
-                                              autocompletion=completion.scenarios)],
+                                              autocompletion=complete_scenarios)],
           changes: Changes = None, plugin: Plugins = None, as_json: AsJson = False) -> None:
     """Validate and summarize a scenario or robot file.
 
@@ -341,7 +162,7 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
         robot = robot_check.look_at(file, changes or [])
         return print_json(robot_check.as_plain_data(*robot)) if as_json else print(
             robot_check.say(*robot))
-    scenario = _load(file, changes, None)
+    scenario = loaded(file, changes)
     found = first_tick(scenario)
     return print_json(scenario_check.as_plain_data(scenario, found)) if as_json else print(
         scenario_check.say(scenario, found))
@@ -353,9 +174,28 @@ def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
                             "command. Default: all sections and commands.")] = None,
           plugin: Plugins = None) -> None:
     """Say what a key of a scenario file means."""
-    from scenarios.cli.help import print_help
+    from hierarchy.errors import UnknownNameError
+    from scenarios.config import Scenario
+    from scenarios.config.reference import explained, keys_of, places_of, sections
 
-    print_help(context, what)
+    above = context.parent
+    assert above is not None, "help is a command of the application"
+    commands = getattr(above.command, "commands", {})
+    if what is None:
+        print_list("commands, see `hierarchy help COMMAND`",
+                   {name: one.get_short_help_str(60) for name, one in commands.items()})
+        print_list("keys of a scenario file, see `hierarchy help KEY`",
+                   {key.name: key.meaning for key in keys_of(Scenario)})
+    elif lines := explained(what):
+        print(*lines, sep="\n")
+    elif what in commands:
+        print(commands[what].get_help(typer.Context(commands[what], above, what)))
+    elif places := places_of(what):
+        print(f"{what} is a key of several sections:", *places, sep="\n  ")
+    else:
+        known = {f"{place.strip('[]')}.{key.name}".lstrip(".")
+                 for place, section in sections() for key in keys_of(section)}
+        raise UnknownNameError("key or command", what, {*known, *commands})
 
 
 @app.command()
@@ -364,25 +204,6 @@ def doctor(as_json: AsJson = False) -> int:
     from scenarios.cli.doctor import doctor_command
 
     return doctor_command(as_json)
-
-
-def _load(name: str, changes: list[str] | None, duration: float | None) -> Scenario:
-    """Load a scenario with changes, which then stand in its title."""
-    from scenarios.config import load
-
-    lengthened = [] if duration is None else [f"control.duration={duration!r}"]
-    found = load(name, [*(changes or []), *lengthened])
-    if not changes:
-        return found
-    said = ", ".join(one if len(one) < _LONG else f"{one[:_LONG]}..." for one in changes)
-    return found.model_copy(update={"title": f"{found.title or found.name} ({said})"})
-
-
-def _split(specs: str) -> list[str]:
-    named = [spec.strip() for spec in specs.split(",")]
-    if not all(named):
-        raise typer.BadParameter(f"an empty name in {specs!r}", param_hint="--resolvers")
-    return named
 
 
 def _given(error: typer.TyperException, arguments: list[str]) -> str:
@@ -402,11 +223,6 @@ def interrupted() -> int:
     """Say that the command was interrupted, and return its exit code."""
     print("hierarchy: interrupted", file=sys.stderr)
     return INTERRUPTED
-
-
-def _fault(text: str) -> int:
-    print(f"hierarchy: fault: {text}", file=sys.stderr)
-    return 1
 
 
 def _wrong(text: str) -> int:

@@ -1,11 +1,49 @@
-"""The options that several commands share."""
+"""The options that several commands share, and the names that the shell completes."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from scenarios.config import Scenario
+
+INTERRUPTED = 130  # exit code of a command that Ctrl-C ended
+PORT = 8080
+_LIBRARY = Path(__file__).parents[1] / "library"
+_LONG = 50  # characters of a change in a title
+
+
+def complete_scenarios(incomplete: str) -> list[str]:
+    """Return the matching scenarios; if there are none, the shell completes files."""
+    from scenarios.files import scenarios_in
+
+    return [name for name in scenarios_in(_LIBRARY) if name.startswith(incomplete)]
+
+
+def complete_groups(incomplete: str) -> list[str]:
+    """Return the matching scenarios and groups."""
+    return [*complete_scenarios(incomplete), *_files("groups", incomplete)]
+
+
+def complete_sweeps(incomplete: str) -> list[str]:
+    """Return the matching sweeps."""
+    return _files("sweeps", incomplete)
+
+
+def complete_resolvers(incomplete: str) -> list[str]:
+    """Return the completions of the last entry of a list "tpm,hcod,..."."""
+    import solvers
+
+    before, comma, last = incomplete.rpartition(",")
+    return [f"{before}{comma}{name}" for name in (*solvers.names(), *solvers.variants())
+            if name.startswith(last)]
+
+
+def _files(folder: str, incomplete: str) -> list[str]:
+    return sorted(path.stem for path in (_LIBRARY / folder).glob(f"{incomplete}*.toml"))
 
 
 def _given(path: str | Path) -> Path:
@@ -49,9 +87,16 @@ Scheduler = Annotated[str | None, typer.Option(
 Part = Annotated[str | None, typer.Option(
     "--part", metavar="I/N", help="Make only the I-th of N parts of the runs, for job arrays; the "
     "same command without it then merges all parts.")]
+Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
+                                   help="Port of the page on 127.0.0.1; 0 for any free port.")]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser",
+                                       help="Open a browser, or only print the address.")]
+Run = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder of `hierarchy run`.")]
+Runs = Annotated[list[Path], typer.Argument(
+    metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")]
 
 
-def workers(processes: int | None, scheduler: str | None, part: str | None) -> Any:
+def workers_of(processes: int | None, scheduler: str | None, part: str | None) -> Any:
     """Return where the runs of a sweep are made."""
     from scenarios.results.sampled import Workers
 
@@ -63,9 +108,21 @@ def workers(processes: int | None, scheduler: str | None, part: str | None) -> A
     return Workers(processes, scheduler, (int(i), int(count)))
 
 
-PORT = 8080
-INTERRUPTED = 130  # exit code of a command that Ctrl-C ended
-Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
-                                   help="Port of the page on 127.0.0.1; 0 for any free port.")]
-Browser = Annotated[bool, typer.Option("--browser/--no-browser",
-                                       help="Open a browser, or only print the address.")]
+def listed_in(specs: str) -> list[str]:
+    """Return the names in "tpm,hcod,..."."""
+    named = [spec.strip() for spec in specs.split(",")]
+    if not all(named):
+        raise typer.BadParameter(f"an empty name in {specs!r}", param_hint="--resolvers")
+    return named
+
+
+def loaded(name: str, changes: list[str] | None, duration: float | None = None) -> Scenario:
+    """Load a scenario with changes, which then stand in its title."""
+    from scenarios.config import load
+
+    lengthened = [] if duration is None else [f"control.duration={duration!r}"]
+    found = load(name, [*(changes or []), *lengthened])
+    if not changes:
+        return found
+    said = ", ".join(one if len(one) < _LONG else f"{one[:_LONG]}..." for one in changes)
+    return found.model_copy(update={"title": f"{found.title or found.name} ({said})"})

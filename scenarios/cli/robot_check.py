@@ -19,7 +19,7 @@ from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.words import some
 from scenarios.config import ScenarioError, is_shipped, shipped, shipped_groups
 from scenarios.config.changes import change, parse_changes
-from scenarios.config.mistaken import WANTED, no_scenario
+from scenarios.config.names import WANTED, no_scenario
 from scenarios.config.robot import RobotSection
 from scenarios.config.sections import Section
 from scenarios.config.validation import validated

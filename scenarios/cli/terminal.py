@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.text import Text
 
-    from scenarios.measure.runs import Run
+    from scenarios.measure.runs import Cell, Row, Run
+    from scenarios.results.columns import Results
 
 _WIDTH = 80   # columns of a terminal
 _NAMES = 26   # columns of it for the names of metrics
@@ -66,24 +67,32 @@ def _finite(data: Any) -> Any:
 
 def print_table(runs: list[Run]) -> None:
     """Print the metrics of runs, where strict resolvers diverge, and the verdict by goal."""
-    from rich.text import Text
-
     from scenarios.measure.partings import partings
     from scenarios.measure.runs import flags, table
     from scenarios.measure.verdict import lines, verdicts
 
-    rows = [(f"{row.label} [{row.unit}]" if row.unit else row.label,
-             [Text(cell + "* "[i not in row.best], "bold" if i in row.best else "")
-              for i, cell in enumerate(row.cells)]) for row in table(runs, details=False)]
     found = verdicts(runs)
     goals = [fill(f"  {goal}", _WIDTH, subsequent_indent="    ") for goal in found[0].goals
              ] if len(found) == 1 else []
-    print_columns(dict.fromkeys(run.title for run in runs), "", [run.label for run in runs], rows,
-                  ["", *map(str, partings(runs)), *flags(runs), *lines(found), *goals])
+    _print_rows(dict.fromkeys(run.title for run in runs), "", [run.label for run in runs],
+                table(runs, details=False),
+                ["", *map(str, partings(runs)), *flags(runs), *lines(found), *goals])
 
 
-def print_columns(above: Iterable[str], corner: str, labels: Sequence[str],
-                  rows: Sequence[tuple[str, Sequence[Text]]], below: Iterable[str] = ()) -> None:
+def print_samples(name: str, results: Results) -> None:
+    """Print the verdict, success rates, and the spread of each metric by resolver."""
+    from scenarios.measure.runs import Cell, Row
+    from scenarios.results.columns import rows, verdict
+
+    shares = [Row(one.label, "", "", "", tuple(Cell(str(results.share(one, label)))
+                                               for label in results.labels))
+              for one in results.criteria()]
+    _print_rows([f"{name}: {results.samples} samples, paired", *verdict(results)],
+                "median [quartiles]", results.labels, [*shares, *rows(results)])
+
+
+def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: Sequence[Row],
+                below: Iterable[str] = ()) -> None:
     """Print lines and a table of labelled columns, in as many tables as 80 columns need."""
     from rich.console import Console
     from rich.table import Table
@@ -92,18 +101,28 @@ def print_columns(above: Iterable[str], corner: str, labels: Sequence[str],
     console = Console(markup=False, highlight=False)
     console.print("", *above, sep="\n")
     heads = [re.sub(r"(?<=[^ :-])[ :-]", lambda at: at[0].strip() + "\n", one) for one in labels]
-    widest = max(len(line) for text in (*heads, *(cell.plain for _, cells in rows
-                                                  for cell in cells)) for line in text.splitlines())
+    cells = [[_text(cell) for cell in row.cells] for row in rows]
+    widest = max(len(line) for text in (*heads, *(cell.plain for some in cells for cell in some))
+                 for line in text.splitlines())
     fit = max(1, (_WIDTH - _NAMES) // (widest + 1))
     beside = -(-len(labels) // -(-len(labels) // fit))  # so that tables are about equally wide
     for first in range(0, len(labels), beside):
         laid_out = Table(corner, box=None, padding=(0, 1, 0, 0), pad_edge=False)
         for head in heads[first:first + beside]:
             laid_out.add_column(Text(head), justify="right", no_wrap=True)
-        for name, cells in rows:
-            laid_out.add_row(Text(name), *cells[first:first + beside])
+        for row, some in zip(rows, cells, strict=True):
+            laid_out.add_row(Text(row.heading), *some[first:first + beside])
         console.print("", laid_out)
     console.print(*below, sep="\n", end="\n" if below else "")
+
+
+def _text(cell: Cell) -> Text:
+    """Return a cell in bold with a star if it is the best, its second line dim."""
+    from rich.text import Text
+
+    best = cell.kind == "best"
+    text = Text(cell.text + ("*" if best else " "), "bold" if best else "")
+    return text.append(f"\n{cell.more} ", "not bold dim") if cell.more else text
 
 
 def print_list(what: str, entries: dict[str, str]) -> None:

@@ -13,7 +13,7 @@ from hierarchy.robots.names import in_package, is_file_name
 from scenarios.config.avoidance import as_table
 from scenarios.config.changes import change_all, laid_over, parse_changes
 from scenarios.config.errors import ScenarioError, naming
-from scenarios.config.mistaken import no_scenario
+from scenarios.config.names import no_scenario
 from scenarios.config.scenario import Scenario
 from scenarios.config.validation import validated
 from scenarios.files import scenarios_in

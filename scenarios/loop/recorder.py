@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -143,9 +144,17 @@ class Recorder:
 
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return the run as recorded so far."""
-        log = _Log._make([values[:self.ticks].copy() for values in self._log])
-        signals = self._of_controller(log) | {
-            name: values[:self.ticks].copy() for name, values in self._extra.items()}
+        recording = replace(self.part(slice(self.ticks), scenario), fault=fault,
+                            events=tuple(self._events))
+        for audit in (self._truth, *self._audits):
+            recording.signals.update(audit.signals(recording))
+        return recording
+
+    def part(self, rows: slice | NDArray[np.int64], scenario: Scenario) -> Recording:
+        """Return some ticks of the run, without their events and what audits say of them."""
+        log = _Log._make([values[rows].copy() for values in self._log])
+        signals = self._of_controller(log, rows) | {
+            name: values[rows].copy() for name, values in self._extra.items()}
         robot, cell = self._cell.robot, self._cell
         if "true_q" in signals:
             signals["true_ee_position"] = _positions(robot, self._frame, signals["true_q"])
@@ -153,15 +162,12 @@ class Recorder:
                     "velocity_limit": cell.velocity_limit}
         if cell.contacts is not None:
             signals["torque_limit"] = cell.torque_limit
-        recording = Recording(signals, tuple(map(" > ".join, self._orders)), scenario, self.facts,
-                              fault, tuple(self._events))
-        for audit in (self._truth, *self._audits):
-            signals.update(audit.signals(recording))
-        return recording
+        return Recording(signals, tuple(map(" > ".join, self._orders)), scenario, self.facts)
 
-    def _of_controller(self, log: _Log) -> dict[str, NDArray[Any]]:
+    def _of_controller(self, log: _Log, rows: slice | NDArray[np.int64]
+                       ) -> dict[str, NDArray[Any]]:
         """Return the signals of what the controller knew and did."""
-        cell, rows, n = self._cell, slice(self.ticks), self._cell.robot.n
+        cell, n = self._cell, self._cell.robot.n
         order, active, repulsion, status, iterations = log.choices.T.copy()
         signals = {"t": log.t, "q": log.q, "v": log.v, "a": log.given[:, :n].copy(),
                    "command": log.given[:, n:].copy(), "ee_position": log.ee_position,

@@ -74,8 +74,9 @@ class Comparison:
 def _html(name: str, runs: Sequence[Run]) -> str:
     """Return the table of runs that stand side by side: a row per metric, the best in bold."""
     rows = table(runs, details=False)
-    best = {(i, j + 1) for i, row in enumerate(rows) for j in row.best}
-    cells = [(f"{row.label} [{row.unit}]" if row.unit else row.label, *row.cells) for row in rows]
+    best = {(i, j + 1) for i, row in enumerate(rows)
+            for j, cell in enumerate(row.cells) if cell.kind == "best"}
+    cells = [(row.heading, *(cell.text for cell in row.cells)) for row in rows]
     faults = [("fault", *(run.fault or "" for run in runs))] if any(
         run.fault for run in runs) else []
     return html_table(name, ("", *(run.label for run in runs)), [*cells, *faults], best)

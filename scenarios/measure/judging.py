@@ -16,9 +16,8 @@ from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell, build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.config.plant import KinematicSection
-from scenarios.recording.depth_view import DepthView
 from scenarios.recording.fate import Fate
-from scenarios.recording.recording import Recording
+from scenarios.recording.recording import DepthView, Recording
 from solvers.certificate import TOLERANCE
 
 _SAME = 1e-9  # [m] of distances that are those recorded

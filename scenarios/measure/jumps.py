@@ -1,10 +1,10 @@
-"""The largest changes of a run's command from one tick to the next, and why they came about."""
+"""What happened in a run: trouble, contacts, the largest changes of its command, and why."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from scenarios.cell.build import Cell, build
 from scenarios.cell.stacked import stack_resolver
 from scenarios.measure.causes import Cause, Tick, causes
 from scenarios.measure.judging import Rows
+from scenarios.measure.safety import STEPS
 from solvers import Status
 
 if TYPE_CHECKING:
@@ -94,3 +95,33 @@ def _tick(recording: Recording, cell: Cell, rows: Rows, k: int) -> Tick | None:
         effect = np.column_stack([*(contacts.torques(cell.state, unit) - still
                                     for unit in np.eye(n)), still])
     return Tick(h, rows.meant[k], effect)
+
+
+class Happening(NamedTuple):
+    """What happened first at t [s], in how many ticks, and the action taken or the reason."""
+
+    what: str
+    why: str
+    ticks: int
+    t: float
+
+
+def happened(recording: Recording) -> Iterator[Happening]:
+    """Yield problems by kind, contacts, and the largest changes of the command with their causes.
+
+    Changes count from the step that is counted in the metrics on. Their causes need the robot's
+    files; where those are missing, changes are left out.
+    """
+    t = recording["t"]
+    for (kind, action), ticks in recording.troubles().items():
+        yield Happening(kind.replace("_", " "), action, len(ticks), float(t[ticks[0]]))
+    touched = np.flatnonzero(recording.get("contacts", np.empty(0)))
+    if touched.size:
+        yield Happening("contact", "–", int(touched.size), float(t[touched[0]]))
+    try:
+        found = jumps(recording, least=STEPS)
+    except HierarchyError:
+        return
+    for one in found:
+        why = "; ".join(f"{kind}: {text}" for kind, text in one.causes)
+        yield Happening(str(one), why or "no single cause", 1, one.t)

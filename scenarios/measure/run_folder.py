@@ -21,9 +21,8 @@ from scenarios.config import load
 from scenarios.files import OutputError, whole, write_json
 from scenarios.measure import metrics
 from scenarios.measure.verdict import verdict
-from scenarios.recording.depth_view import DepthView
 from scenarios.recording.facts import Facts
-from scenarios.recording.recording import Event, Recording
+from scenarios.recording.recording import DepthView, Event, Recording
 
 _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scenarios.config.scenario import OWN
 from scenarios.files import slug
@@ -14,6 +14,7 @@ from scenarios.measure.metrics import Metric
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
+    from scenarios.measure.jumps import Happening
     from scenarios.recording.facts import ResolverFacts
     from scenarios.recording.recording import Recording
 
@@ -66,18 +67,36 @@ class Run:
         return found | {name: one for name, one in timed.items()
                         if name in found and name.startswith(("time_", "ticks_late"))}
 
+    @cached_property
+    def happened(self) -> tuple[Happening, ...]:
+        """What happened in it, with the causes of jumps, which take a while to find."""
+        from scenarios.measure.jumps import happened
 
-@dataclass(frozen=True)
-class Row:
-    """One line of the table: a metric, its value for each run, and which of them are best."""
+        return tuple(happened(self.recording)) if self.recording else ()
+
+
+class Cell(NamedTuple):
+    """A cell of a table: `kind` is "best", "out" of the comparison or "", `more` a second line."""
+
+    text: str
+    kind: str = ""
+    note: str = ""
+    more: str = ""
+
+
+class Row(NamedTuple):
+    """One line of a table of results: a metric, and a cell for each column."""
 
     label: str
     unit: str
     group: str
-    cells: tuple[str, ...]
-    notes: tuple[str, ...]
-    best: frozenset[int]
-    name: str = ""
+    name: str
+    cells: tuple[Cell, ...]
+
+    @property
+    def heading(self) -> str:
+        """Label and unit."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
 
 
 def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
@@ -92,7 +111,8 @@ def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
     known = {name: metric for run in runs for name, metric in run.metrics.items()
              if details or not metric.detail}
     groups = list(dict.fromkeys(metric.group for metric in known.values()))
-    return [_row(metric, [run.metrics.get(name) for run in runs], competes)
+    return [_row(metric, [run.metrics.get(name) for run in runs], competes,
+                 [run.fault is not None for run in runs])
             for name, metric in sorted(known.items(), key=lambda one: groups.index(one[1].group))]
 
 
@@ -117,13 +137,13 @@ def caveats(resolvers: Mapping[str, ResolverFacts]) -> dict[str, list[str]]:
             for label, one in resolvers.items()}
 
 
-def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool]) -> Row:
-    cells = tuple(m.shown() if m else "–" for m in found)
-    values = {i: m.value for i, m in enumerate(found)
-              if m and m.value is not None and competes[i]}
-    return Row(metric.label, metric.shown_unit, metric.group, cells,
-               tuple(m.note if m else "" for m in found), _best(values, metric.lower_is_better),
-               metric.name)
+def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool],
+         out: Sequence[bool]) -> Row:
+    best = _best({i: m.value for i, m in enumerate(found)
+                  if m and m.value is not None and competes[i]}, metric.lower_is_better)
+    return Row(metric.label, metric.shown_unit, metric.group, metric.name, tuple(
+        Cell(m.shown() if m else "–", "best" if i in best else "out" if out[i] else "",
+             m.note if m else "") for i, m in enumerate(found)))
 
 
 def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01,

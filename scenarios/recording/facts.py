@@ -18,8 +18,16 @@ from scenarios.cell.contacts import contacts_of
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario
 from scenarios.config.kinds.torque import TorqueSection
-from scenarios.recording.links import capsules, lowest
-from scenarios.recording.tree import Joint, Matrix, Vector, joint_units, placements, tree_of
+from scenarios.recording.tree import (
+    Joint,
+    Matrix,
+    Vector,
+    capsules,
+    joint_units,
+    lowest,
+    placements,
+    tree_of,
+)
 from solvers.resolver import Handles, Resolver
 
 Setting = bool | int | float | str | tuple[float | str, ...] | None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import UnknownNameError
 from hierarchy.notebook import html_table
-from scenarios.recording.depth_view import DepthView
+from hierarchy.problem import Array
 from scenarios.recording.facts import Facts
 from scenarios.recording.notebook import Column, curves, data_frame
 from scenarios.recording.signals import check, known
@@ -20,6 +20,25 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from scenarios.config import Scenario
+
+
+class DepthView(NamedTuple):
+    """One depth image with the distances that follow from it; P points, the end effector last.
+
+    t [s]; image (h, w) [m], 0 where there is no reading; camera (16,), see `Pinhole.packed`;
+    points (P, 3) [m]; distance (P,) [m] of each to what it is nearest to, infinite where that is
+    nothing; pixel (P,) of the image, counted row by row, in which that is, or -1; active, the
+    point of D_minimal, or -1.
+    """
+
+    t: float
+    image: NDArray[np.float32]
+    camera: Array
+    points: Array
+    distance: Array
+    pixel: NDArray[np.int64]
+    active: int
+
 
 _USUAL = ("q", "v", "position_error", "minimal_distance")  # what `plot` draws unless told
 

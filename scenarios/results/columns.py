@@ -16,7 +16,7 @@ from hierarchy.words import listed
 from scenarios.config import Scenario
 from scenarios.measure import statistics
 from scenarios.measure.metrics import Metric
-from scenarios.measure.runs import caveats
+from scenarios.measure.runs import Cell, Row, caveats
 from scenarios.measure.statistics import Paired, Spread, paired, wilson
 from scenarios.recording.facts import resolver_facts
 from scenarios.results.plan import Plan, Planned
@@ -220,7 +220,20 @@ def valued(metric: Metric, value: float) -> Metric:
     return dataclasses.replace(metric, value=float(value) if math.isfinite(value) else None)
 
 
-def summary(results: Results, metric: Metric, label: str) -> str:
+def rows(results: Results) -> list[Row]:
+    """Return a row for each metric: median and quartiles, and how they compare with the first."""
+    found = []
+    for metric in results.shown():
+        best = results.best(metric)
+        found.append(Row(metric.label, metric.shown_unit, metric.group, metric.name, tuple(
+            Cell(_summary(results, metric, label), "best" if label in best else "",
+                 more="" if label == results.labels[0] else
+                 str(results.paired(metric.name, label))) for label in results.labels)))
+    groups = list(dict.fromkeys(row.group for row in found))
+    return sorted(found, key=lambda row: groups.index(row.group))
+
+
+def _summary(results: Results, metric: Metric, label: str) -> str:
     """Return "median [lower quartile, upper quartile]" of a metric under a resolver."""
     found = results.spread(metric.name, label)
     if found is None:
@@ -228,11 +241,6 @@ def summary(results: Results, metric: Metric, label: str) -> str:
     median, low, high = (valued(metric, value).shown()
                          for value in (found.median, found.lower, found.upper))
     return median if low == high else f"{median} [{low}, {high}]"
-
-
-def compared(results: Results, metric: Metric, label: str) -> str:
-    """Return how a metric under a resolver compares with the first column; "" for that one."""
-    return "" if label == results.labels[0] else str(results.paired(metric.name, label))
 
 
 def results(plan: Plan, kept: Mapping[str, Outcome]) -> dict[str, Results]:

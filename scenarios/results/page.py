@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from hierarchy.words import in_words
+from hierarchy.errors import HierarchyError
+from hierarchy.words import in_words, listed
 from scenarios.config.scenario import OWN
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import svg
@@ -15,14 +18,88 @@ from scenarios.draw.figures.palette import Look, looks
 from scenarios.draw.figures.picture import picture
 from scenarios.measure.motions import Motion, motions
 from scenarios.measure.verdict import lines, table, verdicts
-from scenarios.results import charts, tables
-from scenarios.results.commands import commands
-from scenarios.results.embedded import replay
+from scenarios.results import sections
 from scenarios.templates import render, resource
 
 if TYPE_CHECKING:
     from scenarios.measure.comparison import Comparison
     from scenarios.measure.runs import Run
+    from scenarios.recording.recording import Recording
+
+
+def run_command(run: Run, folder: str) -> str:
+    """Return the command that repeats a run.
+
+    It uses the scenario's name where that gives the same scenario, otherwise the file in the run's
+    folder.
+    """
+    from scenarios.config import load, shipped
+
+    name = run.scenario.name
+    if name in shipped() and load(name).with_resolver(run.spec) == run.scenario:
+        return shlex.join(["hierarchy", "run", name, "--resolver", run.spec])
+    return shlex.join(["hierarchy", "run", str(PurePath(folder, run.folder, "scenario.toml"))])
+
+
+def commands(comparison: Comparison, runs: Sequence[Run]) -> list[tuple[str, str]]:
+    """Return the purpose and text of each command for the runs of one group."""
+    folder = comparison.folder or ""
+    kept = [run for run in runs if run.recording is not None]
+    found = [(f"Repeat {run.label}", run_command(run, folder)) for run in runs]
+    if kept:
+        first = str(PurePath(folder, kept[0].folder))
+        every = [str(PurePath(folder, one.runs[0].folder)) for one in motions(kept)] or [first]
+        found += [("View a run in 3D in the browser", shlex.join(["hierarchy", "view", first])),
+                  ("Write the replay as a single file, each motion once",
+                   shlex.join(["hierarchy", "replay", *every])),
+                  ("Draw a run's figures for a paper, as PDF",
+                   shlex.join(["hierarchy", "figures", first, "--style", "paper"]))]
+    return found
+
+
+MOST = 4  # motions in one replay
+_FASTEST, _SLOWEST = 30.0, 5.0  # [Hz] of the frames kept
+
+
+def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
+    """Return the section with the replay of up to MOST motions.
+
+    The frame rate is lowered if the replay would exceed `most_bytes`.
+    """
+    shown = list(found[:MOST])
+    try:
+        document, rate = _document(name, shown, most_bytes)
+    except HierarchyError as error:
+        return render("results/replay.html", problem=str(error), said="")
+    return render("results/replay.html", name=name, document=document, problem="",
+                  said=_said(shown, found, rate))
+
+
+def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str, float]:
+    from scenarios.draw.replay import html
+
+    recordings: dict[str, Recording] = {one.label: one.recording for one in shown}
+    happenings = {one.label: one.runs[0].happened for one in shown}
+    document, rate = html(recordings, name, happenings, rate=_FASTEST, embedded=True), _FASTEST
+    if len(document) > most_bytes:
+        rate = max(_SLOWEST, float(int(_FASTEST * most_bytes / len(document))))
+        document = html(recordings, name, happenings, rate=rate, embedded=True)
+    return document, rate
+
+
+def _said(shown: Sequence[Motion], found: Sequence[Motion], rate: float) -> str:
+    """Return which runs are shown and which move in the same way."""
+    said = f"Shown: {listed([one.label for one in shown])}, {rate:g} frames per second."
+    for one in shown:
+        if len(one.runs) > 1:
+            moves = "moves" if len(one.runs) == 2 else "move"
+            said += f" {listed(one.labels[1:])} {moves} like {one.label}."
+    left = found[len(shown):]
+    if left:
+        said += (f" Not shown: {listed([label for one in left for label in one.labels])}; the "
+                 f"replay here shows at most {in_words(MOST)} motions.")
+    return said
+
 
 _STARTS = 16  # starts to sample before a difference is believed
 _REPLAY_BYTES, _REPLAYS_BYTES = 3_000_000, 8_000_000  # of one replay, and of all on a page
@@ -35,7 +112,7 @@ def comparison_page(comparison: Comparison, planned: int = 0) -> str:
     """
     groups = comparison.groups()
     with drawing.styled(drawing.SCREEN):
-        sections = [_group(comparison, name, runs) for name, runs in groups.items()]
+        articles = [_group(comparison, name, runs) for name, runs in groups.items()]
     ends = {name: lines(verdicts(runs))[0] for name, runs in groups.items()}
     return str(render("results/page.html", title=f"{', '.join(groups)}: a comparison",
                       style=resource("results/style.css"), script=resource("results/page.js"),
@@ -43,7 +120,7 @@ def comparison_page(comparison: Comparison, planned: int = 0) -> str:
                       about_rows=_about_rows(comparison), file="",
                       contents=ends if len(ends) > 1 else {},
                       count=in_words(len(groups)).capitalize(),
-                      sampled=comparison.sampled(_STARTS), groups=sections,
+                      sampled=comparison.sampled(_STARTS), groups=articles,
                       refused=comparison.refused, command=comparison.command,
                       versions=comparison.versions))
 
@@ -68,15 +145,15 @@ def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
     judged = verdicts(runs)
     room = min(_REPLAY_BYTES, _REPLAYS_BYTES // len(comparison.groups()))
     moved = {"replay": replay(name, found, room),
-             "panels": charts.multiples(name, found, look),
-             "overlays": charts.overlays(name, runs, found, look)} if found else {}
+             "panels": sections.multiples(name, found, look),
+             "overlays": sections.overlays(name, runs, found, look)} if found else {}
     return render("results/group.html", name=name, looks=look, verdict=lines(judged),
                   goals=table(judged),
                   **_about(name, runs), **_picture(name, found, look),
                   **{"replay": "", "panels": "", "overlays": "", **moved},
-                  numbers=tables.numbers(runs, look), stack=charts.stack(name, runs, look),
-                  partings=tables.parted(runs), commands=commands(comparison, runs),
-                  settings=tables.settings(runs))
+                  numbers=sections.numbers(runs, look), stack=sections.stack(name, runs, look),
+                  partings=sections.parted(runs), commands=commands(comparison, runs),
+                  settings=sections.settings(runs))
 
 
 def _about(name: str, runs: Sequence[Run]) -> dict[str, Any]:

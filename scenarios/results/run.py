@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 # Code that only requests or shows runs: changing it does not change the measurements.
 _NOT_IN_A_RUN = ("cli/", "draw/", "export/", "library/", "problems/", "results/", "scene/",
                  "files.py", "templates.py", *(f"measure/{name}.py" for name in (
-                     "comparison", "goals", "motions", "partings", "runs", "statistics",
-                     "verdict")))
+                     "goals", "motions", "partings", "runs", "statistics", "verdict")))
 _PLACE = ("system", "processor")  # entries of versions() that describe the machine
 
 

@@ -16,11 +16,10 @@ from scenarios.files import write_text
 from scenarios.measure.run_folder import versions
 from scenarios.results import cluster, pool
 from scenarios.results.columns import Results, results, verdict
-from scenarios.results.plan import Plan, plan
+from scenarios.results.plan import Plan, Sweep, find, load_sweep, plan
 from scenarios.results.run import Job, Outcome, outcome
 from scenarios.results.sampled_page import name_of, sampled_page, worst_runs
 from scenarios.results.store import TABLE, Store, write_table, writing
-from scenarios.results.sweep_file import Sweep, find, load_sweep
 
 Progress = Callable[[str, int, int], None]
 

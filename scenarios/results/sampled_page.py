@@ -18,10 +18,9 @@ from scenarios.draw.figures.palette import looks
 from scenarios.files import slug
 from scenarios.measure.metrics import Metric
 from scenarios.measure.run_folder import versions
-from scenarios.results import spreads
-from scenarios.results.columns import Results, compared, flags, summary, verdict
+from scenarios.results import curves
+from scenarios.results.columns import Results, flags, rows, verdict
 from scenarios.results.plan import Plan, Planned
-from scenarios.results.tables import Cell, Groups
 from scenarios.templates import render, resource
 
 _FAILURES = 20  # reasons listed
@@ -81,12 +80,12 @@ def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, A
     of_key = {run.job.key: run for run in results.runs}
     return {
         "name": name, **_about(name, plan), "verdict": verdict(results),
-        "shares": svg(spreads.shares(results), f"{name}: shares of runs"),
+        "shares": svg(curves.shares(results), f"{name}: shares of runs"),
         "failures": [(one, *_again(one.run, folder)) for one in failures[:_FAILURES]],
         "more_failures": max(0, len(failures) - _FAILURES), "spreads": _spreads(name, results),
         "worst": [(metrics, of_key[key], *_again(of_key[key], folder))
                   for key, metrics in worst.items()],
-        "numbers": _numbers(results), "looks": looks(results.labels),
+        "numbers": rows(results), "looks": looks(results.labels),
         "heads": {label: [("quiet", text)] if text else [] for label, text in marked.items()}}
 
 
@@ -109,17 +108,6 @@ def _spreads(name: str, results: Results) -> list[tuple[Metric, str, Markup]]:
     """Return each metric that differs between runs, its direction and its figure."""
     better = {True: "lower is better", False: "higher is better", None: ""}
     return [(metric, better[metric.lower_is_better],
-             svg(spreads.spread(results, metric), f"{name}: {metric.label}"))
+             svg(curves.spread(results, metric), f"{name}: {metric.label}"))
             for metric in results.shown()
             if np.nanmin(results.values[metric.name]) < np.nanmax(results.values[metric.name])]
-
-
-def _numbers(results: Results) -> Groups:
-    """Return the spread of each metric under each resolver, by group."""
-    found: dict[str, list[tuple[str, str, list[Cell]]]] = {}
-    for metric in results.shown():
-        best = results.best(metric)
-        found.setdefault(metric.group, []).append((metric.label, metric.shown_unit, [
-            Cell(summary(results, metric, label), "best" if label in best else "",
-                 more=compared(results, metric, label)) for label in results.labels]))
-    return found

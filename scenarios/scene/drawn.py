@@ -14,13 +14,12 @@ from hierarchy import HierarchyError
 from hierarchy.avoidance import Capsule, Measurement, Obstacles
 from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.problem import Array
-from scenarios.cell.scene import make_obstacles
+from scenarios.cell.sensors.sensor import make_obstacles
 from scenarios.recording import listed
 from scenarios.recording.facts import Point, RobotFacts
-from scenarios.recording.fate import Fate
-from scenarios.recording.links import ends
+from scenarios.recording.fate import Fate, Levels, levels_at
+from scenarios.recording.tree import ends
 from scenarios.scene.curves import Areas, Series, marks_of, series
-from scenarios.scene.levels import Levels, levels_at
 from scenarios.scene.pushes import Pushes, pushes
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from hierarchy.robots import TABLES
 from hierarchy.tasks import TASKS
 from scenarios.cli.main import app, run_command
 from scenarios.config import load, members
-from scenarios.results.sweep_file import load_sweep
+from scenarios.results.plan import load_sweep
 
 pytestmark = pytest.mark.slow
 

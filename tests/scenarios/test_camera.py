@@ -8,12 +8,14 @@ from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.robots import TABLES, link_capsules
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
-from scenarios.config.kinds.camera import DepthErrors
+from scenarios.config.kinds.camera import CameraSection, DepthErrors
 
 ROBOT = Robot.named("kuka_lwr")
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
 SMALL = {"width": 80, "height": 60, "fx": 70.0, "fy": 65.0}
-IDEAL = DepthErrors.none()
+EXACT = {"noise_floor": 0.0, "noise_growth": 0.0, "rounding": "step", "step": 0.0, "missing": 0.0,
+         "missing_at_edges": 0.0, "outliers": 0.0}
+IDEAL = {"ideal": True, "near": 0.0, "far": 1e9}
 TURNED = ((0.36, 0.48, -0.8), (-0.8, 0.6, 0.0), (0.48, 0.64, 0.6))
 SHAPES = {
     "sphere": Obstacle("sphere", (0.1, 0.0, 2.0), (0.3,)),
@@ -30,13 +32,13 @@ SHAPES = {
 
 
 def camera(*obstacles, errors=IDEAL, capsules=(), pinhole=None, **settings):
-    return DepthCamera(pinhole or Pinhole(**SMALL), Obstacles(obstacles), capsules, errors,
-                       **settings)
+    section = CameraSection(**{"kind": "camera", "backdrop": 0.0, **errors, **settings})
+    return DepthCamera(section, pinhole or Pinhole(**SMALL), Obstacles(obstacles), capsules)
 
 
 def wall(depth=2.0, **settings):
     """A wall that fills the image, with the default errors."""
-    return camera(backdrop=depth, **{"errors": DepthErrors(), **settings})
+    return camera(backdrop=depth, **{"errors": {}, **settings})
 
 
 def depths(taken):
@@ -91,28 +93,29 @@ def test_the_robot_is_seen_where_its_capsules_are():
 
 @pytest.mark.parametrize("depth", [1.0, 3.0])
 def test_noise_has_the_stated_size_and_a_bound(depth):
-    errors = DepthErrors(step=0.0, missing=0.0, missing_at_edges=0.0, outliers=0.0)
+    errors = {"step": 0.0, "missing": 0.0, "missing_at_edges": 0.0, "outliers": 0.0}
     off = depths(wall(depth, errors=errors)) - depth
     sigma = 1.2e-3 + 1.9e-3 * (depth - 0.4) ** 2
     assert abs(off.mean()) < 0.05 * sigma
     assert off.std() == pytest.approx(sigma, rel=0.05)
-    assert np.abs(off).max() <= errors.bound(depth) + 1e-6 == pytest.approx(3.5 * sigma + 1e-6)
+    bound = DepthErrors(**errors).bound(depth)
+    assert np.abs(off).max() - 1e-6 <= bound == pytest.approx(3.5 * sigma)
 
 
 @pytest.mark.parametrize(("rounding", "step"), [("step", 0.01), ("disparity", 2.85e-3)])
 def test_rounding_is_to_steps_of_the_depth_or_of_its_inverse(rounding, step):
-    errors = DepthErrors.none(0.5, 5.0).model_copy(update={"rounding": rounding, "step": step})
+    errors = EXACT | {"rounding": rounding, "step": step}
     seen = depths(camera(SHAPES["sphere"], errors=errors))
     true = depths(camera(SHAPES["sphere"]))
     steps = seen[seen > 0] / step if rounding == "step" else 1.0 / seen[seen > 0] / step
     np.testing.assert_allclose(steps, np.rint(steps), atol=2e-3)
     assert len(np.unique(seen)) > 3
-    assert all(abs(a - z) <= errors.bound(z) + 1e-6
+    assert all(abs(a - z) <= DepthErrors(**errors).bound(z) + 1e-6
                for a, z in zip(seen[true > 0], true[true > 0], strict=True))
 
 
 def test_pixels_are_missing_at_random_and_more_so_at_edges():
-    errors = DepthErrors(missing=0.1, missing_at_edges=0.5, outliers=0.0)
+    errors = {"missing": 0.1, "missing_at_edges": 0.5, "outliers": 0.0}
     assert (depths(wall(errors=errors)) == 0).mean() == pytest.approx(0.1, abs=0.02)
     scene = camera(Obstacle("sphere", (0.0, 0.0, 2.0), (0.5,)), backdrop=4.0, errors=errors)
     missing = np.mean([scene.image(i, STATE)[0] == 0 for i in range(40)], axis=0)
@@ -123,7 +126,7 @@ def test_pixels_are_missing_at_random_and_more_so_at_edges():
 
 
 def test_outliers_are_nearer_and_come_in_their_share_of_frames():
-    errors = DepthErrors.none(0.5, 5.0).model_copy(update={"outliers": 0.3, "outlier_size": 2})
+    errors = EXACT | {"outliers": 0.3}
     scene = wall(errors=errors)
     off = [np.flatnonzero(scene.image(i, STATE)[0] != 2.0) for i in range(200)]
     assert np.mean([pixels.size > 0 for pixels in off]) == pytest.approx(0.3, abs=0.1)

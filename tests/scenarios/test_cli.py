@@ -121,7 +121,7 @@ def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, capsys
 
 
 def simulation_is(stand_in, monkeypatch):
-    for module in ("scenarios.cli.run", "scenarios.results.comparing"):
+    for module in ("scenarios.loop.simulation", "scenarios.results.comparing"):
         monkeypatch.setattr(importlib.import_module(module), "simulate", stand_in)
 
 
@@ -252,12 +252,12 @@ def test_figures_do_not_depend_on_the_users_matplotlib(tmp_path):
     (tmp_path / "matplotlibrc").write_text("text.usetex: True\nsavefig.bbox: tight\n")
     settings = {**os.environ, "MPLBACKEND": "no-such-backend", "MATPLOTLIBRC": str(tmp_path)}
     draw = ("from pathlib import Path; import hand_made; from scenarios.draw.figures import letter;"
-            "letter.write_all(hand_made.recording(), Path('a'))")
+            "letter.write_all([hand_made.recording()], Path('a'))")
     (tmp_path / "a").mkdir()
     subprocess.run([sys.executable, "-c", draw], cwd=tmp_path, check=True, env={
         **settings, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))})
     drawn = sorted((tmp_path / "a").glob("*.svg"))
-    letter.write_all(recording(), tmp_path)
+    letter.write_all([recording()], tmp_path)
     assert drawn
     assert all(one.read_bytes() == (tmp_path / one.name).read_bytes() for one in drawn)
 

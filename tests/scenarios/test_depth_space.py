@@ -15,16 +15,17 @@ from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
-from scenarios.cell.sensors.exact import ExactDistances
 from scenarios.cell.sensors.frames import RecordedFrames
+from scenarios.cell.sensors.sensor import Asked, ExactDistances
 from scenarios.config import ScenarioError
-from scenarios.config.kinds.camera import DepthErrors
+from scenarios.config.kinds.camera import CameraSection, DepthErrors, ImageSection
 from scenarios.draw.figures.depth import depth_figure
 from scenarios.measure.judging import depth_view
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
+IDEAL = {"ideal": True, "near": 0.0, "far": 1e9}
 FACING = Pinhole(101, 81, 100.0, 100.0)  # at the origin, z forward, its middle in pixel (50, 40)
 SIDE = Pinhole(320, 240, 262.0, 262.0, position=(0.3, 2.2, 0.8),
                rotation=looking_at((0.3, 2.2, 0.8), (0.0, 0.3, 0.1)))
@@ -35,9 +36,15 @@ def at(*places):
     return [ControlPoint("point", 0, np.array(place, dtype=float)) for place in places]
 
 
-def seen_in(image, *places, pinhole=FACING, region=0.4, support=1, **settings):
+def space_of(pinhole, points, capsules, region, mean_within=(inf, inf), pairs=False, **settings):
+    section = ImageSection(kind="camera", region=region, **settings)
+    return DepthSpace(section, pinhole, points, capsules, Asked(region, mean_within), pairs)
+
+
+def seen_in(image, *places, pinhole=FACING, region=0.4, support=1, thin=inf, **settings):
     """Measure points in an image (h, w) without a robot in it."""
-    space = DepthSpace(pinhole, at(*places), (), region, support=support, **settings)
+    space = space_of(pinhole, at(*places), (), region, support=support,
+                     thin=None if thin == inf else thin, **settings)
     obstacles = ObstacleImage.empty(pinhole.height, pinhole.width)
     space.find_obstacles(np.asarray(image, np.float32), STATE.placements, obstacles)
     return space.measure(obstacles, STATE.placements)
@@ -94,6 +101,11 @@ def test_a_point_in_the_shadow_of_an_obstacle_touches_it_and_leaves_it_where_it_
     np.testing.assert_array_equal(seen.pairs.direction[0, 0], seen.direction[0])
 
 
+def camera_of(*obstacles, errors=IDEAL, capsules=CAPSULES, **settings):
+    section = CameraSection(**{"kind": "camera", **errors, **settings})
+    return DepthCamera(section, SIDE, Obstacles(obstacles), capsules)
+
+
 def facing_surface(obstacle, place):
     """The nearest point of an obstacle to a place, and how its normal faces the camera, or None."""
     exact = ExactDistances(ROBOT, Obstacles([obstacle]))
@@ -120,8 +132,7 @@ def overestimate(point, error):
 @pytest.mark.parametrize("noisy", [False, True], ids=["ideal", "noisy"])
 def test_the_distance_to_a_surface_that_is_seen_is_never_overestimated_beyond_its_bound(noisy):
     """Of random spheres, capsules and boxes, where the nearest point of the surface is seen."""
-    errors = DepthErrors(missing=0.0, missing_at_edges=0.0, outliers=0.0) if noisy \
-        else DepthErrors.none()
+    errors = {"missing": 0.0, "missing_at_edges": 0.0, "outliers": 0.0} if noisy else IDEAL
     rng, judged, shapes, worst = np.random.default_rng(7), 0, set(), 0.0
     for i in range(150):
         shape = ("sphere", "capsule", "box")[i % 3]
@@ -134,12 +145,12 @@ def test_the_distance_to_a_surface_that_is_seen_is_never_overestimated_beyond_it
         u, v, depth = SIDE.project(nearest)
         if facing < 0.3 or D < 0.02 or not (5 < u < 314 and 5 < v < 234):
             continue
-        scene = DepthCamera(SIDE, Obstacles([obstacle]), (), errors, seed=i)
-        space = DepthSpace(SIDE, at(place), (), region=2.0)
+        scene = camera_of(obstacle, errors=errors, capsules=(), seed=i, backdrop=0.0)
+        space = space_of(SIDE, at(place), (), region=2.0)
         obstacles = ObstacleImage.empty(SIDE.height, SIDE.width)
         space.find_obstacles(scene.image(0, STATE)[0], STATE.placements, obstacles)
         estimate = space.measure(obstacles, STATE.placements).distance[0]
-        bound = overestimate(nearest, errors.bound(depth) if noisy else 0.0)
+        bound = overestimate(nearest, DepthErrors(**errors).bound(depth) if noisy else 0.0)
         assert estimate - D <= bound, (i, estimate, D, bound)
         if not noisy and SIDE.project(place)[2] < depth:  # nothing is in its shadow
             assert estimate >= D - 1e-6
@@ -151,9 +162,8 @@ def test_the_distance_to_a_surface_that_is_seen_is_never_overestimated_beyond_it
 
 def test_the_arm_does_not_avoid_itself():
     """Wherever it is, and whatever the camera gets wrong but for outliers in blobs."""
-    errors = DepthErrors(outliers=0.0)
-    camera = DepthCamera(SIDE, Obstacles(), CAPSULES, errors, backdrop=4.0)
-    space = DepthSpace(SIDE, ExactDistances(ROBOT, Obstacles()).points, CAPSULES, region=0.4)
+    camera = camera_of(errors={"outliers": 0.0})
+    space = space_of(SIDE, ExactDistances(ROBOT, Obstacles()).points, CAPSULES, region=0.4)
     rng, obstacles = np.random.default_rng(8), ObstacleImage.empty(SIDE.height, SIDE.width)
     for i in range(60):
         state = State.at(ROBOT, rng.uniform(0.9 * ROBOT.lower, 0.9 * ROBOT.upper))
@@ -164,16 +174,12 @@ def test_the_arm_does_not_avoid_itself():
 
 # The sensor in the loop.
 
-def camera_of(*obstacles, errors=None, capsules=CAPSULES, **settings):
-    return DepthCamera(SIDE, Obstacles(obstacles), capsules, errors or DepthErrors.none(),
-                       **{"backdrop": 4.0, **settings})
-
-
 def sensor_of(source, stale_after=0.2, region=0.4, least_readings=0.1, **settings):
     """A sensor, and a function that gives a state at a time."""
     points = ExactDistances(ROBOT, Obstacles()).points
-    space = DepthSpace(source.pinhole, points, CAPSULES, region, **settings)
-    return (DepthSensor(source, space, stale_after, least_readings),
+    space = space_of(source.pinhole, points, CAPSULES, region, **settings)
+    section = ImageSection(kind="camera", stale_after=stale_after, least_readings=least_readings)
+    return (DepthSensor(section, source, space),
             lambda t, q=STATE.q: State.at(ROBOT, q, t=t))
 
 

@@ -9,7 +9,6 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import Patch
 
 from hierarchy import HierarchyError
-from scenarios.cli.figures import redraw
 from scenarios.config import load
 from scenarios.config.kinds.frames import ListedPosition
 from scenarios.draw.figures import drawing, letter, palette, panels
@@ -131,7 +130,7 @@ def test_a_run_far_beyond_the_others_is_cut_and_says_so():
 def drawn(tmp_path_factory):
     """The folder of all figures of a run."""
     folder = tmp_path_factory.mktemp("drawn")
-    letter.write_all(recording(), folder)
+    letter.write_all([recording()], folder)
     return folder
 
 
@@ -191,7 +190,7 @@ def run_folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def paper(run_folder):
-    return redraw([run_folder], "paper", run_folder.parent / "paper")
+    return letter.redraw([run_folder], "paper", run_folder.parent / "paper")
 
 
 @pytest.mark.slow
@@ -212,7 +211,7 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(run_folder
         monkeypatch.setattr(letter, "write_all",
                             lambda recording, folder, text=text: [
                                 (folder / name).write_text(text) for name in ("a.svg", "b.svg")])
-        assert redraw([run_folder]) == [run_folder / "a.svg", run_folder / "b.svg"]
+        assert letter.redraw([run_folder]) == [run_folder / "a.svg", run_folder / "b.svg"]
     assert (run_folder / "b.svg").read_text() == "new"
     assert (run_folder / "run.npz").exists()
     assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
@@ -220,9 +219,9 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(run_folder
 
 def test_a_style_or_folder_that_is_not_there_is_an_error_that_names_it(run_folder, tmp_path):
     with pytest.raises(HierarchyError, match="unknown style 'papr'; did you mean 'paper'"):
-        redraw([run_folder], "papr")
+        letter.redraw([run_folder], "papr")
     with pytest.raises(HierarchyError, match="nothing"):
-        redraw([tmp_path / "nothing"])
+        letter.redraw([tmp_path / "nothing"])
 
 
 @pytest.mark.parametrize("label", ["tpm-published", "recursive", "hqp osqp"])

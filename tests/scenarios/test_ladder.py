@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-import scenarios.config.groups as groups_of
+import scenarios.config.names as groups_of
 from hierarchy import HierarchyError
 from scenarios import compare, load
 from scenarios.cli.main import run_command

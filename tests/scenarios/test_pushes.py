@@ -7,11 +7,9 @@ import pytest
 
 from hierarchy import Robot
 from scenarios import load, simulate
-from scenarios.cell.build import build
 from scenarios.draw.replay.page import html
-from scenarios.draw.viewer.curves import Lately
-from scenarios.draw.viewer.moment import Watched, of_scene
-from scenarios.loop.controller import Controller
+from scenarios.draw.viewer.live import Live
+from scenarios.draw.viewer.moment import of_scene
 from scenarios.recording.facts import ContactPoint, facts_of
 from scenarios.scene import scene
 from scenarios.scene.pushes import pushes
@@ -87,10 +85,9 @@ def test_every_shipped_scenario_of_torques_can_be_replayed(name):
     names = [one.name for one in scene(run).series]
     assert len(set(names)) == len(names)
     assert "</html>" in html({"a": run}, name)
-    watched = Watched(Controller(run.scenario, build(run.scenario)))
-    plant = watched.controller.cell.plant
-    watched.controller.command(0.0, plant.q, plant.v)
-    for (here, goal), path in zip(watched.moment().moved, scene(run).paths, strict=True):
+    live = Live(run.scenario)
+    live.tick()
+    for (here, goal), path in zip(live.moment().moved, scene(run).paths, strict=True):
         np.testing.assert_allclose(here, path.actual[0], atol=1e-9)
         assert (goal is None) == (path.wanted is None)
         if name == "wipe":
@@ -100,15 +97,8 @@ def test_every_shipped_scenario_of_torques_can_be_replayed(name):
 
 
 def test_the_viewers_show_the_same_live_and_afterwards(run):
-    watched = Watched(Controller(run.scenario, build(run.scenario)))
-    controller = watched.controller
-    assert watched.moment().pushes is None
-    plant = controller.cell.plant
-    controller.command(0.0, plant.q, plant.v)
-    live, kept = watched.moment().pushes, of_scene(scene(run), 0).pushes
-    lately = Lately(10, run.facts)
-    lately.add(watched)
-    assert [one.name for one in lately.curves(controller)[1]] == [
-        one.name for one in scene(run).series]
-    for one, other in zip(live, kept, strict=True):
+    live = Live(run.scenario)
+    live.tick()
+    assert [one.name for one in live.curves(1.0)[1]] == [one.name for one in scene(run).series]
+    for one, other in zip(live.moment().pushes, of_scene(scene(run), 0).pushes, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)

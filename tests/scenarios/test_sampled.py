@@ -21,11 +21,10 @@ from scenarios.config.sampling import changed, drawn
 from scenarios.measure import metrics
 from scenarios.measure.statistics import wilson
 from scenarios.results import cluster, pool
-from scenarios.results.plan import plan
+from scenarios.results.plan import load_sweep, plan, shipped_sweeps
 from scenarios.results.run import Job, Outcome, outcome
 from scenarios.results.sampled import compare_starts, sweep
 from scenarios.results.store import FullError, Store, read
-from scenarios.results.sweep_file import load_sweep, shipped_sweeps
 
 BODY = {"name": '"small"', "scenarios": '["ellipse"]', "resolvers": '["tpm", "recursive"]',
         "duration": "0.02", "samples": "3", "seed": "7"}

@@ -13,9 +13,8 @@ from scenarios.config.robot import RobotSection
 from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
 from scenarios.recording.facts import robot_facts
-from scenarios.recording.fate import Fate
+from scenarios.recording.fate import Fate, levels_at
 from scenarios.scene import capsules, ends, scene, stage
-from scenarios.scene.levels import levels_at
 
 SHORT = ["control.duration=1.5"]
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")

@@ -13,7 +13,7 @@ from scenarios.measure.metrics import Metric
 from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
 from scenarios.recording.signals import Signal, known
-from scenarios.results.charts import multiples
+from scenarios.results.sections import multiples
 
 pytestmark = pytest.mark.usefixtures("no_plugins")
 

@@ -99,10 +99,10 @@ def test_a_tick_that_the_run_does_not_have_is_an_error(folder, capsys):
 
 def test_large_changes_are_among_the_events_of_report_and_replay(folder, monkeypatch):
     from scenarios.draw.replay.page import html
-    from scenarios.measure import happened as module
+    from scenarios.measure import jumps as module
     from scenarios.measure.run_folder import load_run
     from scenarios.measure.runs import Run
-    from scenarios.results.tables import events
+    from scenarios.results.sections import events
 
     recording = load_run(folder)
     assert not list(module.happened(recording))

@@ -16,8 +16,7 @@ from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES, DHTable
 from hierarchy.task import Level
-from scenarios.cell.plants.mjcf import each, scene
-from scenarios.cell.plants.stops import Stops
+from scenarios.cell.plants.mjcf import Stops, each, scene
 from scenarios.config import ScenarioError
 from scenarios.config.kinds.mujoco import JointsSection, PhysicsSection, ServoSection
 

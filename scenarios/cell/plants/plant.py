@@ -1,13 +1,20 @@
-"""The interface of a plant."""
+"""What a plant is, how its joints are measured, and the plant that [plant] asks for."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
+import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy import Robot, State
+from hierarchy.avoidance import Obstacles
+from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.plant import MeasurementSection
 
 
 class Plant(Protocol):
@@ -49,3 +56,134 @@ class Driven(Plant, Protocol):
 
     @property
     def reference_v(self) -> Array: ...  # noqa: D102
+
+
+_WHOLE = 1e-6  # of a period: tolerance of a delay in whole periods
+
+
+class Sensed(Protocol):
+    """Turns the true state into the measured one."""
+
+    def __call__(self, q: Array, v: Array) -> tuple[Array, Array]: ...  # noqa: D102
+
+
+class Apart:
+    """A plant whose q and v are measured by `sensed`, once per period.
+
+    The true state at the start of each period is recorded as `true_q`, `true_v`.
+    """
+
+    def __init__(self, plant: Plant, sensed: Sensed) -> None:
+        self._plant, self._sensed = plant, sensed
+        self._true_q, self._true_v = plant.q.copy(), plant.v.copy()
+        self.extra: Mapping[str, NDArray[Any]] = {
+            "true_q": self._true_q, "true_v": self._true_v, **plant.extra}
+        self.q, self.v = sensed(plant.q, plant.v)
+
+    @property
+    def a(self) -> Array:
+        """The acceleration (n,) [rad/s^2] of the last command."""
+        return self._plant.a
+
+    @property
+    def fault(self) -> str | None:
+        """Why the plant cannot go on, or None."""
+        return fault_of(self._plant)
+
+    def act(self, command: Array) -> None:
+        """Apply a command (n,) for one period, then measure."""
+        plant = self._plant
+        self._true_q[:], self._true_v[:] = plant.q, plant.v
+        plant.act(command)
+        self.q, self.v = self._sensed(plant.q, plant.v)
+
+
+class Commanded:
+    """Returns the integral of the controller's own commands instead of the real joint state."""
+
+    def __init__(self, plant: Driven) -> None:
+        self._plant = plant
+
+    def __call__(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Return the reference in place of q (n,), v (n,)."""
+        return self._plant.reference_q.copy(), self._plant.reference_v.copy()
+
+
+def whole_periods(delay: float, period: float, key: str) -> int:
+    """Return a delay [s] in periods; ScenarioError, naming its key, if it is not a whole number."""
+    behind = delay / period
+    if abs(behind - round(behind)) > _WHOLE:
+        raise ScenarioError(f"{key} = {delay:g} s is not a whole number of periods of {period:g} s")
+    return round(behind)
+
+
+class JointSensor:
+    """Joint sensors with noise, quantisation and delay, read every `period` [s]; seeded.
+
+    Noise is added to a position, then it is rounded to the nearest step. With velocity =
+    "differenced" the velocity is the backward difference of these positions after a first-order
+    low-pass filter; the first one is the true velocity. Values arrive `delay` later, until then
+    those of the start. Noise is a small motion from the true position, of which the base of a robot
+    takes part; steps are those of joints only. Raises ScenarioError if the delay is not a whole
+    number of periods.
+    """
+
+    def __init__(self, section: MeasurementSection, period: float, robot: Robot) -> None:
+        self._robot = robot
+        behind = whole_periods(section.delay, period, "plant.measurement.delay")
+        self._section, self._period = section, period
+        self._random = np.random.default_rng(section.seed)
+        self._behind: deque[tuple[Array, Array]] = deque(maxlen=behind + 1)
+        self._last: tuple[Array, Array] | None = None  # position and filtered velocity
+
+    def __call__(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Return the measurement (n,), (n,) when the joints are at q (n,), v (n,)."""
+        position = self._position(q)
+        velocity = (self._differenced(position, v) if self._section.velocity == "differenced"
+                    else v + self._noise(self._section.velocity_noise, len(v)))
+        self._last = position, velocity
+        self._behind.append((position, velocity))
+        return self._behind[0]
+
+    def _position(self, q: Array) -> Array:
+        robot, step = self._robot, self._section.quantisation
+        moved = self._noise(self._section.position_noise, robot.n)
+        noisy = q + moved if robot.nq == robot.n else robot.integrate(q, moved)
+        if step == 0.0:
+            return noisy
+        if robot.nq == robot.n:
+            return np.round(noisy / step) * step
+        joints = robot.vector(noisy)[robot.actuated:]
+        return robot.configuration(np.round(joints / step) * step, noisy)
+
+    def _noise(self, deviation: float, n: int) -> Array:
+        return deviation * self._random.standard_normal(n)
+
+    def _differenced(self, position: Array, v: Array) -> Array:
+        if self._last is None:
+            return v.copy()
+        before, velocity = self._last
+        share = self._period / (self._period + self._section.filter_time)
+        return velocity + share * (
+            self._robot.difference(before, position) / self._period - velocity)
+
+
+def plant_of(scenario: Scenario, start: State, obstacles: Obstacles,
+             contacts: Contacts | None = None) -> Plant:
+    """Return the plant of a robot at its start; `contacts` as in a Cell.
+
+    Raises ScenarioError if the requested measurement is not possible for the robot's joints.
+    """
+    section, control, robot = scenario.plant, scenario.control, start.robot
+    sensor = JointSensor(section.measurement, control.period, robot)
+    plant: Plant = section.made(robot, q=start.q, v=start.v, period=control.period,
+                                level=control.level, obstacles=obstacles, contacts=contacts)
+    driven = hasattr(plant, "reference_q")
+    if section.feedback == "measured":
+        return plant if section.measurement.ideal and not driven else Apart(plant, sensor)
+    if section.follows:
+        return plant
+    if not driven:
+        raise ScenarioError(f'plant.feedback = "commanded": a plant of kind {section.kind!r} has '
+                            "no reference_q and reference_v")
+    return Apart(plant, Commanded(cast(Driven, plant)))

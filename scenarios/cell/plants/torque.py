@@ -15,9 +15,9 @@ from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Array
 from hierarchy.tasks.mechanism import Mechanism
 from scenarios.cell.plants.ground import on_floor
-from scenarios.cell.plants.measured import whole_periods
+from scenarios.cell.plants.mjcf import Stops
 from scenarios.cell.plants.physics import mujoco_module
-from scenarios.cell.plants.stops import Stops
+from scenarios.cell.plants.plant import whole_periods
 from scenarios.cell.plants.touch import Touch
 from scenarios.config import ScenarioError
 from scenarios.config.kinds.torque import PushSection, TorqueSection

@@ -16,7 +16,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.errors import Image, expose
 from scenarios.cell.sensors.rendering import draw_scene
-from scenarios.config.kinds.camera import DepthErrors
+from scenarios.config.kinds.camera import CameraSection, DepthErrors
 
 _UPRIGHT = 1e-6    # from 1, of a direction's vertical part: the image then has another x axis
 _ROUNDING = 1e-9   # [s] of times that are compared
@@ -94,43 +94,39 @@ def looking_at(position: ArrayLike, target: ArrayLike) -> Array:
 class DepthCamera:
     """Takes depth images (h, w) [m] of obstacles and a robot of capsules; 0 means no reading.
 
-    Point obstacles are seen as balls of `point_radius` [m]; a wall perpendicular to the optical
-    axis is at depth `backdrop` [m], infinite for none. Frame i is taken at i / `rate` [Hz] plus up
-    to `jitter` [s], and available `latency` [s] later. The errors of frame i depend only on `seed`
-    and i. `scene` has the true depths of the last frame, infinite where there is nothing.
+    Frame i is taken at i / rate plus up to jitter. Its errors depend only on seed and i. `scene`
+    has the true depths of the last frame, infinite where there is nothing.
     """
 
-    def __init__(self, pinhole: Pinhole, obstacles: Obstacles, capsules: tuple[Capsule, ...],
-                 errors: DepthErrors | None = None, *, rate: float = 30.0, jitter: float = 0.0,
-                 latency: float = 0.0, seed: int = 0, point_radius: float = 0.02,
-                 backdrop: float = inf) -> None:
-        if not 0.0 <= jitter < 1.0 / rate:
-            raise HierarchyError(f"camera: jitter = {jitter} s must be below 1 / rate = "
-                                 f"{1.0 / rate:.3g} s")
-        self.pinhole, self.obstacles, self.latency = pinhole, obstacles, latency
-        self.errors = DepthErrors() if errors is None else errors
-        self._rate, self._jitter, self._seed = rate, jitter, seed
+    def __init__(self, section: CameraSection, pinhole: Pinhole, obstacles: Obstacles,
+                 capsules: tuple[Capsule, ...]) -> None:
+        if not section.jitter < 1.0 / section.rate:
+            raise HierarchyError(f"camera: jitter = {section.jitter} s must be below 1 / rate = "
+                                 f"{1.0 / section.rate:.3g} s")
+        self.pinhole, self.obstacles, self.latency = pinhole, obstacles, section.latency
+        self.errors = DepthErrors.none(section.near, section.far) if section.ideal else section
+        self._section, self._backdrop = section, section.backdrop or inf
         self._eye, self._packed = pinhole.packed(), self.errors.packed()
         self._joints, self._capsules = pack_capsules(capsules)
-        self._point_radius, self._backdrop = point_radius, backdrop
         size = (pinhole.height, pinhole.width)
         self.scene, self._reading = np.zeros(size, np.float32), np.zeros(size, np.float32)
         self._normal, self._uniform = np.zeros(size, np.float32), np.ones(size, np.float32)
 
     def time(self, frame: int) -> float:
         """Return the time at which a frame is taken [s]."""
-        wait = self._jitter * self._rng(frame, 1).random() if self._jitter else 0.0
-        return frame / self._rate + wait
+        jitter = self._section.jitter
+        wait = jitter * self._rng(frame, 1).random() if jitter else 0.0
+        return frame / self._section.rate + wait
 
     def newest(self, t: float) -> int:
         """Return the number of the last frame taken by time t [s], -1 before the first."""
-        frame = floor((t + _ROUNDING) * self._rate)
+        frame = floor((t + _ROUNDING) * self._section.rate)
         return frame - (frame >= 0 and self.time(frame) > t + _ROUNDING)
 
     def image(self, frame: int, state: State) -> tuple[Image, Array]:
         """Take a frame at a state: the image, valid until the next, and the robot's placements."""
         draw_scene(self.scene, self._eye, self._backdrop, self.obstacles.at(state.t),
-                   self._point_radius, state.placements, self._joints, self._capsules)
+                   self._section.point_radius, state.placements, self._joints, self._capsules)
         rng = self._rng(frame, 0)
         if self.errors.random:
             rng.standard_normal(out=self._normal, dtype=np.float32)
@@ -140,4 +136,4 @@ class DepthCamera:
         return self._reading, state.placements
 
     def _rng(self, frame: int, use: int) -> np.random.Generator:
-        return np.random.default_rng((self._seed, frame, use))
+        return np.random.default_rng((self._section.seed, frame, use))

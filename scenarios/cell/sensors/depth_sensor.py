@@ -1,4 +1,4 @@
-"""The depth camera in the control loop: frames at intervals, late or missing."""
+"""The depth sensors of [sensor]: a camera or recorded frames in the loop, late or missing."""
 
 from __future__ import annotations
 
@@ -7,14 +7,18 @@ from math import inf
 from time import perf_counter
 from typing import Protocol
 
-from hierarchy import State
-from hierarchy.avoidance import ControlPoint, Measurement, Obstacles
+import numpy as np
+
+from hierarchy import HierarchyError, Robot, State
+from hierarchy.avoidance import Capsule, ControlPoint, Measurement, Obstacles
 from hierarchy.problem import Array
-from scenarios.cell.sensors.camera import Pinhole
+from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.cell.sensors.depth_space import DepthSpace
 from scenarios.cell.sensors.errors import Image
-from scenarios.cell.sensors.exact import ExactDistances
+from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.cell.sensors.pixels import ObstacleImage
+from scenarios.cell.sensors.sensor import Asked, ExactDistances
+from scenarios.config.kinds.camera import CameraSection, FramesSection, ImageSection
 
 _ROUNDING = 1e-9  # [s] of times that are compared
 
@@ -47,10 +51,10 @@ class DepthSensor:
     the time the source took to make the image, which is not part of the control loop.
     """
 
-    def __init__(self, source: Source, space: DepthSpace, stale_after: float = 0.2,
-                 least_readings: float = 0.1, exact: ExactDistances | None = None) -> None:
-        self.source, self.space, self.stale_after = source, space, stale_after
-        self.least_readings = least_readings
+    def __init__(self, section: ImageSection, source: Source, space: DepthSpace,
+                 exact: ExactDistances | None = None) -> None:
+        self.source, self.space = source, space
+        self.stale_after, self.least_readings = section.stale_after, section.least_readings
         self.points: tuple[ControlPoint, ...] = space.points
         self.measurement, self.obstacles = space.measurement, source.obstacles
         self.reading: Image | None = None
@@ -118,3 +122,40 @@ class DepthSensor:
         self._coming.clear()
         self._current, self._frame, self._now = self._nothing, -1, -inf
         self.measurement.stamp, self.measurement.blind = -inf, True
+
+
+def camera(section: CameraSection, robot: Robot, exact: ExactDistances,
+           asked: Asked) -> DepthSensor:
+    """Make the sensor of a simulated camera, for the points that `exact` measures."""
+    rotation = (looking_at(section.position, section.look_at) if section.rotation is None
+                else np.array(section.rotation))
+    pinhole = Pinhole(section.width, section.height, section.fx, section.fy, section.cx,
+                      section.cy, section.position, rotation)
+    capsules = _capsules(robot, section.foot)
+    source = DepthCamera(section, pinhole, exact.obstacles, capsules)
+    return _sensor(section, source, capsules, exact, asked, exact)
+
+
+def frames(section: FramesSection, robot: Robot, exact: ExactDistances,
+           asked: Asked) -> DepthSensor:
+    """Make the sensor of recorded frames, which cannot be checked for obstacles at the start."""
+    capsules = _capsules(robot, section.foot)
+    source = RecordedFrames(section.folder, robot, section.latency)
+    return _sensor(section, source, capsules, exact, asked, None)
+
+
+def _sensor(section: ImageSection, source: Source, capsules: tuple[Capsule, ...],
+            exact: ExactDistances, asked: Asked, checked: ExactDistances | None) -> DepthSensor:
+    space = DepthSpace(section, source.pinhole, exact.points, capsules, asked,
+                       exact.measurement.pairs is not None)
+    return DepthSensor(section, source, space, checked)
+
+
+def _capsules(robot: Robot, foot: float) -> tuple[Capsule, ...]:
+    if not robot.capsules:
+        raise HierarchyError(f"robot {robot.name!r} has no capsules, which are needed to remove "
+                             "it from the image")
+    if foot == 0.0 or robot.base == "floating":
+        return robot.capsules
+    column = Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), robot.capsules[0].radius)
+    return (column, *robot.capsules)

@@ -7,8 +7,7 @@ from math import inf
 
 import numpy as np
 
-from hierarchy import HierarchyError
-from hierarchy.avoidance import Capsule, ControlPoint, Measurement, Pairs, Repulsion
+from hierarchy.avoidance import Capsule, ControlPoint, Measurement, Pairs
 from hierarchy.avoidance.control_points import pack_points
 from hierarchy.avoidance.repulsion import laws
 from hierarchy.avoidance.self_collision import pack_capsules
@@ -24,6 +23,8 @@ from scenarios.cell.sensors.pixels import (
     measure_pixels,
 )
 from scenarios.cell.sensors.rendering import draw_robot
+from scenarios.cell.sensors.sensor import Asked
+from scenarios.config.kinds.camera import ImageSection
 
 NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # r_max = 0
 _ON_ITS_WAY = 0.3  # [m]
@@ -32,42 +33,31 @@ _ON_ITS_WAY = 0.3  # [m]
 class DepthSpace:
     """Turns depth images into obstacle images, and measures distances of points in them.
 
+    section : its `region` is rho [m], the largest distance that is measured. Space hidden by an
+        obstacle counts as occupied up to `thin` [m] behind its surface. `support` removes
+        outliers, but also surfaces that are smaller or steeper.
     points : control points, the end effector last.
-    capsules : the robot, enlarged by `margin` [m]; pixels that show it or anything behind it do not
-        count as obstacles.
-    region : rho [m], the largest distance that is measured.
-    thin : how far obstacles extend behind their surface along the optical axis [m]. Space hidden by
-        an obstacle counts as occupied up to that depth.
-    support, band : a pixel counts if `support` of the 3 x 3 around it agree within `band` [m] in
-        depth, which removes outliers, but also surfaces that are smaller or steeper.
-    mean_within : distances [m], for control points and end effector, within which the direction is
-        the mean (25)-(26) over all pixels of the region; with 0 it is that of the nearest pixel,
-        except for a point in the shadow of its own pixel.
-    body, tip : repulsion laws. `measurement.nearest` is a pixel v width + u, -1 for none.
+    capsules : the robot; pixels that show it or anything behind it do not count as obstacles.
+    asked : the direction is the mean (25)-(26) over all pixels of the region within `mean_within`
+        [m]; with 0 it is that of the nearest pixel, except for a point in the shadow of its own.
+
+    `measurement.nearest` is a pixel v width + u, -1 for none.
     """
 
-    def __init__(self, pinhole: Pinhole, points: Sequence[ControlPoint],
-                 capsules: Sequence[Capsule], region: float, *, margin: float = 0.05,
-                 thin: float = inf, support: int = 3, band: float = 0.05,
-                 mean_within: tuple[float, float] = (inf, inf),
-                 body: Repulsion | None = None, tip: Repulsion | None = None,
-                 pairs: bool = False) -> None:
-        for name, value, least in (("region", region, 1e-9), ("margin", margin, 0.0),
-                                   ("thin", thin, 0.0), ("band", band, 0.0)):
-            if not value >= least or (name != "thin" and value == inf):
-                raise HierarchyError(f"depth space: {name} = {value} m is out of range")
-        if not 1 <= support <= 9:
-            raise HierarchyError(f"depth space: support = {support} is not in 1 .. 9 pixels")
-        self.pinhole, self.points, self.region = pinhole, tuple(points), region
+    def __init__(self, section: ImageSection, pinhole: Pinhole, points: Sequence[ControlPoint],
+                 capsules: Sequence[Capsule], asked: Asked, pairs: bool = False) -> None:
+        self.pinhole, self.points = pinhole, tuple(points)
+        self.region = section.region or asked.region
         self.measurement = Measurement(len(points) - 1)
         self._pairs = Pairs(len(points), 1)
         if pairs:
             self.measurement.pairs = self._pairs
-        self._eye, self._margin = pinhole.packed(), margin
-        self._support, self._band = support, band
+        self._eye, self._section = pinhole.packed(), section
         self._links, self._capsules = pack_capsules(capsules)
-        self._space = Space(*pack_points(points), self._eye, region, thin, np.array(mean_within),
-                            laws(body, tip) if body and tip else NO_LAWS)
+        self._space = Space(*pack_points(points), self._eye, self.region,
+                            inf if section.thin is None else section.thin,
+                            np.array(asked.mean_within),
+                            laws(asked.body, asked.tip) if asked.body and asked.tip else NO_LAWS)
         self._image: ObstacleImage | None = None
         self._placements: Array | None = None
         self._robot = ObstacleImage.empty(pinhole.height, pinhole.width).depth
@@ -78,9 +68,10 @@ class DepthSpace:
         Pixels beyond the region of every point, even if the robot moves by _ON_ITS_WAY until the
         next frame, are ignored. Returns the share of valid pixels, which are neither 0 nor NaN.
         """
-        draw_robot(self._robot, self._eye, placements, self._links, self._capsules, self._margin)
+        section = self._section
+        draw_robot(self._robot, self._eye, placements, self._links, self._capsules, section.margin)
         beyond = farthest(placements, self._space.joints, self._space.offsets, self._eye)
-        return float(find_obstacles(reading, self._robot, self._support, self._band,
+        return float(find_obstacles(reading, self._robot, section.support, section.band,
                                     beyond + self.region + _ON_ITS_WAY, into.depth, into.tiles))
 
     def measure(self, obstacles: ObstacleImage, placements: Array) -> Measurement:

@@ -1,11 +1,26 @@
-"""What the control loop needs of a sensor."""
+"""What a sensor is, exact distances, and the sensor that [avoidance] and [sensor] ask for."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from hierarchy import State
-from hierarchy.avoidance import Measurement, Obstacles, Repulsion
+import numpy as np
+
+from hierarchy import HierarchyError, Robot, State
+from hierarchy.avoidance import (
+    ControlPoint,
+    Measurement,
+    Obstacles,
+    Pairs,
+    Repulsion,
+    measure_pairs,
+)
+from hierarchy.avoidance.control_points import pack_points
+from hierarchy.avoidance.measurement import exact_measurer
+from hierarchy.avoidance.repulsion import laws
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.avoidance import AvoidanceKind, AvoidanceSection, ObstacleSection
 
 
 class Asked(NamedTuple):
@@ -37,3 +52,110 @@ class Sensor(Protocol):
 
     def check_start(self, state: State) -> None:
         """Raise a HierarchyError if an obstacle touches a point of the robot at the start."""
+
+
+_TOUCHING = 1e-9  # [m] a control point this close to an obstacle has no direction away from it
+_NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # r_max = 0
+
+
+class ExactDistances:
+    """Measures a robot's control points and end effector against obstacles.
+
+    `body` and `tip` are the magnitudes of the repulsion of the control points and of the end
+    effector; without both there is no repulsion. Directions are the mean (25)-(26) over the
+    obstacles nearer than `mean_within` [m], for control points and end effector, where there are
+    any; with 0 those of the nearest obstacle. With `pairs`, every point is also measured against
+    every obstacle, as `Separation` needs.
+    """
+
+    outside = 0.0  # [s] of a measurement that is not part of the control loop
+
+    def __init__(self, robot: Robot, obstacles: Obstacles, body: Repulsion | None = None,
+                 tip: Repulsion | None = None,
+                 mean_within: tuple[float, float] = (0.0, 0.0), pairs: bool = False) -> None:
+        end = robot.frame(robot.end_effector)
+        self.points = (*robot.control_points,
+                       ControlPoint(robot.end_effector, end.joint, end.offset))
+        self.obstacles, self._mean_within = obstacles, np.array(mean_within)
+        self._joints, self._offsets = pack_points(self.points)
+        self._laws = laws(body, tip) if body and tip else _NO_LAWS
+        self.measurement = Measurement(len(robot.control_points))
+        self._followed: State | None = None
+        self._measure: Callable[[], None]
+        if pairs:
+            self.measurement.pairs = Pairs(len(self.points), len(obstacles))
+
+    def measure(self, state: State) -> Measurement:
+        """Measure at a state and attach the measurement to it; valid until the next call."""
+        if state is not self._followed:
+            self._follow(state)
+        self.obstacles.at(state.t)
+        self._measure()
+        if self.measurement.pairs is not None:
+            measure_pairs(self.measurement.pairs, self.measurement.points, self.obstacles)
+        state.measurement = self.measurement
+        return self.measurement
+
+    def _follow(self, state: State) -> None:
+        self._followed = state
+        self._measure = exact_measurer(self.measurement, state.placements, self._joints,
+                                       self._offsets, self.obstacles.table, self._laws,
+                                       self._mean_within)
+
+    def check_start(self, state: State) -> None:
+        """Raise a HierarchyError if an obstacle lies at a control point, or a point inside one."""
+        seen = self.measure(state)
+        for k in np.flatnonzero(seen.distance < _TOUCHING)[:1]:
+            obstacle = self.obstacles.obstacles[seen.nearest[k]]
+            what = "end effector" if k == len(self.points) - 1 else f"control point {k + 1}"
+            raise HierarchyError(
+                f"{obstacle.name} at {self.obstacles.centres[seen.nearest[k]].tolist()} m "
+                f"touches {what} ({self.points[k].name}) at the start: distance "
+                f"{seen.distance[k]:.3g} m")
+
+
+def sensor_of(scenario: Scenario, start: State,
+              kept: tuple[Scenario, Sensor | None] | None = None) -> Sensor | None:
+    """Return the sensor of distances to the obstacles, None without [avoidance].
+
+    `kept` is another scenario and its sensor, which stays if all settings of it are the same; else
+    its obstacles stay. New ones must not touch the robot at the start. Raises ScenarioError if the
+    robot has no control points, or [sensor] does not fit it.
+    """
+    section, robot = scenario.avoidance, start.robot
+    before, sensor = kept or (None, None)
+    if before and (sensor is None or (section, scenario.sensor, scenario.limits) == (
+            before.avoidance, before.sensor, before.limits)):
+        return sensor
+    if section is None:
+        return None
+    if not robot.control_points:
+        raise ScenarioError(f"[avoidance]: robot {robot.name!r} has no control points; list them "
+                            "in robot.control_points")
+    asked = _asked(section, (scenario.limits and scenario.limits.danger_reach) or 0.0)
+    exact = ExactDistances(robot, sensor.obstacles if sensor else make_obstacles(section.placed),
+                           asked.body, asked.tip, asked.mean_within,
+                           pairs=not isinstance(section, AvoidanceSection))
+    try:
+        made: Sensor = scenario.sensor.made(robot, exact=exact, asked=asked, body=asked.body,
+                                            tip=asked.tip)
+    except ScenarioError:
+        raise
+    except HierarchyError as error:
+        raise ScenarioError(f"sensor: {error}") from error
+    if sensor is None:
+        made.check_start(start)
+    return made
+
+
+def _asked(section: AvoidanceKind, danger: float) -> Asked:
+    if not isinstance(section, AvoidanceSection):
+        return Asked(max(section.influence, danger))
+    mean = (section.far, section.end_effector) if section.direction == "mean" else (0.0, 0.0)
+    return Asked(max(section.far, section.end_effector, danger), mean, section.body.make(),
+                 section.tip.make())
+
+
+def make_obstacles(sections: tuple[ObstacleSection, ...]) -> Obstacles:
+    """Make the scene's obstacles, numbered from 1 in messages."""
+    return Obstacles([section.make(f"obstacle {i}") for i, section in enumerate(sections, 1)])

@@ -131,7 +131,7 @@ class DepthErrors(Section):
 class CameraSection(DepthErrors, ImageSection):
     """A simulated depth camera that sees obstacles and robot; see scenarios.cell.sensors.camera."""
 
-    made_by: ClassVar[str] = "scenarios.cell.sensors.images:camera"
+    made_by: ClassVar[str] = "scenarios.cell.sensors.depth_sensor:camera"
     kind: Literal["camera"]
     width: Pixels = 640
     """Columns of the image."""
@@ -175,7 +175,7 @@ class FramesSection(ImageSection):
     See scenarios.cell.sensors.frames.
     """
 
-    made_by: ClassVar[str] = "scenarios.cell.sensors.images:frames"
+    made_by: ClassVar[str] = "scenarios.cell.sensors.depth_sensor:frames"
     is_recorded: ClassVar[bool] = True
     kind: Literal["frames"]
     folder: str

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from hierarchy.problem import Array
 from scenarios.cell.sensors.camera import Pinhole
 from scenarios.draw.figures import drawing
-from scenarios.recording.depth_view import DepthView
+from scenarios.recording.recording import DepthView
 
 _POINT, _NEAREST, _TIP = "#2fb344", "#2f6bff", "#17c3d6"
 _NO_READING = "#000000"

@@ -15,12 +15,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, UnknownNameError
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import INK
 from scenarios.draw.figures.panels import PANEL, Panel
 from scenarios.draw.figures.picture import picture
 from scenarios.draw.figures.timeline import timeline
+from scenarios.files import added_to, claim, named, whole
 
 if TYPE_CHECKING:
     from scenarios.recording.recording import Recording
@@ -76,25 +77,43 @@ EXPERIMENT = (
 _SINGLE = ("velocities-and-distance",)  # of two runs, its panels are in other figures
 
 
-def write_all(recording: Recording, folder: Path) -> None:
-    """Write a run's figures to a folder: the letter's, its picture, its stack over time.
+def redraw(runs: Sequence[str | Path], style: str = "screen",
+           out: str | Path | None = None) -> list[Path]:
+    """Draw the figures of run folders in a style, and return the files.
 
-    The present style gives the formats, by default SVG and PNG; see `drawing.styled`.
+    Those of one run replace the figures in its folder, or go to `out`, which must be new or empty.
+    Several runs need `out`.
+
+    Raises
+    ------
+    HierarchyError : one of `runs` is not a run folder or is damaged, `style` is not in
+        drawing.STYLES, `out` is missing or cannot be written, or there is nothing to draw.
+    """
+    from scenarios.measure.run_folder import load_run
+
+    if style not in drawing.STYLES:
+        raise UnknownNameError("style", style, drawing.STYLES)
+    if len(runs) > 1 and out is None:
+        raise HierarchyError(f"figures of {len(runs)} runs belong to no run's folder: give --out")
+    claimed = None if out is None else claim(out)
+    recordings = [load_run(run) for run in runs]
+    writing = added_to(Path(runs[0])) if claimed is None else whole(claimed)
+    with drawing.styled(drawing.STYLES[style]), named(claimed or runs[0]), writing as partial:
+        write_all(recordings, partial)
+        names = sorted(file.name for file in partial.iterdir())
+    return [(claimed or Path(runs[0])) / name for name in names]
+
+
+def write_all(recordings: Sequence[Recording], folder: Path) -> None:
+    """Write the figures of one run or several to a folder, in the present style.
+
+    Those of one run are the letter's, its picture and its stack over time; those of several are the
+    letter's as far as their runs are there, their parts (a), (b), ... one below the other, and of
+    two runs also each quantity of both. Raises HierarchyError if several runs make no figure.
     """
     with drawing.styled(drawing.present()):
-        for name, fig in _all(recording):
-            drawing.write(fig, str(folder / name))
-
-
-def write_together(recordings: Sequence[Recording], folder: Path) -> None:
-    """Write figures of several runs to a folder, their parts (a), (b), ... one below the other.
-
-    These are the letter's, as far as their runs are there, and of two runs also each quantity of
-    both. Raises HierarchyError if there is no figure.
-    """
-    with drawing.styled(drawing.present()):
-        drawn = dict(_together(recordings))
-        if not drawn:
+        drawn = dict(_all(recordings[0]) if len(recordings) == 1 else _together(recordings))
+        if len(recordings) > 1 and not drawn:
             raise HierarchyError("more than two runs make only the letter's figures 4 to 7, 9 and "
                                  "10, and its runs are not among these")
         for name, fig in drawn.items():

@@ -91,7 +91,7 @@ def _ball(ax: Axes, centre: Array, radius: float, alpha: float) -> None:
 
 
 def _obstacles_at(recording: Recording, tick: int) -> Obstacles:
-    from scenarios.cell.scene import make_obstacles
+    from scenarios.cell.sensors.sensor import make_obstacles
 
     avoidance = recording.scenario.avoidance
     obstacles = make_obstacles(avoidance.placed if avoidance else ())

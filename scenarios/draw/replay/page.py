@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
@@ -11,7 +11,7 @@ from markupsafe import Markup
 from hierarchy.errors import HierarchyError
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.replay.data import fates, phrases, run_data
-from scenarios.measure.happened import happened
+from scenarios.measure.jumps import Happening, happened
 from scenarios.measure.verdict import verdict
 from scenarios.scene import scene
 from scenarios.scene.pushes import key
@@ -25,13 +25,14 @@ _SCRIPTS = ("data.js", "space.js", "painter.js", "sketch.js", "stage.js", "curve
             "stack.js", "player.js")
 
 
-def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
+def html(recordings: Mapping[str, Recording], title: str,
+         happenings: Mapping[str, Iterable[Happening]] | None = None, *, rate: float = 30.0,
          embedded: bool = False) -> str:
     """Return a replay of runs, by label, as a self-contained document.
 
-    `rate` is the frame rate in frames per second. With `embedded` the document has no heading,
-    is as tall as its content, and leaves the mouse wheel to the surrounding page. Raises
-    HierarchyError if there is nothing to show.
+    `happenings` are those of each run, where they are known; `rate` is in frames per second. With
+    `embedded` the document has no heading, is as tall as its content, and leaves the mouse wheel to
+    the surrounding page. Raises HierarchyError if there is nothing to show.
     """
     from scenarios.draw.figures.drawing import JOINTS
 
@@ -39,7 +40,8 @@ def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
         raise HierarchyError("a replay needs at least one run")
     look = looks(recordings)
     runs = [run_data(scene(recording, rate), {"label": label, **look[label]._asdict(),
-                                              **_about(recording)})
+                                              **_about(recording, happenings[label] if happenings
+                                                       else happened(recording))})
             for label, recording in recordings.items()]
     data = {"runs": runs, "fates": fates(), "phrases": phrases(), "joints": JOINTS,
             "embedded": embedded,
@@ -54,11 +56,10 @@ def html(recordings: Mapping[str, Recording], title: str, *, rate: float = 30.0,
     return str(document)  # not markup: a page that embeds it has to escape it
 
 
-def _about(recording: Recording) -> dict[str, Any]:
+def _about(recording: Recording, happenings: Iterable[Happening]) -> dict[str, Any]:
     scenario = recording.scenario
     limits = getattr(scenario, "limits", None)
     return {"scenario": scenario.name, "title": scenario.title, "fault": recording.fault,
             "goals": list(verdict(recording).said), "level": scenario.control.level,
             "limited": limits is not None,
-            "events": [{"t": one.t, "text": f"{one.what}: {one.why}"}
-                       for one in happened(recording)]}
+            "events": [{"t": one.t, "text": f"{one.what}: {one.why}"} for one in happenings]}

@@ -13,11 +13,10 @@ from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.pose import PoseTask
 from scenarios.draw.figures.drawing import colours
-from scenarios.draw.viewer.curves import Lately
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.live_panel import LivePanel, resolvers
 from scenarios.draw.viewer.model import Model, Rgb, rgb
-from scenarios.draw.viewer.moment import Moment, Watched
+from scenarios.draw.viewer.moment import Moment
 from scenarios.draw.viewer.playback import Requests
 from scenarios.draw.viewer.server import lay_floor, look_at_all
 from scenarios.draw.viewer.stack_list import key_html, stack_html
@@ -49,18 +48,17 @@ class LivePage:
         self.specs = resolvers(live.scenario)
         self._colours = colours(self.specs)
         self._due, self._curves_at = 0.0, -np.inf
-        self._stage, self._watched = self._stage_now(), Watched(live.controller)
-        self._lately = Lately(int(_LATELY * FRAMES), live.recorder.facts)
+        self._stage = self._stage_now()
         self._trace: deque[tuple[list[Array], Rgb]] = deque(maxlen=_TRACE)
         self._middle, self._path_wanted = np.zeros(3), self._path_offset()
         lay_floor(server, self._stage.floor)
         paths = self._paths()
         self._model = Model(server, "/run", self._stage, self._colour, paths)
-        self._place_camera(paths)
         self._first_tick()
+        self._place_camera(paths)
         self.panel = LivePanel(
             server, self.requests, live.scenario, list(self.specs),
-            self._lately.curves(live.controller), speed, obstacles=len(self._stage.obstacles),
+            live.curves(_LATELY), speed, obstacles=len(self._stage.obstacles),
             floor=self._stage.floor,
             key=key_html(key(live.recorder.facts, live.scenario), self._colour))
         self.draw()
@@ -81,7 +79,7 @@ class LivePage:
 
     def draw(self) -> None:
         """Draw the present state of the run."""
-        now = self._watched.moment()
+        now = self.live.moment()
         tips, shades = zip(*self._trace, strict=True)
         with self.server.atomic():
             self._model.show(now, list(np.swapaxes(tips, 0, 1)), np.array(shades))
@@ -91,7 +89,7 @@ class LivePage:
         self._show_list(now)
         if time.monotonic() - self._curves_at > 1.0 / _CURVES:
             self._curves_at = time.monotonic()
-            self.panel.roll(self._lately.curves(self.live.controller))
+            self.panel.roll(self.live.curves(_LATELY))
 
     def _make_ticks(self, seconds: float) -> None:
         """Run the ticks that are due as far as time allows; drop the rest."""
@@ -109,8 +107,7 @@ class LivePage:
         self._note()
 
     def _note(self) -> None:
-        self._trace.append((self._watched.moment().tips, rgb(self._colour)))
-        self._lately.add(self._watched)
+        self._trace.append((self.live.moment().tips, rgb(self._colour)))
 
     def _do(self, what: str, value: Any) -> None:
         try:
@@ -141,7 +138,6 @@ class LivePage:
     def _restart(self) -> None:
         self.live.restart()
         self._trace.clear()
-        self._lately.clear()
         self._due, self.playing = 0.0, True
         self._follow()
         self._first_tick()
@@ -164,7 +160,6 @@ class LivePage:
 
     def _follow(self) -> None:
         """Draw the parts that have changed with the scenario."""
-        self._watched = Watched(self.live.controller)
         before, self._stage = self._stage, self._stage_now()
         if (before.areas, before.half_angle) != (self._stage.areas, self._stage.half_angle):
             self._model.set_stage(self._stage)
@@ -200,7 +195,7 @@ class LivePage:
         return paths
 
     def _place_camera(self, paths: list[Array]) -> None:
-        stage, placements = self._stage, self._watched.moment().placements
+        stage, placements = self._stage, self.live.moment().placements
         arm = ends(stage.capsules, placements).reshape(-1, 3)
         near = [place for place in stage.obstacles.centres if np.linalg.norm(place) < _NEAR]
         points = np.vstack([*paths, arm, *near])

@@ -11,6 +11,7 @@ import numpy as np
 
 from hierarchy.problem import Array
 from scenarios.draw.figures.drawing import colours
+from scenarios.draw.figures.picture import once
 from scenarios.draw.viewer.model import Model
 from scenarios.draw.viewer.moment import of_scene
 from scenarios.draw.viewer.playback import Playback, PlayButton, Requests, add_speed
@@ -187,13 +188,4 @@ def _points(one: Scene) -> Array:
 def _paths(one: Scene) -> list[Array]:
     """Return the desired paths of points, (N, 3) [m] each."""
     wanted = [one.desired, *(path.wanted for path in one.paths)]
-    return [_once_around(path) for path in wanted if path is not None]
-
-
-def _once_around(path: Array) -> Array:
-    """Return the path until it first returns to its start, if it does."""
-    far = np.linalg.norm(path - path[0], axis=1)
-    step = np.linalg.norm(np.diff(path, axis=0), axis=1).max(initial=0.0)
-    left = int(np.argmax(far > 2.0 * step))
-    back = np.flatnonzero(far[left:] <= step)
-    return path[:left + back[0] + 1] if left and back.size else path
+    return [once(path) for path in wanted if path is not None]

@@ -1,0 +1,252 @@
+"""`hierarchy run`, `compare` and `sweep`: make runs, and print what came of them."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from scenarios.cli.options import (
+    PORT,
+    AsJson,
+    Browser,
+    Changes,
+    Duration,
+    Out,
+    Part,
+    Plugins,
+    Port,
+    Scheduler,
+    Workers,
+    complete_groups,
+    complete_resolvers,
+    complete_scenarios,
+    complete_sweeps,
+    listed_in,
+    loaded,
+    output,
+    workers_of,
+)
+from scenarios.cli.terminal import exit_code, interruptible, print_json, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from scenarios.config import Scenario
+    from scenarios.recording.recording import Recording
+    from scenarios.results.sampled import Finished
+
+
+def run(scenario: Annotated[str, typer.Argument(
+            help="Name of a scenario, or a scenario file.", autocompletion=complete_scenarios)],
+        resolver: Annotated[str | None, typer.Option(
+            "--resolver", metavar="SPEC", autocompletion=complete_resolvers,
+            help="Use another resolver: name, or name:setting=value:setting=value.")] = None,
+        changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
+        out: Out = None, certify: Annotated[bool, typer.Option(
+            "--certify", help="Certify the answer of every tick; not part of the measured times.")
+            ] = False,
+        figures: Annotated[bool, typer.Option(
+            "--figures", help="Also draw the run's figures, like `hierarchy figures`.")
+            ] = False, as_json: AsJson = False,
+        live: Annotated[bool, typer.Option(
+            "--live", help="Show the run in the browser and change it interactively; needs the "
+                           "extra `view`.")] = False,
+        speed: Annotated[float | None, typer.Option(
+            "--speed", metavar="X", min=0.01, max=100.0,
+            help="With --live: real-time factor. Default: 1.")] = None,
+        wait: Annotated[bool, typer.Option(
+            "--wait/--no-wait", help="With --live: start when a browser has opened the page, or "
+            "at once.")] = True,
+        port: Port = PORT, browser: Browser = True) -> int:
+    """Run a scenario, measure it, and save the run."""
+    if live and (certify or figures or as_json):
+        raise typer.BadParameter("cannot be combined with --certify, --figures or --json",
+                                 param_hint="--live")
+    if speed is not None and not live:
+        raise typer.BadParameter("needs --live", param_hint="--speed")
+    chosen = loaded(scenario, changes, duration)
+    if resolver is not None:
+        chosen = chosen.with_resolver(resolver)
+    from scenarios.files import claim, next_free
+
+    name = f"{chosen.name}-{chosen.control.resolver}"
+    folder = claim(out if out is not None else next_free(Path("runs") / name))
+    if live:
+        from scenarios.cli.shown import show_live
+
+        return show_live(chosen, folder, port, speed or 1.0, browser, wait)
+    return _run(chosen, folder, certify, figures, as_json)
+
+
+def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json: bool) -> int:
+    from scenarios.cli.progress import bar
+    from scenarios.config.validation import doubtful_units
+    from scenarios.draw.figures.letter import redraw
+    from scenarios.loop.first_tick import contact_warnings
+    from scenarios.loop.simulation import simulate
+    from scenarios.measure.metrics import as_plain_data
+    from scenarios.measure.run_folder import kept
+    from scenarios.measure.verdict import verdict
+
+    for text in (*doubtful_units(scenario), *contact_warnings(scenario)):
+        print(f"hierarchy: warning: {text}", file=sys.stderr)
+    with bar() as told:
+        told_of_it = partial(told, str(scenario.make_resolver().label))
+        recording = simulate(scenario, progress=told_of_it, certified=certify)
+    if lost := kept(recording, folder):
+        return exit_code(lost)
+    if figures:
+        redraw([folder])
+    if as_json:
+        print_json({"scenario": scenario.name, "resolver": scenario.control.resolver,
+                    "folder": shown(folder), **as_plain_data(recording),
+                    **verdict(recording).as_plain_data()})
+    else:
+        _print(scenario, recording, certify)
+        print(f"\n{recording.ticks} ticks in {shown(folder)}")
+    return exit_code(recording.fault)
+
+
+def _print(scenario: Scenario, recording: Recording, certify: bool) -> None:
+    """Print the metrics of a run, its certificate, its troubles and the levels that it missed."""
+    from scenarios.cli.terminal import certified, levels_given_up, print_table, troubles
+    from scenarios.measure.runs import Run
+
+    resolver = scenario.make_resolver()
+    print_table([Run(scenario, scenario.control.resolver, str(resolver.label), recording)])
+    if not resolver.strict:
+        print(f"\n{resolver.label} is inexact where a level loses rank, and then lower levels "
+              "disturb it;\n`--resolver hcod` keeps strict priorities at every rank.")
+    if certify:
+        print(f"\n{certified(recording, resolver.damping)}")
+    for line in (*troubles(recording), *levels_given_up(recording)):
+        print(line)
+
+
+def compare(scenarios: Annotated[list[str], typer.Argument(
+                help="Names of scenarios or groups, or scenario files.",
+                autocompletion=complete_groups)],
+            resolvers: Annotated[str | None, typer.Option(
+                "--resolvers", metavar="SPEC,SPEC,...", autocompletion=complete_resolvers,
+                help="Resolvers: name, or name:setting=value; or own, that of each scenario. "
+                     "Default: all suitable ones; own for a group.")] = None,
+            changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
+            out: Out = None, starts: Annotated[int | None, typer.Option(
+                "--starts", metavar="N", min=2, help="Compare over N starts sampled from each "
+                "scenario's [variation].")] = None,
+            seed: Annotated[int, typer.Option(
+                "--seed", metavar="S", min=0, help="With --starts: seed of the samples.")] = 0,
+            workers: Workers = None, scheduler: Scheduler = None, part: Part = None,
+            as_json: AsJson = False) -> int:
+    """Run scenarios under several resolvers and report.
+
+    With --starts every resolver gets the same sampled starts, and the report gives statistics; run
+    the same command again to resume an interrupted comparison.
+    """
+    if starts is None and (seed or scheduler or part):
+        raise typer.BadParameter("needs --starts", param_hint="--seed, --scheduler, --part")
+    from scenarios.config import members, shipped_groups
+    from scenarios.config.scenario import OWN
+    from scenarios.files import next_free
+
+    chosen = [loaded(name, changes, duration) for name in members(scenarios)]
+    grouped = any(name in shipped_groups() for name in scenarios)
+    specs = listed_in(resolvers) if resolvers is not None else [OWN] if grouped else None
+    if starts is None:
+        name = scenarios[0] if grouped else chosen[0].name
+        folder = out if out is not None else next_free(Path("runs") / f"compare-{name}")
+        return _compare(chosen, specs, folder, as_json, workers)
+    from scenarios.results.sampled import compare_starts
+
+    folder = out if out is not None else Path("runs") / f"starts-{chosen[0].name}"
+    return _sampled(partial(compare_starts, chosen, specs, starts, seed, folder,
+                            workers=workers_of(workers, scheduler, part)), folder, as_json)
+
+
+def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Path,
+             as_json: bool, workers: int | None) -> int:
+    from scenarios.cli.progress import bar
+    from scenarios.cli.terminal import print_table
+    from scenarios.config.resolvers import default_resolvers
+    from scenarios.results.comparing import compare
+    from scenarios.results.pool import processors
+
+    missing: dict[str, str] = {}
+    for scenario in scenarios if resolvers is None else ():
+        missing |= default_resolvers(scenario.asks)[1]
+    for spec, remedy in missing.items():
+        print(f"skipped: {spec} is not installed; {remedy}",
+              file=sys.stderr if as_json else sys.stdout)
+    count = workers or processors()
+    with (interruptible(f"the runs made so far are in {shown(folder)}"),
+          bar("runs" if count > 1 else "ticks") as told):
+        comparison = compare(scenarios, resolvers, out=folder, progress=told,
+                             command=_command_line(), workers=count)
+    report = shown(folder / "index.html")
+    if as_json:
+        print_json({"report": report, **comparison.as_plain_data()})
+    else:
+        for runs in comparison.groups().values():
+            print_table(runs)
+        print("", *comparison.refused, sep="\n" if comparison.refused else "")
+        print(f"\nReport: {report}")
+    return max([exit_code(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
+
+
+def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
+                                              autocompletion=complete_sweeps)],
+          out: Annotated[Path | None, output(
+              "Output folder, new or of a sweep to resume. Default: runs/sweep-NAME.")] = None,
+          plugin: Plugins = None, workers: Workers = None, scheduler: Scheduler = None,
+          part: Part = None, as_json: AsJson = False) -> int:
+    """Run scenarios with sampled parameters.
+
+    Run the same command again to resume an interrupted sweep.
+    """
+    asked = workers_of(workers, scheduler, part)
+    from scenarios.results.plan import load_sweep
+    from scenarios.results.sampled import sweep as make
+
+    folder = out if out is not None else Path("runs") / f"sweep-{load_sweep(file).name}"
+    return _sampled(partial(make, file, folder, workers=asked), folder, as_json)
+
+
+def _sampled(make: Callable[..., Finished], folder: Path, as_json: bool) -> int:
+    """Make sampled runs, print their statistics; return 0 if a run finished or a part is made."""
+    from scenarios.cli.progress import bar
+    from scenarios.cli.terminal import print_samples
+    from scenarios.results.store import TABLE
+
+    begun = perf_counter()
+    with (interruptible(f"finished runs are in {folder}, and the same command continues from "
+                        "there"), bar("runs") as told):
+        done = make(progress=told, command=_command_line())
+    seconds, runs = perf_counter() - begun, len(done.plan.runs)
+    if as_json:
+        print_json({"folder": str(folder), "report": str(folder / "index.html"),
+                    "table": str(folder / TABLE), "statistics": str(folder / "results.json"),
+                    "runs": runs, "made_now": done.made, "did_not_reach_their_end": done.failed,
+                    "refused": list(done.plan.refused)})
+        return int(done.failed == runs)
+    for name, results in done.found.items():
+        print_samples(name, results)
+    if done.plan.refused:
+        print("", *done.plan.refused, sep="\n")
+    if not done.found:
+        print(f"{done.made} runs of this part made in {folder}; {seconds:.0f} s\n"
+              "After all parts, the same command without --part makes the table and the page.")
+        return 0
+    kept = f", {runs - done.made} of them from before" if done.made < runs else ""
+    print(f"\n{runs} runs{kept}; {done.failed} did not finish; {seconds:.0f} s")
+    print(f"Report: {folder / 'index.html'}")
+    return int(done.failed == runs)
+
+
+def _command_line() -> str:
+    return shlex.join(["hierarchy", *sys.argv[1:]])

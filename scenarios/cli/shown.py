@@ -1,0 +1,196 @@
+"""`hierarchy view`, `export`, `replay`, `why` and `figures`: show finished runs, or a live one."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+import time
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from scenarios.cli.options import PORT, AsJson, Browser, Plugins, Port, Run, Runs, output
+from scenarios.cli.terminal import print_json, shown
+
+if TYPE_CHECKING:
+    from scenarios.config import Scenario
+    from scenarios.draw.viewer.live_page import LivePage
+
+_POLL = 0.05  # [s] between two looks for the first browser
+
+
+def view(folders: Runs,
+         side_by_side: Annotated[bool, typer.Option(
+             "--side-by-side/--overlay", help="Placement of several runs.")] = True,
+         plugin: Plugins = None,
+         port: Port = PORT, browser: Browser = True) -> int:
+    """Show finished runs in the browser.
+
+    In 3D and as curves; needs the extra `view`.
+    """
+    from scenarios.draw.viewer.server import announce, close, open_server
+    from scenarios.draw.viewer.view import View, labelled
+    from scenarios.measure.run_folder import load_run
+
+    found = [run for folder in folders for run in _runs_in(folder)]
+    runs = labelled(found, [load_run(folder) for folder in found])
+    names = dict.fromkeys(run.scenario.name for run in runs.values())
+    server = open_server(port, ", ".join(names))
+    try:
+        page = View(server, runs, side_by_side)
+        announce(server, browser)
+        page.serve()
+    except KeyboardInterrupt:
+        print()
+    finally:
+        close(server)
+    return 0
+
+
+def _runs_in(folder: Path) -> list[Path]:
+    """Return a run folder, or those of a comparison."""
+    if (folder / "comparison.json").is_file():
+        return sorted(file.parent for file in folder.glob("*/*/run.npz"))
+    return [folder]
+
+
+def show_live(scenario: Scenario, folder: Path, port: int, speed: float, browser: bool,
+              wait: bool = True) -> int:
+    """Run a scenario live in the browser, save the run, and return 1 if it stopped with a fault.
+
+    With `wait` the run starts when the first browser has opened the page.
+
+    The run is saved when it ends or at Ctrl-C, in `folder` or, after a restart, beside it. A run
+    that is restarted before its end is not saved.
+    """
+    from scenarios.draw.viewer.live import Live
+    from scenarios.draw.viewer.live_page import LivePage
+    from scenarios.draw.viewer.server import announce, close, open_server
+
+    live = Live(scenario)
+    server = open_server(port, f"{scenario.name}, live")
+    page = LivePage(server, live, speed)
+    try:
+        announce(server, browser)
+        while wait and not server.get_clients():
+            time.sleep(_POLL)
+        _serve(page, folder)
+    except KeyboardInterrupt:
+        print()
+        if not live.over:
+            _keep(page, folder)
+    finally:
+        close(server)
+    return 1 if live.ending else 0
+
+
+def _serve(page: LivePage, folder: Path) -> None:
+    """Continue the run until Ctrl-C, and save it whenever it ends."""
+    from scenarios.draw.viewer.live_page import FRAMES
+
+    last, kept = time.monotonic(), None
+    while True:
+        time.sleep(1.0 / FRAMES)
+        now = time.monotonic()
+        page.step(now - last)
+        last = now
+        if page.live.over and kept is not page.live.recorder:
+            kept = page.live.recorder
+            _keep(page, folder)
+
+
+def _keep(page: LivePage, folder: Path) -> None:
+    """Save the run in its folder, or in the next free one beside it."""
+    beside = (folder.with_name(f"{folder.name}-{i}") for i in itertools.count(2))
+    free = next(path for path in itertools.chain([folder], beside)
+                if not path.exists() or not any(path.iterdir()))
+    recording = page.live.save(free)
+    print(f"{recording.ticks} ticks in {free}", flush=True)
+    if recording.fault:
+        print(f"hierarchy: fault: {recording.fault}", file=sys.stderr)
+
+
+def export(folder: Run,
+           format: Annotated[str, typer.Option(
+               "--format", metavar="FORMAT", help="mcap. Tables of other formats: "
+               "load_run(RUN).to_dataframe() in Python.")] = "mcap",
+           out: Annotated[Path | None, output(
+               "A new file. Default: run.mcap in RUN.", "FILE")] = None,
+           plugin: Plugins = None, as_json: AsJson = False) -> None:
+    """Export a run as MCAP, with a layout for Foxglove.
+
+    Needs the extra `export`.
+    """
+    from scenarios import load_run
+    from scenarios.export import export as write
+
+    _print_files(write(load_run(folder), out or folder / f"run.{format}"), as_json)
+
+
+def replay(folders: Runs,
+           out: Annotated[Path | None, output(
+               "HTML file to write. Default: RUN/replay.html.", "FILE")] = None,
+           rate: Annotated[float, typer.Option(
+               "--rate", metavar="HZ", help="Frames per second.")] = 30.0,
+           plugin: Plugins = None) -> None:
+    """Write runs as one HTML file that plays without a server."""
+    from scenarios.draw.replay.page import html
+    from scenarios.draw.viewer.view import labelled
+    from scenarios.files import named, write_text
+    from scenarios.measure.run_folder import load_run
+
+    recordings = labelled(folders, [load_run(folder) for folder in folders])
+    titles = dict.fromkeys(one.scenario.title or one.scenario.name for one in recordings.values())
+    target = out if out is not None else folders[0] / "replay.html"
+    text = html(recordings, " · ".join(titles), rate=rate)
+    with named(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_text(target, text)
+    print(f"{target}, {target.stat().st_size / 1e3:.0f} kB")
+
+
+def why(folder: Run,
+        tick: Annotated[int | None, typer.Option(
+            "--tick", metavar="N", help="The change into this tick. Default: the three largest.")
+            ] = None,
+        plugin: Plugins = None, as_json: AsJson = False) -> None:
+    """Say why the command of a run jumped: torque, acceleration or speed.
+
+    Bisects between the rows of two ticks.
+    """
+    from scenarios.measure.jumps import jumps
+    from scenarios.measure.run_folder import load_run
+
+    found = jumps(load_run(folder), tick=tick)
+    if as_json:
+        return print_json({"jumps": [{**vars(one), "causes": [cause._asdict() for cause in
+                                                              one.causes]} for one in found]})
+    for one in found:
+        print(f"tick {one.tick} (t = {one.t:.3f} s): {one}")
+        for kind, text in one.causes or (("other", "no single cause"),):
+            print(fill(f"{kind}: {text}", 80, initial_indent="  ", subsequent_indent="    "))
+
+
+def figures(folders: Runs,
+            style: Annotated[str, typer.Option(
+                "--style", metavar="STYLE",
+                help="screen: SVG and PNG. paper: PDF, one column of a journal wide.")] = "screen",
+            out: Annotated[Path | None, output(
+                "Output folder, new or empty. Default: the run's folder.")] = None,
+            plugin: Plugins = None, as_json: AsJson = False) -> None:
+    """Draw a run's figures again, for screen or paper.
+
+    Several runs are drawn together, as parts (a), (b), ... of the letter's figures.
+    """
+    from scenarios.draw.figures.letter import redraw
+
+    _print_files(redraw(folders, style, out), as_json)
+
+
+def _print_files(files: list[Path], as_json: bool) -> None:
+    names = [shown(file) for file in files]
+    if as_json:
+        return print_json({"files": names})
+    print(*names, sep="\n")
