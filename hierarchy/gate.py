@@ -107,11 +107,6 @@ def checked_sizes(sizes: ArrayLike, rows: int) -> Sizes:
     return np.array(numbers, dtype=np.int64)
 
 
-def unchangeable(numbers: Sizes) -> Sizes:
-    """Return a copy that cannot be made writeable again."""
-    return np.ndarray(numbers.shape, np.int64, numbers.tobytes()).view()
-
-
 def check_rows(name: str, A: Array, lower: Array, upper: Array) -> None:
     """Raise a HierarchyError that names the first bad row of a level, or return None.
 

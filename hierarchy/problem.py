@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import accumulate, pairwise
+from functools import lru_cache
+from itertools import pairwise
 from operator import attrgetter
 from typing import Any, Generic, TypeVar
 
@@ -25,7 +26,6 @@ from hierarchy.gate import (
     readable,
     shaped,
     sound_rows,
-    unchangeable,
 )
 from hierarchy.notebook import html_table
 from hierarchy.records import set_frozen
@@ -39,14 +39,22 @@ _Kind = TypeVar("_Kind")
 class _HandedOut(Generic[_Kind]):
     """An array that a hierarchy hands out as a view: numpy lets its holder change its shape."""
 
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._kept = attrgetter(f"_{name}")
+    def __init__(self, kept: Callable[[Any], Any]) -> None:
+        self._kept = kept
 
     def __get__(self, h: Hierarchy | None, owner: type) -> _Kind:
         if h is None:
             return self  # type: ignore[return-value]
         array: Any = self._kept(h)
         return None if array is None else array.view()  # type: ignore[return-value]
+
+
+@lru_cache(maxsize=256)
+def _layout(sizes: bytes) -> tuple[Sizes, Sizes]:
+    """Return sizes and offsets of levels that nobody can change, from the bytes of the sizes."""
+    kept = np.frombuffer(sizes, np.int64)
+    offsets = np.frombuffer(np.append(0, kept.cumsum()).tobytes(), np.int64)
+    return kept.view(), offsets.view()  # whose `base` is another array
 
 
 class Hierarchy:
@@ -67,12 +75,14 @@ class Hierarchy:
     views, sizes and offsets read-only; see docs/arrays.md.
     """
 
-    __slots__ = ("_A", "_give", "_lower", "_metric", "_offsets", "_reference", "_sizes", "_upper",
-                 "m", "n", "named", "names", "plain", "rows", "start")
+    __slots__ = ("_give", "_metric", "_reference", "m", "n", "named", "names", "plain", "rows",
+                 "start")
 
-    A, lower, upper, reference = (_HandedOut[Array]() for _ in range(4))
-    sizes, offsets = _HandedOut[Sizes](), _HandedOut[Sizes]()
-    metric, give = _HandedOut[Array | None](), _HandedOut[Array | None]()
+    A, lower, upper = (_HandedOut[Array](lambda h, i=i: h.rows[i]) for i in range(3))
+    sizes, offsets = (_HandedOut[Sizes](lambda h, i=i: _layout(h.rows[3].tobytes())[i])
+                      for i in range(2))
+    reference = _HandedOut[Array](attrgetter("_reference"))
+    metric, give = (_HandedOut[Array | None](attrgetter(name)) for name in ("_metric", "_give"))
 
     n: int
     m: int
@@ -81,11 +91,6 @@ class Hierarchy:
     plain: bool
     rows: tuple[Array, Array, Array, Sizes]
     start: Callable[[], Array]
-    _A: Array
-    _lower: Array
-    _upper: Array
-    _sizes: Sizes
-    _offsets: Sizes
     _reference: Array
     _metric: Array | None
     _give: Array | None
@@ -190,17 +195,15 @@ class Hierarchy:
         names = level_names(None, len(sizes)) if names is None else tuple(names)
         if len(names) != len(sizes):
             raise HierarchyError(f"{len(names)} names for {len(sizes)} levels")
-        offsets = np.fromiter(accumulate(sizes.tolist(), initial=0), np.int64)
         set_frozen(
             self, rows=(A, lower, upper, sizes), start=reference.copy, m=m, n=n, names=names,
-            named=None, plain=metric is None and give is None, _A=A, _lower=lower, _upper=upper,
-            _reference=reference, _sizes=unchangeable(sizes), _offsets=unchangeable(offsets),
+            named=None, plain=metric is None and give is None, _reference=reference,
             _metric=None if metric is None else shaped("metric", metric, (n, n)),
             _give=None if give is None else shaped("give", give, (m,)))
 
     def _check_values(self) -> None:
         """Raise a HierarchyError that names the first bad value, or return None."""
-        if not sound_rows(self._A, self._lower, self._upper):
+        if not sound_rows(*self.rows[:3]):
             for name, level in zip(self.names, self.levels(), strict=True):
                 check_rows(name, *level)
         check_finite("reference", self._reference)
@@ -213,12 +216,14 @@ class Hierarchy:
     @property
     def is_equality(self) -> bool:
         """Whether every row is an equality."""
-        return bool((self._lower == self._upper).all())
+        _, lower, upper, _ = self.rows
+        return bool((lower == upper).all())
 
     def levels(self) -> Iterator[tuple[Array, Array, Array]]:
         """Yield `(A_k (m_k, n), lower_k (m_k,), upper_k (m_k,))` as views, top level first."""
+        A, lower, upper, _ = self.rows
         for first, last in self._bounds():
-            yield self._A[first:last], self._lower[first:last], self._upper[first:last]
+            yield A[first:last], lower[first:last], upper[first:last]
 
     @property
     def giving(self) -> list[int]:
@@ -227,17 +232,17 @@ class Hierarchy:
         if give is None:
             return []
         rows = np.flatnonzero(give > 0.0)
-        return sorted(set((np.searchsorted(self._offsets, rows, side="right") - 1).tolist()))
+        return sorted(set((np.searchsorted(self.offsets, rows, side="right") - 1).tolist()))
 
     def _bounds(self) -> Iterator[tuple[int, int]]:
         """Yield the first row of each level and the one after its last."""
-        return pairwise(self._offsets.tolist())
+        return pairwise(self.offsets.tolist())
 
     def upper_part(self, count: int) -> Hierarchy:
         """Return the first `count` levels, as views, none of which gives."""
-        m = self._offsets[count]
-        return self.changed(A=self._A[:m], lower=self._lower[:m], upper=self._upper[:m],
-                            sizes=self._sizes[:count], names=self.names[:count], give=None,
+        m = self.offsets[count]
+        return self.changed(A=self.A[:m], lower=self.lower[:m], upper=self.upper[:m],
+                            sizes=self.sizes[:count], names=self.names[:count], give=None,
                             named=None)
 
     def relaxed(self, level: int, x: ArrayLike) -> Hierarchy:
@@ -248,9 +253,9 @@ class Hierarchy:
         (n,) is optimal for the levels down to this one, which do not give any more.
         """
         assert self._give is not None, "the hierarchy gives"
-        rows = slice(*self._offsets[level:level + 2])
-        slack, lower, upper = self.slacks(x)[rows], self._lower.copy(), self._upper.copy()
-        reach = np.linalg.norm(self._A[rows], axis=1) * float(np.linalg.norm(x))
+        rows = slice(*self.offsets[level:level + 2])
+        slack, lower, upper = self.slacks(x)[rows], self.lower.copy(), self.upper.copy()
+        reach = np.linalg.norm(self.A[rows], axis=1) * float(np.linalg.norm(x))
         slack[np.abs(slack) <= _ROUNDING * (1.0 + reach)] = 0.0
         room = np.abs(slack) + self._give[rows]
         lower[rows] -= room
@@ -264,8 +269,9 @@ class Hierarchy:
 
         Raises HierarchyError for another shape.
         """
-        value = self._A @ shaped("x", x, (self.n,))
-        return np.maximum(value - self._upper, 0.0) - np.maximum(self._lower - value, 0.0)
+        A, lower, upper, _ = self.rows
+        value = A @ shaped("x", x, (self.n,))
+        return np.maximum(value - upper, 0.0) - np.maximum(lower - value, 0.0)
 
     def violations(self, x: ArrayLike) -> Array:
         """Euclidean norm of each level's violation at x: (L,).

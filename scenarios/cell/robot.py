@@ -14,7 +14,7 @@ from scenarios.cell.contacts import on_contacts
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.errors import naming
 from scenarios.config.references import References
-from scenarios.config.robot import RobotSection, StartSection
+from scenarios.config.robot import RobotPointSection, RobotSection, StartSection
 from solvers import make
 
 _REACHED = 1e-6      # [m]
@@ -44,9 +44,8 @@ def _made(section: RobotSection) -> Robot:
                        section.root)
     if section.control_points is not None:
         robot.control_points = tuple(
-            robot.control_point(point.joint, point.offset) if point.joint is not None
-            else robot.control_point_of_frame(str(point.frame), point.offset)
-            for point in section.control_points)
+            _point(robot, point, f"control_points.{i}")
+            for i, point in enumerate(section.control_points))
     if section.capsules is not None:
         base = 1 if robot.base == "floating" else 0
         robot.capsules = tuple(
@@ -55,6 +54,13 @@ def _made(section: RobotSection) -> Robot:
                     capsule.start, capsule.end, capsule.radius)
             for i, capsule in enumerate(section.capsules, 1))
     return robot
+
+
+def _point(robot: Robot, section: RobotPointSection, key: str) -> ControlPoint:
+    with naming(key):
+        if section.joint is not None:
+            return robot.control_point(section.joint, section.offset)
+        return robot.control_point_of_frame(str(section.frame), section.offset)
 
 
 def sensed_points(robot: Robot) -> tuple[ControlPoint, ...]:

@@ -61,7 +61,8 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
     limits, first = _first(scenario, at)
     areas, avoiding = _avoidance(scenario, at)
     position, pointing = _position(scenario, at), _pointing(scenario, at)
-    listed = [_made(section, at) for section in scenario.tasks if section.kind != "collision"]
+    listed = [_made(section, at, f"tasks.{i}") for i, section in enumerate(scenario.tasks)
+              if section.kind != "collision"]
     posture = None if scenario.posture is None else _made(scenario.posture, at)
     last = posture if scenario.posture and scenario.posture.role == "task" else None
     tasks = _in_order(scenario, [*first, *avoiding, *(
@@ -179,9 +180,9 @@ def _reference(scenario: Scenario, at: References, posture: Task | None) -> Task
     return CumulatedRepulsion(at.robot.n, points, avoidance.far, base)
 
 
-def _made(section: Made, at: References) -> Task:
-    """Make a task; raises ScenarioError, naming it, where it does not fit the robot."""
-    with naming(f"task {section.title!r}"):
+def _made(section: Made, at: References, key: str = "") -> Task:
+    """Make a task; raises ScenarioError, naming its key, where it does not fit the robot."""
+    with naming(key or section.title):
         return section.make(at)
 
 

@@ -120,9 +120,6 @@ def _print(scenario: Scenario, recording: Recording, certify: bool) -> None:
 
     resolver = scenario.make_resolver()
     print_table([Run(scenario, scenario.control.resolver, str(resolver.label), recording)])
-    if not resolver.strict:
-        print(f"\n{resolver.label} is inexact where a level loses rank, and then lower levels "
-              "disturb it;\n`--resolver hcod` keeps strict priorities at every rank.")
     if certify:
         print(f"\n{certified(recording, resolver.damping)}")
     for line in (*troubles(recording), *levels_given_up(recording)):

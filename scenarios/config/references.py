@@ -12,7 +12,7 @@ from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules, 
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
-from scenarios.config.errors import ScenarioError
+from scenarios.config.errors import ScenarioError, naming
 
 Pairs = list[tuple[int, int]]
 _POSTURES = 200
@@ -39,9 +39,10 @@ class References:
         assert self.contacts_or_none is not None, "the level of the scenario was checked"
         return self.contacts_or_none
 
-    def frame(self, name: str | None) -> Frame:
-        """Return a frame by name, the end effector for None; raises UnknownNameError."""
-        return self.robot.frame(name or self.robot.end_effector)
+    def frame(self, name: str | None, key: str = "frame") -> Frame:
+        """Return the frame that `key` names, the end effector for None; ScenarioError if none."""
+        with naming(key):
+            return self.robot.frame(name or self.robot.end_effector)
 
     def pairs(self, distance: float) -> Pairs:
         """Return the pairs of capsules to keep at a distance [m]; ScenarioError if none can be."""

@@ -18,6 +18,16 @@ if TYPE_CHECKING:
     from scenarios.recording.facts import ResolverFacts
     from scenarios.recording.recording import Recording
 
+# How a resolver that is not strict departs from strict priorities, by its name.
+_DEPARTS = {
+    "": "not strict, a lower level can disturb a higher one",
+    "tpm": "inexact where a level loses rank, where lower levels disturb it",
+    "reverse": "inexact from the second level on where targets conflict",
+    "augmented": "one least-squares problem without priorities",
+    "weighted": "trades levels off by weights, a lower one disturbs a higher one a little",
+    "merged": "trades levels off by weights in motion, not at rest",
+    "smooth": "not strict while a row is partly active"}
+
 
 @dataclass(frozen=True)
 class Run:
@@ -132,7 +142,7 @@ def caveats(resolvers: Mapping[str, ResolverFacts]) -> dict[str, list[str]]:
     damped = {label: one.damped.replace("each pivot", "each level")
               for label, one in resolvers.items()}
     first = next(iter(resolvers), "")
-    return {label: ["not strict at every rank"] * (not one.strict)
+    return {label: [_DEPARTS.get(one.name, _DEPARTS[""])] * (not one.strict)
             + [f"damped differently from {first}"] * (damped[label] != damped[first])
             for label, one in resolvers.items()}
 

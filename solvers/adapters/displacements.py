@@ -13,21 +13,11 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from hierarchy.errors import HierarchyError
-from hierarchy.gate import check_rows
+from hierarchy.gate import array_of, check_rows
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
-from solvers.adapters.packing import (
-    CONTRADICT,
-    ODD,
-    make_triangular,
-    squared,
-    write_bounds,
-    write_limits,
-    write_pull,
-    write_task,
-)
+from solvers.adapters.packing import CONTRADICT, GIVEN, ODD, damp, write_limits, write_tasks
 
-_FLOAT = np.dtype(np.float64)
 _AXES = ("x", "y", "z", "about x", "about y", "about z")
 _NO_DAMPING = 1e-12  # pink's default: a level above others leaves it out
 
@@ -76,37 +66,30 @@ def hierarchy(configuration: object, joints: Names, n: int, period: float,
     """
     if not 0.0 < period < np.inf:
         raise HierarchyError(f"period {period} s must be positive and finite")
-    entries = [entry if isinstance(entry, Sequence) else [entry] for entry in tasks]
-    damped = pull is not None
-    held = [_read(task, configuration, damped, weighted=False) for task in constraints]
-    levels = [[_read(task, configuration, damped) for task in together] for together in entries]
-    read = [*held, *(one for level in levels for one in level)]
-    packed = _Packed(n, sum(len(one[2]) for one in limits) + sum(len(one.e) for one in read)
-                     + 2 * n)
-    packed.keep("limits", packed.limit(limits, period, joints))
-    packed.keep("constraints", packed.write(held, period))
-    for level in levels:
-        if packed.damped and any(one.cost.any() for one in level):
-            packed.hold(solve, period)
-        last = packed.write(level, period)
-        if pull is not None and last > packed.rows:
-            last = packed.damp(last, level, pull)
-        packed.keep(" + ".join([label(one.task) for one in level]), last)
-    return packed.hierarchy(partial(_row_names, packed, joints, limits, read))
+    entries = [constraints, *(one if isinstance(one, Sequence) else (one,) for one in tasks)]
+    read = [[_read(task, configuration, pull is not None) for task in entry] for entry in entries]
+    packed = _Packed(n, period, limits, read, pull)
+    packed.keep("limits", packed.limit(joints))
+    packed.keep("constraints", packed.write(read[0], weighted=False))
+    for level in read[1:]:
+        if packed.weight and any(np.any(_costs(task, len(e))) for task, _, e in level):
+            packed.hold(solve)
+        packed.level(level)
+    return packed.hierarchy(partial(_row_names, packed, joints))
 
 
 class ContradictionError(HierarchyError):
     """Limits of one joint that no velocity meets."""
 
 
-def _row_names(packed: _Packed, joints: Names, limits: Sequence[Limit],
-               read: Sequence[_Read]) -> tuple[str, ...]:
+def _row_names(packed: _Packed, joints: Names) -> tuple[str, ...]:
     """Name each row: by its joint if it is about a single one, else by its limit or task."""
     known = list(joints())
     above, free = (packed.sizes[0] if packed.names[:1] == ["limits"] else 0), packed.rows
-    free -= packed.sizes[-1] if packed.damped else 0
-    of_tasks = [name for one in read for name in _names_of(one)][:free - above]
-    of_limits = [f"{name}, row {i}" for name, G, h in limits for i, side in enumerate(h)
+    free -= packed.sizes[-1] if packed.weight else 0
+    of_tasks = [name for level in packed.read for one in level
+                for name in _names_of(*one)][:free - above]
+    of_limits = [f"{name}, row {i}" for name, G, h in packed.limits for i, side in enumerate(h)
                  if side < np.inf and np.count_nonzero(G[i]) != 1]
     rows = of_limits + [""] * (above - len(of_limits)) + of_tasks
     rows += [f"{packed.names[-1]}, row {i}" for i in range(packed.rows - free)]
@@ -117,22 +100,27 @@ def _row_names(packed: _Packed, joints: Names, limits: Sequence[Limit],
     return tuple(rows)
 
 
-def _names_of(one: _Read) -> list[str]:
+def _names_of(task: Task, J: Array, e: Array) -> list[str]:
     """Name the rows of a task that cost something: axes of its frame, or their number."""
-    frame = _frame_of(one.task)
-    axes = _AXES[:len(one.e)] if frame and len(one.e) in (3, 6) else ()
-    names = [f"{frame} {axis}" for axis in axes] or [f"row {i}" for i in range(len(one.e))]
-    return [name for name, cost in zip(names, one.cost, strict=True) if cost != 0.0]
+    frame = _frame_of(task)
+    axes = _AXES[:len(e)] if frame and len(e) in (3, 6) else ()
+    names = [f"{frame} {axis}" for axis in axes] or [f"row {i}" for i in range(len(e))]
+    return [name for name, cost in zip(names, _costs(task, len(e)), strict=True) if cost != 0.0]
 
 
 class _Packed:
-    """Arrays for at most `most` rows, and the levels written so far."""
+    """The levels written so far, and a table of what limits and tasks give, see `packing`."""
 
-    def __init__(self, n: int, most: int) -> None:
-        self.A, (self.lower, self.upper) = np.empty((most, n)), np.empty((2, most))
-        self.reference, self.rows = np.zeros(n), 0
-        self.damped: Sequence[_Read] = ()  # the tasks of the last level, if it weighs the step
-        self.weight = 0.0                  # that weight
+    def __init__(self, n: int, period: float, limits: Sequence[Limit],
+                 read: Sequence[Sequence[_Read]], pull: Pull | None) -> None:
+        self.period, self.limits, self.read, self.pull = period, limits, read, pull
+        given = sum([len(h) for _, _, h in limits])
+        most = given + sum([len(e) for level in read for _, _, e in level])
+        self.table = np.empty((most, n + GIVEN))
+        self.A, self.sides = np.empty((most + 2 * n, n)), np.empty((2, most + 2 * n))
+        self.rows, self.filled = 0, 0
+        self.weight = 0.0  # of the step in the last level, whose rows in the table are `last`
+        self.last = (0, 0)
         self.names: list[str] = []
         self.sizes: list[int] = []
 
@@ -144,57 +132,65 @@ class _Packed:
             self.sizes.append(last - self.rows)
             self.rows = last
 
-    def limit(self, limits: Sequence[Limit], period: float, joints: Names) -> int:
+    def limit(self, joints: Names) -> int:
         """Write the rows G x <= h / period from row 0 on: one for a joint, after all others.
 
         Returns their number. Raises HierarchyError for numbers that are not finite, or contradict.
         """
-        n, row = len(self.reference), 0
-        lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
-        given = [(name, _plain(G), _plain(h)) for name, G, h in limits]
-        for name, G, h in given:
-            if (*h.shape, n) != G.shape:
-                raise _unfit(name, G, h, n)
-            row = int(write_limits(G, h, period, (lower, upper), self.A, self.lower, self.upper,
-                                   row))
-            if row == ODD:
-                check_rows(name, G, _filled(len(h), -np.inf), h)
-        last = int(write_bounds(lower, upper, self.A, self.lower, self.upper, row))
-        if last == CONTRADICT:
-            i = int(np.flatnonzero(lower > upper)[0])
-            raise _contradiction(given, n, period, i, joints()[i])
+        n = self.A.shape[1]
+        for name, G, h in self.limits:
+            self._give(name, G, h)
+        last = int(write_limits(self.table, 0, self.filled, self.period, np.empty((2, n)), self.A,
+                                self.sides))
+        if last <= CONTRADICT:
+            raise _contradiction(self, CONTRADICT - last, joints)
+        if last == ODD:
+            for name, G, h in self.limits:
+                check_rows(name, G, np.full(len(h), -np.inf), h)
         return last
 
-    def write(self, read: Sequence[_Read], period: float) -> int:
+    def write(self, level: Sequence[_Read], weighted: bool = True) -> int:
         """Write the rows of tasks that share a level; return the row after them."""
-        row = self.rows
-        for one in read:
-            if (*one.e.shape, self.A.shape[1]) != one.J.shape:
-                raise _unfit(label(one.task), one.J, one.e, self.A.shape[1])
-            found = write_task(one.J, one.e, one.cost, one.gain / period, self.A, self.lower,
-                               self.upper, row)
-            if found == ODD:
-                check_rows(label(one.task), one.J, one.e, one.e)
-                raise HierarchyError(f"{label(one.task)}: its costs {one.cost} or gain {one.gain} "
-                                     "are not finite")
-            row = int(found)
+        if not level:
+            return self.rows
+        first = self.filled
+        for task, J, e in level:
+            row, n = self.filled, self.A.shape[1]
+            self._give(task, J, e)
+            own = self.table[row:self.filled]
+            own[:, n + 1] = _costs(task, len(e)) if weighted else 1.0
+            own[:, n + 2], own[:, n + 3] = task.gain, getattr(task, "lm_damping", 0.0) or 0.0
+        self.last = first, self.filled
+        row = int(write_tasks(self.table, *self.last, self.period, self.A, self.sides, self.rows))
+        if row == ODD:
+            for task, J, e in level:
+                check_rows(label(task), J, e, e)
+            raise HierarchyError(f"{' + '.join([label(one[0]) for one in level])}: its costs or "
+                                 "gain are not finite")
         return row
 
-    def damp(self, last: int, level: Sequence[_Read], pull: Pull) -> int:
-        """Weigh the step in the level that ends before row `last`; return the row after it.
+    def _give(self, what: str | Task, rows: Array, sides: Array) -> None:
+        """Put rows (k, n) and sides (k,) into the table."""
+        n, first = self.A.shape[1], self.filled
+        self.filled = last = first + len(sides)
+        if rows.shape != (last - first, n):
+            name = what if isinstance(what, str) else label(what)
+            raise HierarchyError(f"{name}: {rows.shape} rows for {sides.shape} values and {n} "
+                                 "unknowns")
+        self.table[first:last, :n], self.table[first:last, n] = rows, sides
 
-        n rows then stand for all of the level: what its best x misses says nothing of that x.
-        """
-        weight = sum(one.damping for one in level) + pull.weight
-        if weight == 0.0:
-            return last
-        n = len(self.reference)
-        self.damped, self.weight = level, weight
-        write_pull(self.A, self.lower, self.upper, weight, pull.weight / weight * pull.centre, last)
-        make_triangular(self.A, self.lower, self.upper, self.rows, last + n)
-        return self.rows + n
+    def level(self, level: Sequence[_Read]) -> None:
+        """Write tasks as a level; if its step is weighed, n rows then stand for all of it."""
+        last = self.write(level)
+        if self.pull is not None and last > self.rows:
+            weight, centre = self.pull
+            self.weight = damp(self.table, *self.last, weight, centre, self.A, self.sides,
+                               self.rows, last)
+            if self.weight > 0.0:
+                last = self.rows + self.A.shape[1]
+        self.keep(" + ".join([label(one[0]) for one in level]), last)
 
-    def hold(self, solve: Solve | None, period: float) -> None:
+    def hold(self, solve: Solve | None) -> None:
         """Make the last level, which weighs its step, ask for what it then reaches."""
         x = None
         if self.weight > _NO_DAMPING:
@@ -203,74 +199,51 @@ class _Packed:
                                      "leaves to the levels below needs a resolver")
             x = solve(self.hierarchy())
         first = self.rows = self.rows - self.sizes.pop()
-        name, last = self.names.pop(), self.write(self.damped, period)
-        self.damped = ()
+        last = int(write_tasks(self.table, *self.last, self.period, self.A, self.sides, first))
+        self.weight = 0.0
         if x is not None:
-            self.lower[first:last] = self.upper[first:last] = self.A[first:last] @ x
-        self.keep(name, last)
+            self.sides[:, first:last] = self.A[first:last] @ x
+        self.keep(self.names.pop(), last)
 
     def hierarchy(self, named: Callable[[], tuple[str, ...]] | None = None) -> Hierarchy:
         """Return the levels; a level is named like another one with a number."""
-        m = self.rows
-        return Hierarchy.trusted(self.A[:m], self.lower[:m], self.upper[:m], self.sizes,
-                                 self.reference, self.names, named=named)
+        lower, upper = self.sides[:, :self.rows]
+        return Hierarchy.trusted(self.A[:self.rows], lower, upper, self.sizes, None, self.names,
+                                 named=named)
 
 
-def _contradiction(limits: Sequence[Limit], n: int, period: float, i: int,
-                   joint: str) -> ContradictionError:
+def _contradiction(packed: _Packed, i: int, joints: Names) -> ContradictionError:
     """Return the error that names the two limits that leave unknown i no value."""
-    lows, highs = [], []
-    for name, G, h in limits:
-        lower, upper = _filled(n, -np.inf), _filled(n, np.inf)
-        spare = np.empty((len(h), n)), np.empty(len(h)), np.empty(len(h))
-        write_limits(G, h, period, (lower, upper), *spare, 0)
-        lows.append((float(lower[i]), name))
-        highs.append((float(upper[i]), name))
+    lows, highs, first = [], [], 0
+    for name, _, h in packed.limits:
+        bounds, spare = np.empty((2, packed.A.shape[1])), np.empty((2, *packed.A.shape))
+        last = first + len(h)
+        write_limits(packed.table, first, last, packed.period, bounds, spare[0], packed.sides)
+        lows.append((float(bounds[0, i]), name))
+        highs.append((float(bounds[1, i]), name))
+        first = last
     (low, demands), (high, allows) = max(lows), min(highs)
     return ContradictionError(
-        f"limits cannot all hold: joint {joint} must move by at least {low:.4g} ({demands}) and at "
-        f"most {high:.4g} rad/s or m/s ({allows}); a joint outside its range needs a velocity "
-        "limit that lets it come back within the period")
+        f"limits cannot all hold: joint {joints()[i]} must move by at least {low:.4g} ({demands}) "
+        f"and at most {high:.4g} rad/s or m/s ({allows}); a joint outside its range needs a "
+        "velocity limit that lets it come back within the period")
 
 
-class _Read(NamedTuple):
-    """What a task says: J (k, n), e (k,), cost (k,), gain, and the weight of its lm_damping."""
-
-    task: Task
-    J: Array
-    e: Array
-    cost: Array
-    gain: float
-    damping: float
+_Read = tuple[Task, Array, Array]  # a task, J (k, n), e (k,)
 
 
-def _read(task: Task, configuration: object, damped: bool, weighted: bool = True) -> _Read:
+def _read(task: Task, configuration: object, damped: bool) -> _Read:
     if not (hasattr(task, "compute_error") and hasattr(task, "compute_jacobian")):
         raise HierarchyError(f"{label(task)}: not a task with an error and a Jacobian, so it "
                              "cannot be a level")
-    lm = float(getattr(task, "lm_damping", 0.0) or 0.0)
-    if lm and not damped:
+    if not damped and (lm := getattr(task, "lm_damping", 0.0)):
         raise HierarchyError(f"{label(task)}: lm_damping = {lm:g} weighs the task against its "
                              "own step, which a strict level cannot; set it to 0 and use the "
                              "damping of the resolver")
-    J, e = _plain(task.compute_jacobian(configuration)), _plain(task.compute_error(configuration))
-    if J.ndim == 1 and e.ndim == 1 and J.size == e.size:
+    J, e = task.compute_jacobian(configuration), task.compute_error(configuration)
+    if J.ndim == 1 and e.ndim == 1:
         J = J.reshape(-1, 1)  # as pinocchio returns the Jacobian of a single joint
-    cost = _costs(task, len(e)) if weighted else _filled(len(e), 1.0)
-    gain = float(task.gain)
-    return _Read(task, J, e, cost, gain, lm * gain * gain * squared(cost, e) if lm else 0.0)
-
-
-def _unfit(what: str, rows: Array, sides: Array, n: int) -> HierarchyError:
-    """Return the error of rows that are not (k, n) with sides (k,): kernels do not look."""
-    return HierarchyError(f"{what}: {rows.shape} rows for {sides.shape} values and {n} unknowns")
-
-
-def _plain(values: Any) -> Array:
-    """Return numbers as an array that kernels take without being compiled anew."""
-    if type(values) is np.ndarray and values.dtype == _FLOAT and values.flags.carray:
-        return values
-    return np.array(values, dtype=np.float64, order="C")
+    return task, J, e
 
 
 def residual(task: Task, configuration: object) -> tuple[Array, Array]:
@@ -282,29 +255,21 @@ def residual(task: Task, configuration: object) -> tuple[Array, Array]:
     ------
     HierarchyError : the task is not of the form J dq = -gain e, or has lm_damping.
     """
-    one = _read(task, configuration, False)
-    asked = one.cost != 0.0
-    return one.cost[asked, None] * one.J[asked], -one.cost[asked] * one.e[asked]
+    _, J, e = _read(task, configuration, False)
+    cost = np.broadcast_to(_costs(task, len(e)), e.shape)
+    asked = cost != 0.0
+    return cost[asked, None] * J[asked], -cost[asked] * e[asked]
 
 
-def _costs(task: Task, rows: int) -> Array:
-    """Return the cost of each row of a task: (rows,); ones for a task without a cost."""
+def _costs(task: Task, rows: int) -> Array | float:
+    """Return the cost of each row of a task, or of all; 1 for a task without a cost."""
     given = getattr(task, "cost", None)
     if given is None or type(given) is float:
-        return _filled(rows, 1.0 if given is None else given)
-    cost = _plain(given)
-    if cost.shape == (rows,):
-        return cost
-    if cost.shape not in ((), (1,)):
+        return 1.0 if given is None else given
+    cost = given if type(given) is np.ndarray else array_of(f"{label(task)}: cost", given)
+    if cost.size not in (1, rows):
         raise HierarchyError(f"{label(task)}: {cost.size} costs for {rows} rows")
-    return _filled(rows, float(cost.item()))
-
-
-def _filled(size: int, value: float) -> Array:
-    """Return what `np.full` does, in a fifth of its time."""
-    filled = np.empty(size)
-    filled.fill(value)
-    return filled
+    return cost
 
 
 def label(task: object) -> str:

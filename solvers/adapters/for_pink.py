@@ -105,15 +105,16 @@ def _qp_solvers() -> frozenset[str]:
 
 def _check_held(h: Hierarchy, resolution: Resolution, tolerance: float) -> None:
     """Raise NoSolutionFound if limits or constraints do not hold."""
+    A, lower, upper, sizes = h.rows
     first = 0
-    for name, size in zip(h.names, h.sizes.tolist(), strict=True):
+    for name, size in zip(h.names, sizes.tolist(), strict=True):
         if name not in _ALWAYS:
             return
-        beyond = largest_violation(h.A, h.lower, h.upper, resolution.x, first, first + size)
-        if beyond > tolerance:
-            raise _no_solution(h, resolution, _conflict(h, resolution.x, name, first, first + size,
+        last = first + size
+        if largest_violation(A, lower, upper, resolution.x, first, last) > tolerance:
+            raise _no_solution(h, resolution, _conflict(h, resolution.x, name, first, last,
                                                         tolerance))
-        first += size
+        first = last
 
 
 def _conflict(h: Hierarchy, x: Array, name: str, first: int, last: int, tolerance: float) -> str:

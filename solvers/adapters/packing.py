@@ -1,7 +1,8 @@
 """Kernels that write tasks and limits of pink and mink into the rows of a hierarchy.
 
 An adapter is called once per tick of somebody's loop; small arrays in numpy would take longer than
-the solve.
+the solve. All that is given stands in one table, a row for each row of a limit or task: n entries
+of G or J, then h or e, and of a task its cost, gain and lm_damping.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -10,80 +11,81 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import compiled
+from hierarchy.jit import compiled, inlined
 from solvers.kernels.tableau import reflect_columns
 
+GIVEN = 4        # columns of the table after those of the unknowns
 ODD = -1         # returned for rows with numbers that are not finite, apart from missing limits
-CONTRADICT = -2  # returned for bounds that no value meets
+CONTRADICT = -2  # returned for bounds that no value meets, minus the number of the unknown
 
 
 @compiled
-def write_limits(G, h, period, bounds, A, low, up, row):
-    """Write the rows G x <= h / period on several unknowns from `row` on.
+def write_limits(table, first, last, period, bounds, A, sides):
+    """Write the rows G x <= h / period of the table from row 0 on, after them those on one unknown.
 
-    Rows on a single one narrow its bounds, two of (n,); rows with infinite h are no limits.
-    Returns the row after them, or ODD.
+    Of these each unknown that has any gets one row; bounds (2, n) are what they leave it. Rows with
+    infinite h are no limits. Returns the row after them, ODD or CONTRADICT.
     """
-    lower, upper = bounds
-    for i in range(len(h)):
-        if np.isnan(h[i]) or h[i] == -np.inf:
+    n, row = A.shape[1], 0
+    for c in range(n):
+        bounds[0, c], bounds[1, c] = -np.inf, np.inf
+    for i in range(first, last):
+        h = table[i, n] / period
+        if np.isnan(h) or h == -np.inf:
             return ODD
-        if h[i] == np.inf:
+        if h == np.inf:
             continue
         unknown, count = -1, 0
-        for c in range(G.shape[1]):
-            if not np.isfinite(G[i, c]):
+        for c in range(n):
+            if not np.isfinite(table[i, c]):
                 return ODD
-            if G[i, c] != 0.0:
+            if table[i, c] != 0.0:
                 unknown, count = c, count + 1
         if count != 1:
-            for c in range(A.shape[1]):
-                A[row, c] = G[i, c]
-            low[row], up[row] = -np.inf, h[i] / period
+            for c in range(n):
+                A[row, c] = table[i, c]
+            sides[0, row], sides[1, row] = -np.inf, h
             row += 1
-        elif G[i, unknown] > 0.0:
-            upper[unknown] = min(upper[unknown], h[i] / period / G[i, unknown])
+        elif table[i, unknown] > 0.0:
+            bounds[1, unknown] = min(bounds[1, unknown], h / table[i, unknown])
         else:
-            lower[unknown] = max(lower[unknown], h[i] / period / G[i, unknown])
+            bounds[0, unknown] = max(bounds[0, unknown], h / table[i, unknown])
+    return _write_bounds(bounds, A, sides, row)
+
+
+@inlined
+def _write_bounds(bounds, A, sides, row):
+    for c in range(A.shape[1]):
+        if bounds[0, c] > bounds[1, c]:
+            return CONTRADICT - c
+        if bounds[0, c] > -np.inf or bounds[1, c] < np.inf:
+            for j in range(A.shape[1]):
+                A[row, j] = 0.0
+            A[row, c] = 1.0
+            sides[0, row], sides[1, row] = bounds[0, c], bounds[1, c]
+            row += 1
     return row
 
 
 @compiled
-def write_bounds(lower, upper, A, low, up, row):
-    """Write the bounds that exist as rows of the identity from `row` on.
+def write_tasks(table, first, last, period, A, sides, row):
+    """Write the rows cost J x = -cost gain / period e of the table from `row` on.
 
-    Returns the row after them, or CONTRADICT.
+    Rows that cost nothing are left out. Returns the row after them, or ODD.
     """
-    for c in range(len(lower)):
-        if lower[c] > upper[c]:
-            return CONTRADICT
-        if lower[c] == -np.inf and upper[c] == np.inf:
+    n = A.shape[1]
+    for i in range(first, last):
+        cost = table[i, n + 1]
+        if cost == 0.0:
             continue
-        for j in range(A.shape[1]):
-            A[row, j] = 0.0
-        A[row, c] = 1.0
-        low[row], up[row] = lower[c], upper[c]
-        row += 1
-    return row
-
-
-@compiled
-def write_task(J, e, cost, rate, A, low, up, row):
-    """Write cost J x = -cost rate e from `row` on, without rows that cost nothing.
-
-    Returns the row after them, or ODD.
-    """
-    for i in range(len(e)):
-        if cost[i] == 0.0:
-            continue
-        value = -cost[i] * rate * e[i]
+        value = -cost * (table[i, n + 2] / period) * table[i, n]
         if not np.isfinite(value):
             return ODD
-        for c in range(A.shape[1]):
-            A[row, c] = cost[i] * J[i, c]
+        for c in range(n):
+            A[row, c] = cost * table[i, c]
             if not np.isfinite(A[row, c]):
                 return ODD
-        low[row] = up[row] = value
+        sides[0, row] = sides[1, row] = value
         row += 1
     return row
 
@@ -101,39 +103,40 @@ def largest_violation(A, lower, upper, x, first, last):
 
 
 @compiled
-def squared(cost, e):
-    """|cost e|^2, row by row."""
-    total = 0.0
-    for i in range(len(e)):
-        total += (cost[i] * e[i]) ** 2
+def damp(table, first, last, weight, centre, A, sides, row, end):
+    """Weigh the step in the level of these rows of the table, which was written from row to end.
+
+    `weight` is that of a pull to `centre` (n,); each task adds its lm_damping |gain cost e|^2.
+    Returns the sum; if it is not zero, n rows then stand for the level: what its best x misses says
+    nothing of that x.
+    """
+    n, total = A.shape[1], weight
+    for i in range(first, last):
+        total += table[i, n + 3] * (table[i, n + 2] * table[i, n + 1] * table[i, n]) ** 2
+    if total > 0.0:
+        for c in range(n):
+            for j in range(n):
+                A[end + c, j] = np.sqrt(total) if j == c else 0.0
+            sides[0, end + c] = np.sqrt(total) * weight / total * centre[c]
+        _make_triangular(A, sides, row, end + n)
     return total
 
 
-@compiled
-def write_pull(A, lower, upper, weight, centre, row):
-    """Write sqrt(weight) x = sqrt(weight) centre from `row` on."""
-    root = np.sqrt(weight)
-    for i in range(len(centre)):
-        for c in range(A.shape[1]):
-            A[row + i, c] = root if c == i else 0.0
-        lower[row + i] = upper[row + i] = root * centre[i]
+@inlined
+def _make_triangular(A, sides, first, last):
+    """Replace the rows A x = side from first to last, of rank n, by n rows from `first` on.
 
-
-@compiled
-def make_triangular(A, lower, upper, first, last):
-    """Replace the rows A x = lower from first to last, of rank n, by n rows from `first` on.
-
-    |A x - lower|^2 of the new ones is less by what no x can change.
+    |A x - side|^2 of the new ones is less by what no x can change.
     """
     m, n = last - first, A.shape[1]
     M, total = np.empty((m, n + 1)), np.empty(n + 1)
     for i in range(m):
         for c in range(n):
             M[i, c] = A[first + i, c]
-        M[i, n] = lower[first + i]
+        M[i, n] = sides[0, first + i]
     for k in range(n):
         reflect_columns(M, k, m, k, k + 1, total)
     for i in range(n):
         for c in range(n):
             A[first + i, c] = M[i, c] if c >= i else 0.0
-        lower[first + i] = upper[first + i] = M[i, n]
+        sides[0, first + i] = sides[1, first + i] = M[i, n]

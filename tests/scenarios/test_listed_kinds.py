@@ -142,9 +142,9 @@ def test_wrong_values_are_named(task, said, tmp_path):
 
 
 @pytest.mark.parametrize(("task", "said"), [
-    (COUPLING | {"joints": {"joint_9": 1.0}}, "task 'coupling': unknown joint 'joint_9'"),
-    (LOOK | {"frame": "thumb"}, "task 'look-at': unknown frame 'thumb'"),
-    (RELATIVE | {"to": "thumb"}, "task 'relative': unknown frame 'thumb'"),
+    (COUPLING | {"joints": {"joint_9": 1.0}}, "tasks.0: unknown joint 'joint_9'"),
+    (LOOK | {"frame": "thumb"}, "tasks.0: frame: unknown frame 'thumb'"),
+    (RELATIVE | {"to": "thumb"}, "tasks.0: to: unknown frame 'thumb'"),
     ({"kind": "self-collision", "distance": 0.5}, "influence"),
     ({"kind": "position", "frame": "end_effector",
       "path": {"kind": "recorded", "file": "none.csv"}}, "none.csv cannot be read"),

@@ -148,7 +148,7 @@ class ListedRelative(Listed, TaskSection):
         """Return the task."""
         from hierarchy.tasks import RelativePose
 
-        start, frame, to = at.start, at.frame(self.frame), at.frame(self.to)
+        start, frame, to = at.start, at.frame(self.frame), at.frame(self.to, "to")
         axes = start.rotation(to).T
         position = (axes @ (start.position(frame) - start.position(to)) if self.position is None
                     else self.position)
