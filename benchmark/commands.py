@@ -201,8 +201,9 @@ def open_(family: Family = None,
           public: Annotated[int | None, typer.Option(
               "--public", min=1, metavar="N", help="Problems of the public set. Default: that of "
               "--count.")] = None,
-          limit: Annotated[float, typer.Option("--limit", min=0.1, metavar="S",
-                                               help="Time for one problem.")] = 10.0,
+          limit: Annotated[float, typer.Option(
+              "--limit", min=0.1, metavar="S", help="Time for one problem; also kept by --check.")
+              ] = 10.0,
           python: Annotated[str, typer.Option(
               "--python", metavar="PATH", help="Interpreter that has your entrant's package.")
               ] = "",
@@ -226,8 +227,7 @@ def open_(family: Family = None,
         return _installed((EMBODIK,))
     table = chosen(entrants or [], python, compiled(library or [], name or []))
     if check:
-        passed = [opened.check(one) for one in table]  # every one is tried
-        return int(not all(passed))
+        return int(not opened.check(table, limit))
     for left, why in ({} if family else unavailable()).items():
         print(f"left out: {left}, which {why}", file=sys.stderr)
     counts = {0: public or count, **dict.fromkeys(fresh or [1], count)}

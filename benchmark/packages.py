@@ -72,7 +72,7 @@ PACKAGES = (PINK, MINK, PLACO, TSID, EMBODIK, ROBOPLAN, FRAX)
 
 def folder_of(package: Package) -> Path:
     """Return the folder of the package's environment, which may not exist."""
-    root = os.environ.get("XDG_CACHE_HOME", "~/.cache")
+    root = os.environ.get("XDG_CACHE_HOME") or "~/.cache"  # an empty one is as good as none
     return Path(root).expanduser() / "task-hierarchy" / "peers" / package.name
 
 

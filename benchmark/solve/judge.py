@@ -104,7 +104,8 @@ def miss_of(h: Hierarchy, proof: Proof | None, x: Array | None) -> Miss:
         miss = np.maximum(beyond, 0.0)
         relative = miss / sizes
     missed = np.flatnonzero(relative > RIGHT)
-    return Miss(float(miss.max()), float(relative.max()), int(missed[0]) if missed.size else -1)
+    return Miss(float(miss.max(initial=0.0)), float(relative.max(initial=0.0)),
+                int(missed[0]) if missed.size else -1)
 
 
 def _moved(h: Hierarchy, proof: Proof | None, x: Array | None, without: Array | None) -> float:

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from benchmark import solve
-from benchmark.packages import OWN, Entrant, MissingError
-from benchmark.process import CRASHED, HUNG, LEFT_OUT
+from benchmark.packages import OWN, Entrant
+from benchmark.process import CRASHED, HUNG, LEFT_OUT, Field
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
 from benchmark.solve.entrants import ENTRANTS, chosen, compiled
 from benchmark.solve.interface import read_problems
 from benchmark.solve.judge import cells, judge, judged, summaries, summary
-from benchmark.solve.open import asked
+from benchmark.solve.open import QUESTIONS, asked, improve
 from benchmark.solve.views import lead
 from benchmark.store import Store
 from benchmark.worker import Repeats
@@ -27,7 +27,7 @@ from hierarchy import Hierarchy
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
 from solvers import certify
-from solvers.problems.files import Collection, Head
+from solvers.problems.files import Collection, Head, read
 from solvers.proof import prove
 
 HELPERS = Path(__file__).parents[1] / "helpers"
@@ -57,7 +57,9 @@ def equalities(tmp_path_factory):
 
 
 def run_entrant(entrant, file, limit=10.0):
-    return list(asked(entrant, [file], limit))[0]  # noqa: RUF015
+    with Field([entrant], QUESTIONS) as field:
+        assert not field.missing, field.missing
+        return asked(field, file, limit)[entrant.label]
 
 
 def fake(name, **options):
@@ -82,7 +84,10 @@ def test_every_resolver_of_the_project_is_an_entrant():
 def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
         equalities, monkeypatch, name, limit, most, expected):
     monkeypatch.setattr(opened, "MOST_ENDS", most)
-    first, second = asked(fake(name), [equalities] * 2, limit)
+    with Field([fake(name), fake("LeastSquares")], QUESTIONS) as field:
+        first, second = (asked(field, equalities, limit) for _ in range(2))
+    assert [row["x"][0] for row in second["LeastSquares"]] == pytest.approx([0, 1, 2, 3, 4])
+    first, second = first[name], second[name]
     assert [row.get("ended") for row in first] == [row.get("ended") for row in second] == expected
     assert first[0]["version"] == "fake 1"
     assert [row["problem"] for row in first] == [0, 1, 2, 3, 4]
@@ -92,11 +97,12 @@ def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
 
 
 @pytest.mark.slow
-def test_an_entrant_that_cannot_start_is_missing_with_the_reason(equalities):
-    with pytest.raises(MissingError, match="takes no arguments"):
-        run_entrant(fake("LeastSquares", no=1), equalities)
-    with pytest.raises(MissingError, match="No such file"):
-        run_entrant(replace(fake("LeastSquares"), python="/no/such/python"), equalities)
+def test_an_entrant_that_cannot_start_is_missing_with_the_reason():
+    with Field([fake("LeastSquares", no=1), replace(fake("Moody"), python="/no/such/python")],
+               QUESTIONS) as field:
+        assert not field.running
+    assert "takes no arguments" in field.missing["LeastSquares"]
+    assert "No such file" in field.missing["Moody"]
 
 
 CC = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
@@ -288,6 +294,23 @@ def test_the_check_accepts_the_example_of_the_documents_and_not_what_ends(tmp_pa
     page = (Path(__file__).parents[2] / "docs" / "extending" / "entrant.md").read_text()
     (tmp_path / "mine.py").write_text(re.search(r"```python\n(.*?)```", page, re.DOTALL)[1])
     assert run_command(["bench", "open", "--check", "--entrant", f"{tmp_path}/mine.py:Mine"]) == 0
-    assert run_command(["bench", "open", "--check", "--entrant",
-                        f"{HELPERS / 'fake_entrants.py'}:Raising"]) == 1
-    assert "the rules are broken" in capsys.readouterr().out
+    broken = {"Raising": "it raises: ArithmeticError: not today", "Moody": "other bits the second",
+              "Slow": "it takes longer than --limit"}
+    line = [part for name in broken for part in ("--entrant",
+                                                 f"{HELPERS / 'fake_entrants.py'}:{name}")]
+    assert run_command(["bench", "open", "--check", "--limit", "0.5", *line]) == 1
+    said = capsys.readouterr().out
+    for rule in broken.values():
+        assert re.search(f"a rule is broken: .*{rule}", said)
+
+
+def test_what_an_entrant_finds_completes_a_proof(equalities, tmp_path):
+    """A file whose candidates led to no proof, and an entrant that has the answer."""
+    known = read(equalities)
+    none = [prove(h, []) for h in known.problems]
+    replace(known, answers=tuple(none)).save(tmp_path / "simple-fresh-7.npz")
+    rows = [{"x": proof.x.tolist()} for proof in known.answers]
+    improve(tmp_path / "simple-fresh-7.npz", [[{"x": None}] * 5, rows])
+    found = read(tmp_path / "simple-fresh-7.npz")
+    assert found.digest == known.digest
+    assert all(proof.complete for proof in found.answers)

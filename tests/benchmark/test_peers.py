@@ -14,10 +14,10 @@ from benchmark.peers.moving import ENTRANTS, QUESTIONS, START, make_scenes, run
 from benchmark.peers.ours import stand
 from benchmark.peers.scenes import Arm, Stand
 from benchmark.peers.standing import Judge, followed, make_scene
-from benchmark.process import Process, staged
+from benchmark.process import Field
 from benchmark.report import Report
 from benchmark.solve import entrants as solvers_
-from benchmark.solve.open import asked
+from benchmark.solve import open as solve
 from benchmark.urdf import urdf
 from hierarchy import Hierarchy, Robot, State
 from hierarchy.paths import Still
@@ -45,13 +45,10 @@ def alone(tmp_path, monkeypatch):
 
 def answered(entrant, questions, *calls):
     """The last answer of a process, which is skipped by name where the package is not installed."""
-    with staged() as folder:
-        try:
-            process = Process(entrant, questions, folder)
-        except MissingError as reason:
-            pytest.skip(f"{entrant.label}: {reason}")
-        with process:
-            return [process.ask(call, 120.0) for call in calls][-1]
+    with Field([entrant], questions) as field:
+        if field.missing:
+            pytest.skip(f"{entrant.label}: {field.missing[entrant.label]}")
+        return [field.running[entrant.label].ask(call, 120.0) for call in calls][-1]
 
 
 # -- the robots ------------------------------------------------------------------------------------
@@ -176,10 +173,10 @@ def test_an_adapter_of_a_solver_gives_the_known_answer(entrant, tmp_path):
     made = [Hierarchy.from_levels(tasks), Hierarchy.from_levels([limits, *tasks])]
     file = tmp_path / "known.npz"
     Collection(Head("known", "", "fresh", 1), tuple(made)).save(file)
-    try:
-        ((equal, limited),) = asked(entrant, [file])
-    except MissingError as reason:
-        pytest.skip(f"{entrant.label}: {reason}")
+    with Field([entrant], solve.QUESTIONS) as field:
+        if field.missing:
+            pytest.skip(f"{entrant.label}: {field.missing[entrant.label]}")
+        ((equal, limited),) = solve.asked(field, file).values()
     np.testing.assert_allclose(equal["x"], [1.0, 2.0], atol=2e-3)
     if limited.get("refused"):
         assert limited["refused"] == "equalities only"
