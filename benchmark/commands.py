@@ -207,6 +207,10 @@ def open_(family: Family = None,
           python: Annotated[str, typer.Option(
               "--python", metavar="PATH", help="Interpreter that has your entrant's package.")
               ] = "",
+          borders: Annotated[bool, typer.Option(
+              "--borders", help="Also prove the answers for other borders between what counts as "
+              "dependent and what does not, from 1e-12 to 1e-5; takes several times as long.")
+              ] = False,
           check: Annotated[bool, typer.Option(
               "--check", help="Try the entrants on a few problems of each kind, in a minute, and "
               "store nothing.")] = False,
@@ -217,14 +221,14 @@ def open_(family: Family = None,
 
     Run the same command again to resume an interrupted one.
     """
-    from benchmark.packages import EMBODIK
+    from benchmark.packages import EMBODIK, HIGHS
     from benchmark.solve import open as opened
     from benchmark.solve.entrants import chosen, compiled
     from scenarios.problems.families import available, unavailable
     from scenarios.problems.families import family as named
 
     if install:
-        return _installed((EMBODIK,))
+        return _installed((EMBODIK, HIGHS))
     table = chosen(entrants or [], python, compiled(library or [], name or []))
     if check:
         return int(not opened.check(table, limit))
@@ -233,6 +237,8 @@ def open_(family: Family = None,
     counts = {0: public or count, **dict.fromkeys(fresh or [1], count)}
     store = opened.run(out, [named(one) for one in family or ()] or available(), table, counts,
                        limit, lambda text: print(text, file=sys.stderr, flush=True))
+    if borders:
+        opened.prove_at_borders(store)
     found = opened.report(store)
     found.say()
     found.write(out)

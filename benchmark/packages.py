@@ -66,7 +66,8 @@ EMBODIK = Package("embodik", "embodik", ("embodik==0.23.2",))
 ROBOPLAN = Package("roboplan", "roboplan", ("roboplan==0.7.0",))
 # jax as frax's own documents advise for processors.
 FRAX = Package("frax", "frax", ("frax==0.1.0", "jax==0.4.30", "jaxlib==0.4.30", "numpy<2.1"))
-PACKAGES = (PINK, MINK, PLACO, TSID, EMBODIK, ROBOPLAN, FRAX)
+HIGHS = Package("highspy", "highspy", ("highspy==1.15.1", "qpsolvers==4.13.0"))
+PACKAGES = (PINK, MINK, PLACO, TSID, EMBODIK, ROBOPLAN, FRAX, HIGHS)
 """Those that have an environment of their own."""
 
 

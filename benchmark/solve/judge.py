@@ -213,6 +213,15 @@ def profile(rows: Sequence[Row], ratios: Array) -> dict[str, Array]:
     return found
 
 
+def right_within(rows: Sequence[Row], thresholds: Array) -> dict[str, Array]:
+    """Return the share of the problems asked that an entrant solves and calls so, if `RIGHT` were
+    each of the thresholds (k,).
+    """
+    return {name: np.array([np.mean([bool(row.get("solved")) and row["relative"] <= most
+                                     for row in own if row["verdict"] != REFUSED] or [np.nan])
+                            for most in thresholds]) for name, own in by(rows, "entrant")}
+
+
 def _over(reduce: Callable[..., Any], values: Iterable[float | None]) -> float:
     known = [value for value in values if value is not None and not np.isnan(value)]
     return float(reduce(known)) if known else np.nan

@@ -15,17 +15,19 @@ from benchmark.packages import Entrant
 from benchmark.process import CRASHED, HUNG, Field
 from benchmark.report import Report
 from benchmark.solve import views
-from benchmark.solve.entrants import ENTRANTS
+from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
 from benchmark.store import Row, Store
 from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
 from scenarios.problems.answers import export, file_of, save
 from scenarios.problems.families import FAMILIES, Family
-from solvers.problems.files import read
+from solvers.problems.files import Collection, read
 from solvers.proof import prove
 
 QUESTIONS = "benchmark.solve.questions:Questions"
 LIMIT = 10.0     # [s] for one problem with all its repetitions
+BORDERS = tuple(10.0**-k for k in range(12, 4, -1))  # angles and lengths as proof.UNCLEAR
 MOST_ENDS = 5    # crashes and hangs of an entrant on a file, after which the rest is left out
 CHECKED = ("EQ7", "EQ7sing", "INEQ7", "tied_box", "contacts", "mixed_units", "one_unknown")
 _CHECKS = 4  # problems of each of them
@@ -94,30 +96,56 @@ def improve(file: Path, found: Iterable[list[Row]]) -> None:
         save(replace(one, answers=tuple(proofs)), file.parent)
 
 
+def prove_at_borders(store: Store) -> None:
+    """Prove the answers of a folder at each of BORDERS, into `borders/`, from those of entrants.
+
+    The border decides which rows are dependent, and so which problems are well posed.
+    """
+    xs: dict[tuple[str, int], list[Array]] = {}
+    for row in store.rows():
+        if row.get("solved"):
+            xs.setdefault((row["sha256"], row["problem"]), []).append(np.array(row["x"]))
+    for border, file in product(BORDERS, sorted(store.problems.glob("[!.]*.npz"))):
+        folder = store.folder / "borders" / f"{border:g}"
+        if not (folder / file.name).is_file():
+            one = read(file)
+            save(replace(one, answers=tuple(
+                prove(h, xs.get((one.digest, p), []), border)
+                for p, h in enumerate(one.problems))), folder)
+
+
 def report(store: Store) -> Report:
     """Return what a folder has, judged anew; raises HierarchyError if it has no rows.
 
     Each set has a section, fresh ones first; no number is of two sets together.
     """
-    found = [read(file) for file in sorted(store.problems.glob("[!.]*.npz"))]
-    rows = judge(store.rows(), {one.digest: one for one in found})
+    order, labels = [*FAMILIES], [one.label for one in ENTRANTS]
+    raw = sorted(store.rows(), key=lambda row: (_place(order, row["family"]),
+                                                _place(labels, row["entrant"])))
+    found = _problems(store.problems)
+    rows = judge(raw, {one.digest: one for one in found})
+    at = {float(folder.name): judge(raw, {one.digest: one for one in _problems(folder)})
+          for folder in (store.folder / "borders").glob("[!.]*")}
     if not rows:
         raise HierarchyError(f"{store.folder} has no rows of a benchmark: run `hierarchy bench "
                              "open` first")
-    order, labels = [*FAMILIES], [one.label for one in ENTRANTS]
-    rows.sort(key=lambda row: (_place(order, row["family"]), _place(labels, row["entrant"])))
     sections, kept = [], list[Row]()
     for seed in sorted({row["seed"] for row in rows}, key=lambda seed: (seed == 0, seed)):
         title = f"Fresh problems, seed {seed}" if seed else "Public problems"
         section, cells = views.section(
             title, [row for row in rows if row["seed"] == seed],
-            {one.head.family: one for one in found if one.head.seed == seed})
+            {one.head.family: one for one in found if one.head.seed == seed},
+            {border: [row for row in some if row["seed"] == seed] for border, some in at.items()})
         sections.append(section)
         kept += [{"half": title, **row} for row in cells]
     versions = {row["entrant"]: row["version"] for row in rows}
     return Report("The open benchmark of prioritized control",
                   [*sections, views.entrants(versions, store.notes("limits"))], {"summary": kept},
-                  store.notes("missing"))
+                  store.notes("missing") | ABSENT)
+
+
+def _problems(folder: Path) -> list[Collection]:
+    return [read(file) for file in sorted(folder.glob("[!.]*.npz"))]
 
 
 def _place(order: Sequence[str], name: str) -> int:
