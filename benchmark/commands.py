@@ -201,11 +201,16 @@ def open_(family: Family = None,
           public: Annotated[int | None, typer.Option(
               "--public", min=1, metavar="N", help="Problems of the public set. Default: that of "
               "--count.")] = None,
-          limit: Annotated[float, typer.Option("--limit", min=0.1, metavar="S",
-                                               help="Time for one problem.")] = 10.0,
+          limit: Annotated[float, typer.Option(
+              "--limit", min=0.1, metavar="S", help="Time for one problem; also kept by --check.")
+              ] = 10.0,
           python: Annotated[str, typer.Option(
               "--python", metavar="PATH", help="Interpreter that has your entrant's package.")
               ] = "",
+          borders: Annotated[bool, typer.Option(
+              "--borders", help="Also prove the answers for other borders between what counts as "
+              "dependent and what does not, from 1e-12 to 1e-5; takes several times as long.")
+              ] = False,
           check: Annotated[bool, typer.Option(
               "--check", help="Try the entrants on a few problems of each kind, in a minute, and "
               "store nothing.")] = False,
@@ -216,23 +221,24 @@ def open_(family: Family = None,
 
     Run the same command again to resume an interrupted one.
     """
-    from benchmark.packages import EMBODIK
+    from benchmark.packages import EMBODIK, HIGHS
     from benchmark.solve import open as opened
     from benchmark.solve.entrants import chosen, compiled
     from scenarios.problems.families import available, unavailable
     from scenarios.problems.families import family as named
 
     if install:
-        return _installed((EMBODIK,))
+        return _installed((EMBODIK, HIGHS))
     table = chosen(entrants or [], python, compiled(library or [], name or []))
     if check:
-        passed = [opened.check(one) for one in table]  # every one is tried
-        return int(not all(passed))
+        return int(not opened.check(table, limit))
     for left, why in ({} if family else unavailable()).items():
         print(f"left out: {left}, which {why}", file=sys.stderr)
     counts = {0: public or count, **dict.fromkeys(fresh or [1], count)}
     store = opened.run(out, [named(one) for one in family or ()] or available(), table, counts,
                        limit, lambda text: print(text, file=sys.stderr, flush=True))
+    if borders:
+        opened.prove_at_borders(store)
     found = opened.report(store)
     found.say()
     found.write(out)

@@ -68,18 +68,18 @@ def _dot(ax: Axes, row: Row, look: Look) -> None:
         ax.plot(x, y, "x", color=drawing.ALERT, markersize=4.0, markeredgewidth=0.8, clip_on=False)
 
 
-def profiles(ratios: Array, found: Mapping[str, Array]) -> Figure:
-    """Return the performance profile: share solved against time over that of the fastest."""
+def curves(at: Array, found: Mapping[str, Array], words: str) -> Figure:
+    """Return shares of problems solved over a logarithmic axis; words : its label."""
     style = looks(found)
     with _figure(6.2, max(4.2, 0.155 * len(found) + 0.3)) as fig:
         ax = fig.subplots()
         for label, share in found.items():
             look = style[label]
-            ax.plot(ratios, 100.0 * share, color=look.colour, label=label, linewidth=1.2,
+            ax.plot(at, 100.0 * share, color=look.colour, label=label, linewidth=1.2,
                     linestyle=(0, look.dash) if look.dash else "-")
         drawing.make_logarithmic(ax, "x")
-        ax.set(xlabel="median time of a problem, over that of the fastest entrant",
-               ylabel="problems solved [%]", xlim=(ratios[0], ratios[-1]), ylim=(0.0, 102.0))
+        ax.set(xlabel=words, ylabel="problems solved [%]", xlim=(at[0], at[-1]),
+               ylim=(0.0, 102.0))
         fig.legend(loc="outside right upper", fontsize=7.0)
     return fig
 

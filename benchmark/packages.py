@@ -66,13 +66,14 @@ EMBODIK = Package("embodik", "embodik", ("embodik==0.23.2",))
 ROBOPLAN = Package("roboplan", "roboplan", ("roboplan==0.7.0",))
 # jax as frax's own documents advise for processors.
 FRAX = Package("frax", "frax", ("frax==0.1.0", "jax==0.4.30", "jaxlib==0.4.30", "numpy<2.1"))
-PACKAGES = (PINK, MINK, PLACO, TSID, EMBODIK, ROBOPLAN, FRAX)
+HIGHS = Package("highspy", "highspy", ("highspy==1.15.1", "qpsolvers==4.13.0"))
+PACKAGES = (PINK, MINK, PLACO, TSID, EMBODIK, ROBOPLAN, FRAX, HIGHS)
 """Those that have an environment of their own."""
 
 
 def folder_of(package: Package) -> Path:
     """Return the folder of the package's environment, which may not exist."""
-    root = os.environ.get("XDG_CACHE_HOME", "~/.cache")
+    root = os.environ.get("XDG_CACHE_HOME") or "~/.cache"  # an empty one is as good as none
     return Path(root).expanduser() / "task-hierarchy" / "peers" / package.name
 
 

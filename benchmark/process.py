@@ -1,4 +1,4 @@
-"""The one runner: an entrant in its own process, asked line by line, started again if it ends."""
+"""The one runner: entrants in a process each, which take turns, and start again if they end."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from itertools import product
 from pathlib import Path
 from threading import Timer
 from typing import Any, final
@@ -83,23 +84,6 @@ class Process:
             pass
         return self._next(limit)
 
-    def answers(self, questions: Iterable[tuple[Any, ...]], limit: float, most: int = 5
-                ) -> Iterator[dict[str, Any]]:
-        """Yield the answer to each question, or how and why the process ended without one.
-
-        After `most` ends the rest is left out.
-        """
-        ends = 0
-        for question in questions:
-            if ends >= most:
-                yield {"ended": LEFT_OUT}
-                continue
-            try:
-                yield self.ask(question, limit)
-            except EndedError as end:
-                ends += 1
-                yield {"ended": end.kind, "why": str(end)}
-
     def _begin(self) -> None:
         entrant = self.entrant
         python = entrant.python or python_of(entrant.package)
@@ -148,3 +132,54 @@ class Process:
         self._log.seek(0)
         lines = self._log.read().strip().splitlines()
         return f"ended with code {code}" + (f": {lines[-1]}" if lines else "")
+
+
+@final
+class Field(ExitStack):
+    """Entrants in a process each, which take turns with every question.
+
+    questions : MODULE:CLASS of what asks them. missing : why others are not asked, by label.
+    """
+
+    def __init__(self, entrants: Sequence[Entrant], questions: str) -> None:
+        super().__init__()
+        self.running: dict[str, Process] = {}
+        self.missing: dict[str, str] = {}
+        folder = self.enter_context(staged())
+        for one in entrants:
+            try:
+                self.running[one.label] = self.enter_context(Process(one, questions, folder))
+            except MissingError as error:
+                self.missing[one.label] = str(error)
+
+    def ask(self, question: tuple[Any, ...], limit: float, labels: Iterable[str] | None = None
+            ) -> dict[str, Any]:
+        """Return the answers to a question; whose process ends within `limit` [s] is missing."""
+        found = {}
+        for label in tuple(self.running if labels is None else labels):
+            try:
+                found[label] = self.running[label].ask(question, limit)
+            except MissingError as error:
+                self.missing[label] = str(error)
+                del self.running[label]
+        return found
+
+    def answers(self, questions: Iterable[tuple[Any, ...]], limit: float, most: int,
+                labels: Iterable[str] | None = None) -> dict[str, list[dict[str, Any]]]:
+        """Return the answers to questions, or how and why a process ended without one.
+
+        An entrant whose process has ended `most` times is not asked the rest.
+        """
+        found: dict[str, list[dict[str, Any]]] = {
+            label: [] for label in (self.running if labels is None else labels)}
+        ends = dict.fromkeys(found, 0)
+        for question, (label, answers) in product(questions, found.items()):
+            if ends[label] >= most:
+                answers.append({"ended": LEFT_OUT})
+                continue
+            try:
+                answers.append(self.running[label].ask(question, limit))
+            except EndedError as end:
+                ends[label] += 1
+                answers.append({"ended": end.kind, "why": str(end)})
+        return found

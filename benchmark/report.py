@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from benchmark.machine import machine
-from benchmark.tables import Row, Table, write_rows
+from benchmark.tables import Column, Row, Table, text, write_rows
 from scenarios.draw.figures import drawing
 from scenarios.files import make_folder, slug, write_json, write_text
 from scenarios.templates import filled, resource
@@ -52,8 +52,10 @@ class Report:
             for words in (*section.lead, section.text):
                 if words:
                     console.print(words, "", sep="\n")
-        for label, why in self.missing.items():
-            console.print(f"skipped: {label} ({why})")
+        if self.missing:
+            console.print(Table("", [{"entrant": label, "why": why} for label, why in
+                                     self.missing.items()], (Column("absent", "why", text),)
+                                ).rich())
 
     def write(self, out: Path) -> None:
         """Write rows as CSV, figures as files, the machine, and the page into a folder."""

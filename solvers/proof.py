@@ -81,8 +81,10 @@ class _NoProofError(Exception):
     """The rows are not as the candidate says."""
 
 
-def prove(h: Hierarchy, candidates: Iterable[ArrayLike]) -> Proof:
+def prove(h: Hierarchy, candidates: Iterable[ArrayLike], unclear: float = UNCLEAR) -> Proof:
     """Return what the candidates (n,) lead to: the answer of h, or of as many levels as possible.
+
+    unclear : what counts as zero; see UNCLEAR.
 
     Slow: 0.02 s for 7 unknowns and 20 rows, 1 s for 38 unknowns and 106 rows.
 
@@ -107,7 +109,7 @@ def prove(h: Hierarchy, candidates: Iterable[ArrayLike]) -> Proof:
                         continue
                     tried.add(key)
                     try:
-                        return _Attempt(h, rows, None if complete else x, count).proof()
+                        return _Attempt(h, rows, None if complete else x, count, unclear).proof()
                     except _NoProofError:
                         continue
     return Proof(np.full(h.n, np.nan), np.full(levels, np.nan), 0, levels + 1, 0.0, 0.0)
@@ -146,8 +148,10 @@ class _Rows:
 class _Attempt:
     """One classification of the rows, from the answer that it implies to the proof."""
 
-    def __init__(self, h: Hierarchy, rows: _Rows, near: Array | None, count: int) -> None:
+    def __init__(self, h: Hierarchy, rows: _Rows, near: Array | None, count: int,
+                 unclear: float) -> None:
         """Take the first `count` levels, and of their x the nearest to `near` if it is given."""
+        self.unclear = Decimal(unclear)
         self.h, self.near, self.count = h, near, count
         self.equal, self.pulled, self.on, self.above = rows.equal, rows.pulled, rows.on, rows.above
         self.seen = rows.seen
@@ -185,7 +189,7 @@ class _Attempt:
             if (~self.seen[own] & (self.norm[own] > 0)).any():
                 self._unclear_below(k)
             rows = np.flatnonzero((self.pulled | self.on) & own)
-            for i, left in span.add(self.A[rows], self.norm[rows], Decimal(UNCLEAR)):
+            for i, left in span.add(self.A[rows], self.norm[rows], self.unclear):
                 if left is not None:
                     self.A[rows[i]] = self.A[rows[i]] - left
                     if k < self.count:
@@ -193,7 +197,7 @@ class _Attempt:
 
     def _used(self, by: Decimal, most: float, level: int) -> float:
         """Return the larger of a turn or a shift of a level and those before."""
-        _demand(by <= Decimal(UNCLEAR))
+        _demand(by <= self.unclear)
         if by > Decimal(ROUNDING):
             self._unclear_below(level)
         return max(most, float(by) if by > ZERO else 0.0)
@@ -225,7 +229,7 @@ class _Attempt:
             elif self.pulled[i]:
                 beyond = self.t[i] / length if self.above[i] else -self.t[i] / length
                 _demand(beyond > 0)
-                if beyond < Decimal(UNCLEAR):
+                if beyond < self.unclear:
                     self._unclear_below(level)
             else:
                 _demand(self.lower[i] <= value[i] <= self.upper[i])

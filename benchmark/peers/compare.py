@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmark.packages import Entrant, MissingError
-from benchmark.process import START_LIMIT, Process, staged
+from benchmark.packages import Entrant
+from benchmark.process import START_LIMIT, EndedError, Field
 from benchmark.store import Row
 from benchmark.tables import Column
 from benchmark.timing import times_of
@@ -20,6 +19,7 @@ TICK = (Column("tick\nmedian", "median_us"), Column("\np95", "p95_us"),
         Column("\np99.9", "p99.9_us"), Column("solve\nmedian", "solve_us"))
 
 Log = dict[str, Array]
+Ask = Callable[[tuple[Any, ...], float], Any]  # as `Process.ask`
 
 
 class Turns(NamedTuple):
@@ -42,43 +42,31 @@ class Turns(NamedTuple):
 
 
 def measure(entrants: Sequence[Entrant], questions: str, scene: tuple[Any, ...], turns: Turns,
-            judge: Callable[[Log, Process], Row]) -> tuple[list[Row], dict[str, str]]:
+            judge: Callable[[Log, Ask], Row]) -> tuple[list[Row], dict[str, str]]:
     """Let all entrants take turns; return a judged row for each, and why others are missing.
 
     questions : MODULE:CLASS of what asks. scene : arguments of its `open`. judge : makes a row of a
-    log and the process, which it may ask for more.
+    log, and may ask for more.
     """
-    missing: dict[str, str] = {}
     rows: list[Row] = []
-    running: dict[str, tuple[Process, list[Row]]] = {}
-    with ExitStack() as stack:
-        folder = stack.enter_context(staged())
-        for one in entrants:
-            with _noted(missing, one.label):
-                process = stack.enter_context(Process(one, questions, folder))
-                process.ask(("open", *scene), START_LIMIT)
-                running[one.label] = process, []
+    with Field(entrants, questions) as field:
+        replies: dict[str, list[Row]] = {
+            label: [] for label in field.ask(("open", *scene), START_LIMIT)}
         for part in turns.parts():
-            for label, (process, replies) in running.items():
-                spent = sum(reply["seconds"] for reply in replies)
-                if label not in missing and (len(replies) < 2 or spent <= turns.seconds):
-                    with _noted(missing, label):
-                        replies.append(process.ask(("turn", *part), TURN_LIMIT))
+            some = [label for label, own in replies.items() if label in field.running and (
+                len(own) < 2 or sum(reply["seconds"] for reply in own) <= turns.seconds)]
+            for label, reply in field.ask(("turn", *part), TURN_LIMIT, some).items():
+                replies[label].append(reply)
         for one in entrants:
-            if one.label not in missing:
-                process, replies = running[one.label]
+            if (process := field.running.get(one.label)) is None:
+                continue
+            own = replies[one.label]
+            try:
                 rows.append({"entrant": one.label, **process.about, "kind": one.limits,
-                             "why": replies[-1]["why"], **judge(joined(replies), process)})
-    return rows, missing
-
-
-@contextmanager
-def _noted(missing: dict[str, str], label: str) -> Iterator[None]:
-    """Record why an entrant is missing, and continue."""
-    try:
-        yield
-    except MissingError as error:
-        missing[label] = str(error)
+                             "why": own[-1]["why"], **judge(joined(own), process.ask)})
+            except EndedError as end:
+                field.missing[one.label] = str(end)
+    return rows, field.missing
 
 
 def joined(replies: Sequence[Row]) -> Log:

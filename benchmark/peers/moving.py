@@ -22,9 +22,9 @@ from benchmark.packages import (
     TSID,
     Entrant,
 )
-from benchmark.peers.compare import TICK, TURN_LIMIT, Log, Turns, joined, measure, times
+from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, Turns, joined, measure, times
 from benchmark.peers.scenes import Arm
-from benchmark.process import START_LIMIT, EndedError, Process
+from benchmark.process import START_LIMIT, EndedError
 from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import Column, Table, power, text
@@ -62,7 +62,9 @@ ENTRANTS = (
                                            ("pink", PINK, "pink", "any"))
       for hard in (False, True)),
     Entrant("embodiK", EMBODIK, f"{_HERE}.embodik:arm", {}, f"strict, scaled; {_KINDS}, hard"),
-    Entrant("OInK", ROBOPLAN, f"{_HERE}.roboplan:arm", {}, f"weights; {_KINDS}, hard"),
+    *(Entrant(label, ROBOPLAN, f"{_HERE}.roboplan:arm", {"levels": label != "OInK"},
+              f"{words}; {_KINDS}, hard")
+      for label, words in (("OInK", "weights"), ("OInK levels", "strict"))),
     Entrant("frax", FRAX, f"{_HERE}.frax:arm", {}, "strict, then clipped; limits of joints"),
 )
 NOTES = """\
@@ -88,7 +90,7 @@ def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: fl
         scenes = make_scenes(Path(temporary))
         rows, missing = measure(entrants, QUESTIONS, (asdict(scenes["ellipse"]),),
                                 Turns(ticks, 1000, 1000, 50, seconds),
-                                lambda log, process: _judged(log, process, scenes))
+                                lambda log, ask: _judged(log, ask, scenes))
     title = "One tick of inverse kinematics of a KUKA LWR, and its quality"
     return Report("Inverse kinematics beside other packages", [
         Section(title, [Table(title, rows, _COLUMNS)], NOTES, {"peers": figures.bars(rows)}),
@@ -109,13 +111,13 @@ def make_scenes(folder: Path) -> dict[str, Arm]:
                                                 sine=still, turning=0.0)}
 
 
-def _judged(path: Log, process: Process, scenes: dict[str, Arm]) -> Row:
+def _judged(path: Log, ask: Ask, scenes: dict[str, Arm]) -> Row:
     """Return the row of an entrant from its path, its step, and what a NaN does to it."""
-    process.ask(("open", asdict(scenes["step"]), True), START_LIMIT)
-    reply = process.ask(("turn", STEP_TICKS, 0), TURN_LIMIT)
+    ask(("open", asdict(scenes["step"]), True), START_LIMIT)
+    reply = ask(("turn", STEP_TICKS, 0), TURN_LIMIT)
     try:
-        process.ask(("open", asdict(scenes["ellipse"])), START_LIMIT)
-        nan = process.ask(("after_nan",), START_LIMIT)
+        ask(("open", asdict(scenes["ellipse"])), START_LIMIT)
+        nan = ask(("after_nan",), START_LIMIT)
     except EndedError as end:
         nan = f"{end.kind}: {end}"
     step, limit = joined([reply]), np.array(scenes["ellipse"].limit)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmark.packages import MINK, OWN, PINK, PLACO, Entrant, MissingError
-from benchmark.process import Process, staged
+from benchmark.packages import MINK, OWN, PINK, PLACO, Entrant
+from benchmark.process import Field
 from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import Column, Table, power
@@ -58,32 +58,27 @@ def run(count: int = 1000, seed: int = 0) -> Report:
     `TOLERANCE`, all joints within their limits.
     """
     rows: list[Row] = []
-    missing: dict[str, str] = {}
-    with TemporaryDirectory() as folder, staged() as checkout:
+    absent: dict[str, str] = {}
+    with TemporaryDirectory() as folder, Field(ENTRANTS, QUESTIONS) as field:
         for name, model in ROBOTS.items():
             try:
                 file = _plain_urdf(model, Path(folder) / f"{name.replace(' ', '-')}.urdf")
             except RobotError as error:
-                missing[name] = str(error)
+                absent[name] = str(error)
                 continue
             robot = Robot.from_file(file, shapes=False)
             for kind in ("reachable", "unreachable"):
+                print(name, kind, "...", file=sys.stderr, flush=True)
                 poses, starts = problems(robot, model.frames, count, seed, kind == "reachable")
                 asked = [("problem", [str(file), model.frames, TOLERANCE], pose, start)
                          for pose, start in zip(poses.tolist(), starts.tolist(), strict=True)]
-                for one in ENTRANTS:
-                    about = {"robot": name, "poses": kind, "package": one.label}
-                    print(*about.values(), "...", file=sys.stderr, flush=True)
-                    try:
-                        with Process(one, QUESTIONS, checkout) as process:
-                            answers = list(process.answers(asked, LIMIT, count))
-                    except MissingError as error:
-                        missing[f"{name}, {kind}, {one.label}"] = str(error)
-                        continue
+                for label, answers in field.answers(asked, LIMIT, count).items():
+                    about = {"robot": name, "poses": kind, "package": label}
                     rows.append({"entrant": ", ".join(about.values()), **about,
                                  **judge(answers, robot, model.frames, poses)})
     return Report("Whole inverse kinematics", [Section("", [Table(
-        "Poses of hands: robot, poses, package", rows, _COLUMNS)])], {"ik": rows}, missing)
+        "Poses of hands: robot, poses, package", rows, _COLUMNS)])], {"ik": rows},
+        {**absent, **field.missing})
 
 
 def judge(answers: list[Row], robot: Robot, frames: tuple[str, ...], poses: Array) -> Row:

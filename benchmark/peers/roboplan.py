@@ -1,4 +1,4 @@
-"""roboplan's OInK: weighted tasks in one quadratic program; targets as in `pink`."""
+"""roboplan's OInK: tasks weighted in one quadratic program, or in levels; targets as in `pink`."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from roboplan import core, optimal_ik
 from benchmark.peers.scenes import Arm, Array
 
 
-def arm(scene: Arm, posture: bool) -> tuple[Any, None]:
-    """`Oink.solveIk` for displacements of one period."""
+def arm(scene: Arm, posture: bool, levels: bool = False) -> tuple[Any, None]:
+    """`Oink.solveIk` for displacements of one period; with levels the posture has priority 2."""
     model = core.Scene("arm", core.loadUrdfSceneDescription(scene.file))
     oink = optimal_ik.Oink(model)
     model.setJointPositions(np.array(scene.start))
     target = core.CartesianConfiguration("base", scene.frame, np.asfortranarray(np.eye(4)))
     # Its costs weigh squares.
     position = optimal_ik.FrameTask(oink, model, target, optimal_ik.FrameTaskOptions(
-        position_cost=scene.ratio**2, orientation_cost=0.0))
+        position_cost=1.0 if levels else scene.ratio**2, orientation_cost=0.0))
     tasks = [position]
     if posture:
-        gain = optimal_ik.ConfigurationTaskOptions(task_gain=scene.posture_gain * scene.period)
+        gain = optimal_ik.ConfigurationTaskOptions(
+            task_gain=scene.posture_gain * scene.period, priority=1 + levels)
         tasks.append(optimal_ik.ConfigurationTask(oink, np.array(scene.posture),
                                                   np.ones(len(scene.start)), gain))
     limits = [optimal_ik.VelocityLimit(oink, scene.period, np.array(scene.limit))]

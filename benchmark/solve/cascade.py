@@ -7,6 +7,7 @@ above within what they have reached. A last program finds the x nearest to the r
 from __future__ import annotations
 
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 from qpsolvers import solve_qp
@@ -17,14 +18,17 @@ _TINY = 1e-9  # weight of |x - reference|^2 beside |w|^2, for solvers that need 
 
 
 class Cascade(Solver):
-    """One backend of qpsolvers; `slack` is left to rows above when they are kept."""
+    """One backend of qpsolvers with options of its own.
 
-    def __init__(self, backend: str, slack: float = 0.0) -> None:
-        self.backend, self.slack = backend, slack
+    slack : left to rows above when they are kept.
+    """
+
+    def __init__(self, backend: str, slack: float = 0.0, **options: Any) -> None:
+        self.backend, self.slack, self.options = backend, slack, options
 
     def version(self) -> str:
         """Return that of qpsolvers and of the backend."""
-        package = {"proxqp": "proxsuite"}.get(self.backend, self.backend)
+        package = {"proxqp": "proxsuite", "highs": "highspy"}.get(self.backend, self.backend)
         return f"qpsolvers {version('qpsolvers')}, {package} {version(package)}"
 
     def solve(self, prepared: Problem) -> tuple[Array, bool]:
@@ -69,7 +73,8 @@ class Cascade(Solver):
         try:
             found = solve_qp(P, q, G if len(G) else None, h if len(G) else None,
                              A[equal] if equal.any() else None,
-                             lower[equal] if equal.any() else None, solver=self.backend)
+                             lower[equal] if equal.any() else None, solver=self.backend,
+                             **self.options)
         except Exception:  # backends raise for what others call infeasible
             return None
         return None if found is None or not np.isfinite(found).all() else np.asarray(found)

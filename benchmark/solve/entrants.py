@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmark.packages import DAQP, EMBODIK, OWN, Entrant
+from benchmark.packages import DAQP, EMBODIK, HIGHS, OWN, Entrant
 from hierarchy.errors import HierarchyError, UnknownNameError
 from solvers import names
 from solvers.qp.backends import BACKENDS
@@ -21,36 +21,65 @@ _LIMITS = {
     "recursive": "Equalities only.", "tpm": "Bounds of single unknowns in the first level only.",
     "reverse": "Equalities; strict in the first level only.",
     "sns": "Bounds of single unknowns in the first level only; scales what they do not allow."}
-_QP = "Levels above are kept to the backend's tolerance."
+_QP = "Levels above are kept to the backend's tolerance"
+_TIGHTER = 100.0  # times the tolerances of hqp
 _EMBODIK = ("Scales a task that limits do not allow, and damps near singularities; the first level "
             "holds as hard limits, the others are equalities.")
 _CASCADE = "Programs written by hand, in floating point; rows above"
+ABSENT = {
+    "soth, LexLS": "no package on PyPI; with --library FILE.so --name NAME",
+    "eiquadprog": "its wheel has a C++ library and no module of Python; with --library",
+    "OpenSoT": "its headers need ROS",
+    "pink, mink, placo, tsid, OInK, frax": "they own the robot's model, and are compared on whole "
+    "ticks: hierarchy bench peers"}
+"""Solvers that no command here can ask, and why."""
+
+
+def _settings(backend: str) -> dict[str, dict[str, float]]:
+    """Return the options of a backend in words: its defaults, those of `hqp`, and tighter ones."""
+    own = dict(BACKENDS[backend].options)
+    return {"defaults": {}} | ({"as hqp": own, "tight": {
+        key: value / _TIGHTER if isinstance(value, float) else value
+        for key, value in own.items()}} if own else {})
 
 
 def _ours() -> list[Entrant]:
     ours = f"{_HERE}.ours:Ours"
     rows = [Entrant(name, OWN, ours, {"resolver": name}, _LIMITS.get(name, ""))
             for name in (*names(), "tpm-published") if name != "hqp"]
-    return rows + [Entrant(f"hqp {name}", OWN, ours, {"resolver": "hqp", "backend": name}, _QP)
-                   for name in BACKENDS]
+    rows += [Entrant(f"hqp {name}", OWN, ours, {"resolver": "hqp", "backend": name},
+                     f"{_QP}, set by hqp.") for name in BACKENDS]
+    return rows + [Entrant(f"hqp {name}, {words}", OWN, f"{_HERE}.ours:Hqp",
+                           {"backend": name, **options}, f"{_QP}: {words}.")
+                   for name in BACKENDS for words, options in _settings(name).items()
+                   if words != "as hqp" and BACKENDS[name].options]
 
 
 def _cascades() -> list[Entrant]:
     cascade = f"{_HERE}.cascade:Cascade"
-    exact = [Entrant(f"cascade {name}", OWN, cascade, {"backend": name},
-                     f"{_CASCADE} are kept exactly.") for name in BACKENDS]
+    exact = [Entrant(_labelled(f"cascade {name}", words), OWN, cascade,
+                     {"backend": name, **options},
+                     f"{_CASCADE} are kept exactly; tolerances: {words}.")
+             for name in BACKENDS for words, options in _settings(name).items()]
+    exact.append(Entrant("cascade highs", HIGHS, cascade, {"backend": "highs"},
+                         f"{_CASCADE} are kept exactly; tolerances: defaults."))
     return exact + [Entrant(f"cascade {name}, slack", OWN, cascade,
                             {"backend": name, "slack": _SLACK},
                             f"{_CASCADE} may move by {_SLACK:g}.")
                     for name in ("quadprog", "daqp")]
 
 
+def _labelled(name: str, words: str) -> str:
+    return name if words == "defaults" else f"{name}, {words}"
+
+
 ENTRANTS = (
     *_ours(),
     Entrant(NUMPY, OWN, f"{_HERE}.ours:Plain", limits="Equalities only, by np.linalg.pinv."),
-    Entrant(HIERARCHICAL, DAQP, f"{_HERE}.with_daqp:Daqp",
-            limits="Minimises violations divided by the norms of rows, with a finite weight; rows "
-            "of zeros are infeasible to it."),
+    *(Entrant(_labelled(HIERARCHICAL, words), DAQP, f"{_HERE}.with_daqp:Daqp", options,
+              "Minimises violations divided by the norms of rows, with a finite weight; rows of "
+              f"zeros are infeasible to it; tolerances: {words}.")
+      for words, options in _settings("daqp").items()),
     *_cascades(),
     Entrant("embodiK", EMBODIK, f"{_HERE}.with_embodik:Embodik", {}, _EMBODIK),
     Entrant("embodiK refined", EMBODIK, f"{_HERE}.with_embodik:Embodik", {"refine": True},

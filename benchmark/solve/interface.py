@@ -52,6 +52,12 @@ class Problem:
         return Problem(self.A[:m].copy(), self.lower[:m].copy(), self.upper[:m].copy(),
                        self.sizes[:full[-1]].copy(), self.reference)
 
+    def shifted(self) -> Problem:
+        """Return the problem of x - reference, for solvers that know no reference."""
+        by = self.A @ self.reference
+        return Problem(self.A, self.lower - by, self.upper - by, self.sizes,
+                       np.zeros(len(self.reference)))
+
     def moved(self, seed: int) -> Problem:
         """Return the problem with both sides of each row changed by a factor within 1 % of 1."""
         factor = 1.0 + _MOVED * np.random.default_rng(seed).uniform(-1.0, 1.0, len(self.A))

@@ -104,7 +104,8 @@ def miss_of(h: Hierarchy, proof: Proof | None, x: Array | None) -> Miss:
         miss = np.maximum(beyond, 0.0)
         relative = miss / sizes
     missed = np.flatnonzero(relative > RIGHT)
-    return Miss(float(miss.max()), float(relative.max()), int(missed[0]) if missed.size else -1)
+    return Miss(float(miss.max(initial=0.0)), float(relative.max(initial=0.0)),
+                int(missed[0]) if missed.size else -1)
 
 
 def _moved(h: Hierarchy, proof: Proof | None, x: Array | None, without: Array | None) -> float:
@@ -210,6 +211,15 @@ def profile(rows: Sequence[Row], ratios: Array) -> dict[str, Array]:
                           for own in problems.values()])
         found[name] = np.array([(ratio <= most).mean() for most in ratios])
     return found
+
+
+def right_within(rows: Sequence[Row], thresholds: Array) -> dict[str, Array]:
+    """Return the share of the problems asked that an entrant solves and calls so, if `RIGHT` were
+    each of the thresholds (k,).
+    """
+    return {name: np.array([np.mean([bool(row.get("solved")) and row["relative"] <= most
+                                     for row in own if row["verdict"] != REFUSED] or [np.nan])
+                            for most in thresholds]) for name, own in by(rows, "entrant")}
 
 
 def _over(reduce: Callable[..., Any], values: Iterable[float | None]) -> float:

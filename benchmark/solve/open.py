@@ -2,76 +2,116 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from benchmark.machine import machine
-from benchmark.packages import Entrant, MissingError
-from benchmark.process import CRASHED, HUNG, Process, staged
+from benchmark.packages import Entrant
+from benchmark.process import CRASHED, HUNG, Field
 from benchmark.report import Report
 from benchmark.solve import views
-from benchmark.solve.entrants import ENTRANTS
-from benchmark.solve.judge import RAISED, SOLVED, WRONG, by, judge, summary
+from benchmark.solve.entrants import ABSENT, ENTRANTS
+from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
 from benchmark.store import Row, Store
 from hierarchy.errors import HierarchyError
-from scenarios.problems.answers import export, file_of
+from hierarchy.problem import Array
+from scenarios.problems.answers import export, file_of, save
 from scenarios.problems.families import FAMILIES, Family
-from solvers.problems.files import read
+from solvers.problems.files import Collection, read
+from solvers.proof import prove
 
 QUESTIONS = "benchmark.solve.questions:Questions"
 LIMIT = 10.0     # [s] for one problem with all its repetitions
+BORDERS = tuple(10.0**-k for k in range(12, 4, -1))  # angles and lengths as proof.UNCLEAR
 MOST_ENDS = 5    # crashes and hangs of an entrant on a file, after which the rest is left out
 CHECKED = ("EQ7", "EQ7sing", "INEQ7", "tied_box", "contacts", "mixed_units", "one_unknown")
-_CHECKS, _CHECK_LIMIT = 4, 2.0  # problems of each of them; [s] for each problem
+_CHECKS = 4  # problems of each of them
+_BREAKS = {RAISED: "raises", CRASHED: "ends its process", HUNG: "takes longer than --limit"}
 
 
 def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
         counts: Mapping[int, int | None], limit: float = LIMIT,
         told: Callable[[str], None] = print) -> Store:
-    """Write the problems, run every entrant on them, and keep the raw rows.
+    """Write the problems, let all entrants take turns with each, and keep the raw rows.
 
     What is in the folder already stays as it is: an interrupted benchmark goes on, and an entrant
-    that is added later meets the same problems.
+    that is added later meets the same problems. What entrants find goes to the prover where no
+    proof is complete.
 
     counts : problems of each set, by its seed, None for the usual number; 0 is the public set.
     limit : [s] for one problem. told : gets a line of text now and then.
     """
-    store, files = Store(folder), []
-    for family in families:
-        for seed, count in counts.items():
-            files.append(file_of(store.problems, family.name, seed))
-            if not files[-1].is_file():
-                told(f"{family.name}, seed {seed}: problems and their proofs")
-                export(family, seed, count, True, store.problems)
-    missing, limits = store.notes("missing"), store.notes("limits")
+    store, left = Store(folder), dict[Path, list[str]]()
+    for family, (seed, count) in product(families, counts.items()):
+        file = file_of(store.problems, family.name, seed)
+        if not file.is_file():
+            told(f"{family.name}, seed {seed}: problems and their proofs")
+            export(family, seed, count, True, store.problems)
+        left[file] = [one.label for one in entrants
+                      if not store.file_of(one.label, file).is_file()]
     store.note("machine", machine())
-    for one in entrants:
-        told(one.label)
-        limits[one.label] = one.limits
-        missing.pop(one.label, None)
-        left = [file for file in files if not store.file_of(one.label, file).is_file()]
-        try:
-            for file, rows in zip(left, asked(one, left, limit) if left else (), strict=True):
-                store.add(rows, store.file_of(one.label, file))
-        except MissingError as reason:
-            missing[one.label] = str(reason)
-        store.note("limits", limits)
-        store.note("missing", missing)
+    store.note("limits", store.notes("limits") | {one.label: one.limits for one in entrants})
+    with Field([one for one in entrants if any(one.label in some for some in left.values())],
+               QUESTIONS) as field:
+        missing = {label: why for label, why in store.notes("missing").items()
+                   if all(one.label != label for one in entrants)}
+        store.note("missing", missing | field.missing)
+        for file, labels in left.items():
+            some = [label for label in labels if label in field.running]
+            told(f"{file.stem}: {len(some)} entrants")
+            found = asked(field, file, limit, some)
+            for label, rows in found.items():
+                store.add(rows, store.file_of(label, file))
+            improve(file, found.values())
     return store
 
 
-def asked(entrant: Entrant, files: Sequence[Path], limit: float = LIMIT) -> Iterator[list[Row]]:
-    """Yield the raw rows of an entrant on each file; raises MissingError if it cannot start."""
-    with staged() as folder, Process(entrant, QUESTIONS, folder) as process:
-        for file in files:
+def asked(field: Field, file: Path, limit: float = LIMIT, labels: Sequence[str] | None = None
+          ) -> dict[str, list[Row]]:
+    """Return the raw rows of entrants that take turns with each problem of a file."""
+    one = read(file)
+    same = {"family": one.head.family, "half": one.head.half, "seed": one.head.seed,
+            "sha256": one.digest}
+    questions = [("problem", str(file.resolve()), p) for p in range(len(one.problems))]
+    return {label: [{"entrant": label, "version": field.running[label].about["version"], **same,
+                     "problem": p, **row} for p, row in enumerate(answers)]
+            for label, answers in field.answers(questions, limit, MOST_ENDS, labels).items()}
+
+
+def improve(file: Path, found: Iterable[list[Row]]) -> None:
+    """Let the answers of all entrants be candidates where levels of a file are not yet proved."""
+    one, rows = read(file), list(zip(*found, strict=True))
+    proofs = list(one.answers or ())
+    for p, (h, proof) in enumerate(zip(one.problems, proofs, strict=False)):
+        if rows and proof.proved < min(proof.posed, len(h.sizes) + 1):
+            xs = [np.array(row["x"]) for row in rows[p] if row.get("x") is not None]
+            proofs[p] = max(proof, prove(h, [x for x in xs if miss_of(h, proof, x).level < 0]),
+                            key=lambda one: one.judged)
+    if any(new is not old for new, old in zip(proofs, one.answers or (), strict=False)):
+        save(replace(one, answers=tuple(proofs)), file.parent)
+
+
+def prove_at_borders(store: Store) -> None:
+    """Prove the answers of a folder at each of BORDERS, into `borders/`, from those of entrants.
+
+    The border decides which rows are dependent, and so which problems are well posed.
+    """
+    xs: dict[tuple[str, int], list[Array]] = {}
+    for row in store.rows():
+        if row.get("solved"):
+            xs.setdefault((row["sha256"], row["problem"]), []).append(np.array(row["x"]))
+    for border, file in product(BORDERS, sorted(store.problems.glob("[!.]*.npz"))):
+        folder = store.folder / "borders" / f"{border:g}"
+        if not (folder / file.name).is_file():
             one = read(file)
-            same = {"entrant": entrant.label, "version": process.about["version"],
-                    "family": one.head.family, "half": one.head.half, "seed": one.head.seed,
-                    "sha256": one.digest}
-            answers = process.answers((("problem", str(file.resolve()), p)
-                                       for p in range(len(one.problems))), limit, MOST_ENDS)
-            yield [{**same, "problem": p, **row} for p, row in enumerate(answers)]
+            save(replace(one, answers=tuple(
+                prove(h, xs.get((one.digest, p), []), border)
+                for p, h in enumerate(one.problems))), folder)
 
 
 def report(store: Store) -> Report:
@@ -79,52 +119,67 @@ def report(store: Store) -> Report:
 
     Each set has a section, fresh ones first; no number is of two sets together.
     """
-    found = [read(file) for file in sorted(store.problems.glob("[!.]*.npz"))]
-    rows = judge(store.rows(), {one.digest: one for one in found})
+    order, labels = [*FAMILIES], [one.label for one in ENTRANTS]
+    raw = sorted(store.rows(), key=lambda row: (_place(order, row["family"]),
+                                                _place(labels, row["entrant"])))
+    found = _problems(store.problems)
+    rows = judge(raw, {one.digest: one for one in found})
+    at = {float(folder.name): judge(raw, {one.digest: one for one in _problems(folder)})
+          for folder in (store.folder / "borders").glob("[!.]*")}
     if not rows:
         raise HierarchyError(f"{store.folder} has no rows of a benchmark: run `hierarchy bench "
                              "open` first")
-    order, labels = [*FAMILIES], [one.label for one in ENTRANTS]
-    rows.sort(key=lambda row: (_place(order, row["family"]), _place(labels, row["entrant"])))
     sections, kept = [], list[Row]()
     for seed in sorted({row["seed"] for row in rows}, key=lambda seed: (seed == 0, seed)):
         title = f"Fresh problems, seed {seed}" if seed else "Public problems"
         section, cells = views.section(
             title, [row for row in rows if row["seed"] == seed],
-            {one.head.family: one for one in found if one.head.seed == seed})
+            {one.head.family: one for one in found if one.head.seed == seed},
+            {border: [row for row in some if row["seed"] == seed] for border, some in at.items()})
         sections.append(section)
         kept += [{"half": title, **row} for row in cells]
     versions = {row["entrant"]: row["version"] for row in rows}
     return Report("The open benchmark of prioritized control",
                   [*sections, views.entrants(versions, store.notes("limits"))], {"summary": kept},
-                  store.notes("missing"))
+                  store.notes("missing") | ABSENT)
+
+
+def _problems(folder: Path) -> list[Collection]:
+    return [read(file) for file in sorted(folder.glob("[!.]*.npz"))]
 
 
 def _place(order: Sequence[str], name: str) -> int:
     return order.index(name) if name in order else len(order)
 
 
-def check(entrant: Entrant) -> bool:
-    """Try an entrant on a few problems of each kind; print what came of it; return if it is well.
+def check(entrants: Sequence[Entrant], limit: float = LIMIT) -> bool:
+    """Try entrants on a few problems of each kind; print what came of it; return if all is well.
 
-    It must run, answer something, never end early, and give the same bits twice.
+    limit : [s] for one problem.
     """
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder, Field(entrants, QUESTIONS) as field:
         files = [export(FAMILIES[name], 0, _CHECKS, True, Path(folder)) for name in CHECKED]
-        try:
-            every = [row for rows in asked(entrant, files, _CHECK_LIMIT) for row in rows]
-        except MissingError as reason:
-            print(f"{entrant.label}: cannot run: {reason}")
-            return False
-        rows = judge(every, {one.digest: one for one in map(read, files)})
-    answered = [row for row in rows if row["x"] is not None]
-    ended = any(row["verdict"] in (CRASHED, HUNG, RAISED) for row in rows)
-    well = bool(answered) and not ended and all(row["same"] for row in answered)
-    print(f"{entrant.label}: {rows[0]['version']}",
-          *(f"  {name:12} {_line(own)}" for name, own in by(rows, "family")),
-          "  the rules are kept" if well else
-          "  the rules are broken: see docs/extending/entrant.md", sep="\n")
-    return well
+        rows = [row for file in files for own in asked(field, file, limit).values() for row in own]
+        judged = by(judge(rows, {one.digest: one for one in map(read, files)}), "entrant")
+    for label, why in field.missing.items():
+        print(f"{label}: cannot run: {why}")
+    broken = {label: _broken(own) for label, own in judged}
+    for label, own in judged:
+        print(f"{label}: {own[0]['version']}",
+              *(f"  {name:12} {_line(some)}" for name, some in by(own, "family")),
+              *(f"  a rule is broken: {rule}" for rule in broken[label] or ()),
+              *(() if broken[label] else ("  the rules are kept",)), sep="\n")
+    return not field.missing and not any(broken.values())
+
+
+def _broken(rows: Sequence[Row]) -> list[str]:
+    """Return the rules of docs/extending/entrant.md that an entrant has broken."""
+    early = {row["verdict"]: row.get("raised") or row.get("why") or "" for row in rows
+             if row["verdict"] in ENDED}
+    rules = [f"{row['family']}, problem {row['problem']}: other bits the second time"
+             for row in rows if row.get("same") is False]
+    return [*(f"it {_BREAKS[verdict]}: {why}" for verdict, why in early.items()), *rules[:1],
+            *(["it answers nothing"] if all(row["x"] is None for row in rows) else [])]
 
 
 def _line(rows: list[Row]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -11,6 +12,7 @@ from benchmark.solve.interface import Answer, Array, Problem, Solver
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Hierarchy
 from solvers import Resolution, Status, make
+from solvers.qp import backends
 
 
 class Ours(Solver):
@@ -51,6 +53,15 @@ class Ours(Solver):
     def read(self, raw: Resolution) -> Answer:
         """Return x, and whether the status is SOLVED."""
         return Answer(raw.x, raw.status is Status.SOLVED, raw.iterations)
+
+
+class Hqp(Ours):
+    """`hqp` with other options of its backend than its own; in a process of its own."""
+
+    def __init__(self, backend: str, **options: Any) -> None:
+        backends.BACKENDS = {**backends.BACKENDS, backend: replace(
+            backends.BACKENDS[backend], options=options)}
+        super().__init__("hqp", backend=backend)
 
 
 class Plain(Solver):

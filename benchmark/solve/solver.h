@@ -2,7 +2,8 @@
  *
  * A problem has levels of rows lower <= A x <= upper, the most important first. Each level minimises
  * the Euclidean norm of its violation without giving up any of the norms above it; of all such x the
- * answer is the one nearest to the reference.
+ * answer is the one nearest to the reference. A solver without a reference solves for x - reference: it
+ * subtracts A reference from the sides, and adds the reference to its answer.
  *
  * Compile these functions with your solver, on your side; library.c does it for our C library:
  *

@@ -10,9 +10,17 @@ from rich.console import Console
 
 from benchmark import figures
 from benchmark.report import Section
-from benchmark.solve.judge import RIGHT, by, cells, profile, steps_of, summaries
+from benchmark.solve.judge import (
+    RIGHT,
+    by,
+    cells,
+    profile,
+    right_within,
+    steps_of,
+    summaries,
+)
 from benchmark.store import Row
-from benchmark.tables import Column, Table, digits, percent, power, text, whole, yes
+from benchmark.tables import Column, Table, digits, percent, power, text, whole, wide, yes
 from hierarchy.words import listed
 from solvers.problems.files import Collection
 
@@ -30,6 +38,7 @@ TIMED = ("EQ7", "INEQ7", "HUM38", "human-hqp")
 """Families whose times are printed."""
 _WIDELY = 0.95            # share of the problems that an entrant of the first sentence can be asked
 _RATIOS = np.geomspace(1.0, 1e4, 200)  # of times, in the performance profile
+_THRESHOLDS = np.geomspace(1e-9, 1e-3, 13)
 _LABEL, _FAMILY = 23, 19  # width of the entrants' column and of a family's three
 _ANSWERS = (Column("asked", "asked", whole), Column("right", "right", percent),
             *(Column(key, key, whole) for key in ("wrong", "modest", "failed", "ended")))
@@ -40,9 +49,12 @@ _INSIDE = (Column("Python", "median_us"), Column("C", "inside_median_us"),
            Column("warm, Python", "warm_median_us"), Column("C", "warm_inside_median_us"))
 
 
-def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collection]
-            ) -> tuple[Section, list[Row]]:
-    """Return the section of a set and the summaries behind it, of its judged rows and problems."""
+def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collection],
+            at: Mapping[float, Sequence[Row]]) -> tuple[Section, list[Row]]:
+    """Return the section of a set and the summaries behind it, of its judged rows and problems.
+
+    at : the rows as judged by proofs at other borders of rank.
+    """
     steps = steps_of(collections)
     total, some = summaries(rows, steps), cells(rows, steps)
     families = list(dict.fromkeys(row["family"] for row in rows))
@@ -54,11 +66,31 @@ def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collectio
         tables.append(Table(f"{title}: medians of compiled entrants", [
             {**row, "entrant": f"{row['family']}, {row['entrant']}"} for row in inside], _INSIDE))
     chosen = [name for name in CHOSEN if name in families] or families[:4]
-    drawn = {f"{title}: performance profiles": figures.profiles(_RATIOS, profile(rows, _RATIOS)),
+    drawn = {f"{title}: performance profiles": figures.curves(
+                 _RATIOS, profile(rows, _RATIOS),
+                 "median time of a problem, over that of the fastest entrant"),
+             f"{title}: right over threshold": figures.curves(
+                 _THRESHOLDS, right_within(rows, _THRESHOLDS), "largest miss of a right answer"),
              f"{title}: time against miss": figures.time_against_error(
                  [mark(row) for row in some if row["family"] in chosen and row["answered"]]),
              f"{title}: share right": figures.heat(some)}
+    if at:
+        every = {border: {row["entrant"]: row for row in summaries(rows)}
+                 for border, rows in sorted(at.items()) if rows}
+        tables.append(_at_borders(title, every))
+        drawn[f"{title}: right over border"] = figures.curves(np.array([*every]), {
+            row["entrant"]: np.array([one[row["entrant"]]["right"] for one in every.values()])
+            for row in total},
+            "angle [rad] or length from which rows are independent, sides apart")
     return Section(title, tables, NOTES, drawn, lead(title, total, some)), some
+
+
+def _at_borders(title: str, every: Mapping[float, Mapping[str, Row]]) -> Table:
+    """Return the numbers of wrong answers at each border of rank, from summaries by entrant."""
+    found = [{**row, "border": f"{border:.0e}"} for border, some in every.items()
+             for row in some.values()]
+    return Table(f"{title}: answers called solved that are wrong, over the border of rank",
+                 *wide(found, "entrant", "border", "wrong", whole))
 
 
 def mark(row: Row) -> Row:
@@ -81,14 +113,15 @@ def _times(title: str, cells: Sequence[Row], families: Sequence[str]) -> Table:
     chosen = [name for name in TIMED if name in families][:room] or [*families[:room]]
     rows: dict[str, dict[str, object]] = {}
     for row in cells:
+        own = rows.setdefault(row["entrant"], {"entrant": row["entrant"]})
         if row["family"] in chosen and row["answered"]:
-            own = rows.setdefault(row["entrant"], {"entrant": row["entrant"]})
             own |= {f"{row['family']} {key}": row[key]
                     for key in ("median_us", "p95_us", "warm_median_us")}
     columns = [Column(f"{head}\n{key}", f"{name} {of}") for name in chosen
                for head, key, of in ((name, "median", "median_us"), ("", "p95", "p95_us"),
                                      ("", "warm", "warm_median_us"))]
-    return Table(f"{title}: times", list(rows.values()), columns)
+    return Table(f"{title}: times; {len(chosen)} of {len(families)} families, all in summary.csv",
+                 list(rows.values()), columns)
 
 
 def lead(title: str, total: Sequence[Row], cells: Sequence[Row]) -> list[str]:

@@ -14,7 +14,10 @@ _UNBOUNDED = 1e30  # how it writes a missing side
 
 
 class Daqp(Solver):
-    """`daqp.solve` with break points; leading rows of the identity as simple bounds."""
+    """`daqp.solve` with break points and settings; leading rows of the identity as bounds."""
+
+    def __init__(self, **settings: float) -> None:
+        self.settings = settings
 
     def version(self) -> str:
         """Return that of daqp."""
@@ -31,7 +34,7 @@ class Daqp(Solver):
 
     def solve(self, prepared: tuple[Any, ...]) -> Any:
         """Call it."""
-        return daqp.solve(*prepared)
+        return daqp.solve(*prepared, **self.settings)
 
     def read(self, raw: Any) -> Answer:
         """Return x, which is uninitialised unless the exit flag is positive."""

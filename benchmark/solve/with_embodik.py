@@ -9,7 +9,7 @@ from typing import Any
 import embodik
 import numpy as np
 
-from benchmark.solve.interface import Answer, Problem, Solver
+from benchmark.solve.interface import Answer, Array, Problem, Solver
 
 _UNBOUNDED = 1e10  # how it writes a missing side
 
@@ -25,17 +25,16 @@ class Embodik(Solver):
         return f"embodik {version('embodik')}"
 
     def refuses(self, problem: Problem) -> str:
-        """Inequalities belong in the first level, and there is no reference."""
+        """Inequalities belong in the first level."""
         equal = problem.lower == problem.upper
         first = int(problem.sizes[0]) if len(problem.sizes) else 0
         if not equal[first:].all():
             return "inequalities in the first level only"
-        if problem.reference.any():
-            return "no reference but zero"
         return "" if (len(problem.A) > first or not equal.all()) else "no task"
 
-    def prepare(self, problem: Problem) -> tuple[Any, ...]:
-        """Split limits and tasks; a first level of equalities is a task."""
+    def prepare(self, problem: Problem) -> tuple[Array, tuple[Any, ...]]:
+        """Split limits and tasks, of x - reference; a first level of equalities is a task."""
+        reference, problem = problem.reference, problem.shifted()
         n, first = len(problem.reference), int(problem.sizes[0])
         limits = 0 if (problem.lower[:first] == problem.upper[:first]).all() else first
         begins = np.concatenate([[0], problem.ends])
@@ -44,16 +43,18 @@ class Embodik(Solver):
         C = problem.A[:limits] if limits else np.eye(n)
         lower = problem.lower[:limits] if limits else np.full(n, -_UNBOUNDED)
         upper = problem.upper[:limits] if limits else np.full(n, _UNBOUNDED)
-        return ([problem.lower[rows].copy() for rows in levels],
-                [np.asfortranarray(problem.A[rows]) for rows in levels], np.asfortranarray(C),
-                np.maximum(lower, -_UNBOUNDED), np.minimum(upper, _UNBOUNDED))
+        return reference, (
+            [problem.lower[rows].copy() for rows in levels],
+            [np.asfortranarray(problem.A[rows]) for rows in levels], np.asfortranarray(C),
+            np.maximum(lower, -_UNBOUNDED), np.minimum(upper, _UNBOUNDED))
 
-    def solve(self, prepared: tuple[Any, ...]) -> Any:
+    def solve(self, prepared: tuple[Array, tuple[Any, ...]]) -> tuple[Array, Any]:
         """Call it."""
-        return embodik.computeMultiObjectiveVelocitySolutionEigen(
-            *prepared, refine_partial_scale=self.refine)
+        return prepared[0], embodik.computeMultiObjectiveVelocitySolutionEigen(
+            *prepared[1], refine_partial_scale=self.refine)
 
-    def read(self, raw: Any) -> Answer:
+    def read(self, raw: tuple[Array, Any]) -> Answer:
         """Return the solution, and whether the status is SUCCESS."""
-        x = np.array(raw.solution, dtype=float)
-        return Answer(x, raw.status == embodik.SolverStatus.SUCCESS)
+        reference, found = raw
+        return Answer(np.array(found.solution, dtype=float) + reference,
+                      found.status == embodik.SolverStatus.SUCCESS)

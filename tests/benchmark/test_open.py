@@ -12,23 +12,24 @@ import numpy as np
 import pytest
 
 from benchmark import solve
-from benchmark.packages import OWN, Entrant, MissingError
-from benchmark.process import CRASHED, HUNG, LEFT_OUT
+from benchmark.packages import OWN, Entrant
+from benchmark.process import CRASHED, HUNG, LEFT_OUT, Field
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
 from benchmark.solve.entrants import ENTRANTS, chosen, compiled
 from benchmark.solve.interface import read_problems
-from benchmark.solve.judge import cells, judge, judged, summaries, summary
-from benchmark.solve.open import asked
+from benchmark.solve.judge import cells, judge, judged, right_within, summaries, summary
+from benchmark.solve.open import QUESTIONS, asked, improve
 from benchmark.solve.views import lead
 from benchmark.store import Store
 from benchmark.worker import Repeats
 from hierarchy import Hierarchy
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
-from solvers import certify
-from solvers.problems.files import Collection, Head
+from solvers import certify, names
+from solvers.problems.files import Collection, Head, read
 from solvers.proof import prove
+from solvers.qp.backends import BACKENDS
 
 HELPERS = Path(__file__).parents[1] / "helpers"
 SOLVE = Path(solve.__file__).parent
@@ -57,7 +58,9 @@ def equalities(tmp_path_factory):
 
 
 def run_entrant(entrant, file, limit=10.0):
-    return list(asked(entrant, [file], limit))[0]  # noqa: RUF015
+    with Field([entrant], QUESTIONS) as field:
+        assert not field.missing, field.missing
+        return asked(field, file, limit)[entrant.label]
 
 
 def fake(name, **options):
@@ -65,9 +68,6 @@ def fake(name, **options):
 
 
 def test_every_resolver_of_the_project_is_an_entrant():
-    from solvers import names
-    from solvers.qp.backends import BACKENDS
-
     labels = {row.label for row in ENTRANTS}
     assert {name for name in names() if name != "hqp"} <= labels
     assert {f"hqp {name}" for name in BACKENDS} <= labels
@@ -82,7 +82,10 @@ def test_every_resolver_of_the_project_is_an_entrant():
 def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
         equalities, monkeypatch, name, limit, most, expected):
     monkeypatch.setattr(opened, "MOST_ENDS", most)
-    first, second = asked(fake(name), [equalities] * 2, limit)
+    with Field([fake(name), fake("LeastSquares")], QUESTIONS) as field:
+        first, second = (asked(field, equalities, limit) for _ in range(2))
+    assert [row["x"][0] for row in second["LeastSquares"]] == pytest.approx([0, 1, 2, 3, 4])
+    first, second = first[name], second[name]
     assert [row.get("ended") for row in first] == [row.get("ended") for row in second] == expected
     assert first[0]["version"] == "fake 1"
     assert [row["problem"] for row in first] == [0, 1, 2, 3, 4]
@@ -92,11 +95,12 @@ def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
 
 
 @pytest.mark.slow
-def test_an_entrant_that_cannot_start_is_missing_with_the_reason(equalities):
-    with pytest.raises(MissingError, match="takes no arguments"):
-        run_entrant(fake("LeastSquares", no=1), equalities)
-    with pytest.raises(MissingError, match="No such file"):
-        run_entrant(replace(fake("LeastSquares"), python="/no/such/python"), equalities)
+def test_an_entrant_that_cannot_start_is_missing_with_the_reason():
+    with Field([fake("LeastSquares", no=1), replace(fake("Moody"), python="/no/such/python")],
+               QUESTIONS) as field:
+        assert not field.running
+    assert "takes no arguments" in field.missing["LeastSquares"]
+    assert "No such file" in field.missing["Moody"]
 
 
 CC = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
@@ -230,6 +234,27 @@ def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():
     assert np.isnan(whole["warm_median_us"])
 
 
+def test_shares_right_are_told_for_every_threshold():
+    one = collection([simple(3.0)])
+    rows = judge([raw([3.0 + 1e-4, 1.0], one), raw([3.0, 1.0], one, entrant="modest", solved=False),
+                  raw(None, one, entrant="asked nothing", refused="no")], {one.digest: one})
+    shares = right_within(rows, np.array([1e-9, 1e-3]))
+    assert {label: share.tolist() for label, share in shares.items() if label != "asked nothing"
+            } == {"one": [0.0, 1.0], "modest": [0.0, 0.0]}
+    assert np.isnan(shares["asked nothing"]).all()
+
+
+def test_hqp_and_its_rivals_have_the_same_settings():
+    known = {one.label: dict(one.options) for one in ENTRANTS}
+    for name, backend in BACKENDS.items():
+        if not backend.options:
+            continue
+        for words in ("defaults", "tight"):
+            rival = known[f"cascade {name}" + ("" if words == "defaults" else f", {words}")]
+            assert rival == known[f"hqp {name}, {words}"]
+        assert known[f"cascade {name}, as hqp"] == {"backend": name, **backend.options}
+
+
 def test_the_three_sentences_name_who_solves_most_and_who_is_faster():
     one = collection([simple(3.0)])
     rows = judge([raw([3.0, 1.0], one, entrant="hcod", cold_ns=[4000]),
@@ -262,15 +287,18 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     monkeypatch.setenv("COLUMNS", "80")
     out = tmp_path / "open"
     line = ["bench", "open", "--family", "integers", "--family", "one_unknown", "--count", "3",
-            "--public", "2", "--fresh", "9", "--entrant", "hcod", "--out", str(out)]
+            "--public", "2", "--fresh", "9", "--borders", "--entrant", "hcod", "--out", str(out)]
     mine = f"{HELPERS / 'fake_entrants.py'}:Moody"
     assert run_command(line) == 0
-    first = {file: file.stat().st_mtime_ns for file in out.glob("*/*")}
+    first = {file: file.stat().st_mtime_ns for file in out.glob("*/*.*")}
     assert len(first) == 8  # four files of problems, four of rows
+    assert len(list(out.glob("borders/*/*.npz"))) == 4 * 8
     (out / "missing.json").write_text('{"absent": "not installed", "Moody": "not installed"}')
     assert run_command([*line, "--entrant", mine]) == 0
-    assert json.loads((out / "missing.json").read_text()) == {"absent": "not installed"}
-    assert first.items() <= {file: file.stat().st_mtime_ns for file in out.glob("*/*")}.items()
+    missing = json.loads((out / "missing.json").read_text())
+    assert missing["absent"] == "not installed"
+    assert "Moody" not in missing
+    assert first.items() <= {file: file.stat().st_mtime_ns for file in out.glob("*/*.*")}.items()
     said = capsys.readouterr()
     assert said.err.count("integers, seed 9") == 1
     assert max(len(line) for line in said.out.splitlines() if ": /" not in line) <= 80
@@ -278,7 +306,8 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     assert fresh < said.out.index("Public problems: 4 problems of 2 families")
     page = (out / "index.html").read_text()
     assert page.count("<svg") >= 6
-    for text in ("Fresh problems, seed 9", "Moody", "fake 1", "hierarchy"):
+    assert re.search(r"^soth, LexLS +no package on PyPI", said.out, re.MULTILINE)
+    for text in ("Fresh problems, seed 9", "Moody", "fake 1", "hierarchy", "over border"):
         assert text in page
     assert not re.search(r'(src|href)="http', page)
 
@@ -288,6 +317,23 @@ def test_the_check_accepts_the_example_of_the_documents_and_not_what_ends(tmp_pa
     page = (Path(__file__).parents[2] / "docs" / "extending" / "entrant.md").read_text()
     (tmp_path / "mine.py").write_text(re.search(r"```python\n(.*?)```", page, re.DOTALL)[1])
     assert run_command(["bench", "open", "--check", "--entrant", f"{tmp_path}/mine.py:Mine"]) == 0
-    assert run_command(["bench", "open", "--check", "--entrant",
-                        f"{HELPERS / 'fake_entrants.py'}:Raising"]) == 1
-    assert "the rules are broken" in capsys.readouterr().out
+    broken = {"Raising": "it raises: ArithmeticError: not today", "Moody": "other bits the second",
+              "Slow": "it takes longer than --limit"}
+    line = [part for name in broken for part in ("--entrant",
+                                                 f"{HELPERS / 'fake_entrants.py'}:{name}")]
+    assert run_command(["bench", "open", "--check", "--limit", "0.5", *line]) == 1
+    said = capsys.readouterr().out
+    for rule in broken.values():
+        assert re.search(f"a rule is broken: .*{rule}", said)
+
+
+def test_what_an_entrant_finds_completes_a_proof(equalities, tmp_path):
+    """A file whose candidates led to no proof, and an entrant that has the answer."""
+    known = read(equalities)
+    none = [prove(h, []) for h in known.problems]
+    replace(known, answers=tuple(none)).save(tmp_path / "simple-fresh-7.npz")
+    rows = [{"x": proof.x.tolist()} for proof in known.answers]
+    improve(tmp_path / "simple-fresh-7.npz", [[{"x": None}] * 5, rows])
+    found = read(tmp_path / "simple-fresh-7.npz")
+    assert found.digest == known.digest
+    assert all(proof.complete for proof in found.answers)

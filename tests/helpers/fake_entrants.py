@@ -40,6 +40,15 @@ class Hanging(LeastSquares):
         return super().solve(prepared)
 
 
+class Slow(LeastSquares):
+    """Never comes back from a problem of one unknown."""
+
+    def solve(self, prepared):
+        if len(prepared.reference) == 1:
+            time.sleep(1000.0)
+        return super().solve(prepared)
+
+
 class Raising(LeastSquares):
     """Raises, and prints where rows are expected."""
 
