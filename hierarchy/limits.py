@@ -59,6 +59,8 @@ from hierarchy.task import Level
 
 ROUNDING = 1e-12  # of a position, relative to 1 + its limit: closer to a limit counts as on it
 _FAR = 1e100      # [rad] stands for an infinite distance
+_CLEARANCE = 1e-3  # [rad or m] at which a horizon brings joints to rest before a position limit,
+#                    so that a disturbance of 0.05 rad/s does not reach the steep side of one tick
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,8 @@ def box(q, v, limits, i, acceleration):
         return widest(q, v, (L, U, V, A, T), acceleration)
     # A joint beyond its speed limit returns in H, not in a tick.
     low, up = widest(q, v, (L, U, max(V, abs(v) - (abs(v) - V) * T / H), A, T), acceleration)
-    least, most = next_velocities(q + v * H if acceleration else q, L, U, V, A, H)     # (c)
+    c = min(_CLEARANCE, 0.25 * (U - L))
+    least, most = next_velocities(q + v * H if acceleration else q, L + c, U - c, V, A, H)  # (c)
     if acceleration:
         least, most = (least - v) / H, (most - v) / H
     return clipped(least, low, up), clipped(most, low, up)

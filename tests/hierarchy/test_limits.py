@@ -237,8 +237,9 @@ def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():
     one = np.ones(2000)
     low, up = Limits(-one, one, 4.0 * one, 300.0 * one, 1e-3, H).box(q, v, "acceleration")
     wide_low, wide_up = Limits(-one, one, 4.0 * one, 300.0 * one, 1e-3).box(q, v, "acceleration")
-    most = np.minimum((4.0 - v) / H, (1.0 - q) / H**2 - 2.0 * v / H)
-    least = np.maximum((-4.0 - v) / H, (-1.0 - q) / H**2 - 2.0 * v / H)
+    end = 1.0 - 1e-3  # the clearance
+    most = np.minimum((4.0 - v) / H, (end - q) / H**2 - 2.0 * v / H)
+    least = np.maximum((-4.0 - v) / H, (-end - q) / H**2 - 2.0 * v / H)
     most, least = np.maximum(most, (-4.0 - v) / H), np.minimum(least, (4.0 - v) / H)
     np.testing.assert_allclose(up, np.clip(most, wide_low, wide_up), rtol=0, atol=1e-9)
     np.testing.assert_allclose(low, np.clip(least, wide_low, wide_up), rtol=0, atol=1e-9)
