@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hierarchy.errors import HierarchyError
+from hierarchy.problem import Hierarchy
 from scenarios.cell.build import Cell, build
 from scenarios.cell.stacked import stack_resolver
 from scenarios.measure.causes import Cause, Tick, causes
 from scenarios.measure.judging import Rows
 from scenarios.measure.safety import STEPS
 from solvers import Status
+from solvers.resolvers.merged import Merged
 
 if TYPE_CHECKING:
     from scenarios.recording.recording import Recording
@@ -75,17 +77,25 @@ def _causes(recording: Recording, cell: Cell, rows: Rows, k: int) -> Iterator[Ca
                                       f"{event.action}")
         if (status := Status(int(recording["status"][one]))) is not Status.SOLVED:
             yield Cause("status", f"tick {one} is {status.name}")
+    resolver = stack_resolver(recording.scenario, cell.stack, cell.activation)
+    memory = None
+    for one in range(k if isinstance(resolver, Merged) else 0):  # it moves the targets of tick k
+        if (h := _hierarchy(recording, rows, one)) is not None:
+            memory = resolver.solve(h, memory).memory
     before, after = (_tick(recording, cell, rows, one) for one in (k - 1, k))
     if before is None or after is None:
         yield Cause("other", "its rows do not follow from the recording")
         return
-    resolver = stack_resolver(recording.scenario, cell.stack, cell.activation)
-    yield from causes(before, after, lambda h: resolver.solve(h).x)
+    yield from causes(before, after, lambda h: resolver.solve(h, memory).x)
+
+
+def _hierarchy(recording: Recording, rows: Rows, k: int) -> Hierarchy | None:
+    order = recording.order_names[recording["order"][k]]
+    return rows.hierarchy(k, order) if order else None
 
 
 def _tick(recording: Recording, cell: Cell, rows: Rows, k: int) -> Tick | None:
-    order = recording.order_names[recording["order"][k]]
-    h = rows.hierarchy(k, order) if order else None
+    h = _hierarchy(recording, rows, k)
     if h is None or np.isnan(rows.meant[k]).any():
         return None
     h, n = h.copy(), h.n

@@ -74,6 +74,11 @@ def test_an_answer_that_the_resolver_does_not_give_is_not_blamed_on_the_rows():
     assert text.startswith("other: one of two answers to the same data was not sent as it is")
 
 
+def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
+    run = simulate(load("reach-torque-smooth").with_changes({"control.duration": 0.05}))
+    assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return save(simulate(load("ellipse-hqp").with_changes({"control.duration": 0.05})),
