@@ -76,7 +76,7 @@ def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
 
 
 def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str, float]:
-    from scenarios.draw.replay import html
+    from scenarios.draw.replay.page import html
 
     recordings: dict[str, Recording] = {one.label: one.recording for one in shown}
     happenings = {one.label: one.runs[0].happened for one in shown}
