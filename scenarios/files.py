@@ -76,7 +76,7 @@ def lock(path: Path) -> None:
         stream.close()
         return lock(path)  # whoever held it has just removed the file
     stream.truncate(0)
-    stream.write(_identity())
+    stream.write(f"process {os.getpid()} on {platform.node()}")
     stream.flush()
     _HELD[path] = stream
     atexit.register(unlock, path)
@@ -116,15 +116,6 @@ def _locked(stream: TextIO) -> bool:
     except OSError:
         return True
     return True
-
-
-def _identity() -> str:
-    """Return this process in words: number, host, its start and that of the system."""
-    boot, start = "unknown", "unknown"
-    with suppress(OSError, IndexError):
-        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="utf-8").strip()
-        start = Path("/proc/self/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[19]
-    return f"process {os.getpid()} on {platform.node()} (boot {boot}, started at tick {start})"
 
 
 def next_free(base: str | Path) -> Path:

@@ -15,13 +15,15 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli import benchmarks, runs
-from scenarios.cli import shown as showing
+import scenarios.cli.runs
+import scenarios.cli.shown  # noqa: F401, both add their commands
+from scenarios.cli import benchmarks
 from scenarios.cli.options import (
     INTERRUPTED,
     AsJson,
     Changes,
     Plugins,
+    app,
     complete_scenarios,
     listed_in,
     loaded,
@@ -30,7 +32,6 @@ from scenarios.cli.options import (
 from scenarios.cli.problems import problems
 from scenarios.cli.terminal import exit_code, first_line, print_json, print_list, shown
 
-app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 app.add_typer(problems, name="problems")
 
 
@@ -99,11 +100,6 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
         return print_json(entries)
     for what, named in entries.items():
         print_list(what, named)
-
-
-for _command in (runs.run, runs.compare, runs.sweep, showing.view, showing.export, showing.replay,
-                 showing.why, showing.figures):
-    app.command()(_command)
 
 
 @app.command()

@@ -1,4 +1,4 @@
-"""The options that several commands share, and the names that the shell completes."""
+"""The application, the options that commands share, and the names that the shell completes."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 if TYPE_CHECKING:
     from scenarios.config import Scenario
 
+app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 INTERRUPTED = 130  # exit code of a command that Ctrl-C ended
 PORT = 8080
 _LIBRARY = Path(__file__).parents[1] / "library"

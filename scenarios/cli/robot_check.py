@@ -108,7 +108,8 @@ def say(section: RobotSection, robot: Robot) -> str:
              f"  frames          {some(found['frames'])}",
              f"  end effector    {robot.end_effector}, {end}; "
              f"{_moved_by(robot)} joints move it",
-             *_said_of_feet(found["lowest_frames"]),
+             *([f"  lowest frames   {some(feet)}; [[contacts]] may be there"]
+               if (feet := found["lowest_frames"]) else []),
              f"  capsules        {capsules}",
              f"  control points  {len(robot.control_points)}, {points}"]
     lines += [f"  missing         {sentence}" for sentence in found["missing"]]
@@ -212,10 +213,6 @@ def _lowest(robot: Robot) -> list[str]:
             lowest[frame.joint] = min(here, lowest.get(frame.joint, here), key=itemgetter(0))
     floor = min((height for height, _ in lowest.values()), default=0.0)
     return [name for height, name in lowest.values() if height < floor + _LEVEL]
-
-
-def _said_of_feet(names: list[str]) -> list[str]:
-    return [f"  lowest frames   {some(names)}; [[contacts]] may be there"] if names else []
 
 
 def _moved_by(robot: Robot) -> int:

@@ -23,6 +23,7 @@ from scenarios.cli.options import (
     Port,
     Scheduler,
     Workers,
+    app,
     complete_groups,
     complete_resolvers,
     complete_scenarios,
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from scenarios.results.sampled import Finished
 
 
+@app.command()
 def run(scenario: Annotated[str, typer.Argument(
             help="Name of a scenario, or a scenario file.", autocompletion=complete_scenarios)],
         resolver: Annotated[str | None, typer.Option(
@@ -126,6 +128,7 @@ def _print(scenario: Scenario, recording: Recording, certify: bool) -> None:
         print(line)
 
 
+@app.command()
 def compare(scenarios: Annotated[list[str], typer.Argument(
                 help="Names of scenarios or groups, or scenario files.",
                 autocompletion=complete_groups)],
@@ -196,6 +199,7 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
     return max([exit_code(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
 
 
+@app.command()
 def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
                                               autocompletion=complete_sweeps)],
           out: Annotated[Path | None, output(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.cli.options import PORT, AsJson, Browser, Plugins, Port, Run, Runs, output
+from scenarios.cli.options import PORT, AsJson, Browser, Plugins, Port, Run, Runs, app, output
 from scenarios.cli.terminal import print_json, shown
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _POLL = 0.05  # [s] between two looks for the first browser
 
 
+@app.command()
 def view(folders: Runs,
          side_by_side: Annotated[bool, typer.Option(
              "--side-by-side/--overlay", help="Placement of several runs.")] = True,
@@ -112,6 +113,7 @@ def _keep(page: LivePage, folder: Path) -> None:
         print(f"hierarchy: fault: {recording.fault}", file=sys.stderr)
 
 
+@app.command()
 def export(folder: Run,
            format: Annotated[str, typer.Option(
                "--format", metavar="FORMAT", help="mcap. Tables of other formats: "
@@ -129,6 +131,7 @@ def export(folder: Run,
     _print_files(write(load_run(folder), out or folder / f"run.{format}"), as_json)
 
 
+@app.command()
 def replay(folders: Runs,
            out: Annotated[Path | None, output(
                "HTML file to write. Default: RUN/replay.html.", "FILE")] = None,
@@ -151,6 +154,7 @@ def replay(folders: Runs,
     print(f"{target}, {target.stat().st_size / 1e3:.0f} kB")
 
 
+@app.command()
 def why(folder: Run,
         tick: Annotated[int | None, typer.Option(
             "--tick", metavar="N", help="The change into this tick. Default: the three largest.")
@@ -173,6 +177,7 @@ def why(folder: Run,
             print(fill(f"{kind}: {text}", 80, initial_indent="  ", subsequent_indent="    "))
 
 
+@app.command()
 def figures(folders: Runs,
             style: Annotated[str, typer.Option(
                 "--style", metavar="STYLE",

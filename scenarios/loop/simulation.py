@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from hierarchy.errors import HierarchyError, brief, expect
-from hierarchy.problem import Array
 from scenarios.cell.build import Cell
 from scenarios.cell.plants.plant import fault_of
 from scenarios.config import Scenario, load
@@ -48,8 +47,8 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     ticks = scenario.control.ticks
     recorder = Recorder(controller, ticks, (*_audits(controller, scenario, certified), *audits))
     try:
-        fault = _run(controller, recorder, scenario.control.period, ticks, progress or _silent,
-                     faults)
+        fault = _run(controller, recorder, scenario.control.period, ticks,
+                     progress or (lambda done, total: None), faults)
     except KeyboardInterrupt:
         fault = f"interrupted at tick {recorder.ticks}"
     return completed(recorder.finish(scenario, fault), rehearsal)
@@ -102,7 +101,8 @@ def tick(controller: Controller, recorder: Recorder, t: float,
     sound = recorder.write()
     recorder.stamp(controller.clock())
     recorder.look()
-    if not sound or (controller.policy.events and not _finite(plant.q, plant.v)):
+    if not sound or (controller.policy.events and not (
+            np.isfinite(plant.q).all() and np.isfinite(plant.v).all())):
         return _unsound(controller)
     return fault_of(plant)
 
@@ -114,11 +114,3 @@ def _unsound(controller: Controller) -> str:
         return "the state is not finite"
     return (f"the motion has diverged: joint {robot.velocity_names[i]} moves at {state.v[i]:.3g} "
             f"{robot.velocity_units[i]}/s, more than {FASTEST:g},")
-
-
-def _finite(*arrays: Array) -> bool:
-    return all(np.isfinite(array).all() for array in arrays)
-
-
-def _silent(done: int, total: int) -> None:
-    pass

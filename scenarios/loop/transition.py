@@ -79,7 +79,8 @@ class Blend:
             visits.append((present, t))
         while len(visits) > 1 and t - visits[1][1] >= self._time:
             del visits[0]
-        risen = [1.0, *(_smoothstep((t - since) / self._time) for _, since in visits[1:]), 0.0]
+        ages = (min((t - since) / self._time, 1.0) for _, since in visits[1:])
+        risen = [1.0, *(s * s * (3.0 - 2.0 * s) for s in ages), 0.0]  # the smoothstep
         found: dict[Key, float] = {}
         for (key, _), here, after in zip(visits, risen[:-1], risen[1:], strict=True):
             found[key] = found.get(key, 0.0) + here - after
@@ -115,7 +116,3 @@ def _rows(stack: Stack, state: State, key: Key) -> Hierarchy:
     rows = stack.hierarchy(state, key.order)
     seen.active = active
     return rows
-
-
-def _smoothstep(s: float) -> float:
-    return 1.0 if s >= 1.0 else s * s * (3.0 - 2.0 * s)

@@ -15,7 +15,6 @@ from solvers import make
 from solvers.problems.files import Collection
 from solvers.proof import Proof, prove
 from solvers.qp.backends import installed
-from solvers.resolver import Resolver
 
 _BACKENDS = ("daqp", "quadprog", "clarabel", "proxqp")
 
@@ -51,15 +50,11 @@ def answer(h: Hierarchy) -> Proof:
 
 
 def _candidates(h: Hierarchy) -> Iterator[Array]:
-    for resolver in _resolvers():
-        if resolver.name == "recursive" and not h.is_equality:
-            continue
-        yield resolver.solve(h).x
-
-
-def _resolvers() -> list[Resolver]:
-    return [make("hcod"), *(make("hqp", backend=name) for name in _BACKENDS
-                            if installed(name)), make("recursive")]
+    yield make("hcod").solve(h).x
+    for name in filter(installed, _BACKENDS):
+        yield make("hqp", backend=name).solve(h).x
+    if h.is_equality:
+        yield make("recursive").solve(h).x
 
 
 def file_of(folder: Path, family: str, seed: int) -> Path:

@@ -14,7 +14,7 @@ from typing import final
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Hierarchy
-from scenarios.problems import postures, windows
+from scenarios.problems import postures, recorded
 from scenarios.problems import reference as stored
 from solvers import problems
 from solvers.problems.files import FRESH, PUBLIC, Collection, Head
@@ -124,9 +124,9 @@ def _all() -> dict[str, Family]:
     made = [Family(name, "reference", what, partial(_reference, name),
                    usual=_FEW if name in _SIMULATED else COUNT)
             for name, what in _REFERENCE.items()]
-    made += [Family(name, "recorded", what, partial(windows.recorded, name),
-                    windows.PERIODS[name], _FEW if name in _SIMULATED else _CONSECUTIVE)
-             for name, what in windows.SCENARIOS.items()]
+    made += [Family(name, "recorded", what, partial(recorded.recorded, name),
+                    recorded.PERIODS[name], _FEW if name in _SIMULATED else _CONSECUTIVE)
+             for name, what in recorded.SCENARIOS.items()]
     made += [Family(name, "postures", what, partial(postures.posed, name))
              for name, what in _POSTURES.items()]
     made += [Family(name, "degenerate", what, partial(_kind, name))

@@ -1,4 +1,4 @@
-"""The family DYN60: ticks of `stand-push`, recorded (extra `sim`).
+"""Problems of closed loops: windows of consecutive ticks, and DYN60, of `stand-push` (extra `sim`).
 
 `python -m scenarios.problems.recorded --out FILE` writes the stored set again, with another seed
 a fresh one.
@@ -7,17 +7,20 @@ a fresh one.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any, final
 
 import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import build
-from scenarios.config import Scenario, load
+from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.sampling import changed, drawn
+from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
 from scenarios.measure.judging import Rows
+from scenarios.recording.recording import Recording
 from solvers import Status, certify, make
 from solvers.qp.backends import BACKENDS, installed
 
@@ -97,6 +100,66 @@ def packed(problems: list[tuple[Hierarchy, Array]]) -> dict[str, Array]:
                   f"lb{k}": np.array([np.maximum(h.lower[i:j], -_MISSING) for h in hs]),
                   f"ub{k}": np.array([np.minimum(h.upper[i:j], _MISSING) for h in hs])}
     return found
+
+
+
+
+SCENARIOS = {
+    "ellipse-hqp": "an arm on a path, with joint limits, distances and a cone as inequalities",
+    "ellipse-limits": "an arm on a path inside its joint limits, with Algorithm 1",
+    "human-hqp": "an arm beside a moving hand, seen by a camera",
+    "humanoid-reach": "a humanoid asked to reach farther than it can",
+    "stand-push": "a pushed humanoid, torque motors: dynamics, contacts, friction (extra `sim`)"}
+"""Scenarios that are recorded, by name."""
+PERIODS = {"ellipse-hqp": 0.001, "ellipse-limits": 0.001, "human-hqp": 0.005,
+           "humanoid-reach": 0.005, "stand-push": 0.001}
+"""Time between two ticks [s]."""
+_WITHIN = (0.1, 0.7)  # share of a run at which a window begins
+_PUBLIC = 0.4         # the same for the public set
+_RUNS = 20            # sampled runs tried until one lasts to the end of its window
+
+
+def recorded(name: str, seed: int, count: int) -> list[Hierarchy]:
+    """Return the problems of `count` consecutive ticks of a scenario's closed loop.
+
+    seed : 0 for the scenario as shipped; any other samples its start from its [variation], and the
+        tick at which the window begins.
+
+    Raises
+    ------
+    ScenarioError : no run lasts to the end of its window.
+    """
+    shipped, begin = load(name), _PUBLIC
+    if seed:
+        begin = float(np.random.default_rng([seed, 3]).uniform(*_WITHIN))
+    first = int(begin * shipped.control.ticks)
+    longest = (first + count) * shipped.control.period
+    for run in range(_RUNS if seed else 1):
+        window = _Window(first)
+        values = drawn(shipped, shipped.variation, seed, run) if seed else {}
+        simulate(changed(shipped, values | {"control.duration": longest}, name), audits=[window])
+        if len(window.problems) >= count:
+            return window.problems[:count]
+    raise ScenarioError(f"{name}: no run with seed {seed} has {count} problems from tick {first} "
+                        "on")
+
+
+@final
+class _Window:
+    """Keeps the problems of all ticks from one on; an Audit."""
+
+    def __init__(self, first: int) -> None:
+        self.first = first
+        self.problems: list[Hierarchy] = []
+
+    def look(self, tick: int, controller: Controller) -> None:
+        """Keep the problem of a tick."""
+        if tick >= self.first:
+            self.problems.append(controller.hierarchy.copy())
+
+    def signals(self, recording: Recording) -> Mapping[str, Any]:
+        """Return no signals."""
+        return {}
 
 
 def main() -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hierarchy.archives import read_arrays
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from scenarios.problems.recorded import TOGETHER, sequences
 from solvers.problems import family as make_problem
 
 EQUALITIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10")
@@ -79,19 +80,14 @@ def fresh(name: str, seed: int, count: int) -> list[Problem]:
     """
     if name in RECORDED:
         return _in_sequence(*_recorded(seed, count))
-    return [_unanswered(make_problem(name, seed + i)) for i in range(count)]
+    made = (make_problem(name, seed + i) for i in range(count))
+    return [Problem(h, np.full(h.n, np.nan), np.full(len(h.sizes), np.nan)) for h in made]
 
 
 def _recorded(seed: int, count: int) -> tuple[list[Problem], NDArray[Any]]:
-    from scenarios.problems.recorded import TOGETHER, sequences
-
     problems: list[Problem] = []
     for some in sequences(seed):
         problems += [Problem(h, x, h.violations(x)) for h, x in some]
         if len(problems) >= count:
             break
     return problems[:count], np.arange(count) // TOGETHER
-
-
-def _unanswered(h: Hierarchy) -> Problem:
-    return Problem(h, np.full(h.n, np.nan), np.full(len(h.sizes), np.nan))

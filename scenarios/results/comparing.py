@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import final
+from typing import Self, final
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, brief, expect, file_path
@@ -36,21 +36,18 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
             resolvers: Sequence[str] | None = None,
             out: str | Path | None = None, progress: Progress | None = None,
             command: str | None = None, workers: int = 1) -> Comparison:
-    """Run every scenario under every resolver and compare.
-
-    A resolver that cannot resolve a scenario's rows is skipped, and the Comparison says so.
+    """Run every scenario under every resolver that can resolve its rows, and compare.
 
     With `out`, each run's folder is out/<scenario>/<resolver>, the page is out/index.html, the
     table of results out/results.csv, and the numbers are in out/comparison.json. They are written
-    as runs end and are never removed: a run that fails does not affect the others, and Ctrl-C keeps
-    the runs made so far.
+    as runs end; a run that fails does not affect the others, and Ctrl-C keeps what was made.
 
     Parameters
     ----------
     scenarios : names of scenarios or groups, paths or Scenario objects.
     resolvers : specs `name` or `name:setting=value:setting=value`, or "own", the one that each
-        scenario names; by default those of DEFAULT_RESOLVERS that can resolve the scenario and are
-        installed, with a group "own".
+        scenario names; by default those of DEFAULT_RESOLVERS that are installed, with a group
+        "own".
     progress : called as progress(label, ticks done, total ticks); with several workers as
         progress(what, runs done, total runs).
     command : the command line shown on the page; derived from the names by default.
@@ -62,28 +59,15 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     HierarchyError : before any run: an unknown scenario, resolver or setting, a scenario that does
         not fit its robot, no resolver that can resolve any scenario, or an output folder in use.
     """
-    if not isinstance(scenarios, str | Scenario | Iterable):
-        raise HierarchyError("compare: expected names, files, or what `load` returns, got "
-                             f"{brief(scenarios)}")
-    asked = [scenarios] if isinstance(scenarios, str | Scenario) else scenarios
-    planned, refused = _plan(asked, resolvers)
+    planned, refused = _plan(scenarios, resolvers)
     folder = None if out is None else make_folder(claim(file_path("compare: out", out)))
-    written = _Written(folder, Comparison(
-        (), command or _command(planned, out), versions(), refused,
-        None if out is None else str(out)), len(planned))
-    try:
+    with _Written(folder, Comparison((), command or _command(planned, out), versions(), refused,
+                                     None if out is None else str(out)), len(planned)) as written:
         for i, run in (_together(planned, folder, workers, progress)
                        if min(workers, len(planned)) > 1 else
                        _one_by_one(planned, folder, progress)):
             written.add(i, run)
-    except KeyboardInterrupt:
-        written.finish()
-        raise
-    else:
         return written.finish()
-    finally:
-        if folder is not None:
-            unlock(folder)
 
 
 class PageError(RuntimeError):
@@ -92,12 +76,21 @@ class PageError(RuntimeError):
 
 @final
 class _Written:
-    """The runs made so far; the page and the table are written again as they come."""
+    """The runs made so far, also at Ctrl-C; page and table are written again as they come."""
 
     def __init__(self, folder: Path | None, empty: Comparison, count: int) -> None:
         self._folder, self._empty, self._count = folder, empty, count
         self._runs: dict[int, Run] = {}
         self._next = 0.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is KeyboardInterrupt:
+            self.finish()
+        if self._folder is not None:
+            unlock(self._folder)
 
     def add(self, i: int, run: Run) -> None:
         """Take a run; write the table, and the page of two or more unless it was just written."""
@@ -147,10 +140,13 @@ def _job(run: Run) -> Job:
                plugins=plugins.loaded())
 
 
-def _plan(scenarios: Iterable[str | Scenario],
+def _plan(scenarios: Iterable[str | Scenario] | str | Scenario,
           resolvers: Sequence[str] | None) -> tuple[list[Run], tuple[str, ...]]:
     """Return the planned runs, and why others are not possible."""
-    named = list(scenarios)
+    if not isinstance(scenarios, str | Scenario | Iterable):
+        raise HierarchyError("compare: expected names, files, or what `load` returns, got "
+                             f"{brief(scenarios)}")
+    named = [scenarios] if isinstance(scenarios, str | Scenario) else list(scenarios)
     if resolvers is None and any(one in shipped_groups() for one in named):
         resolvers = [OWN]
     loaded = [load(s) if isinstance(s, (str, Path)) else s for s in members(named)]

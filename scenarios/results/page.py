@@ -76,7 +76,7 @@ def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
 
 
 def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str, float]:
-    from scenarios.draw.replay import html
+    from scenarios.draw.replay.page import html
 
     recordings: dict[str, Recording] = {one.label: one.recording for one in shown}
     happenings = {one.label: one.runs[0].happened for one in shown}
@@ -110,23 +110,19 @@ def comparison_page(comparison: Comparison, planned: int = 0) -> str:
 
     planned : number of runs; while there are fewer, the page says so and loads itself again.
     """
-    groups = comparison.groups()
+    groups, made = comparison.groups(), len(comparison.runs)
     with drawing.styled(drawing.SCREEN):
         articles = [_group(comparison, name, runs) for name, runs in groups.items()]
     ends = {name: lines(verdicts(runs))[0] for name, runs in groups.items()}
     return str(render("results/page.html", title=f"{', '.join(groups)}: a comparison",
                       style=resource("results/style.css"), script=resource("results/page.js"),
-                      unfinished=_unfinished(len(comparison.runs), planned),
+                      unfinished=f"{made} of {planned} runs have ended" * (made < planned),
                       about_rows=_about_rows(comparison), file="",
                       contents=ends if len(ends) > 1 else {},
                       count=in_words(len(groups)).capitalize(),
                       sampled=comparison.sampled(_STARTS), groups=articles,
                       refused=comparison.refused, command=comparison.command,
                       versions=comparison.versions))
-
-
-def _unfinished(made: int, planned: int) -> str:
-    return f"{made} of {planned} runs have ended" if made < planned else ""
 
 
 def _about_rows(comparison: Comparison) -> str:

@@ -114,7 +114,8 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
     HierarchyError : an unknown scenario, resolver or setting, a scenario that does not fit its
         robot, a parameter that a scenario does not have, an invalid sampled value.
     """
-    asked = _loaded(sweep) if scenarios is None else scenarios
+    lasting = {} if sweep.duration is None else {"control.duration": sweep.duration}
+    asked = [load(name, lasting) for name in sweep.scenarios] if scenarios is None else scenarios
     columns, refused = side_by_side(asked, sweep.resolvers or None, f"sweep {sweep.name!r}: ")
     alone = len({run.spec for run in columns}) == 1 and len(asked) > 1
     versions = digest()
@@ -141,11 +142,6 @@ def _drawn(sweep: Sweep, index: int, scenario: Scenario) -> dict[str, Value]:
     own = drawn(scenario, scenario.variation, sweep.seed, index) if sweep.variation else {}
     return own | drawn(scenario, sweep.parameters, sweep.seed, index,
                        f"sweep {sweep.name!r}: parameters")
-
-
-def _loaded(sweep: Sweep) -> tuple[Scenario, ...]:
-    lasting = {} if sweep.duration is None else {"control.duration": sweep.duration}
-    return tuple(load(name, lasting) for name in sweep.scenarios)
 
 
 def side_by_side(scenarios: Sequence[Scenario], specs: Sequence[str] | None, what: str = ""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from hierarchy import plugins
-from hierarchy.words import listed
+from hierarchy.words import counted, listed
 from scenarios.draw.figures import drawing, panels
 from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, task_colours
@@ -39,17 +39,14 @@ _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_v
 def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     """Return the metrics with the best of each row marked; minor ones are folded away."""
     rows = table(runs, details=False)
-    first, rest = ([row for row in rows if _is_first(row.name) == is_first]
-                   for is_first in (True, False))
+    first = [row for row in rows if row.name in _FIRST or (
+        row.name.startswith("task_") and row.name.endswith("_rms"))]
+    rest = [row for row in rows if row not in first]
     marked = flags({run.label: run.scenario for run in runs})
     heads = {run.label: [(kind, text) for kind, text in (
         ("alert", _stopped(run)), ("quiet", marked[run.label])) if text] for run in runs}
     return render("results/measured.html", heads=heads, looks=looks, first=first, rest=rest,
                   said=_marks(runs)) if rows else Markup()
-
-
-def _is_first(name: str) -> bool:
-    return name in _FIRST or (name.startswith("task_") and name.endswith("_rms"))
 
 
 def _marks(runs: Sequence[Run]) -> str:
@@ -124,7 +121,8 @@ def stack(name: str, runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     beside = [one.recording for one in found]
     colours = task_colours(tasks(beside))
     bands = [(one, svg(timeline(one.recording, beside),
-                       f"{name}, {one.label}: the stack over time"), _changes(one.recording))
+                       f"{name}, {one.label}: the stack over time"),
+              counted(int(one.recording.switches().size), "change"))
              for one in found if colours]
     return render("results/stack.html", looks=looks, colours=colours, drawn=bands,
                   events=events(runs))
@@ -136,11 +134,6 @@ def _events(run: Run) -> object:
         return None
     return recording.events, recording.fault, tuple(recording["status"].nonzero()[0]) \
         if "status" in recording else ()
-
-
-def _changes(recording: Recording) -> str:
-    count = recording.switches().size
-    return f"{count} change{'' if count == 1 else 's'}"
 
 
 def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> Markup:

@@ -4,7 +4,7 @@ import base64
 
 import numpy as np
 
-from scenarios.draw.replay.data import NOTHING
+from scenarios.draw.replay.page import NOTHING
 
 
 def unpacked(array):

@@ -62,21 +62,6 @@ def test_a_file_extends_another(tmp_path):
     assert s.avoidance == load("ellipse").avoidance
 
 
-def test_bad_files_are_named(tmp_path):
-    with pytest.raises(ScenarioError, match=r"none\.toml' does not exist"):
-        load(tmp_path / "none.toml")
-    broken = tmp_path / "broken.toml"
-    broken.write_text("name = 'x'\n[robot\n")
-    with pytest.raises(ScenarioError, match=r"line 2, column 7"):
-        load(broken)
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
-    with pytest.raises(ScenarioError, match="UTF-8"):
-        load(tmp_path / "binary.toml")
-    (tmp_path / "folder.toml").mkdir()
-    with pytest.raises(ScenarioError, match="folder"):
-        load(tmp_path / "folder.toml")
-
-
 def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     path = tmp_path / "idle.toml"
     path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'

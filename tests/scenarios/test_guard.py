@@ -4,7 +4,7 @@ from contextlib import closing
 
 import pytest
 
-from scenarios.draw.viewer.guard import is_own
+from scenarios.draw.viewer.server import is_own
 
 
 @pytest.mark.parametrize("headers", [

@@ -164,16 +164,3 @@ def test_tasks_stand_behind_limits_position_and_pointing_in_their_order():
     data["position"] = {"path": {"kind": "still", "position": [0.5, -0.4, 0.8]}}
     cell = build(Scenario.model_validate(data))
     assert cell.stack.names == ("joint limits", "position", "b", "a", "com")
-
-
-@pytest.mark.parametrize(("entries", "control", "said"), [
-    ([HAND, HAND], {}, "2 tasks are named 'position'"),
-    ([HAND], {"stack": "switched"}, "hierarchical"),
-    ([{**HAND, "from_start": True}], {}, "from_start needs a path"),
-    ([{**HAND, "frame": 3}], {}, "frame"),
-    ([{"kind": "fly"}], {}, "kind"),
-    ([{**HAND, "stifness": 1.0}], {}, "stifness"),
-])
-def test_a_wrong_list_of_tasks_is_refused(entries, control, said):
-    with pytest.raises(ValueError, match=said):
-        Scenario.model_validate(listed(*entries, **control))

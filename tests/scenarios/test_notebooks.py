@@ -152,12 +152,6 @@ def test_without_a_library_a_data_frame_says_what_to_install(run, monkeypatch):
         run.to_dataframe("panda")
 
 
-@pytest.mark.slow
-def test_simulate_takes_a_name():
-    with pytest.raises(HierarchyError, match="did you mean 'strictness'"):
-        simulate("strictnes")
-
-
 @pytest.mark.parametrize("package", [hierarchy, solvers, scenarios])
 def test_dir_lists_every_public_name_and_each_can_be_had(package):
     assert set(package.__all__) <= set(dir(package))
@@ -188,10 +182,6 @@ def test_notebooks_are_stored_with_their_outputs_and_no_paths_of_a_machine(path)
                    for out in cell["outputs"])
     assert not re.search(r"/(home|root|tmp|work|Users)/", path.read_text(encoding="utf-8"))
     assert len({cell["id"] for cell in cells_of(path)}) == len(cells_of(path))
-
-
-def test_there_are_two_notebooks():
-    assert [path.stem for path in NOTEBOOKS] == ["compare-resolvers", "first-stack"]
 
 
 def cells_of(path, kind=None):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from scenarios.cli.main import run_command
+from scenarios.problems import recorded
 from scenarios.problems.answers import export, save
 from scenarios.problems.families import FAMILIES, available, family
 from solvers import problems
@@ -87,11 +88,10 @@ def test_a_sequence_with_a_plant_is_as_long_as_asked_and_has_consecutive_ticks()
 
 def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
     from scenarios.config import ScenarioError
-    from scenarios.problems import windows
 
-    monkeypatch.setattr(windows, "simulate", lambda *_, **__: None)
+    monkeypatch.setattr(recorded, "simulate", lambda *_, **__: None)
     with pytest.raises(ScenarioError, match="ellipse-limits: no run with seed 3 has 2 problems"):
-        windows.recorded("ellipse-limits", 3, 2)
+        recorded.recorded("ellipse-limits", 3, 2)
 
 
 def test_list_names_every_family(capsys):

@@ -9,7 +9,7 @@ from packing import unpacked
 
 from scenarios import load, save, simulate
 from scenarios.cli.main import run_command
-from scenarios.draw.replay import html
+from scenarios.draw.replay.page import html
 from scenarios.scene import scene
 
 

@@ -24,14 +24,6 @@ def test_jitter_is_bounded_and_moves_in_every_axis():
     assert (np.abs(offsets).max(axis=0) > 0.0005).all()
 
 
-def test_the_derivatives_of_jitter_are_those_of_its_position():
-    path, h = jittered(), 1e-5
-    for t in (0.0, 0.3, 1.7):
-        before, here, after = path(t - h), path(t), path(t + h)
-        np.testing.assert_allclose(here[1], (after[0] - before[0]) / (2 * h), atol=1e-6)
-        np.testing.assert_allclose(here[2], (after[1] - before[1]) / (2 * h), atol=1e-5)
-
-
 def test_jitter_depends_on_its_seed_alone():
     assert np.array_equal(jittered()(0.7), jittered()(0.7))
     assert not np.allclose(jittered()(0.7)[0], jittered(seed=4)(0.7)[0])

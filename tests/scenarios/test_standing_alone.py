@@ -12,7 +12,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.robots import TABLES
 from scenarios import load, load_run, save, simulate
 from scenarios.cli.main import run_command
-from scenarios.draw.replay import html
+from scenarios.draw.replay.page import html
 from scenarios.measure.metrics import as_plain_data
 from scenarios.recording.tree import joint_units, placements, tree_of
 from scenarios.scene import scene

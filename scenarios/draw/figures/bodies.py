@@ -45,8 +45,8 @@ def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str]) -> 
         _body(ax, robot, first["q"][k], aside)
         for label, colour in reversed(list(colours.items())):
             run = recordings[label]
-            for name in _moved(run):
-                path = run[f"task_position_{name}"]
+            for signal in (one for one in run.signals if one.startswith("task_position_")):
+                path, name = run[signal], signal.removeprefix("task_position_")
                 if "task_error_" + name in first and run is first:
                     error = run[f"task_error_{name}"]
                     if error.shape[1] >= 3:
@@ -60,11 +60,6 @@ def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str]) -> 
     ax.margins(0.02, 0.08)
     ax.set_axis_off()
     return fig
-
-
-def _moved(recording: Recording) -> list[str]:
-    return [name.removeprefix("task_position_") for name in recording.signals
-            if name.startswith("task_position_")]
 
 
 def _body(ax: Axes, robot: RobotFacts, q: Array, aside: Array) -> None:

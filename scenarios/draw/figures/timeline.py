@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from hierarchy.words import counted
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.draw.figures.palette import task_colours
@@ -110,7 +111,7 @@ def _frame(ax: Axes, names: list[str], start: float, end: float) -> None:
 def _explain(fig: Figure, ax: Axes, colours: Mapping[str, str], changes: int) -> None:
     fig.legend(handles=[Patch(color=colour, label=task) for task, colour in colours.items()],
                loc="outside lower center", ncols=4, fontsize="small", handlelength=1.0)
-    ax.set_title(f"Place in the stack, {changes} change{'' if changes == 1 else 's'}", loc="left")
+    ax.set_title(f"Place in the stack, {counted(changes, 'change')}", loc="left")
     ax.set_xlabel("time [s]")
 
 

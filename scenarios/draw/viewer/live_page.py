@@ -25,7 +25,6 @@ from scenarios.scene.pushes import key
 
 FRAMES = 30.0   # frames per second
 _CURVES = 4.0   # updates of the curves per second
-_LATELY = 10.0  # [s] shown by the curves
 _TRACE = 600    # length of the trace in frames, points of the path
 _BUSY = 0.05    # [s] of ticks between two frames, at most
 _HAND = 1.0     # [m/s] greatest speed of a dragged path
@@ -57,10 +56,8 @@ class LivePage:
         self._first_tick()
         self._place_camera(paths)
         self.panel = LivePanel(
-            server, self.requests, live.scenario, list(self.specs),
-            live.curves(_LATELY), speed, obstacles=len(self._stage.obstacles),
-            floor=self._stage.floor,
-            key=key_html(key(live.recorder.facts, live.scenario), self._colour))
+            server, self.requests, live, list(self.specs), speed, self._stage,
+            key_html(key(live.recorder.facts, live.scenario), self._colour))
         self.draw()
 
     @property
@@ -89,7 +86,7 @@ class LivePage:
         self._show_list(now)
         if time.monotonic() - self._curves_at > 1.0 / _CURVES:
             self._curves_at = time.monotonic()
-            self.panel.roll(self.live.curves(_LATELY))
+            self.panel.roll()
 
     def _make_ticks(self, seconds: float) -> None:
         """Run the ticks that are due as far as time allows; drop the rest."""
