@@ -1,20 +1,14 @@
-"""The machine of a benchmark, pinning to one core, and work on all of them."""
+"""The machine of a benchmark, and pinning to one core."""
 
 from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import metadata
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, TypeVar
 
-from solvers.batch import cores
-
-Found = TypeVar("Found")
 _PACKAGES = ("numpy", "numba", "scipy", "qpsolvers", "proxsuite", "osqp", "quadprog", "daqp",
              "piqp", "clarabel")
 
@@ -31,12 +25,6 @@ def one_core() -> Iterator[None]:
         yield
     finally:
         os.sched_setaffinity(0, before)
-
-
-def on_all_cores(work: Callable[..., Found], calls: Sequence[tuple[Any, ...]]) -> list[Found]:
-    """Return work(*call) of each call, in processes side by side: not for what is timed."""
-    with ProcessPoolExecutor(min(cores(), len(calls)), get_context("spawn")) as pool:
-        return list(pool.map(work, *zip(*calls, strict=True)))
 
 
 def machine() -> dict[str, str]:
