@@ -45,7 +45,7 @@ def recorded(name: str, seed: int, count: int) -> list[Hierarchy]:
     first = int(begin * shipped.control.ticks)
     longest = (first + count) * shipped.control.period
     for run in range(_RUNS if seed else 1):
-        window = _Window(first)
+        window = Window(first)
         scenario = _varied(shipped, seed, run) if seed else shipped
         simulate(changed(scenario, {"control.duration": longest}, name), audits=[window])
         if len(window.problems) >= count:
@@ -61,7 +61,7 @@ def _varied(scenario: Scenario, seed: int, run: int) -> Scenario:
 
 
 @final
-class _Window:
+class Window:
     """Keeps the problems of all ticks from one on; an Audit."""
 
     def __init__(self, first: int) -> None:
