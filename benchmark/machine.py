@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import metadata
-from pathlib import Path
 
-_PACKAGES = ("numpy", "numba", "scipy", "qpsolvers", "proxsuite", "osqp", "quadprog", "daqp",
-             "piqp", "clarabel")
+from scenarios.measure.run_folder import versions
+
+_PACKAGES = "scipy", "quadprog", "daqp", "piqp", "clarabel"  # besides those of a run
 
 
 @contextmanager
@@ -29,11 +28,5 @@ def one_core() -> Iterator[None]:
 
 def machine() -> dict[str, str]:
     """Return processor, cores and versions by name, without personal data."""
-    about = Path("/proc/cpuinfo")
-    lines = about.read_text().splitlines() if about.is_file() else []
-    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     known = {one.metadata["Name"]: one.version for one in metadata.distributions()}
-    return {"processor": named[0] if named else platform.processor() or "unknown",
-            "cores": str(os.cpu_count()), "system": f"{platform.system()} {platform.machine()}",
-            "python": platform.python_version(),
-            **{name: known.get(name, "not installed") for name in _PACKAGES}}
+    return {**versions(), **{name: known.get(name, "not installed") for name in _PACKAGES}}
