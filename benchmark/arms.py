@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,35 +17,26 @@ _BISECTIONS = 60
 _BATCHES = 1000          # largest number of draws
 
 
-@final
-@dataclass(frozen=True)
-class Arms:
-    """N arms: standard Denavit-Hartenberg a, d [m] and alpha [rad] of their joints, each (N, 6)."""
+def jacobians(arms: Array, q: Array) -> Array:
+    """Jacobians (N, 6, 6) of the end effectors at q (N, 6) [rad]: position, then rotation.
 
-    a: Array
-    d: Array
-    alpha: Array
-
-    def __getitem__(self, chosen: Array) -> Arms:
-        return Arms(self.a[chosen], self.d[chosen], self.alpha[chosen])
-
-    def jacobians(self, q: Array) -> Array:
-        """Jacobians (N, 6, 6) of the end effectors at q (N, 6) [rad]: position, then rotation."""
-        count, n = q.shape
-        R, p = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
-        axes, origins = np.empty((count, n, 3)), np.empty((count, n, 3))
-        for i in range(n):
-            axes[:, i], origins[:, i] = R[:, :, 2], p
-            R = R @ Rotation.from_euler("z", q[:, i, None]).as_matrix()
-            p = p + self.a[:, i, None] * R[:, :, 0] + self.d[:, i, None] * R[:, :, 2]
-            R = R @ Rotation.from_euler("x", self.alpha[:, i, None]).as_matrix()
-        return np.concatenate([np.cross(axes, p[:, None] - origins), axes], axis=2).swapaxes(1, 2)
+    arms : (N, 3, 6) standard Denavit-Hartenberg a, d [m] and alpha [rad] of their joints.
+    """
+    (a, d, alpha), (count, n) = arms.swapaxes(0, 1), q.shape
+    R, p = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+    axes, origins = np.empty((count, n, 3)), np.empty((count, n, 3))
+    for i in range(n):
+        axes[:, i], origins[:, i] = R[:, :, 2], p
+        R = R @ Rotation.from_euler("z", q[:, i, None]).as_matrix()
+        p = p + a[:, i, None] * R[:, :, 0] + d[:, i, None] * R[:, :, 2]
+        R = R @ Rotation.from_euler("x", alpha[:, i, None]).as_matrix()
+    return np.concatenate([np.cross(axes, p[:, None] - origins), axes], axis=2).swapaxes(1, 2)
 
 
 def regular(count: int, seed: int = 0) -> Array:
     """Return Jacobians (count, 6, 6) with no singular value below REGULAR."""
     def some(rng: np.random.Generator) -> Array:
-        J = draw(count, rng).jacobians(_configurations(count, rng))
+        J = jacobians(draw(count, rng), _configurations(count, rng))
         return J[_singular_values(J)[:, -1] >= REGULAR]
 
     return _collect(some, count, seed)
@@ -62,38 +51,38 @@ def near_singular(count: int, seed: int = 0) -> Array:
     """
     def some(rng: np.random.Generator) -> Array:
         arms, low, high = draw(count, rng), _configurations(count, rng), _configurations(count, rng)
-        J_low, J_high = arms.jacobians(low), arms.jacobians(high)
+        J_low, J_high = jacobians(arms, low), jacobians(arms, high)
         apart = np.linalg.det(J_low) * np.linalg.det(J_high) < 0.0
         apart &= _singular_values(J_low)[:, -1] >= REGULAR  # some arms are singular everywhere
         arms, low, high = arms[apart], low[apart], high[apart]
         along = (high - low) / np.linalg.norm(high - low, axis=1, keepdims=True)
         singular = _bisected(arms, low, high)
         step = np.exp(rng.uniform(np.log(_STEPS[0]), np.log(_STEPS[1]), (len(singular), 1)))
-        J = arms.jacobians(singular + step * along)
+        J = jacobians(arms, singular + step * along)
         s = _singular_values(J)
         return J[(s[:, -2] >= REGULAR) & (s[:, -1] >= NEAREST)]
 
     return _collect(some, count, seed)
 
 
-def draw(count: int, rng: np.random.Generator) -> Arms:
-    """Draw arms: a and d up to 0.5 m; alpha of -90, 0, 90 deg in one half, any in the other."""
+def draw(count: int, rng: np.random.Generator) -> Array:
+    """Draw arms (N, 3, 6): a, d up to 0.5 m; alpha of -90, 0, 90 deg in a half, any in the rest."""
     square = rng.choice([-0.5 * np.pi, 0.0, 0.5 * np.pi], (count, 6))
     alpha = np.where(rng.random((count, 1)) < 0.5, square, rng.uniform(-np.pi, np.pi, (count, 6)))
     a, d = rng.uniform(0.0, _LENGTH, (2, count, 6))
-    return Arms(a, d, alpha)
+    return np.stack([a, d, alpha], axis=1)
 
 
 def _configurations(count: int, rng: np.random.Generator) -> Array:
     return rng.uniform(-np.pi, np.pi, (count, 6))
 
 
-def _bisected(arms: Arms, low: Array, high: Array) -> Array:
+def _bisected(arms: Array, low: Array, high: Array) -> Array:
     """Return configurations (N, 6) between low and high at which the determinant changes sign."""
-    sign = np.sign(np.linalg.det(arms.jacobians(low)))
+    sign = np.sign(np.linalg.det(jacobians(arms, low)))
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        before = (np.sign(np.linalg.det(arms.jacobians(middle))) == sign)[:, None]
+        before = (np.sign(np.linalg.det(jacobians(arms, middle))) == sign)[:, None]
         low, high = np.where(before, middle, low), np.where(before, high, middle)
     return low
 

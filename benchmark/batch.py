@@ -58,7 +58,7 @@ def run(counts: Sequence[int] = COUNTS, seconds: float = 1.0,
         columns = [Column(head, key, "{:.3g}".format) for row in found
                    for head, key in ((row["way"],) * 2, ("per core", f"{row['way']} core"))]
         tables.append(Table(f"{name}, {resolver}", sizes, columns, "problems"))
-    return Report(f"Batches on {cores()} cores of {machine()['processor']}",
+    return Report(f"Batches on {machine()['processor']}",
                   [Section("", tables, _NOTES)], {"batch": rows})
 
 

@@ -1,22 +1,15 @@
-"""The machine of a benchmark, pinning to one core, and work on all of them."""
+"""The machine of a benchmark, and pinning to one core."""
 
 from __future__ import annotations
 
 import os
-import platform
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import metadata
-from multiprocessing import get_context
-from pathlib import Path
-from typing import Any, TypeVar
 
-from solvers.batch import cores
+from scenarios.measure.run_folder import versions
 
-Found = TypeVar("Found")
-_PACKAGES = ("numpy", "numba", "scipy", "qpsolvers", "proxsuite", "osqp", "quadprog", "daqp",
-             "piqp", "clarabel")
+_PACKAGES = "scipy", "quadprog", "daqp", "piqp", "clarabel"  # besides those of a run
 
 
 @contextmanager
@@ -33,19 +26,7 @@ def one_core() -> Iterator[None]:
         os.sched_setaffinity(0, before)
 
 
-def on_all_cores(work: Callable[..., Found], calls: Sequence[tuple[Any, ...]]) -> list[Found]:
-    """Return work(*call) of each call, in processes side by side: not for what is timed."""
-    with ProcessPoolExecutor(min(cores(), len(calls)), get_context("spawn")) as pool:
-        return list(pool.map(work, *zip(*calls, strict=True)))
-
-
 def machine() -> dict[str, str]:
     """Return processor, cores and versions by name, without personal data."""
-    about = Path("/proc/cpuinfo")
-    lines = about.read_text().splitlines() if about.is_file() else []
-    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     known = {one.metadata["Name"]: one.version for one in metadata.distributions()}
-    return {"processor": named[0] if named else platform.processor() or "unknown",
-            "cores": str(os.cpu_count()), "system": f"{platform.system()} {platform.machine()}",
-            "python": platform.python_version(),
-            **{name: known.get(name, "not installed") for name in _PACKAGES}}
+    return {**versions(), **{name: known.get(name, "not installed") for name in _PACKAGES}}

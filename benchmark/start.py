@@ -196,11 +196,9 @@ def memory(folder: Path) -> list[Cost]:
     command = ["-m", "scenarios.cli.start", "run", "ellipse", "--duration", "2", "--out",
                str(folder / "run")]
     costs = [Cost("hierarchy run ellipse --duration 2", _run(command).memory, "MB", 300.0)]
-    if find_spec("distributed") is not None:
-        after = json.loads(_run(["-c", _WORKER]).said.splitlines()[-1])
-        costs += [Cost("a worker of a sweep of 20 runs", max(after), "MB", 300.0),
-                  Cost("growth over the last 15 runs", after[-1] - after[4], "MB")]
-    return costs
+    after = json.loads(_run(["-c", _WORKER]).said.splitlines()[-1])
+    return [*costs, Cost("a worker of a sweep of 20 runs", max(after), "MB", 300.0),
+            Cost("growth over the last 15 runs", after[-1] - after[4], "MB")]
 
 
 def resident() -> float:

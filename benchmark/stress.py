@@ -14,10 +14,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
 from typing import final
 
@@ -29,6 +26,7 @@ from benchmark.tables import Column, Table, whole
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cli.progress import bar
 from scenarios.problems.answers import answer
+from scenarios.results.pool import ended
 from solvers import Resolver, Status, certify, make, problems
 from solvers.proof import prove
 
@@ -123,6 +121,10 @@ def tally(name: str, seeds: range, kind: str = RECIPE) -> Tally:
     return found
 
 
+def _tally(job: tuple[str, range, str]) -> Tally:
+    return tally(*job)
+
+
 def run(count: int, name: str, first: int = 0, processes: int | None = None, kind: str = RECIPE
         ) -> dict[str, Tally]:
     """Judge a resolver on `count` problems starting at seed `first`; return the counts by kind.
@@ -133,15 +135,10 @@ def run(count: int, name: str, first: int = 0, processes: int | None = None, kin
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by the processes when they start
     kinds = KINDS if kind == ALL else (kind,)
     each, found = -(-count // len(kinds)), {one: Tally() for one in kinds}
-    with ProcessPoolExecutor(processes, get_context("spawn")) as pool, bar("problems") as told:
-        parts = {pool.submit(tally, name, seeds, one): (one, seeds) for one in kinds
-                 for seeds in _chunks(first, each)}
-        for part in as_completed(parts):
-            one, seeds = parts[part]
-            try:
-                found[one].add(part.result())
-            except BrokenProcessPool:
-                found[one].add(Tally(Counter({CRASHED: len(seeds)}), lost=[seeds]))
+    jobs = [(name, seeds, one) for one in kinds for seeds in _chunks(first, each)]
+    with bar("problems") as told:
+        for (_, seeds, one), part in ended(_tally, jobs, processes):
+            found[one].add(part or Tally(Counter({CRASHED: len(seeds)}), lost=[seeds]))
             told(name, sum(some.counts.total() for some in found.values()), each * len(kinds))
     return found
 

@@ -11,12 +11,12 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, final
 
 import numpy as np
 
-from benchmark.machine import on_all_cores
 from benchmark.peers.compare import joined
 from benchmark.peers.moving import judge_step, make_scenes
 from benchmark.peers.ours import arm
@@ -25,6 +25,7 @@ from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import Column, Table, power, whole, yes
 from hierarchy import Hierarchy, HierarchyError
+from scenarios.results.pool import ended
 from solvers import Resolution, Resolver, make, names
 from solvers.qp.backends import BACKENDS, installed
 from solvers.resolver import Handles
@@ -97,9 +98,12 @@ def strictness(resolver: Resolver, duration: float = 2.0) -> Row:
 def run(resolvers: Iterable[Resolver] | None = None, duration: float = 2.0) -> Report:
     """Measure resolvers, by default all that handle bounds."""
     chosen = [*able(), CutOff()] if resolvers is None else list(resolvers)
-    rows = on_all_cores(strictness, [(resolver, duration) for resolver in chosen])
+    found = {resolver.label: row for resolver, row in ended(
+        partial(strictness, duration=duration), chosen)}
+    rows = [row for one in chosen if (row := found[one.label])]
     title = "Motion of the end effector due to the posture, which has lower priority [m]"
     text = f"strict: at most {AIM:g} m per tick, and no tick without an answer."
     return Report("Strictness at the limits", [
-        Section(title, [Table(title, rows, _COLUMNS)], text)], {"strictness": rows})
+        Section(title, [Table(title, rows, _COLUMNS)], text)], {"strictness": rows},
+        {label: "its process ended, as said above" for label, row in found.items() if not row})
 

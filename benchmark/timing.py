@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from math import nan
 from time import perf_counter
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -16,29 +15,6 @@ from hierarchy.problem import Array
 
 FOR_P999 = 1000  # times needed for a 99.9th percentile
 TURN = Repeats(least=1, turn=1_000_000)
-
-
-@final
-@dataclass
-class Timed:
-    """A call, what the row of its times begins with, and the times [ns] so far.
-
-    before : called untimed before each turn.
-    """
-
-    call: Callable[[], Any]
-    about: Mapping[str, Any] = field(default_factory=dict)
-    before: Callable[[], Any] | None = None
-    times: list[int] = field(default_factory=list)
-
-    def take_turn(self) -> None:
-        """Call untimed, for the caches, then timed for a millisecond; once after a `before`."""
-        (self.before or self.call)()
-        self.times += timed(self.call, Repeats(1, 1) if self.before else TURN)
-
-    def row(self) -> dict[str, Any]:
-        """Return the row of a table: what it is about, and its times."""
-        return {**self.about, "solves": len(self.times), **times_of(self.times)}
 
 
 def times_of(nanoseconds: Sequence[float] | Array, prefix: str = "") -> dict[str, float]:
@@ -53,18 +29,22 @@ def times_of(nanoseconds: Sequence[float] | Array, prefix: str = "") -> dict[str
     return dict(zip(names, map(float, found), strict=True))
 
 
-def take_turns(everyone: Sequence[Timed], seconds: float, turns: int = 1) -> list[dict[str, Any]]:
-    """Let all take turns on one core for `seconds` [s], at least so many each; return their rows.
+def take_turns(calls: Sequence[tuple[Mapping[str, Any], Callable[[], Any]]], seconds: float
+               ) -> list[dict[str, Any]]:
+    """Let calls take turns on one core for `seconds` [s], at least one each; return their rows.
 
-    One turn before them is not counted: it compiles and fills caches.
+    calls : what the row of its times begins with, and the call. One turn before them is not
+    counted: it compiles and fills caches.
     """
+    times: list[list[int]] = [[] for _ in calls]
     with one_core():
-        for one in everyone:
-            one.take_turn()
-            one.times.clear()
+        for _, call in calls:
+            call()
+            timed(call, TURN)
         end = perf_counter() + seconds
-        while turns > 0 or perf_counter() < end:
-            turns -= 1
-            for one in everyone:
-                one.take_turn()
-    return [one.row() for one in everyone]
+        while not times[0] or perf_counter() < end:
+            for own, (_, call) in zip(times, calls, strict=True):
+                call()
+                own += timed(call, TURN)
+    return [{**about, "solves": len(own), **times_of(own)}
+            for own, (about, _) in zip(times, calls, strict=True)]

@@ -64,7 +64,7 @@ ENTRANTS = (
     Entrant("embodiK", EMBODIK, f"{_HERE}.embodik:arm", {}, f"strict, scaled; {_KINDS}, hard"),
     *(Entrant(label, ROBOPLAN, f"{_HERE}.roboplan:arm", {"levels": label != "OInK"},
               f"{words}; {_KINDS}, hard")
-      for label, words in (("OInK", "weights"), ("OInK levels", "strict"))),
+      for label, words in (("OInK", "weights"), ("OInK levels", "strict below a whole pose"))),
     Entrant("frax", FRAX, f"{_HERE}.frax:arm", {}, "strict, then clipped; limits of joints"),
 )
 NOTES = """\

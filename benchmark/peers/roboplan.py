@@ -11,7 +11,10 @@ from benchmark.peers.scenes import Arm, Array
 
 
 def arm(scene: Arm, posture: bool, levels: bool = False) -> tuple[Any, None]:
-    """`Oink.solveIk` for displacements of one period; with levels the posture has priority 2."""
+    """`Oink.solveIk` for displacements of one period; with levels the posture has priority 2.
+
+    It then acts in the null space of all six rows of the frame, whatever their costs.
+    """
     model = core.Scene("arm", core.loadUrdfSceneDescription(scene.file))
     oink = optimal_ik.Oink(model)
     model.setJointPositions(np.array(scene.start))

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from benchmark.reproduce.protocol import Claim, Protocol, Rows
-from benchmark.reproduce.verdicts import Found, judged, shown
+from benchmark.reproduce.verdicts import judged, shown
 from scenarios.measure.statistics import probability
 
 
@@ -49,12 +47,6 @@ def faults(protocol: Protocol, rows: Rows) -> list[str]:
     said = [f"`{column}` {total - int(rows.ended(column).sum())} of {total} "
             f"({'; '.join(told)})" for column, told in rows.reasons[0].items()]
     return [f"{progress(protocol, rows)} Runs that ended in a fault: {', '.join(said) or 'none'}."]
-
-
-def counted(every: Sequence[Found]) -> dict[str, int]:
-    """Return how many claims have each verdict."""
-    names = [one.decided.partition(":")[0] for one in every]
-    return {name: names.count(name) for name in dict.fromkeys(names)}
 
 
 def _decider(claim: Claim) -> str:

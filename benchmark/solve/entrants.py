@@ -25,7 +25,7 @@ _QP = "Levels above are kept to the backend's tolerance"
 _TIGHTER = 100.0  # times the tolerances of hqp
 _EMBODIK = ("Scales a task that limits do not allow, and damps near singularities; the first level "
             "holds as hard limits, the others are equalities.")
-_CASCADE = "Programs written by hand, in floating point; rows above"
+_CASCADE = "By hand, in floating point; rows above"
 ABSENT = {
     "soth, LexLS": "no package on PyPI; with --library FILE.so --name NAME",
     "eiquadprog": "its wheel has a C++ library and no module of Python; with --library",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from benchmark.solve.accuracy import entrants
 from benchmark.solve.interface import Problem
 from benchmark.store import Row
 from benchmark.tables import Column, Table, short, wide
-from benchmark.timing import Timed, take_turns
+from benchmark.timing import take_turns
 from benchmark.worker import load
 
 Size = tuple[int, int, int]  # joints, tasks, rows of each
@@ -60,16 +61,17 @@ def over(title: str, rows: Sequence[Row], size: str) -> Table:
                  [*columns, Column("power", "power")])
 
 
-def _field(figure: str, sizes: Sequence[Size], seed: int) -> list[Timed]:
+def _field(figure: str, sizes: Sequence[Size], seed: int
+           ) -> list[tuple[Row, Callable[[], Any]]]:
     solvers = {one.label: load(one.adapter)(**one.options) for one in entrants()
                if one.label not in LEVEL_LESS}
-    found = []
+    found: list[tuple[Row, Callable[[], Any]]] = []
     for i, (joints, tasks, each) in enumerate(sizes):
         problem = random_problem((joints, tasks, each), seed + i)
-        found += [Timed(partial(solver.solve, solver.prepare(problem)), {
-            "figure": figure, "entrant": label, "joints": joints, "tasks": tasks,
-            "rows": each if figure == "rows" else each * tasks})
-            for label, solver in solvers.items()]
+        found += [({"figure": figure, "entrant": label, "joints": joints, "tasks": tasks,
+                    "rows": each if figure == "rows" else each * tasks},
+                   partial(solver.solve, solver.prepare(problem)))
+                  for label, solver in solvers.items()]
     return found
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from time import perf_counter_ns
 from typing import Any, final
 
 import numpy as np
@@ -33,14 +32,14 @@ class Questions:
     def problem(self, file: str, p: int) -> dict[str, Any]:
         """Return the raw row of a problem of a file; a new file is read, and solved once untimed.
 
-        The row has how large and how fast all is where the file begins.
+        The row has the memory where the file begins.
         """
         if file != self._file:
             with np.load(file, allow_pickle=False) as kept:
                 sequence = bool(json.loads(kept["head.json"])["sequence"])
             self.take(read_problems(Path(file)), sequence=sequence)
             self._rehearse(self.problems[p])
-            self._file, self._ready = file, {"start_kib": resident(), "yardstick_ns": yardstick()}
+            self._file, self._ready = file, {"start_kib": resident()}
         return {**self._ready, **self.asked(p)}
 
     def asked(self, p: int) -> dict[str, Any]:
@@ -111,17 +110,6 @@ def plain(answer: Answer) -> dict[str, Any]:
     """Return an answer as plain data."""
     return {"solved": bool(answer.solved), "x": np.asarray(answer.x, dtype=float).tolist(),
             "iterations": answer.iterations}
-
-
-def yardstick() -> int:
-    """Return the time [ns] of a fixed piece of work, so that a slow machine is noticed."""
-    work = np.arange(40_000.0).reshape(200, 200)
-    times = []
-    for _ in range(20):
-        start = perf_counter_ns()
-        np.sort(work[::-1], axis=0).sum()
-        times.append(perf_counter_ns() - start)
-    return int(np.median(times))
 
 
 def resident() -> int:

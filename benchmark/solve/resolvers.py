@@ -7,7 +7,7 @@ families, with seeds not used for tuning, are timed and reported separately.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isnan, nan
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from benchmark.solve.judge import RIGHT, SOLVED, WRONG, by, judged, summary
 from benchmark.solve.questions import Questions
 from benchmark.solve.views import mark
 from benchmark.store import Row
-from benchmark.tables import TIMES, Column, Table, digits, percent, power, whole
+from benchmark.tables import TIMES, Column, Table, percent, power, whole
 from benchmark.worker import Repeats, load
 from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Hierarchy
@@ -35,12 +35,6 @@ from solvers.qp.backends import installed
 KNOWN, FRESH = "known", "fresh"
 COUNT = 200      # fresh problems of a family
 _MOST = 200      # times of one problem
-
-# Target medians relative to the median of DAQP on the same family in the same run.
-TARGETS = {("EQ7", "tpm"): 0.3, ("EQ30L8", "tpm"): 0.6, ("EQ30L10", "tpm"): 0.6,
-           ("INEQ7", "hcod"): 1.0, ("INEQ7", "hcod warm"): 0.47,
-           ("HUM38", "hcod"): 1.3, ("HUM38", "hcod warm"): 0.25,
-           ("DYN60", "hcod"): 1.5, ("DYN60", "hcod warm"): 0.4}
 
 NOTES = f"""\
 Times of one call from Python, in microseconds; iter: median iterations, each resolver's own. \
@@ -98,7 +92,7 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
         if name not in FAMILIES:
             raise UnknownNameError("family", name, FAMILIES)
     entrants, missing = field(resolvers)
-    rows, sections, targets = list[Row](), list[Section](), list[str]()
+    rows, sections = list[Row](), list[Section]()
     for origin in (KNOWN,) if seed is None else (KNOWN, FRESH):
         some = []
         for name in families:
@@ -108,10 +102,9 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
                 some += [{"family": name, "origin": origin, **row}
                          for row in _measured(name, problems, entrants, seconds)]
         sections.append(_section(some, origin))
-        targets += _targets(some, origin)
         rows += some
     return Report(f"Resolvers on reference problems, one core of {machine()['processor']}",
-                  [*sections, Section("Targets", text="\n".join([NOTES, *targets]))],
+                  [*sections, Section("", text=NOTES)],
                   {"resolvers": rows}, missing)
 
 
@@ -182,18 +175,3 @@ def _row(rows: Sequence[Row], problems: Sequence[reference.Problem]) -> Row:
     return {**found, "certified": sum(map(bool, certified)) / len(rows),
             "solves": sum(len(row.get("cold_ns") or ()) for row in rows),
             "unsolved": len(rows) - found["answered"]}
-
-
-def _targets(rows: Sequence[Row], origin: str) -> list[str]:
-    """Return a line for each target: met or not; those of rows that are missing are left out."""
-    lines = []
-    for row in rows:
-        name, label = row["family"], row["entrant"]
-        most = TARGETS.get((name, label))
-        if most is not None and not isnan(row["to_daqp"]):
-            right = row["certified"] == 1.0 and not row["unsolved"] and not row["wrong"]
-            met = ("not met: not all certified" if not right else
-                   "met" if row["to_daqp"] <= most else "not met")
-            lines.append(f"{origin:5} {name:7} {label:9} {digits(row['to_daqp'])} x DAQP, "
-                         f"target {most:g}: {met}")
-    return lines

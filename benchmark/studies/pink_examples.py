@@ -2,7 +2,7 @@
 
 Takes the folder `examples` of a checkout of pink. Those run whose robot lies beside them or in
 `example_robot_data` (extra `robots`), without viewer and clock. All tasks share one level; the
-answers are compared with the exact minimum of pink's cost. Prints a table.
+answers are compared with the proved minimum of pink's cost. Prints a table.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from unittest.mock import MagicMock, patch
 import numpy as np
 import pink
 import qpsolvers
-from numpy.typing import NDArray
 
-from hierarchy.problem import Array
+from hierarchy.problem import Array, Hierarchy
 from hierarchy.robots.names import file_of
 from solvers.adapters.for_pink import solve_ik
+from solvers.proof import prove
 
 STUBBED = ("meshcat", "meshcat.geometry", "meshcat.transformations", "meshcat_shapes",
            "pink.visualization", "loop_rate_limiters", "robot_descriptions",
@@ -65,45 +65,14 @@ def least_squares(tasks: Iterable[Any], barriers: Iterable[Any], configuration: 
 
 
 def exact(A: Array, b: Array, G: Array, h: Array, C: Array, d: Array, near: Array) -> Array:
-    """Return the x of least |A x - b| with G x <= h, C x = d, in extended precision.
-
-    Rows act that do at `near`; those with a multiplier of the wrong sign leave, exceeded ones
-    enter, one at a time. Augmented system: r = b - A x, A^T r = G^T y + C^T z.
+    """Return the x of least |A x - b| with G x <= h, C x = d, proved from the rows that act at
+    `near`; ArithmeticError where that proves nothing.
     """
-    scale = np.linalg.norm(G, axis=1)
-    G, h = G[scale > 0.0] / scale[scale > 0.0, None], h[scale > 0.0] / scale[scale > 0.0]
-    acting = list(np.flatnonzero(h - G @ near < 1e-9))
-    for _ in range(10 * len(h) + 10):
-        E, f = np.vstack([C, G[acting]]), np.concatenate([d, h[acting]])
-        m, n, k = len(b), A.shape[1], len(f)
-        K = np.block([[np.eye(m), A, np.zeros((m, k))], [A.T, np.zeros((n, n)), -E.T],
-                      [np.zeros((k, m)), E, np.zeros((k, k))]])
-        found = _eliminated(K, np.concatenate([b, np.zeros(n), f]))
-        x, y = found[m:m + n], found[m + n + len(d):]
-        over = G @ x - h
-        if acting and y.min() < -1e-15 * (1.0 + np.abs(b).max()):
-            acting.pop(int(np.argmin(y)))
-        elif over.size and over.max() > 1e-15:
-            acting.append(np.intp(np.argmax(over)))
-        else:
-            return np.asarray(x, dtype=float)
-    raise ArithmeticError("the active set did not settle")
-
-
-def _eliminated(K: Array, side: Array) -> NDArray[np.longdouble]:
-    """Return the solution of K x = side in extended precision; dependent rows have none of it."""
-    M = np.column_stack([K, side]).astype(np.longdouble)
-    size = len(side)
-    for i in range(size):
-        pivot = i + int(np.argmax(np.abs(M[i:, i])))
-        M[[i, pivot]] = M[[pivot, i]]
-        if abs(M[i, i]) > 1e-17:
-            M[i + 1:, i:] -= np.outer(M[i + 1:, i] / M[i, i], M[i, i:])
-    x = np.zeros(size, dtype=np.longdouble)
-    for i in range(size - 1, -1, -1):
-        if abs(M[i, i]) > 1e-17:
-            x[i] = (M[i, -1] - M[i, i + 1:-1] @ x[i + 1:]) / M[i, i]
-    return x
+    kept = (np.vstack([G, C]), np.concatenate([np.full(len(h), -np.inf), d]), np.append(h, d))
+    found = prove(Hierarchy.from_levels([kept, (A, b)], near), [near])
+    if not found.complete:
+        raise ArithmeticError("the minimum could not be proved")
+    return found.x
 
 
 @dataclass

@@ -13,25 +13,18 @@ import numpy as np
 import typer
 
 from hierarchy.problem import Array, Hierarchy
-from scenarios import Recording, Scenario, load, simulate
-from scenarios.loop.controller import Controller
+from scenarios import load
+from scenarios.loop.simulation import simulate
+from scenarios.problems.recorded import Window
 from solvers import make
 
 
 def recorded(name: str, ticks: int) -> list[Hierarchy]:
     """Return the problems of the first ticks of a scenario, which all have one shape."""
-    scenario = load(name)
-    run = simulate(scenario.with_changes({"control.duration": ticks * scenario.control.period}))
-    return problems_at(run, scenario)
-
-
-def problems_at(run: Recording, scenario: Scenario) -> list[Hierarchy]:
-    """Return what a scenario asks of its resolver in the states of a run."""
-    controller, problems = Controller(scenario), []
-    for t, q, v in zip(run["t"], run["q"], run["v"], strict=True):
-        controller.command(t, q, v)
-        problems.append(controller.hierarchy.copy())
-    return problems
+    scenario, window = load(name), Window(0)
+    simulate(scenario.with_changes({"control.duration": ticks * scenario.control.period}),
+             audits=[window])
+    return window.problems
 
 
 def answers(problems: Sequence[Hierarchy]) -> list[Array]:

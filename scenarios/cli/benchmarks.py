@@ -20,8 +20,9 @@ def register(app: typer.Typer) -> None:
     if (_ROOT / "benchmark" / "commands.py").is_file():
         if str(_ROOT) not in sys.path:
             sys.path.insert(0, str(_ROOT))  # before another's package of the same name
-        app.add_typer(import_module("benchmark.commands").bench, name="bench")
-        app.command()(import_module("benchmark.reproduce.command").reproduce)
+        commands = import_module("benchmark.commands")
+        app.add_typer(commands.bench, name="bench")
+        app.command()(commands.reproduce)
         return
     for name, what in (("bench", "Measure speed, accuracy and strictness (in a checkout)."),
                        ("reproduce", "Regenerate the numbers in the documents (in a checkout).")):

@@ -12,9 +12,11 @@ from functools import partial
 from importlib.metadata import PackageNotFoundError, distribution, version
 from typing import final
 
+import numpy as np
+
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Hierarchy
-from scenarios.problems import postures, recorded
+from scenarios.problems import others, postures, recorded
 from scenarios.problems import reference as stored
 from solvers import problems
 from solvers.problems.files import FRESH, PUBLIC, Collection, Head
@@ -80,6 +82,11 @@ def _kind(name: str, seed: int, count: int) -> list[Hierarchy]:
     return [problems.structured(seed * _STRIDE + i, (name,)) for i in range(count)]
 
 
+def _other(make: Callable[[np.random.Generator], Hierarchy], seed: int, count: int
+           ) -> list[Hierarchy]:
+    return [make(np.random.default_rng([seed, i])) for i in range(count)]
+
+
 def _recipe(seed: int, count: int) -> list[Hierarchy]:
     return [problems.generate(seed * _STRIDE + i) for i in range(count)]
 
@@ -119,6 +126,11 @@ _POSTURES = {
     "singular-panda": "Franka Panda, likewise (extra `robots`)",
     "singular-romeo": "Romeo on two feet, likewise (extra `robots`)"}
 
+_OTHERS = {
+    "of-soth": (others.of_soth, "as soth is tested: ranks, rows of upper levels, all sides"),
+    "of-lexls": (others.of_lexls, "as LexLS is tested: equalities that add a rank each"),
+    "of-daqp": (others.of_daqp, "as DAQP is tested: a program whose acting rows are known")}
+
 
 def _all() -> dict[str, Family]:
     made = [Family(name, "reference", what, partial(_reference, name),
@@ -131,6 +143,8 @@ def _all() -> dict[str, Family]:
              for name, what in _POSTURES.items()]
     made += [Family(name, "degenerate", what, partial(_kind, name))
              for name, what in _KINDS.items()]
+    made += [Family(name, "others", what, partial(_other, make))
+             for name, (make, what) in _OTHERS.items()]
     made.append(Family("recipe", "random", "random sizes, ranks, ties, scales", _recipe))
     return {one.name: one for one in made}
 

@@ -135,7 +135,7 @@ def recorded(name: str, seed: int, count: int) -> list[Hierarchy]:
     first = int(begin * shipped.control.ticks)
     longest = (first + count) * shipped.control.period
     for run in range(_RUNS if seed else 1):
-        window = _Window(first)
+        window = Window(first)
         values = drawn(shipped, shipped.variation, seed, run) if seed else {}
         simulate(changed(shipped, values | {"control.duration": longest}, name), audits=[window])
         if len(window.problems) >= count:
@@ -145,7 +145,7 @@ def recorded(name: str, seed: int, count: int) -> list[Hierarchy]:
 
 
 @final
-class _Window:
+class Window:
     """Keeps the problems of all ticks from one on; an Audit."""
 
     def __init__(self, first: int) -> None:
