@@ -26,13 +26,14 @@ def untested(protocol: Protocol) -> list[str]:
 
 def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
     """Return a table of what was found about the claims of a family."""
-    head = ["claim", "effect [95 % interval]", *rows.layouts, "Holm's p", "verdict"]
+    head = ["claim", "effect [95 % interval]", ", ".join(rows.layouts), "Holm's p", "verdict"]
     lines = [f"| {' | '.join(head)} |",
              "|---" * len(head) + "|"]
     for one in judged(protocol, rows, family):
-        each = " | ".join(shown(one.claim, rows, effect) for effect in one.layouts)
+        each = ", ".join(shown(one.claim, rows, effect).partition(" [")[0]
+                         for effect in one.layouts)
         lines.append(f"| {one.claim.text} | {shown(one.claim, rows, one.effect)} | {each} | "
-                     f"{probability(one.p)} | **{one.decided}** |")
+                     f"{probability(one.p).removeprefix('p = ')} | {one.decided} |")
     return lines
 
 
@@ -47,7 +48,8 @@ def faults(protocol: Protocol, rows: Rows) -> list[str]:
     """Return how much of the protocol has been run, and which columns have runs with a fault."""
     total = rows.blocks.size
     said = [f"`{column}` {total - int(rows.ended(column).sum())} of {total} "
-            f"({'; '.join(told)})" for column, told in rows.reasons[0].items()]
+            f"({'; '.join(reason.partition(':')[0] for reason in reasons)})"
+            for column, reasons in rows.reasons[0].items()]
     return [f"{progress(protocol, rows)} Runs that ended in a fault: {', '.join(said) or 'none'}."]
 
 
