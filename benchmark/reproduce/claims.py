@@ -10,13 +10,14 @@ from scenarios.measure.statistics import probability
 
 
 def asked(protocol: Protocol, family: str) -> list[str]:
-    """Return a table of the claims of a family: words, what decides, smallest effect."""
-    lines = ["| claim | section, quotation | decided by | smallest effect |", "|---|---|---|---|"]
+    """Return a table of the claims of a family, or of their quotations: what decides them."""
+    lines = [f"| {'section, quotation' if family == 'letter' else 'claim'} | decided by | "
+             "smallest effect |", "|---|---|---|"]
     for one in protocol.claims:
         if one.family == family:
-            said = f"{one.section}: “{one.quotation}”" if one.quotation else ""
-            lines.append(f"| {one.text} | {said} | {_decider(one)} | {_least(protocol, one)} |")
-    return lines if family == "letter" else _without(lines, 1)
+            said = f"{one.section}: “{one.quotation}”" if one.quotation else one.text
+            lines.append(f"| {said} | {_decider(one)} | {_least(protocol, one)} |")
+    return lines
 
 
 def untested(protocol: Protocol) -> list[str]:
@@ -73,8 +74,3 @@ def _least(protocol: Protocol, claim: Claim) -> str:
     if not claim.rival:
         return f"{100 * protocol.share:g} % of starts"
     return f"{claim.matters:g}{' %' if claim.percent else ' (SI)' if claim.matters < 1 else ''}"
-
-
-def _without(lines: list[str], column: int) -> list[str]:
-    cells = [line.strip("|").split("|") for line in lines]
-    return [f"|{'|'.join(row[:column] + row[column + 1:])}|" for row in cells]

@@ -130,12 +130,18 @@ def page() -> str:
 
 
 def _entry(key: Key, places: dict[str, str]) -> str:
-    """Return a key as an entry of a list, with links by name to the sections below it."""
+    """Return a key as an entry of a list: name, default with unit, else type, and meaning."""
     below = ", ".join(f"`{one}`" for one in dict.fromkeys(places[name] for name in key.below))
-    value = below or _escaped(key.value) + (f" [{key.unit}]" if key.unit else "")
-    default = {"": "", "required": ", required"}.get(
-        key.default, f", default `{key.default}`")
-    return f"- **{key.name}** ({value}{default}): {_escaped(key.meaning)}"
+    unit = f" [{key.unit}]" if key.unit else ""
+    value = below or _escaped(key.value)
+    if key.default == "required":
+        value = f"{value}{unit}, required"
+    elif key.default:
+        bounds = "" if value == "boolean" else value.removeprefix("number").strip()
+        value = f"`{key.default}`{unit}{bounds and f'; {bounds}'}"
+    else:
+        value += unit
+    return f"- **{key.name}** ({value}): {_escaped(key.meaning)}"
 
 
 def _escaped(text: str) -> str:
