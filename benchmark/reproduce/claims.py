@@ -8,13 +8,14 @@ from scenarios.measure.statistics import probability
 
 
 def asked(protocol: Protocol, family: str) -> list[str]:
-    """Return a table of the claims of a family: words, what decides, smallest effect."""
-    lines = ["| claim | section, quotation | decided by | smallest effect |", "|---|---|---|---|"]
+    """Return a table of the claims of a family, or of their quotations: what decides them."""
+    lines = [f"| {'section, quotation' if family == 'letter' else 'claim'} | decided by | "
+             "smallest effect |", "|---|---|---|"]
     for one in protocol.claims:
         if one.family == family:
-            said = f"{one.section}: “{one.quotation}”" if one.quotation else ""
-            lines.append(f"| {one.text} | {said} | {_decider(one)} | {_least(protocol, one)} |")
-    return lines if family == "letter" else _without(lines, 1)
+            said = f"{one.section}: “{one.quotation}”" if one.quotation else one.text
+            lines.append(f"| {said} | {_decider(one)} | {_least(protocol, one)} |")
+    return lines
 
 
 def untested(protocol: Protocol) -> list[str]:
@@ -24,13 +25,14 @@ def untested(protocol: Protocol) -> list[str]:
 
 def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
     """Return a table of what was found about the claims of a family."""
-    head = ["claim", "effect [95 % interval]", *rows.layouts, "Holm's p", "verdict"]
+    head = ["claim", "effect [95 % interval]", ", ".join(rows.layouts), "Holm's p", "verdict"]
     lines = [f"| {' | '.join(head)} |",
              "|---" * len(head) + "|"]
     for one in judged(protocol, rows, family):
-        each = " | ".join(shown(one.claim, rows, effect) for effect in one.layouts)
+        each = ", ".join(shown(one.claim, rows, effect).partition(" [")[0]
+                         for effect in one.layouts)
         lines.append(f"| {one.claim.text} | {shown(one.claim, rows, one.effect)} | {each} | "
-                     f"{probability(one.p)} | **{one.decided}** |")
+                     f"{probability(one.p).removeprefix('p = ')} | {one.decided} |")
     return lines
 
 
@@ -45,7 +47,8 @@ def faults(protocol: Protocol, rows: Rows) -> list[str]:
     """Return how much of the protocol has been run, and which columns have runs with a fault."""
     total = rows.blocks.size
     said = [f"`{column}` {total - int(rows.ended(column).sum())} of {total} "
-            f"({'; '.join(told)})" for column, told in rows.reasons[0].items()]
+            f"({'; '.join(reason.partition(':')[0] for reason in reasons)})"
+            for column, reasons in rows.reasons[0].items()]
     return [f"{progress(protocol, rows)} Runs that ended in a fault: {', '.join(said) or 'none'}."]
 
 
@@ -63,8 +66,3 @@ def _least(protocol: Protocol, claim: Claim) -> str:
     if not claim.rival:
         return f"{100 * protocol.share:g} % of starts"
     return f"{claim.matters:g}{' %' if claim.percent else ' (SI)' if claim.matters < 1 else ''}"
-
-
-def _without(lines: list[str], column: int) -> list[str]:
-    cells = [line.strip("|").split("|") for line in lines]
-    return [f"|{'|'.join(row[:column] + row[column + 1:])}|" for row in cells]

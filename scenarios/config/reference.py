@@ -21,8 +21,7 @@ from scenarios.config.sections import Section, kinds_of
 from scenarios.config.validation import sections_at
 
 _BOUNDS = (("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"), ("exclusiveMaximum", "<"))
-_TYPES = {"string": "text", "boolean": "true or false", "integer": "whole number",
-          "object": "table"}
+_TYPES = {"string": "string", "boolean": "boolean", "integer": "integer", "object": "table"}
 
 
 class Key(NamedTuple):
@@ -44,7 +43,7 @@ def keys_of(section: type[Section]) -> list[Key]:
     schemas = _schemas(section)
     schema, meaning = schemas[section.__name__], _meanings(section)
     return [Key(name, _value(value, schemas), _unit(value),
-                "must be given" if name in schema.get("required", ()) else _default(value),
+                "required" if name in schema.get("required", ()) else _default(value),
                 meaning[name], tuple(dict.fromkeys(_below(value, schemas))))
             for name, value in schema["properties"].items() if "const" not in value]
 
@@ -112,21 +111,37 @@ def sections() -> Iterator[tuple[str, type[Section]]]:
 
 
 def page() -> str:
-    """Return the tables of all keys as Markdown."""
+    """Return all keys as Markdown; a key that several sections have is described in the first."""
     places = {section.__name__: place for place, section in sections()}
-    parts = []
+    parts, first = [], dict[tuple[str, ...], str]()
     for place, section in sections():
         head = title_of(section, f"`{place}`") if place else "Top of the file"
-        parts += [f"## {head}", "", _escaped(about(section)), "",
-                  "| key | value | unit | default | meaning |", "|---|---|---|---|---|"]
+        parts += [f"## {head}", "", _escaped(about(section)), ""]
+        shared: dict[str, list[str]] = {}
         for key in keys_of(section):
-            value = ", ".join(f"`{one}`" for one in dict.fromkeys(
-                places[name] for name in key.below)) or key.value
-            parts.append("| " + " | ".join(
-                (f"`{key.name}`", _escaped(value), key.unit, key.default and f"`{key.default}`",
-                 _escaped(key.meaning))) + " |")
-        parts.append("")
-    return "\n".join(parts).replace("`must be given`", "must be given")
+            above = first.setdefault((key.name, key.value, key.unit, key.meaning), head)
+            if above == head:
+                parts.append(_entry(key, places))
+            else:
+                default = key.default and f" (default {key.default})"
+                shared.setdefault(above, []).append(f"`{key.name}`{default}")
+        parts += [f"- as in {above}: {', '.join(names)}" for above, names in shared.items()] + [""]
+    return "\n".join(parts).replace("(default required)", "(required)")
+
+
+def _entry(key: Key, places: dict[str, str]) -> str:
+    """Return a key as an entry of a list: name, default with unit, else type, and meaning."""
+    below = ", ".join(f"`{one}`" for one in dict.fromkeys(places[name] for name in key.below))
+    unit = f" [{key.unit}]" if key.unit else ""
+    value = below or _escaped(key.value)
+    if key.default == "required":
+        value = f"{value}{unit}, required"
+    elif key.default:
+        bounds = "" if value == "boolean" else value.removeprefix("number").strip()
+        value = f"`{key.default}`{unit}{bounds and f'; {bounds}'}"
+    else:
+        value += unit
+    return f"- **{key.name}** ({value}): {_escaped(key.meaning)}"
 
 
 def _escaped(text: str) -> str:
@@ -135,7 +150,7 @@ def _escaped(text: str) -> str:
 
 def _lines(key: Key) -> Iterator[str]:
     unit = f" [{key.unit}]" if key.unit else ""
-    default = key.default if key.default in ("", "must be given") else f"default {key.default}"
+    default = key.default if key.default in ("", "required") else f"default {key.default}"
     yield f"  {key.name}: {', '.join(filter(None, (f'{key.value}{unit}', default)))}"
     if key.meaning:
         yield fill(key.meaning, 88, initial_indent="      ", subsequent_indent="      ")

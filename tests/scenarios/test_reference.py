@@ -26,7 +26,7 @@ def test_the_page_of_keys_is_as_the_program_has_them(monkeypatch):
 
 @pytest.mark.parametrize(("asked", "said"), [
     ("avoidance.obstacles.path", ["Path of its middle", 'with kind = "waypoints"', "list: 3 × numb"
-                                  "er [m], must be given"]),
+                                  "er [m], required"]),
     ("tasks.0.gain", ['[[tasks]] with kind = "pose"', "[1/s], default 10.0", "default 5.0"]),
     ("control.period", ["number > 0 ≤ 1 [s], default 0.001", "Time from tick to tick."]),
     ("start.q", ["[rad or m]"]), ("duration", ["control.duration", "faults.duration"]),
