@@ -104,7 +104,7 @@ def checked_sizes(sizes: ArrayLike, rows: int) -> Sizes:
                                  f"from 0 to {rows}")
     if sum(numbers) != rows:
         raise HierarchyError(f"sizes sum to {sum(numbers)}, but A has {rows} rows")
-    return np.array(numbers, dtype=np.int64)
+    return found.astype(np.int64)
 
 
 def check_rows(name: str, A: Array, lower: Array, upper: Array) -> None:

@@ -78,9 +78,11 @@ class Hierarchy:
     __slots__ = ("_give", "_metric", "_reference", "m", "n", "named", "names", "plain", "rows",
                  "start")
 
-    A, lower, upper = (_HandedOut[Array](lambda h, i=i: h.rows[i]) for i in range(3))
-    sizes, offsets = (_HandedOut[Sizes](lambda h, i=i: _layout(h.rows[3].tobytes())[i])
-                      for i in range(2))
+    A = _HandedOut[Array](lambda h: h.rows[0])
+    lower = _HandedOut[Array](lambda h: h.rows[1])
+    upper = _HandedOut[Array](lambda h: h.rows[2])
+    sizes = _HandedOut[Sizes](lambda h: _layout(h.rows[3].tobytes())[0])
+    offsets = _HandedOut[Sizes](lambda h: _layout(h.rows[3].tobytes())[1])
     reference = _HandedOut[Array](attrgetter("_reference"))
     metric, give = (_HandedOut[Array | None](attrgetter(name)) for name in ("_metric", "_give"))
 
@@ -190,7 +192,8 @@ class Hierarchy:
             raise HierarchyError(f"A has shape {A.shape}, expected (rows, n) with n >= 1")
         m, n = A.shape
         lower, upper = shaped("lower", lower, (m,)), shaped("upper", upper, (m,))
-        reference = shaped("reference", np.zeros(n) if reference is None else reference, (n,))
+        reference = (np.zeros(n).view() if reference is None
+                     else shaped("reference", reference, (n,)))
         sizes = checked_sizes(sizes, m)
         names = level_names(None, len(sizes)) if names is None else tuple(names)
         if len(names) != len(sizes):

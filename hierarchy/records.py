@@ -5,5 +5,6 @@ from __future__ import annotations
 
 def set_frozen(record: object, **values: object) -> None:
     """Set fields of a frozen dataclass; only for its own `__post_init__`."""
+    put = object.__setattr__  # looked up once: a hierarchy is made in each tick of an adapter
     for name, value in values.items():
-        object.__setattr__(record, name, value)
+        put(record, name, value)

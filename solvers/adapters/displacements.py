@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from hierarchy.errors import HierarchyError
-from hierarchy.gate import array_of, check_rows
+from hierarchy.gate import Sizes, array_of, check_rows
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from solvers.adapters.packing import CONTRADICT, GIVEN, ODD, damp, write_limits, write_tasks
@@ -49,10 +49,10 @@ class Pull(NamedTuple):
     centre: Array
 
 
-def hierarchy(configuration: object, joints: Names, n: int, period: float,
-              limits: Sequence[Limit], constraints: Sequence[Task],
-              tasks: Iterable[Task | Sequence[Task]], pull: Pull | None = None,
-              *, solve: Solve | None = None) -> Hierarchy:
+def packed(configuration: object, joints: Names, n: int, period: float,
+           limits: Sequence[Limit], constraints: Sequence[Task],
+           tasks: Iterable[Task | Sequence[Task]], pull: Pull | None = None,
+           *, solve: Solve | None = None) -> Packed:
     """Pack limits, constraints and tasks into levels, without the empty ones.
 
     n unknowns [rad/s or m/s], and a function that returns their names; period [s]. An entry of
@@ -68,31 +68,31 @@ def hierarchy(configuration: object, joints: Names, n: int, period: float,
         raise HierarchyError(f"period {period} s must be positive and finite")
     entries = [constraints, *(one if isinstance(one, Sequence) else (one,) for one in tasks)]
     read = [[_read(task, configuration, pull is not None) for task in entry] for entry in entries]
-    packed = _Packed(n, period, limits, read, pull)
-    packed.keep("limits", packed.limit(joints))
-    packed.keep("constraints", packed.write(read[0], weighted=False))
+    levels = Packed(n, joints, period, limits, read, pull)
+    levels.keep("limits", levels.limit())
+    levels.keep("constraints", levels.write(read[0], weighted=False))
     for level in read[1:]:
-        if packed.weight and any(np.any(_costs(task, len(e))) for task, _, e in level):
-            packed.hold(solve)
-        packed.level(level)
-    return packed.hierarchy(partial(_row_names, packed, joints))
+        if levels.weight and any(np.any(_costs(task, len(e))) for task, _, e in level):
+            levels.hold(solve)
+        levels.level(level)
+    return levels
 
 
 class ContradictionError(HierarchyError):
     """Limits of one joint that no velocity meets."""
 
 
-def _row_names(packed: _Packed, joints: Names) -> tuple[str, ...]:
+def _row_names(packed: Packed) -> tuple[str, ...]:
     """Name each row: by its joint if it is about a single one, else by its limit or task."""
-    known = list(joints())
-    above, free = (packed.sizes[0] if packed.names[:1] == ["limits"] else 0), packed.rows
+    known = list(packed.joints())
+    above, free = (packed.sizes[0] if packed.names[:1] == ["limits"] else 0), packed.count
     free -= packed.sizes[-1] if packed.weight else 0
     of_tasks = [name for level in packed.read for one in level
                 for name in _names_of(*one)][:free - above]
     of_limits = [f"{name}, row {i}" for name, G, h in packed.limits for i, side in enumerate(h)
                  if side < np.inf and np.count_nonzero(G[i]) != 1]
     rows = of_limits + [""] * (above - len(of_limits)) + of_tasks
-    rows += [f"{packed.names[-1]}, row {i}" for i in range(packed.rows - free)]
+    rows += [f"{packed.names[-1]}, row {i}" for i in range(packed.count - free)]
     for i, (row, name) in enumerate(zip(packed.A, rows, strict=False)):
         of_row = [known[c] for c in np.flatnonzero(row)]
         if not name or (len(of_row) == 1 and name.startswith("row ")):
@@ -105,20 +105,26 @@ def _names_of(task: Task, J: Array, e: Array) -> list[str]:
     frame = _frame_of(task)
     axes = _AXES[:len(e)] if frame and len(e) in (3, 6) else ()
     names = [f"{frame} {axis}" for axis in axes] or [f"row {i}" for i in range(len(e))]
-    return [name for name, cost in zip(names, _costs(task, len(e)), strict=True) if cost != 0.0]
+    costs = np.broadcast_to(_costs(task, len(e)), len(e))
+    return [name for name, cost in zip(names, costs, strict=True) if cost != 0.0]
 
 
-class _Packed:
-    """The levels written so far, and a table of what limits and tasks give, see `packing`."""
+class Packed:
+    """The levels written so far, and a table of what limits and tasks give, see `packing`.
 
-    def __init__(self, n: int, period: float, limits: Sequence[Limit],
+    names, sizes : of the levels, without the empty ones. A (m, n), sides (2, m): their rows, m =
+    `count`, and room for more.
+    """
+
+    def __init__(self, n: int, joints: Names, period: float, limits: Sequence[Limit],
                  read: Sequence[Sequence[_Read]], pull: Pull | None) -> None:
-        self.period, self.limits, self.read, self.pull = period, limits, read, pull
+        self.n, self.joints, self.period, self.pull = n, joints, period, pull
+        self.limits, self.read = limits, read
         given = sum([len(h) for _, _, h in limits])
         most = given + sum([len(e) for level in read for _, _, e in level])
         self.table = np.empty((most, n + GIVEN))
         self.A, self.sides = np.empty((most + 2 * n, n)), np.empty((2, most + 2 * n))
-        self.rows, self.filled = 0, 0
+        self.count, self.filled = 0, 0
         self.weight = 0.0  # of the step in the last level, whose rows in the table are `last`
         self.last = (0, 0)
         self.names: list[str] = []
@@ -126,24 +132,23 @@ class _Packed:
 
     def keep(self, name: str, last: int) -> None:
         """Make the rows written up to `last` a level, unless there are none."""
-        if last > self.rows:
+        if last > self.count:
             again = self.names.count(name)
             self.names.append(f"{name} ({again + 1})" if again else name)
-            self.sizes.append(last - self.rows)
-            self.rows = last
+            self.sizes.append(last - self.count)
+            self.count = last
 
-    def limit(self, joints: Names) -> int:
+    def limit(self) -> int:
         """Write the rows G x <= h / period from row 0 on: one for a joint, after all others.
 
         Returns their number. Raises HierarchyError for numbers that are not finite, or contradict.
         """
-        n = self.A.shape[1]
         for name, G, h in self.limits:
             self._give(name, G, h)
-        last = int(write_limits(self.table, 0, self.filled, self.period, np.empty((2, n)), self.A,
-                                self.sides))
+        last = int(write_limits(self.table, 0, self.filled, self.period, np.empty((2, self.n)),
+                                self.A, self.sides))
         if last <= CONTRADICT:
-            raise _contradiction(self, CONTRADICT - last, joints)
+            raise _contradiction(self, CONTRADICT - last)
         if last == ODD:
             for name, G, h in self.limits:
                 check_rows(name, G, np.full(len(h), -np.inf), h)
@@ -152,16 +157,16 @@ class _Packed:
     def write(self, level: Sequence[_Read], weighted: bool = True) -> int:
         """Write the rows of tasks that share a level; return the row after them."""
         if not level:
-            return self.rows
+            return self.count
         first = self.filled
         for task, J, e in level:
-            row, n = self.filled, self.A.shape[1]
+            row, n = self.filled, self.n
             self._give(task, J, e)
             own = self.table[row:self.filled]
             own[:, n + 1] = _costs(task, len(e)) if weighted else 1.0
             own[:, n + 2], own[:, n + 3] = task.gain, getattr(task, "lm_damping", 0.0) or 0.0
         self.last = first, self.filled
-        row = int(write_tasks(self.table, *self.last, self.period, self.A, self.sides, self.rows))
+        row = int(write_tasks(self.table, *self.last, self.period, self.A, self.sides, self.count))
         if row == ODD:
             for task, J, e in level:
                 check_rows(label(task), J, e, e)
@@ -171,7 +176,7 @@ class _Packed:
 
     def _give(self, what: str | Task, rows: Array, sides: Array) -> None:
         """Put rows (k, n) and sides (k,) into the table."""
-        n, first = self.A.shape[1], self.filled
+        n, first = self.n, self.filled
         self.filled = last = first + len(sides)
         if rows.shape != (last - first, n):
             name = what if isinstance(what, str) else label(what)
@@ -182,12 +187,12 @@ class _Packed:
     def level(self, level: Sequence[_Read]) -> None:
         """Write tasks as a level; if its step is weighed, n rows then stand for all of it."""
         last = self.write(level)
-        if self.pull is not None and last > self.rows:
+        if self.pull is not None and last > self.count:
             weight, centre = self.pull
             self.weight = damp(self.table, *self.last, weight, centre, self.A, self.sides,
-                               self.rows, last)
+                               self.count, last)
             if self.weight > 0.0:
-                last = self.rows + self.A.shape[1]
+                last = self.count + self.n
         self.keep(" + ".join([label(one[0]) for one in level]), last)
 
     def hold(self, solve: Solve | None) -> None:
@@ -198,25 +203,29 @@ class _Packed:
                 raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
                                      "leaves to the levels below needs a resolver")
             x = solve(self.hierarchy())
-        first = self.rows = self.rows - self.sizes.pop()
+        first = self.count = self.count - self.sizes.pop()
         last = int(write_tasks(self.table, *self.last, self.period, self.A, self.sides, first))
         self.weight = 0.0
         if x is not None:
             self.sides[:, first:last] = self.A[first:last] @ x
         self.keep(self.names.pop(), last)
 
-    def hierarchy(self, named: Callable[[], tuple[str, ...]] | None = None) -> Hierarchy:
-        """Return the levels; a level is named like another one with a number."""
-        lower, upper = self.sides[:, :self.rows]
-        return Hierarchy.trusted(self.A[:self.rows], lower, upper, self.sizes, None, self.names,
-                                 named=named)
+    @property
+    def rows(self) -> tuple[Array, Array, Array, Sizes]:
+        """A (m, n), lower and upper (m,), and sizes (L,), as kernels read them."""
+        lower, upper = self.sides[:, :self.count]
+        return self.A[:self.count], lower, upper, np.array(self.sizes, dtype=np.int64)
+
+    def hierarchy(self) -> Hierarchy:
+        """Return the levels as a Hierarchy of its own."""
+        return Hierarchy.trusted(*self.rows, None, self.names, named=partial(_row_names, self))
 
 
-def _contradiction(packed: _Packed, i: int, joints: Names) -> ContradictionError:
+def _contradiction(packed: Packed, i: int) -> ContradictionError:
     """Return the error that names the two limits that leave unknown i no value."""
     lows, highs, first = [], [], 0
     for name, _, h in packed.limits:
-        bounds, spare = np.empty((2, packed.A.shape[1])), np.empty((2, *packed.A.shape))
+        bounds, spare = np.empty((2, packed.n)), np.empty((2, *packed.A.shape))
         last = first + len(h)
         write_limits(packed.table, first, last, packed.period, bounds, spare[0], packed.sides)
         lows.append((float(bounds[0, i]), name))
@@ -224,9 +233,9 @@ def _contradiction(packed: _Packed, i: int, joints: Names) -> ContradictionError
         first = last
     (low, demands), (high, allows) = max(lows), min(highs)
     return ContradictionError(
-        f"limits cannot all hold: joint {joints()[i]} must move by at least {low:.4g} ({demands}) "
-        f"and at most {high:.4g} rad/s or m/s ({allows}); a joint outside its range needs a "
-        "velocity limit that lets it come back within the period")
+        f"limits cannot all hold: joint {packed.joints()[i]} must move by at least {low:.4g} "
+        f"({demands}) and at most {high:.4g} rad/s or m/s ({allows}); a joint outside its range "
+        "needs a velocity limit that lets it come back within the period")
 
 
 _Read = tuple[Task, Array, Array]  # a task, J (k, n), e (k,)

@@ -14,10 +14,11 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from solvers.adapters.displacements import ContradictionError, Task
-from solvers.adapters.from_pink import hierarchy
+from solvers.adapters.from_pink import packed
 from solvers.adapters.packing import largest_violation
 from solvers.resolver import Resolution, Resolver, make
-from solvers.status import Status
+from solvers.resolvers.hcod import Hcod, solve_exactly
+from solvers.status import SOLVED, Status
 
 if TYPE_CHECKING:
     from pink import Configuration
@@ -56,16 +57,27 @@ def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]
         says which.
     HierarchyError : an unknown solver or setting, or rows that the resolver cannot handle.
     """
-    resolver = solver if isinstance(solver, Resolver) else _resolver(solver, of_the_solver)
+    resolver = _resolver(solver, of_the_solver) if isinstance(solver, str) else solver
     configuration.check_limits(safety_break=safety_break)
     if not 0.0 <= damping < np.inf:
         raise HierarchyError(f"damping {damping} must not be negative")
     solve = partial(_solved, resolver, tolerance)
     try:
-        return solve(hierarchy(configuration, tasks, dt, limits, barriers, constraints, damping,
-                               solve))
+        levels = packed(configuration, tasks, dt, limits, barriers, constraints, damping, solve)
+        x = _at_once(resolver, levels, tolerance) if type(resolver) is Hcod else None
+        return solve(levels.hierarchy()) if x is None else x
     except ContradictionError as error:
         raise _no_solution(None, None, str(error)) from error
+
+
+def _at_once(resolver: Hcod, levels: Any, tolerance: float) -> Array | None:
+    """Return what `_solved` does without making a Hierarchy, or None where that has more to say."""
+    x = np.zeros(levels.n)
+    solved = solve_exactly(levels, x, np.zeros(3 * levels.count + 3), resolver._settings) == SOLVED
+    always = sum([size for name, size in zip(levels.names, levels.sizes, strict=True)
+                  if name in _ALWAYS])
+    held = largest_violation(levels.A, *levels.sides, x, 0, always) <= tolerance
+    return x if solved and held else None
 
 
 def _solved(resolver: Resolver, tolerance: float, h: Hierarchy) -> Array:

@@ -44,8 +44,8 @@ def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task
     given = [(name, one.G, one.h) for name, one in found if not one.inactive]
     n = configuration.model.nv
     pull = None if damping is None else Pull(damping, np.zeros(n))
-    return displacements.hierarchy(configuration, partial(_joints, configuration.model), n, dt,
-                                   given, list(constraints or ()), tasks, pull, solve=solve)
+    return displacements.packed(configuration, partial(_joints, configuration.model), n, dt, given,
+                                list(constraints or ()), tasks, pull, solve=solve).hierarchy()
 
 
 def _joints(model: MjModel) -> list[str]:

@@ -139,6 +139,16 @@ def hierarchy(configuration: Configuration,
         `damping`, for lm_damping and safe_displacement_gain: both are weights
         against all tasks, which exact levels have no place for.
     """
+    return packed(configuration, tasks, dt, limits, barriers, constraints, damping,
+                  solve).hierarchy()
+
+
+def packed(configuration: Configuration,
+           tasks: Iterable[displacements.Task | Sequence[displacements.Task]], dt: float,
+           limits: Iterable[Limit] | None, barriers: Iterable[Barrier] | None,
+           constraints: Iterable[displacements.Task] | None, damping: float | None,
+           solve: displacements.Solve | None) -> displacements.Packed:
+    """Return the levels of `hierarchy`, which takes the same arguments, as they were packed."""
     given, n = list(barriers or ()), configuration.model.nv
     found = [(type(one).__name__, one.compute_qp_inequalities(configuration, dt))
              for one in (*(_limits_of_model(configuration) if limits is None else limits), *given)]
@@ -151,9 +161,9 @@ def hierarchy(configuration: Configuration,
         if barrier.safe_displacement_gain and pull is not None:
             H, c = barrier.compute_qp_objective(configuration)
             pull = _pulled(pull, H, c, dt)
-    return displacements.hierarchy(configuration, partial(_joints, configuration.model), n, dt,
-                                   [(name, *pair) for name, pair in found if pair is not None],
-                                   list(constraints or ()), tasks, pull, solve=solve)
+    return displacements.packed(configuration, partial(_joints, configuration.model), n, dt,
+                                [(name, *pair) for name, pair in found if pair is not None],
+                                list(constraints or ()), tasks, pull, solve=solve)
 
 
 def _joints(model: Any) -> list[str]:

@@ -15,7 +15,7 @@ import pytest
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import make, problems
-from solvers.adapters.displacements import hierarchy as of_displacements
+from solvers.adapters.displacements import packed as of_displacements
 from solvers.batch import Batch
 from solvers.factorization import Factorization
 from solvers.problems.files import Collection, Head, ProblemFileError, read

@@ -47,10 +47,14 @@ def tasks_of(configuration):
     apart.set_target(mink.SE3.from_translation(np.array([0.3, -0.1, 0.2])))
     posture, still = mink.PostureTask(model, cost=0.1), mink.DampingTask(model, cost=0.05)
     posture.set_target(model.qpos0)
-    return [hand, mass, apart, posture, still]
+    upright = mink.AxisAlignTask("right_tip", "site", cost=0.6, lm_damping=0.1)
+    upright.set_target([0.6, 0.0, 0.8])
+    look = mink.LookAtTask("left_tip", "site", axis=(1.0, 0.0, 0.0), cost=0.4, gain=0.7)
+    look.set_target([2.0, 1.0, 0.5])
+    return [hand, mass, apart, posture, still, upright, look]
 
 
-@pytest.mark.parametrize("kinds", [(0,), (0, 1), (1, 2, 3), (2, 4), (0, 1, 2, 3, 4)])
+@pytest.mark.parametrize("kinds", [(0,), (0, 1), (1, 2, 3), (2, 4), (5,), (5, 6), tuple(range(7))])
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("damping", [1e-9, 1e-2])
 def test_one_level_is_the_minimum_of_minks_cost(configuration, kinds, held, damping):
@@ -59,6 +63,7 @@ def test_one_level_is_the_minimum_of_minks_cost(configuration, kinds, held, damp
     limits = [mink.ConfigurationLimit(model),
               mink.VelocityLimit(model, {f"{side}_{joint}": 0.8 for side in ("left", "right")
                                          for joint in "abc"}),
+              mink.FreeJointVelocityLimit(model, 0.5, 0.9),
               mink.CollisionAvoidanceLimit(model, [(["left_h"], ["right_h"])])]
     frozen = [mink.DofFreezingTask(model, dof_indices=[0, 5])] if held else []
     h = from_mink.hierarchy(configuration, [tasks], DT, limits, frozen, damping=damping)
