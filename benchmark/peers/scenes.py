@@ -61,7 +61,7 @@ class Arm:
 
     def target(self, t: float) -> tuple[Array, Array]:
         """Position (3,) [m] and velocity (3,) [m/s] of the path at t [s]."""
-        p, dp, _ = circle(self.centre, self.cosine, self.sine, self.turning, t)
+        p, dp, _ = circle(t, self.centre, self.cosine, self.sine, self.turning)
         return p, dp
 
 
@@ -130,10 +130,10 @@ class Stand:
 
     def targets(self, t: float) -> Array:
         """Position, velocity, acceleration of centre of mass and hands at t [s]: (3, 3, 3)."""
-        return np.array([circle(*one, t) for one in self.circles])
+        return np.array([circle(t, *one) for one in self.circles])
 
 
-def circle(centre: Numbers, cosine: Numbers, sine: Numbers, rate: float, t: float) -> Array:
+def circle(t: float, centre: Numbers, cosine: Numbers, sine: Numbers, rate: float) -> Array:
     """Return position, velocity and acceleration at t [s] of centre + cosine cos + sine sin."""
     c, s, a, b = np.cos(rate * t), np.sin(rate * t), np.array(cosine), np.array(sine)
     out = c * a + s * b
