@@ -212,8 +212,8 @@ def open_(family: Family = None,
               "dependent and what does not, from 1e-12 to 1e-5; takes several times as long.")
               ] = False,
           check: Annotated[bool, typer.Option(
-              "--check", help="Try the entrants on a few problems of each kind, in a minute, and "
-              "store nothing.")] = False,
+              "--check", help="Try the entrants, or the libraries alone, on a few problems of each "
+              "kind, in a minute, and store nothing.")] = False,
           install: Install = False,
           out: Annotated[Path, output("Folder to begin or to continue.")] = Path("runs/open")
           ) -> int:
@@ -229,7 +229,8 @@ def open_(family: Family = None,
 
     if install:
         return _installed((EMBODIK, HIGHS))
-    table = chosen(entrants or [], python, compiled(library or [], name or []))
+    more = compiled(library or [], name or [])
+    table = more if check and more and not entrants else chosen(entrants or [], python, more)
     if check:
         return int(not opened.check(table, limit))
     for left, why in ({} if family else unavailable()).items():

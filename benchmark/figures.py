@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -24,6 +25,9 @@ _LEAST, _MOST = 1e-17, 1e-2  # errors beyond are drawn at the edge
 _SHADES = LinearSegmentedColormap.from_list("share", ["#b42318", "#f0c66b", "#e9f4ee", "#7cc4a0"])
 _STRICT = 1e-9               # [m per tick], as in `hierarchy bench strictness`
 _MARKS = "osD^v<P>X"
+_KINDS = "hqp", "cascade"  # with panels of their own
+_HUES = matplotlib.colormaps["tab20"]
+_DASHES = defaultdict(lambda: "-", {"defaults": ":", "tight": "--", "as hqp": "-.", "slack": ":"})
 
 
 @contextmanager
@@ -69,18 +73,28 @@ def _dot(ax: Axes, row: Row, look: Look) -> None:
 
 
 def curves(at: Array, found: Mapping[str, Array], words: str) -> Figure:
-    """Return shares of problems solved over a logarithmic axis; words : its label."""
-    style = looks(found)
-    with _figure(6.2, max(4.2, 0.155 * len(found) + 0.3)) as fig:
-        ax = fig.subplots()
-        for label, share in found.items():
-            look = style[label]
-            ax.plot(at, 100.0 * share, color=look.colour, label=label, linewidth=1.2,
-                    linestyle=(0, look.dash) if look.dash else "-")
-        drawing.make_logarithmic(ax, "x")
-        ax.set(xlabel=words, ylabel="problems solved [%]", xlim=(at[0], at[-1]),
-               ylim=(0.0, 102.0))
-        fig.legend(loc="outside right upper", fontsize=7.0)
+    """Return shares of problems solved over a logarithmic axis; words : its label.
+
+    One panel for each kind of entrants, with a colour for each and dashes for its settings.
+    """
+    kinds: dict[str, list[str]] = {}
+    for label in found:
+        first = label.partition(" ")[0]
+        kinds.setdefault(first if first in _KINDS else "others", []).append(label)
+    longest = max(map(len, kinds.values()))
+    with _figure(3.4 * len(kinds), 3.2 + 0.17 * longest, {"font.size": 8.5}) as fig:
+        for ax, (kind, labels) in zip(fig.subplots(1, len(kinds), squeeze=False, sharey=True)[0],
+                                      kinds.items(), strict=True):
+            names = list(dict.fromkeys(label.partition(", ")[0] for label in labels))
+            for label in labels:
+                name, _, setting = label.partition(", ")
+                ax.plot(at, 100.0 * found[label], label=label, linewidth=1.2,
+                        color=_HUES(names.index(name) % _HUES.N), linestyle=_DASHES[setting])
+            drawing.make_logarithmic(ax, "x")
+            ax.set(title=kind, xlim=(at[0], at[-1]), ylim=(0.0, 102.0))
+            ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), fontsize=7.0)
+        fig.supxlabel(words, fontsize=9.0)
+        fig.supylabel("problems solved [%]", fontsize=9.0)
     return fig
 
 

@@ -9,30 +9,31 @@ A resolver whose answer is clipped at the limits shows what a lack of strictness
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, final
 
 import numpy as np
 
-from benchmark.peers.compare import joined
-from benchmark.peers.moving import judge_step, make_scenes
+from benchmark.packages import OWN, Entrant
+from benchmark.peers.compare import Log, Turns, measure
+from benchmark.peers.moving import QUESTIONS, judge_step, make_scenes
 from benchmark.peers.ours import arm
-from benchmark.peers.questions import Moving
+from benchmark.peers.scenes import Arm
 from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import Column, Table, power, whole, yes
-from hierarchy import Hierarchy, HierarchyError
-from scenarios.results.pool import ended
+from hierarchy import Hierarchy
 from solvers import Resolution, Resolver, make, names
 from solvers.qp.backends import BACKENDS, installed
 from solvers.resolver import Handles
 
 AIM = 1e-9                       # [m per tick] of the end effector
-RATIOS = (10.0, 100.0, 1000.0)   # of weights of successive levels
-_FORMS = {"sns": ("optimal",)}   # besides the default
+_SETTINGS: Mapping[str, Sequence[Mapping[str, Any]]] = {  # of those that have several
+    "hqp": [{"backend": backend} for backend in BACKENDS if installed(backend)],
+    "weighted": [{"ratio": ratio} for ratio in (10.0, 100.0, 1000.0)],
+    "sns": [{}, {"form": "optimal"}]}
 _COLUMNS = (Column("max per\ntick", "moved_m", power), Column("last\ntick", "last_m", power),
             Column("limits\nprevent", "prevented_m", power),
             Column("final\nerror", "error_m", power), Column("at\nlimit", "at_limit_ticks", whole),
@@ -62,48 +63,36 @@ class CutOff(Resolver):
         return Resolution(np.clip(res.x, h.lower[:n], h.upper[:n]), res.status)
 
 
-def able() -> list[Resolver]:
-    """Return every resolver that handles bounds, with each backend and ratio."""
-    found: list[Resolver] = []
-    for name in names():
-        if name == "hqp":
-            found += [make(name, backend=backend) for backend in BACKENDS if installed(backend)]
-        elif name == "weighted":
-            found += [make(name, ratio=ratio) for ratio in RATIOS]
-        else:
-            found += [make(name), *(make(name, form=form) for form in _FORMS.get(name, ()))]
-    return [resolver for resolver in found if resolver.handles != "equalities"]
+def cut_off(scene: Arm, posture: bool) -> tuple[Any, Any]:
+    """The adapter of `CutOff`."""
+    return arm(scene, posture, CutOff())
 
 
-def strictness(resolver: Resolver, duration: float = 2.0) -> Row:
-    """Run the step for `duration` [s]; see `judge_step`, and `strict`: whether it is so.
+def entrants() -> list[Entrant]:
+    """Return every resolver that handles bounds, in each of its settings, and one that does not."""
+    every = [(make(name, **more), more) for name in names() for more in _SETTINGS.get(name, [{}])]
+    return [*(Entrant(one.label, OWN, "benchmark.peers.ours:arm", {"resolver": one.name, **more})
+              for one, more in every if one.handles != "equalities"),
+            Entrant(CutOff.name, OWN, "benchmark.strictness:cut_off")]
 
-    Raises
-    ------
-    HierarchyError : it has no answer in any tick, as when it does not handle bounds.
+
+def run(resolvers: Sequence[Entrant] | None = None, duration: float = 2.0) -> Report:
+    """Let resolvers, by default all that handle bounds, run the step for `duration` [s].
+
+    The rows have what `judge_step` finds, and whether the resolver is strict.
     """
     with tempfile.TemporaryDirectory() as folder:
         scene = make_scenes(Path(folder))["step"]
-        asked = Moving(arm, {"resolver": resolver})
-        asked.open(asdict(scene), beside=True)
-        reply = asked.turn(round(duration / scene.period), 0)
-        log = joined([reply])
-        if log["failed"].all():
-            raise HierarchyError(f"{resolver.label}: {reply['why']}")
-        found, failed = judge_step(log, scene), int(log["failed"].sum())
-    return {"entrant": resolver.label, "ticks": len(log["t"]), "failed": failed, **found,
-            "strict": found["moved_m"] <= AIM and not failed}
 
+        def judged(log: Log, _: Any) -> Row:
+            found, failed = judge_step(log, scene), int(log["failed"].sum())
+            return {"ticks": len(log["t"]), "failed": failed, **found,
+                    "strict": found["moved_m"] <= AIM and not failed}
 
-def run(resolvers: Iterable[Resolver] | None = None, duration: float = 2.0) -> Report:
-    """Measure resolvers, by default all that handle bounds."""
-    chosen = [*able(), CutOff()] if resolvers is None else list(resolvers)
-    found = {resolver.label: row for resolver, row in ended(
-        partial(strictness, duration=duration), chosen)}
-    rows = [row for one in chosen if (row := found[one.label])]
+        ticks = round(duration / scene.period)
+        rows, missing = measure(entrants() if resolvers is None else resolvers, QUESTIONS,
+                                (asdict(scene), True), Turns(ticks, 0, ticks, 0), judged)
     title = "Motion of the end effector due to the posture, which has lower priority [m]"
     text = f"strict: at most {AIM:g} m per tick, and no tick without an answer."
     return Report("Strictness at the limits", [
-        Section(title, [Table(title, rows, _COLUMNS)], text)], {"strictness": rows},
-        {label: "its process ended, as said above" for label, row in found.items() if not row})
-
+        Section(title, [Table(title, rows, _COLUMNS)], text)], {"strictness": rows}, missing)

@@ -61,10 +61,8 @@ class Arm:
 
     def target(self, t: float) -> tuple[Array, Array]:
         """Position (3,) [m] and velocity (3,) [m/s] of the path at t [s]."""
-        c, s = np.cos(self.turning * t), np.sin(self.turning * t)
-        cosine, sine = np.asarray(self.cosine), np.asarray(self.sine)
-        return (np.asarray(self.centre) + c * cosine + s * sine,
-                self.turning * (c * sine - s * cosine))
+        p, dp, _ = circle(t, self.centre, self.cosine, self.sine, self.turning)
+        return p, dp
 
 
 class Answer(NamedTuple):
@@ -132,12 +130,14 @@ class Stand:
 
     def targets(self, t: float) -> Array:
         """Position, velocity, acceleration of centre of mass and hands at t [s]: (3, 3, 3)."""
-        found = []
-        for centre, cosine, sine, rate in self.circles:
-            c, s = np.cos(rate * t) * np.array(cosine), np.sin(rate * t) * np.array(sine)
-            dc, ds = -np.sin(rate * t) * np.array(cosine), np.cos(rate * t) * np.array(sine)
-            found.append([np.array(centre) + c + s, rate * (dc + ds), -(rate**2) * (c + s)])
-        return np.array(found)
+        return np.array([circle(t, *one) for one in self.circles])
+
+
+def circle(t: float, centre: Numbers, cosine: Numbers, sine: Numbers, rate: float) -> Array:
+    """Return position, velocity and acceleration at t [s] of centre + cosine cos + sine sin."""
+    c, s, a, b = np.cos(rate * t), np.sin(rate * t), np.array(cosine), np.array(sine)
+    out = c * a + s * b
+    return np.array([centre + out, rate * (c * b - s * a), -(rate**2) * out])
 
 
 def wrench(rotation: Array, points: Array, forces: Array) -> Array:

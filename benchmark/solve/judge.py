@@ -205,21 +205,25 @@ def profile(rows: Sequence[Row], ratios: Array) -> dict[str, Array]:
         own = problems.setdefault((row["family"], row["problem"]), {})
         if row["verdict"] == SOLVED:
             own[row["entrant"]] = float(np.median(row["cold_ns"]))
-    found = {}
-    for name, _ in by(rows, "entrant"):
-        ratio = np.array([own[name] / min(own.values()) if name in own else np.inf
-                          for own in problems.values()])
-        found[name] = np.array([(ratio <= most).mean() for most in ratios])
-    return found
+    return {name: _shares([own[name] / min(own.values()) if name in own else np.inf
+                           for own in problems.values()], ratios)
+            for name, _ in by(rows, "entrant")}
 
 
 def right_within(rows: Sequence[Row], thresholds: Array) -> dict[str, Array]:
-    """Return the share of the problems asked that an entrant solves and calls so, if `RIGHT` were
-    each of the thresholds (k,).
+    """Return the share of the problems asked that an entrant solves, were `RIGHT` a threshold.
+
+    thresholds : (k,).
     """
-    return {name: np.array([np.mean([bool(row.get("solved")) and row["relative"] <= most
-                                     for row in own if row["verdict"] != REFUSED] or [np.nan])
-                            for most in thresholds]) for name, own in by(rows, "entrant")}
+    return {name: _shares([row["relative"] if row.get("solved") else np.inf for row in own
+                           if row["verdict"] != REFUSED], thresholds)
+            for name, own in by(rows, "entrant")
+            if any(row["verdict"] != REFUSED for row in own)}
+
+
+def _shares(values: Sequence[float], most: Array) -> Array:
+    """Return which share of values is at most each of `most` (k,)."""
+    return np.asarray(np.mean(np.array(values)[:, None] <= most, axis=0))
 
 
 def _over(reduce: Callable[..., Any], values: Iterable[float | None]) -> float:

@@ -62,12 +62,12 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
                    if all(one.label != label for one in entrants)}
         store.note("missing", missing | field.missing)
         for file, labels in left.items():
-            some = [label for label in labels if label in field.running]
-            told(f"{file.stem}: {len(some)} entrants")
-            found = asked(field, file, limit, some)
-            for label, rows in found.items():
-                store.add(rows, store.file_of(label, file))
-            improve(file, found.values())
+            if some := [label for label in labels if label in field.running]:
+                told(f"{file.stem}: {len(some)} entrants")
+                found = asked(field, file, limit, some)
+                for label, rows in found.items():
+                    store.add(rows, store.file_of(label, file))
+                improve(file, found.values())
     return store
 
 
