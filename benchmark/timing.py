@@ -54,7 +54,7 @@ def times_of(nanoseconds: Sequence[float] | Array, prefix: str = "") -> dict[str
 
 
 def take_turns(everyone: Sequence[Timed], seconds: float, turns: int = 1) -> list[dict[str, Any]]:
-    """Let all take turns on one core for `seconds` [s], at least so many each; return their rows.
+    """Time all in turns on one core for `seconds` [s], each at least so often; return their rows.
 
     One turn before them is not counted: it compiles and fills caches.
     """

@@ -27,7 +27,7 @@ class Happening(NamedTuple):
 def happened(recording: Recording) -> Iterator[Happening]:
     """Yield problems by kind, contacts, and the largest changes of the command with their causes.
 
-    Changes count from the step that is counted in the metrics on. Their causes need the robot's
+    Changes count from the step from which the metrics count. Their causes need the robot's
     files; where those are missing, changes are left out.
     """
     t = recording["t"]

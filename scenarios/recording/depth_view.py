@@ -14,9 +14,9 @@ class DepthView(NamedTuple):
     """One depth image with the distances that follow from it; P points, the end effector last.
 
     t [s]; image (h, w) [m], 0 where there is no reading; camera (16,), see `Pinhole.packed`;
-    points (P, 3) [m]; distance (P,) [m] of each to what it is nearest to, infinite where that is
-    nothing; pixel (P,) of the image, counted row by row, in which that is, or -1; active, the
-    point of D_minimal, or -1.
+    points (P, 3) [m]; distance (P,) [m] of each to the nearest obstacle, infinite without
+    one; pixel (P,) of the image, counted row by row, that shows it, or -1; active, the point of
+    D_minimal, or -1.
     """
 
     t: float

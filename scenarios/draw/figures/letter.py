@@ -89,8 +89,8 @@ def write_all(recording: Recording, folder: Path) -> None:
 def write_together(recordings: Sequence[Recording], folder: Path) -> None:
     """Write figures of several runs to a folder, their parts (a), (b), ... one below the other.
 
-    These are the letter's, as far as their runs are there, and of two runs also each quantity of
-    both. Raises HierarchyError if there is no figure.
+    These are the letter's figures whose runs are given, and for two runs each quantity of both.
+    Raises HierarchyError if there is no figure.
     """
     with drawing.styled(drawing.present()):
         drawn = dict(_together(recordings))

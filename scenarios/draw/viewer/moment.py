@@ -136,7 +136,7 @@ class Watched:
                       None if com is None else com[None]).at(0)
 
     def _active(self, became: Mapping[str, Became]) -> int:
-        """Return the point that is kept away, as `active` of `scenarios.scene.Scene`."""
+        """Return the point that avoidance acts on, as `active` of `scenarios.scene.Scene`."""
         cell = self.controller.cell
         if cell.sensor is None:
             return -1
