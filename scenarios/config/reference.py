@@ -113,19 +113,20 @@ def sections() -> Iterator[tuple[str, type[Section]]]:
 def page() -> str:
     """Return all keys as Markdown; a key that several sections have is described in the first."""
     places = {section.__name__: place for place, section in sections()}
-    parts, first = [], dict[tuple[str, ...], str]()
+    parts, first = [], dict[tuple[str, ...], tuple[str, str]]()
     for place, section in sections():
         head = title_of(section, f"`{place}`") if place else "top of the file"
         parts += [f"## {head[:1].upper()}{head[1:]}", "", _escaped(about(section)), ""]
         shared: dict[str, list[str]] = {}
         for key in keys_of(section):
-            above = first.setdefault((key.name, key.value, key.unit, key.meaning), head)
+            above, default = first.setdefault(
+                (key.name, key.value, key.unit, key.meaning), (head, key.default))
             if above == head:
                 parts.append(_entry(key, places))
             else:
-                default = key.default and f" (default {key.default})"
+                other = f" (default {key.default or 'none'})" if key.default != default else ""
                 shared.setdefault(above.removeprefix(f"`{place}` with "), []).append(
-                    f"`{key.name}`{default}")
+                    f"`{key.name}`{other}")
         parts += [f"- as in {above}: {', '.join(names)}" for above, names in shared.items()] + [""]
     return "\n".join(parts).replace("(default required)", "(required)")
 
