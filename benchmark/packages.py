@@ -24,10 +24,10 @@ class MissingError(Exception):
 @final
 @dataclass(frozen=True)
 class Package:
-    """What pip is asked for, into an environment of that name.
+    """The requirements that pip installs into an environment of that name.
 
-    Its own, since these packages want different versions of pinocchio, numpy and MuJoCo. `module`
-    is what is imported. An empty tuple of requirements: part of this project's own environment.
+    They require different versions of pinocchio, numpy and MuJoCo. `module` is what is imported. An
+    empty tuple of requirements: part of this project's own environment.
     """
 
     name: str

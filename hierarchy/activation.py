@@ -50,7 +50,7 @@ class Activation:
         return np.concatenate([np.empty(0), *map(self._of_task, self._tasks)])
 
     def demanded(self, h: Hierarchy) -> Array:
-        """Return the lower sides (m,) of h with those of rows that do not act fully left out.
+        """Return the lower sides (m,) of h, without those of rows that do not act fully.
 
         Such a row is followed in part by design, so it cannot be missed. h has the rows of `tasks`.
         """

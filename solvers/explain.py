@@ -121,7 +121,7 @@ def _giving(h: Hierarchy, resolution: ActiveSetResolution, k: int, witness: Arra
 
 def _given(h: Hierarchy, resolution: ActiveSetResolution, i: int, by: float,
            words: tuple[Sequence[str], Sequence[str]]) -> str:
-    """Say how much row i gives; for the level that would take more, where it gives all it may."""
+    """Say how much row i gives, and if that is all it may, the level that would use more."""
     assert h.give is not None
     (name, unit), level = (of[i] for of in words), int(resolution.holds_back[i])
     whom = ("the levels below" if level < 0 else

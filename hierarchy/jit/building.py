@@ -29,7 +29,7 @@ Call = tuple[str, tuple[Any, ...]]  # the name of a kernel with its module, type
 
 @global_compiler_lock  # type: ignore[untyped-decorator]
 def build(file: Path, jobs: str, calls: Sequence[Call], say: Callable[[int], None]) -> None:
-    """Write an object file with these calls, and its index; `say` hears how many are compiled."""
+    """Write an object file with these calls, and its index; `say` takes the number compiled."""
     _without_machine_code()
     libraries: dict[Any, None] = {}
     kernels: dict[str, tuple[str, dict[str, Entry]]] = {}

@@ -39,7 +39,7 @@ class KernelCache(NullCache):  # type: ignore[misc]
         self._name = f"{function.__module__}.{function.__qualname__}"
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """Return what is kept, or None.
+        """Return the stored kernel, or None.
 
         Without the refresh of numba's registries, which takes a third of a first solve; compiling
         refreshes them itself.
@@ -54,7 +54,7 @@ class KernelCache(NullCache):  # type: ignore[misc]
         return None
 
     def save_overload(self, signature: Any, made: Any) -> None:
-        """Keep a compiled kernel; where that is impossible, say so once."""
+        """Store a compiled kernel; if that is impossible, say so once."""
         file = self._file(signature, made.target_context)
         if file is None:
             _say_lost("their sources or a home folder are not to be found")

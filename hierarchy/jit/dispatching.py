@@ -53,7 +53,7 @@ class Cached(CPUDispatcher):  # type: ignore[misc]
             super().add_overload(made)
 
     def compile(self, signature: Any) -> Any:
-        """Return what Python calls, compiled now or on an earlier day, and kept."""
+        """Return the function that Python calls, compiled now or loaded from the cache."""
         with global_compiler_lock:
             if self.kept and not isinstance(self._cache, KernelCache):
                 self._cache = KernelCache(self.py_func)

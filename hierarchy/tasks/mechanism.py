@@ -181,7 +181,7 @@ class Mechanism:
         return here
 
     def gap(self, q: ArrayLike) -> tuple[float, str]:
-        """Return by how much it is open at q at most [m or rad], and in which row."""
+        """Return the largest opening at q [m or rad], and its row."""
         if not self:
             return 0.0, ""
         error = np.abs(self._rows(self._robot.normalised(q))[1])

@@ -210,7 +210,7 @@ def _given(error: typer.TyperException, arguments: list[str]) -> str:
 
 
 def _with_its_file(text: str, arguments: list[str]) -> str:
-    """Put the file of a command that has one in front of an error that does not name it."""
+    """Prefix an error with the file of the command, unless it names it."""
     files = [one for one in arguments if one.endswith(".toml") or ".toml:" in one]
     return f"{files[0]}: {text}" if len(files) == 1 and files[0] not in text else text
 

@@ -12,7 +12,7 @@ _EVERY = 10.0  # [s] between two lines
 
 @contextmanager
 def bar(what: str = "ticks") -> Iterator[Callable[[str, int, int], None]]:
-    """Yield a function to call as told(label, done, total); `what` is the unit of the count."""
+    """Yield a function to call with (label, done, total); `what` is the unit of the count."""
     if not sys.stderr.isatty():
         yield lines(what)
         return

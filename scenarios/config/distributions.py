@@ -100,7 +100,7 @@ class Integers(Section):
 
 
 class _ByKey(OneOf):
-    """Says which distribution a table is by its key."""
+    """Selects the distribution by the key of a table."""
 
     wants: ClassVar[str] = "expected a table with one of"
 

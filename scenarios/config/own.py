@@ -112,7 +112,7 @@ def _again(own: type[OwnSection], kind: str, data: dict[str, Any]) -> OwnSection
 
 
 def _taken(maker: Maker, given: dict[str, Any]) -> dict[str, Any]:
-    """Return what of some arguments a maker has parameters for."""
+    """Return those of the arguments that a maker has parameters for."""
     known = inspect.signature(maker).parameters
     return {name: value for name, value in given.items() if name in known}
 

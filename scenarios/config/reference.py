@@ -113,18 +113,20 @@ def sections() -> Iterator[tuple[str, type[Section]]]:
 def page() -> str:
     """Return all keys as Markdown; a key that several sections have is described in the first."""
     places = {section.__name__: place for place, section in sections()}
-    parts, first = [], dict[tuple[str, ...], str]()
+    parts, first = [], dict[tuple[str, ...], tuple[str, str]]()
     for place, section in sections():
-        head = title_of(section, f"`{place}`") if place else "Top of the file"
-        parts += [f"## {head}", "", _escaped(about(section)), ""]
+        head = title_of(section, f"`{place}`") if place else "top of the file"
+        parts += [f"## {head[:1].upper()}{head[1:]}", "", _escaped(about(section)), ""]
         shared: dict[str, list[str]] = {}
         for key in keys_of(section):
-            above = first.setdefault((key.name, key.value, key.unit, key.meaning), head)
+            above, default = first.setdefault(
+                (key.name, key.value, key.unit, key.meaning), (head, key.default))
             if above == head:
                 parts.append(_entry(key, places))
             else:
-                default = key.default and f" (default {key.default})"
-                shared.setdefault(above, []).append(f"`{key.name}`{default}")
+                other = f" (default {key.default or 'none'})" if key.default != default else ""
+                shared.setdefault(above.removeprefix(f"`{place}` with "), []).append(
+                    f"`{key.name}`{other}")
         parts += [f"- as in {above}: {', '.join(names)}" for above, names in shared.items()] + [""]
     return "\n".join(parts).replace("(default required)", "(required)")
 
@@ -137,7 +139,8 @@ def _entry(key: Key, places: dict[str, str]) -> str:
     if key.default == "required":
         value = f"{value}{unit}, required"
     elif key.default:
-        bounds = "" if value == "boolean" else value.removeprefix("number").strip()
+        said = value == "boolean" or all(one in key.meaning for one in value.split(", "))
+        bounds = "" if said else value.removeprefix("number").strip()
         value = f"`{key.default}`{unit}{bounds and f'; {bounds}'}"
     else:
         value += unit

@@ -82,7 +82,7 @@ class Section(BaseModel):
 
 @dataclass(frozen=True)
 class OneOf:
-    """What makes `Annotated[A | B, OneOf()]` a section of the kind that its table names.
+    """Makes `Annotated[A | B, OneOf()]` the section whose kind the table names.
 
     Without a key "kind" it is the `default`. Keys in messages are then those of the file, without
     the kinds that a union of pydantic puts between them.

@@ -48,7 +48,7 @@ class _Log(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """What is read in each tick: the state, the distances [m]."""
+    """What the recorder reads in each tick: the state, the distances [m]."""
 
     q: Array
     v: Array

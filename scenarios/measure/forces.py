@@ -80,7 +80,7 @@ def wanted_forces(recording: Recording) -> Iterator[tuple[ListedForce, Array]]:
 
 
 def _torques(recording: Recording) -> Iterator[Metric]:
-    """Yield how near to their limits the torques are, and how they jump."""
+    """Yield the largest use of the torque limits, and the largest torque steps."""
     torque, metric = recording["command"], partial(Metric, group="Torques")
     if "torque_limit" in recording:
         at = (np.abs(torque) >= _AT_LIMIT * recording["torque_limit"]).any(axis=1)

@@ -88,7 +88,7 @@ class Fates:
 
 
 def completed(recording: Recording, cell: Cell) -> Recording:
-    """Return a run with the fates of its levels and, if it has a camera, a depth image.
+    """Return a run with the states of its levels and, if it has a camera, a depth image.
 
     `cell` is built from the run's scenario; its state is moved, its plant is not used.
     """

@@ -96,9 +96,9 @@ def true(recording: Recording, signal: str) -> Array:
 
 
 def passed(off: Array, tolerance: float = 0.0) -> Array:
-    """Return by how much a limit is passed, from how far beyond it a run is (T, ...), at least 0.
+    """Return the excess (T, ...), at least 0, of a run that is `off` beyond a limit.
 
-    Who begins beyond it and comes back has not passed it, unless by going further.
+    A run that begins beyond it and comes back has not passed it, unless it goes further.
     """
     came_back = (off <= tolerance).any(axis=0)
     return np.asarray(np.where(came_back, off - np.fmin.accumulate(off), off))

@@ -20,7 +20,7 @@ ALIKE = 1e-5
 
 @dataclass(frozen=True)
 class Motion:
-    """Runs whose joints keep together, and by how much they do not at most [rad]."""
+    """Runs with the same motion, and the largest difference between their joints [rad]."""
 
     runs: tuple[Run, ...]
     apart: float = 0.0

@@ -58,7 +58,7 @@ class ContactPoint:
 
 @dataclass(frozen=True)
 class RobotFacts:
-    """A robot as far as readers of a run need it.
+    """What readers of a run need to know of the robot.
 
     joints : the kinematic tree. rest (nq,) : the robot's own posture.
     velocity_names, velocity_units (n,) : name of each velocity, and unit of a small step along it;

@@ -163,7 +163,7 @@ class _Refinement(NamedTuple):
         return bool(optimal), next_active, next_broken
 
     def _within_reach(self, z: Array) -> bool:
-        """Whether rows that count as independent can ask for a z as long as this one."""
+        """Whether rows that count as independent can require a z as long as this one."""
         sides = np.concatenate([self.e, *(side for rows in (self.limits, self.kept)
                                           for side in (rows.lower, rows.upper))])
         asked = float(abs(sides[np.isfinite(sides)]).max(initial=0.0))

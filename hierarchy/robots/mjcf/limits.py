@@ -34,7 +34,7 @@ def set_limits(built: Built) -> Iterator[str]:
     model.upperVelocityLimit = np.full(model.nv, np.inf)
     yield "velocity limits: an MJCF has none"
     if balls:
-        yield f"limits of the angle of ball joints are not kept: {some(balls)}"
+        yield f"limits of the angle of ball joints are ignored: {some(balls)}"
 
 
 def effort_limits(built: Built) -> Iterator[str]:
