@@ -19,8 +19,8 @@ from scenarios.measure.metrics import Metric
 from scenarios.measure.runs import Cell, Row, caveats
 from scenarios.measure.statistics import Paired, Spread, paired, wilson
 from scenarios.recording.facts import resolver_facts
-from scenarios.results.plan import Plan, Planned
-from scenarios.results.run import Outcome
+from scenarios.results.plan import Plan
+from scenarios.results.run import Job, Outcome
 
 # What is weighed in the verdict.
 _WEIGHED = ("position_error_median_settled", "body_distance_min", "ee_distance_min",
@@ -57,7 +57,7 @@ class Failure:
     """A reason why runs stopped early or failed, the first such run, and their number."""
 
     reason: str
-    run: Planned
+    run: Job
     count: int
 
 
@@ -68,7 +68,7 @@ class Results:
     Those are the runs of one scenario under its resolvers, or, with one resolver, of all scenarios.
     """
 
-    runs: tuple[Planned, ...]
+    runs: tuple[Job, ...]
     reasons: tuple[str | None, ...]
     metrics: dict[str, Metric]
     values: dict[str, NDArray[np.float64]]
@@ -83,7 +83,7 @@ class Results:
         names = np.array([run.label for run in self.runs])
         return {label: names == label for label in self.labels}
 
-    def firsts(self) -> list[Planned]:
+    def firsts(self) -> list[Job]:
         """Return the first run of each label."""
         return [next(run for run in self.runs if run.label == label) for label in self.labels]
 
@@ -95,13 +95,13 @@ class Results:
     @cached_property
     def samples(self) -> int:
         """Number of samples."""
-        return 1 + max(run.job.sample for run in self.runs)
+        return 1 + max(run.sample for run in self.runs)
 
     def column(self, name: str, label: str) -> NDArray[np.float64]:
         """Return a metric under a resolver by sample, (samples,)."""
         found = np.full(self.samples, np.nan)
         for i in np.flatnonzero(self._of[label]):
-            found[self.runs[i].job.sample] = self.values[name][i]
+            found[self.runs[i].sample] = self.values[name][i]
         return found
 
     def spread(self, name: str, label: str) -> Spread | None:
@@ -156,7 +156,7 @@ class Results:
         return [metric for name, metric in self.metrics.items()
                 if metric.group != "Computing" and np.isfinite(self.values[name]).any()]
 
-    def worst(self) -> list[tuple[Metric, Planned]]:
+    def worst(self) -> list[tuple[Metric, Job]]:
         """Return the worst run for each metric that has a direction and differs between runs."""
         found = []
         for metric in self.shown():
@@ -249,14 +249,14 @@ def results(plan: Plan, kept: Mapping[str, Outcome]) -> dict[str, Results]:
     A group is a scenario; with one resolver and several scenarios there is one group, named after
     the resolver, whose columns are the scenarios.
     """
-    groups: dict[str, list[Planned]] = {}
+    groups: dict[str, list[Job]] = {}
     for run in plan.runs:
         groups.setdefault(run.group, []).append(run)
-    return {name: _group(runs, [kept[run.job.key] for run in runs])
+    return {name: _group(runs, [kept[run.key] for run in runs])
             for name, runs in groups.items()}
 
 
-def _group(runs: Sequence[Planned], found: Sequence[Outcome]) -> Results:
+def _group(runs: Sequence[Job], found: Sequence[Outcome]) -> Results:
     known = {one.name: one for outcome in found for one in outcome.metrics
              if one.value is not None}
     values = {name: np.full(len(runs), np.nan) for name in known}

@@ -82,15 +82,6 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
 
 
 @dataclass(frozen=True)
-class Planned:
-    """A run of a sweep: `group` are the runs it stands beside, `label` its column there."""
-
-    group: str
-    label: str
-    job: Job
-
-
-@dataclass(frozen=True)
 class Plan:
     """All runs of a sweep, without duplicates.
 
@@ -100,7 +91,7 @@ class Plan:
 
     sweep: Sweep
     scenarios: tuple[Scenario, ...]
-    runs: tuple[Planned, ...]
+    runs: tuple[Job, ...]
     refused: tuple[str, ...]
 
 
@@ -119,7 +110,7 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
     columns, refused = side_by_side(asked, sweep.resolvers or None, f"sweep {sweep.name!r}: ")
     alone = len({run.spec for run in columns}) == 1 and len(asked) > 1
     versions = digest()
-    runs: dict[str, Planned] = {}
+    runs: dict[str, Job] = {}
     for index in range(sweep.samples):
         for scenario in asked:
             values = _drawn(sweep, index, scenario)
@@ -128,9 +119,9 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
             for run in columns:
                 if run.scenario.name == scenario.name:
                     key = key_of(text, run.spec, versions)
-                    job = Job(key, text, run.spec, scenario.name, index, values, plugins.loaded())
-                    runs.setdefault(key, Planned(run.spec if alone else scenario.name, run.label,
-                                                 job))
+                    runs.setdefault(key, Job(
+                        key, text, run.spec, scenario.name, index, values, plugins.loaded(),
+                        run.spec if alone else scenario.name, run.label))
     return Plan(sweep, tuple(asked), tuple(runs.values()), refused)
 
 

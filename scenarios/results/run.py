@@ -29,7 +29,8 @@ _PLACE = ("system", "processor")  # entries of versions() that describe the mach
 class Job:
     """A planned run: the scenario's text, the resolver, the key of both, and needed plugins.
 
-    sample, values : the number of the sample, and what was sampled by dotted key.
+    sample, values : the number of the sample, and what was sampled by dotted key. group, label :
+    the runs that it stands beside, and its column there.
     """
 
     key: str
@@ -39,6 +40,8 @@ class Job:
     sample: int = 0
     values: Mapping[str, Any] = field(default_factory=dict)
     plugins: tuple[str, ...] = ()
+    group: str = ""
+    label: str = ""
 
     def load(self) -> Scenario:
         """Return the scenario under its resolver, after importing the plugins."""

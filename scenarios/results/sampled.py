@@ -103,7 +103,7 @@ def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str]
 def _made(planned: Plan, out: Path, source: tuple[str, str], workers: Workers,
           progress: Progress | None) -> Finished:
     """Make the runs of a plan that a folder does not have, and write the results of all."""
-    jobs = [run.job for run in planned.runs]
+    jobs = list(planned.runs)
     if workers.part is None:
         store = Store(out)
     else:
@@ -148,9 +148,9 @@ def _written(planned: Plan, store: Store, source: tuple[str, str]) -> dict[str, 
     kept = store.outcomes()
     found = results(planned, kept)
     command, file = source
-    write_table(store.folder / TABLE, [(run.job, kept[run.job.key]) for run in planned.runs])
+    write_table(store.folder / TABLE, [(run, kept[run.key]) for run in planned.runs])
     texts = {"results.json": json.dumps(_plain(planned, found, command), indent=2) + "\n",
-             **{f"worst/{name_of(run)}": run.job.load().to_toml() for run in worst_runs(found)}}
+             **{f"worst/{name_of(run)}": run.load().to_toml() for run in worst_runs(found)}}
     (store.folder / "worst").mkdir(exist_ok=True)
     for name, text in texts.items():
         with writing(store.folder / name):

@@ -20,7 +20,8 @@ from scenarios.measure.metrics import Metric
 from scenarios.measure.run_folder import versions
 from scenarios.results import curves
 from scenarios.results.columns import Results, flags, rows, verdict
-from scenarios.results.plan import Plan, Planned
+from scenarios.results.plan import Plan
+from scenarios.results.run import Job
 from scenarios.templates import render, resource
 
 _FAILURES = 20  # reasons listed
@@ -47,18 +48,17 @@ def sampled_page(plan: Plan, found: Mapping[str, Results], folder: Path, command
         scenarios=shown, about_rows=_ABOUT_ROWS, command=command, file=file, versions=versions()))
 
 
-def worst_runs(found: Mapping[str, Results]) -> list[Planned]:
+def worst_runs(found: Mapping[str, Results]) -> list[Job]:
     """Return the runs for which the page shows a command."""
-    runs = {run.job.key: run for results in found.values()
+    runs = {run.key: run for results in found.values()
             for run in (*(run for _, run in results.worst()),
                         *(failure.run for failure in results.failures()[:_FAILURES]))}
     return list(runs.values())
 
 
-def name_of(run: Planned) -> str:
+def name_of(run: Job) -> str:
     """Return the name of the file that has the scenario of a run."""
-    job = run.job
-    return f"{slug(f'{job.scenario}-{job.resolver}-{job.sample}')}-{job.key[:6]}.toml"
+    return f"{slug(f'{run.scenario}-{run.resolver}-{run.sample}')}-{run.key[:6]}.toml"
 
 
 def _variations(plan: Plan) -> dict[str, dict[str, Distribution]]:
@@ -73,11 +73,11 @@ def _variations(plan: Plan) -> dict[str, dict[str, Distribution]]:
 def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, Any]:
     """Return the content of the page for one group of runs."""
     failures = results.failures()
-    marked = flags({run.label: run.job.load() for run in results.firsts()})
+    marked = flags({run.label: run.load() for run in results.firsts()})
     worst: dict[str, list[Metric]] = {}
     for metric, run in results.worst():
-        worst.setdefault(run.job.key, []).append(metric)
-    of_key = {run.job.key: run for run in results.runs}
+        worst.setdefault(run.key, []).append(metric)
+    of_key = {run.key: run for run in results.runs}
     return {
         "name": name, **_about(name, plan), "verdict": verdict(results),
         "shares": svg(curves.shares(results), f"{name}: shares of runs"),
@@ -98,7 +98,7 @@ def _about(name: str, plan: Plan) -> dict[str, str]:
     return {"title": f"{in_words(len(plan.scenarios))} scenarios side by side", "about": f"{each}."}
 
 
-def _again(run: Planned, folder: Path) -> tuple[str, str]:
+def _again(run: Job, folder: Path) -> tuple[str, str]:
     """Return the file of a run's scenario and the command that repeats it."""
     file = f"worst/{name_of(run)}"
     return file, shlex.join(["hierarchy", "run", str(folder / file)])

@@ -126,16 +126,16 @@ def test_all_resolvers_see_the_same_samples_and_no_run_is_planned_twice(tmp_path
     planned = plan(load_sweep(write(tmp_path, resolvers='["tpm", "recursive", "tpm"]')))
     texts = {}
     for one in planned.runs:
-        texts.setdefault(one.job.sample, set()).add(one.job.text)
+        texts.setdefault(one.sample, set()).add(one.text)
     assert [len(seen) for seen in texts.values()] == [1, 1, 1]
-    assert len({one.job.key for one in planned.runs}) == len(planned.runs) == 6
+    assert len({one.key for one in planned.runs}) == len(planned.runs) == 6
     assert len(plan(load_sweep(write(tmp_path, ""))).runs) == 2  # all samples are the same
 
 
 def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_on_it(tmp_path):
     (tmp_path / "mine.toml").write_text('extends = "ellipse"\nname = "mine"\n')
     planned = plan(load_sweep(write(tmp_path, "", scenarios='["ellipse-hqp", "mine.toml"]')))
-    assert {one.job.scenario for one in planned.runs} == {"mine"}
+    assert {one.scenario for one in planned.runs} == {"mine"}
     assert len(planned.refused) == 2
 
 
@@ -161,7 +161,7 @@ def test_a_variation_that_cannot_be_drawn_is_refused(variation, says, tmp_path):
 # Runs, wherever they are made
 
 def test_a_run_has_every_metric_of_its_scenario_as_sampled(tmp_path):
-    job = plan(load_sweep(write(tmp_path))).runs[1].job
+    job = plan(load_sweep(write(tmp_path))).runs[1]
     found, expected = outcome(job), metrics.measure(simulate(job.load()))
     assert (found.key, found.ticks, found.reason) == (job.key, 20, None)
     assert {m.name: m.value for m in found.metrics if m.group != "Computing"} == {
@@ -324,7 +324,7 @@ def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_sa
     assert all(line in page for line in data["groups"]["ellipse"]["verdict"])
     for metric, run in found.found["ellipse"].worst()[:3]:
         name = next(file for file in (folder / "worst").iterdir()
-                    if run.job.key[:6] in file.name)
+                    if run.key[:6] in file.name)
         assert f"worst/{name.name}" in page
         again = metrics.measure(simulate(load(name)))
         assert again[metric.name].value == metric.value

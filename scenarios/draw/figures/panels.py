@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -125,17 +126,9 @@ def position_error(ax: Axes, recording: Recording, colour: str) -> None:
     drawing.make_logarithmic(ax, "y")
 
 
-def task_errors(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw the errors of listed tasks that are lengths [mm], on a logarithmic scale."""
-    _listed(ax, recording, "m", 1e3)
-
-
-def task_angles(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw the errors of listed tasks that are angles [deg], on a logarithmic scale."""
-    _listed(ax, recording, "deg", 1.0)
-
-
-def _listed(ax: Axes, recording: Recording, unit: str, scale: float) -> None:
+def task_errors(ax: Axes, recording: Recording, colour: str, unit: str = "m",
+                scale: float = 1e3) -> None:
+    """Draw the errors of listed tasks in a unit, lengths [mm] or angles [deg], logarithmic."""
     titles = [section.title for section in recording.scenario.tasks]
     for section, of, error in errors(recording):
         if of == unit:
@@ -169,7 +162,7 @@ TASK_PANELS = (
     Panel("task-errors", "Errors of the tasks, lengths", "mm, logarithmic", "task_error_",
           task_errors, "Each task's own error, whatever its place in the stack."),
     Panel("task-angles", "Errors of the tasks, angles", "°, logarithmic", "task_error_",
-          task_angles),
+          partial(task_errors, unit="deg", scale=1.0)),
 )
 for _panel in (*PANELS, *TASK_PANELS):
     plugins.register("figures", _panel.name, shipped=True)(_panel)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,6 @@ from hierarchy.problem import Array
 from scenarios.recording.fate import Fate
 from scenarios.scene import Scene
 from scenarios.scene.pushes import Pushes
-
-if TYPE_CHECKING:
-    pass
 
 
 class Became(NamedTuple):
