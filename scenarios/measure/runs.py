@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 # How a resolver that is not strict departs from strict priorities, by its name.
 _DEPARTS = {
-    "": "not strict, a lower level can disturb a higher one",
-    "tpm": "inexact where a level loses rank, and lower levels then disturb it",
-    "reverse": "inexact from the second level on where targets conflict",
-    "augmented": "one least-squares problem without priorities",
-    "weighted": "trades levels off by weights, a lower one disturbs a higher one a little",
-    "merged": "trades levels off by weights in motion, not at rest",
+    "": "not strict",
+    "tpm": "inexact where a level loses rank",
+    "reverse": "inexact where targets conflict",
+    "augmented": "without priorities",
+    "weighted": "trades levels off by weights",
+    "merged": "trades levels off by weights in motion",
     "smooth": "not strict while a row is partly active"}
 
 
