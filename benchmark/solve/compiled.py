@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import sys
+from pathlib import Path
 from typing import Any, final
 
 import numba
@@ -41,7 +43,8 @@ class Compiled(Solver):
     warm = True
 
     def __init__(self, library: str, name: str) -> None:
-        self.name, self.library = name, ctypes.CDLL(library)
+        digest = hashlib.sha256(Path(library).read_bytes()).hexdigest()[:12]
+        self.name, self.library = f"{name}, SHA-256 {digest}", ctypes.CDLL(library)
         self.library.prepare.restype = _VOID
         self.library.prepare.argtypes = [ctypes.c_int64, ctypes.c_int64, *[_VOID] * 5]
         self.library.solve.argtypes = [_VOID] * 4
@@ -49,7 +52,7 @@ class Compiled(Solver):
         self._timed = _loop(self.library.solve) if sys.platform == "linux" else None
 
     def version(self) -> str:
-        """Return the name that was given."""
+        """Return the name that was given, and what the file is: archives have no version."""
         return self.name
 
     def refuses(self, problem: Problem) -> str:

@@ -138,6 +138,7 @@ def test_a_solver_in_a_library_is_timed_from_python_and_inside(tmp_path, equalit
     (one,) = compiled([shared(tmp_path / "one.c", tmp_path / "one.so")], ["one"])
     answers = run_entrant(one, equalities)
     assert [answer["x"] for answer in answers] == [[float(side), 1.0] for side in range(5)]
+    assert re.fullmatch("one, SHA-256 [0-9a-f]{12}", answers[0]["version"])
     for answer in answers:
         assert (answer["iterations"], answer["warm_iterations"]) == (7, 1)
         if sys.platform == "linux":
