@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Hierarchy", "HierarchyError", "Robot", "Stack", "State", "Task"]
 
 _PARTS = ("activation", "allocation", "avoidance", "kinematics", "limits", "loop", "paths",
-          "robots", "tasks")  # modules that are public
+          "measured", "robots", "tasks")  # modules that are public
 
 _HOME = {"Robot": "robot", "Stack": "stack", "State": "state", "Task": "task"}
 

@@ -43,6 +43,7 @@ class Readings(NamedTuple):
     direction: Array
     magnitude: Array
     nearest: NDArray[np.int64]
+    active: NDArray[np.int64]  # (1,)
 
 
 @inlined

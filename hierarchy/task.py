@@ -24,7 +24,7 @@ Kind = Literal["equality", "inequality"]
 
 _ROUNDING = 1e-9  # of a period, relative
 _OF_STATE = ("error", "jacobian", "jacobian_derivative", "desired_velocity",
-             "desired_acceleration", "reference_velocity", "reference_acceleration", "repulsion",
+             "desired_acceleration", "reference_velocity", "reference_acceleration", "measure",
              "writer")
 # Parts of a task by the type of the field, and how to make one.
 _PARTS: dict[str, tuple[type, str]] = {

@@ -45,13 +45,12 @@ class Measurement:
     points (K + 1, 3) [m]; distance (K + 1,) [m] to the nearest obstacle, eq. (22), infinite when
     there is none; direction (K + 1, 3) unit vector away from it; magnitude (K + 1,) of the
     repulsion, eq. (23); nearest (K + 1,) index of that obstacle or -1; `arrays` has all of these
-    for the kernels. `active` is the control point of eq. (31), the first with the smallest distance
-    (-1 if there is none). `pairs` has every point against every obstacle, or is None if it is not
-    measured; it remains the same object. `stamp` is the time [s] of the data, infinite for now. A
-    sensor is `blind` when its last new data are too old to be used.
+    and `active` for the kernels. `pairs` has every point against every obstacle, or is None if it
+    is not measured; it remains the same object. `stamp` is the time [s] of the data, infinite for
+    now. A sensor is `blind` when its last new data are too old to be used.
     """
 
-    __slots__ = ("active", "arrays", "blind", "direction", "distance", "magnitude", "nearest",
+    __slots__ = ("arrays", "blind", "direction", "distance", "magnitude", "nearest",
                  "pairs", "points", "stamp")
 
     def __init__(self, control_points: int) -> None:
@@ -60,15 +59,24 @@ class Measurement:
         self.distance, self.magnitude = np.full(size, inf), np.zeros(size)
         self.nearest = np.full(size, -1, dtype=np.int64)
         self.arrays = Readings(self.points, self.distance, self.direction, self.magnitude,
-                           self.nearest)
-        self.active = -1
+                           self.nearest, np.array([-1]))
         self.pairs: Pairs | None = None
         self.stamp, self.blind = inf, False
 
     @property
+    def active(self) -> int:
+        """The control point of eq. (31), the first with the smallest distance, or -1."""
+        return self.arrays.active.item()
+
+    @active.setter
+    def active(self, index: int) -> None:
+        self.arrays.active[0] = index
+
+    @property
     def minimal_distance(self) -> float:
         """D_minimal [m] of eq. (31): the smallest distance of a control point of the body."""
-        return float(self.distance.item(self.active)) if self.active >= 0 else inf
+        active = self.active
+        return float(self.distance.item(active)) if active >= 0 else inf
 
     @property
     def end_effector_distance(self) -> float:
@@ -85,7 +93,7 @@ def measure_exactly(measurement: Measurement, placements: Array, joints: NDArray
 
 def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[np.int64],
                    offsets: Array, obstacles: Array, laws: Array,
-                   mean_within: Array) -> Callable[[], None]:
+                   mean_within: Array) -> Callable[[], object]:
     """Return a function that fills a Measurement from known geometry at each call.
 
     placements (joints + 1, 12) of a State; joints (K + 1,), offsets (K + 1, 3) of the control
@@ -94,18 +102,13 @@ def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[
     (25)-(26) over the obstacles nearer than `mean_within` (2,) [m], for control points and end
     effector, if there are any.
     """
-    fill = bind(_measure, placements, joints, offsets, obstacles, laws, mean_within,
+    return bind(_measure, placements, joints, offsets, obstacles, laws, mean_within,
                 measurement.arrays)
-
-    def measure() -> None:
-        measurement.active = fill()
-
-    return measure
 
 
 @compiled
 def _measure(placements, joints, offsets, obstacles, laws, mean_within, seen):
-    points, distance, direction, magnitude, nearest = seen
+    points, distance, direction, magnitude, nearest, chosen = seen
     count = len(joints)
     active, D_minimal = -1, np.inf
     for k in range(count):
@@ -138,4 +141,4 @@ def _measure(placements, joints, offsets, obstacles, laws, mean_within, seen):
                                  laws[law, 3])  # (23)
         if k < count - 1 and D_min < D_minimal:  # (31)
             D_minimal, active = D_min, k
-    return active
+    chosen[0] = active

@@ -4,33 +4,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
-from hierarchy.avoidance.measurement import Measurement
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import (
-    add_row,
-    drift_of_point,
-    place,
-    write_equality,
-    write_point_jacobian,
-    write_point_jacobian_derivative,
-)
+from hierarchy.jit.sources import Kernel
+from hierarchy.kinematics import add_row, drift_of_point, place, write_point_jacobian
+from hierarchy.measured import Measured, measured
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+
+
+@measured
+def _avoidance(kinematics, reads, goal, J, motion):
+    joints, offsets, seen = reads
+    k = max(seen.active[0], 0)
+    joint, offset, r, magnitude = joints[k], offsets[k], seen.direction[k], seen.magnitude[k]
+    columns, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
+    vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(kinematics, joint, offset[0], offset[1],
+                                                     offset[2])
+    if len(motion.error) == 3:  # (28)
+        write_point_jacobian(columns, placements, supports, joint, offset, J, 0)
+        motion.rate[0], motion.rate[1], motion.rate[2] = vx, vy, vz
+        motion.drift[0], motion.drift[1], motion.drift[2] = ax, ay, az
+        for i in range(3):
+            motion.error[i] = magnitude * r[i]
+        return
+    point = place(placements[joint], offset[0], offset[1], offset[2])
+    add_row(columns, supports, joint, point, (r[0], r[1], r[2]), J, 0)
+    motion.error[0] = magnitude
+    motion.rate[0] = r[0] * vx + r[1] * vy + r[2] * vz
+    motion.drift[0] = r[0] * ax + r[1] * ay + r[2] * az  # (29)
 
 
 @dataclass(frozen=True)
-class Avoidance(Task):
+class Avoidance(Measured):
     """Push the active control point of the measurement away from the nearest obstacle.
 
     With rows = 3 the acceleration of the point equals the repulsive vector, eqs. (27)-(28). With
@@ -46,6 +60,7 @@ class Avoidance(Task):
     points: Sequence[ControlPoint]
     rows: Literal[1, 3] = 1
     name: str = "avoidance"
+    stiffness = gain = 1.0  # the error is the command at both levels
     joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
     offsets: Array = field(init=False, repr=False, compare=False)
 
@@ -63,76 +78,8 @@ class Avoidance(Task):
         """One row or three."""
         return self.rows
 
-    def error(self, state: State) -> Array:
-        """The repulsion (rows,) [m/s^2 or m/s]; this task has no target position."""
-        seen, k = self._seen(state)
-        r = seen.magnitude[k]
-        return np.array([r]) if self.rows == 1 else np.asarray(r * seen.direction[k])
-
-    def jacobian(self, state: State) -> Array:
-        """J_c (3, n) of the active point, or r^T J_c (1, n)."""
-        seen, k = self._seen(state)
-        J = np.empty((3, state.n))
-        write_point_jacobian(state.J, state.placements, state.supports, int(self.joints[k]),
-                             self.offsets[k], J, 0)
-        return J if self.rows == 3 else seen.direction[k][None] @ J
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """dJ_c/dt (3, n) of the active point, or r^T dJ_c/dt (1, n)."""
-        seen, k = self._seen(state)
-        dJ = np.empty((3, state.n))
-        write_point_jacobian_derivative(state.kinematics, int(self.joints[k]), self.offsets[k], dJ)
-        return dJ if self.rows == 3 else seen.direction[k][None] @ dJ
-
-    def reference_velocity(self, state: State) -> Array:
-        """The repulsion as a velocity (rows,) [m/s]."""
-        return self.error(state)
-
-    def reference_acceleration(self, state: State) -> Array:
-        """The repulsion as an acceleration (rows,) [m/s^2], eqs. (28)-(29)."""
-        return self.error(state)
-
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`."""
-        seen, k = self._seen(state)
-        parameters = _Parameters(self.joints, self.offsets, level == "acceleration", self.rows)
-        write_rows = bind(_write, state.kinematics, parameters, seen.arrays, A, lower, upper, row,
-                          then=(k,))
-        return lambda: write_rows(seen.active)
-
-    def _seen(self, state: State) -> tuple[Measurement, int]:
+    def measure(self, state: State) -> tuple[Kernel, Any]:
+        """See `Measured.measure`; the error is the repulsion [m/s^2 or m/s]."""
         if state.measurement is None:
             raise HierarchyError(f"task {self.name!r}: the state carries no measurement")
-        return state.measurement, max(state.measurement.active, 0)
-
-
-class _Parameters(NamedTuple):
-    joints: NDArray[np.int64]
-    offsets: Array
-    acceleration: bool
-    rows: int
-
-
-@compiled
-def _write(kinematics, parameters, seen, A, lower, upper, row, active):
-    k = max(active, 0)
-    joint, offset = parameters.joints[k], parameters.offsets[k]
-    r, magnitude = seen.direction[k], seen.magnitude[k]
-    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    ax = ay = az = 0.0
-    if parameters.acceleration:
-        _, _, _, ax, ay, az, _, _, _ = drift_of_point(kinematics, joint, offset[0], offset[1],
-                                                      offset[2])
-    if parameters.rows == 3:
-        write_point_jacobian(J, placements, supports, joint, offset, A, row)
-        write_equality(lower, upper, row, magnitude * r[0] - ax)  # (28)
-        write_equality(lower, upper, row + 1, magnitude * r[1] - ay)
-        write_equality(lower, upper, row + 2, magnitude * r[2] - az)
-        return
-    point = place(placements[joint], offset[0], offset[1], offset[2])
-    for c in range(A.shape[1]):
-        A[row, c] = 0.0
-    add_row(J, supports, joint, point, (r[0], r[1], r[2]), A, row)
-    write_equality(lower, upper, row,
-                   magnitude - (r[0] * ax + r[1] * ay + r[2] * az))  # (29)
+        return _avoidance, (self.joints, self.offsets, state.measurement.arrays)

@@ -4,24 +4,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import zip_longest
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError, expect, number
-from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import write_equality
+from hierarchy.jit import compiled
+from hierarchy.jit.sources import Kernel
+from hierarchy.measured import Measured, measured
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.robots.found import Coupled
 from hierarchy.robots.joints import Part
 from hierarchy.state import State
-from hierarchy.task import Level, Task
 
 
 class Terms(NamedTuple):
@@ -40,23 +40,20 @@ class Terms(NamedTuple):
     turns: Array
 
 
-class _Coupling(Task):
+class _Coupling(Measured):
     """Rows in which polynomials of joints add up to zero. Abstract: needs `terms`."""
 
     terms: Terms
+    exact = True
 
     @property
     def dimension(self) -> int:
         """One row per coupling."""
         return len(self.terms.turns)
 
-    def error(self, state: State) -> Array:
-        """Minus the sums, to the nearest full turn of a continuous joint (m,) [rad or m]."""
-        return self._rows(state)[1]
-
-    def jacobian(self, state: State) -> Array:
-        """The derivatives of the polynomials (m, n)."""
-        return self._rows(state)[0]
+    def measure(self, state: State) -> tuple[Kernel, Any]:
+        """See `Measured.measure`; the error is to the nearest full turn of a continuous joint."""
+        return _coupling, (state.q, self.terms)
 
     def jacobian_derivative(self, state: State) -> Array:
         """Their second derivatives, times the velocities of the joints (m, n)."""
@@ -64,18 +61,6 @@ class _Coupling(Task):
         for row, at, of, continuous, c in zip(*self.terms[:5], strict=True):
             found[row, of] = _polynomial(c, _position(state.q, at, continuous))[2] * state.v[of]
         return found
-
-    def _rows(self, state: State) -> tuple[Array, Array]:
-        A, error = np.zeros((self.dimension, state.n)), np.zeros(self.dimension)
-        _write(state.q, state.v, self.terms, _Gains(0.0, 0.0, 1.0, False), A, error, error.copy(),
-               0)
-        return A, error
-
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`."""
-        gains = _Gains(self.stiffness, self.damping, self.gain, level == "acceleration")
-        return bind(_write, state.q, state.v, self.terms, gains, A, lower, upper, row)
 
 
 @dataclass(frozen=True)
@@ -179,13 +164,6 @@ def _part(robot: Robot, name: str) -> Part:
                          f"coupled{''.join(turn)}")
 
 
-class _Gains(NamedTuple):
-    stiffness: float
-    damping: float
-    gain: float
-    acceleration: bool
-
-
 @compiled
 def _position(q, at, continuous):
     """Position or angle of a joint."""
@@ -203,24 +181,18 @@ def _polynomial(c, x):
     return value, slope, bend
 
 
-@compiled
-def _write(q, v, terms, gains, A, lower, upper, row):
-    m = len(terms.turns)
-    total, rate, drift = np.zeros(m), np.zeros(m), np.zeros(m)
-    A[row:row + m] = 0.0
+@measured
+def _coupling(kinematics, reads, goal, J, motion):
+    q, terms = reads
+    v, error = kinematics.v, motion.error
     for t in range(len(terms.rows)):
         i, of = terms.rows[t], terms.velocities[t]
         x = _position(q, terms.positions[t], terms.continuous[t])
         value, slope, bend = _polynomial(terms.coefficients[t], x)
-        A[row + i, of] += slope
-        total[i] += value
-        rate[i] += slope * v[of]
-        drift[i] += bend * v[of] * v[of]
-    for i in range(m):
-        error = -total[i]
+        J[i, of] += slope
+        error[i] -= value
+        motion.rate[i] += slope * v[of]
+        motion.drift[i] += bend * v[of] * v[of]
+    for i in range(len(error)):
         if terms.turns[i] < np.inf:
-            error -= terms.turns[i] * np.round(error / terms.turns[i])
-        b = gains.gain * error
-        if gains.acceleration:
-            b = gains.stiffness * error - gains.damping * rate[i] - drift[i]
-        write_equality(lower, upper, row + i, b)
+            error[i] -= terms.turns[i] * np.round(error[i] / terms.turns[i])

@@ -4,25 +4,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import row_times, write_equality
+from hierarchy.jit.sources import Kernel
+from hierarchy.kinematics import row_times
+from hierarchy.measured import Measured, measured
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Task
 
 _ROWS = {"both": (0, 6), "linear": (0, 3), "angular": (3, 6)}
 
 
 @dataclass(frozen=True)
-class Momentum(Task):
+class Momentum(Measured):
     """Bring the momentum of the whole robot to `target`, about its centre of mass.
 
     `part` is "linear" (m = 3) [kg m/s], "angular" (m = 3) [kg m^2/s] or "both" (m = 6), linear
@@ -37,6 +37,7 @@ class Momentum(Task):
     target: Sequence[float] | None = None
     damping: float = 10.0
     name: str = "momentum"
+    exact = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -51,58 +52,40 @@ class Momentum(Task):
     @property
     def dimension(self) -> int:
         """Three rows, or six."""
-        return len(self._rows)
+        return len(self.columns)
 
     @property
     def row_names(self) -> tuple[str, ...]:
         """Linear and angular momentum along the axes."""
         names = [f"{kind} {axis}" for kind in ("linear", "angular") for axis in "xyz"]
-        return tuple(names[i] for i in self._rows)
+        return tuple(names[i] for i in self.columns)
 
-    def error(self, state: State) -> Array:
-        """Zero (m,): a momentum has no position."""
-        return np.zeros(self.dimension)
-
-    def jacobian(self, state: State) -> Array:
-        """Rows of the centroidal momentum matrix A (m, n)."""
-        return np.ascontiguousarray(state.momentum.A[self._rows])
+    def measure(self, state: State) -> tuple[Kernel, Any]:
+        """See `Measured.measure`; a momentum has no position, so there is no error."""
+        return _momentum, (*state.momentum, self.columns)
 
     def jacobian_derivative(self, state: State) -> Array:
         """Its time derivative (m, n)."""
-        return np.ascontiguousarray(state.momentum.dA[self._rows])
-
-    def desired_velocity(self, state: State) -> Array:
-        """The target (m,)."""
-        return np.zeros(self.dimension) if self.target is None else np.array(self.target, float)
-
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`."""
-        parameters = _Parameters(*state.momentum, self._rows, self.desired_velocity(state),
-                                 self.damping, level == "acceleration")
-        return bind(_write, state.v, parameters, A, lower, upper, row)
+        return np.ascontiguousarray(state.momentum.dA[self.columns])
 
     @property
-    def _rows(self) -> NDArray[np.int64]:
+    def columns(self) -> NDArray[np.int64]:
+        """The components."""
         return np.arange(*_ROWS[self.part])
 
-
-class _Parameters(NamedTuple):
-    A: Array
-    dA: Array  # noqa: N815
-    rows: NDArray[np.int64]
-    target: Array
-    damping: float
-    acceleration: bool
+    def goal(self, state: State) -> Array:
+        """The target in the place of a velocity (3, 6)."""
+        goal = np.zeros((3, 6))
+        goal[1, self.columns] = 0.0 if self.target is None else self.target
+        return goal
 
 
-@compiled
-def _write(v, parameters, A, lower, upper, row):
-    of_robot, rates, rows, target, damping, acceleration = parameters
+@measured
+def _momentum(kinematics, reads, goal, J, motion):
+    of_robot, rates, rows = reads
+    v = kinematics.v
     for i in range(len(rows)):
         for c in range(len(v)):
-            A[row + i, c] = of_robot[rows[i], c]
-        b = target[i]
-        if acceleration:
-            b = damping * (b - row_times(A, row + i, v)) - row_times(rates, rows[i], v)
-        write_equality(lower, upper, row + i, b)
+            J[i, c] = of_robot[rows[i], c]
+        motion.rate[i] = row_times(J, i, v)
+        motion.drift[i] = row_times(rates, rows[i], v)

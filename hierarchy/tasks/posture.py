@@ -6,14 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, expect, finite_numbers
 from hierarchy.jit import bind, compiled
+from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import write_equality, write_identity
+from hierarchy.measured import Measured, measured
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
@@ -42,7 +44,7 @@ class JointTask(Task):
 
 
 @dataclass(frozen=True)
-class Posture(Task):
+class Posture(Measured):
     """Move every joint to `target` [rad or m]; gains as in `Task`.
 
     The target has the values of all joints, or is a configuration (nq,), or {joint: value, ...}
@@ -64,7 +66,8 @@ class Posture(Task):
     name: str = "posture"
     robot: Robot | None = None
     straight = True
-    goal: Array = field(init=False, repr=False, compare=False)  # (nq,)
+    exact = True
+    rest: Array = field(init=False, repr=False, compare=False)  # (nq,)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -73,7 +76,7 @@ class Posture(Task):
         if self.robot is not None:
             expect(f"task {self.name!r}: robot", self.robot, Robot, "give Robot.load(NAME)")
             try:
-                set_frozen(self, goal=self.robot.configuration(self.target))
+                set_frozen(self, rest=self.robot.configuration(self.target))
             except HierarchyError as error:
                 raise HierarchyError(f"task {self.name!r}: {error}") from error
 
@@ -97,39 +100,47 @@ class Posture(Task):
         robot = self.robot
         return super().row_names if robot is None else tuple(robot.velocity_names[robot.actuated:])
 
-    def error(self, state: State) -> Array:
-        """The step from q to the target (m,) [rad or m]."""
-        robot = state.robot
-        return robot.difference(state.q, self.on(robot).goal)[robot.actuated:]
-
-    def jacobian(self, state: State) -> Array:
-        """The identity (m, m), to the right of zeros for a floating base."""
-        return np.eye(state.n)[state.robot.actuated:]
-
     def jacobian_derivative(self, state: State) -> Array:
-        """Zero, of the same shape."""
+        """Zero (m, n)."""
         return np.zeros((state.n - state.robot.actuated, state.n))
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`."""
-        robot, goal = state.robot, self.on(state.robot).goal
-        m = robot.n - robot.actuated
-        plain = robot.nq - robot.n == (1 if robot.actuated else 0)
-        positions, target = (state.q[robot.nq - m:], goal[robot.nq - m:]) if plain else np.zeros(
-            (2, m))
-        parameters = _Parameters(target, self.stiffness, self.damping, self.gain,
-                                 level == "acceleration")
-        write_rows = bind(_write, positions, state.v[robot.actuated:], parameters, A, lower, upper,
-                          row)
-        if plain:
-            return write_rows
+    def measure(self, state: State) -> tuple[Kernel, Any]:
+        """See `Measured.measure`."""
+        robot, m = state.robot, self.dimension
+        positions = state.q[robot.nq - m:] if _plain(robot) else np.zeros(m)
+        return _posture, (positions, robot.actuated)
 
-        def write() -> None:
-            target[:] = robot.difference(state.q, goal)[robot.actuated:]
-            write_rows()
+    def goal(self, state: State) -> Array:
+        """See `Measured.goal`: the target, or the step there."""
+        robot, m = state.robot, self.dimension
+        goal = np.zeros((3, m))
+        goal[0] = self.on(robot).rest[robot.nq - m:] if _plain(robot) else 0.0
+        return goal
 
-        return write
+    def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
+        """See `Measured.follow`."""
+        robot, rest = state.robot, self.on(state.robot).rest
+        if _plain(robot):
+            return None
+
+        def move(t: float) -> None:
+            goal[0] = robot.difference(state.q, rest)[robot.actuated:]
+
+        return move
+
+
+def _plain(robot: Robot) -> bool:
+    """Whether each joint that is actuated has one position, which subtracts."""
+    return robot.nq - robot.n == (1 if robot.actuated else 0)
+
+
+@measured
+def _posture(kinematics, reads, goal, J, motion):
+    positions, first = reads
+    for i in range(len(positions)):
+        J[i, first + i] = 1.0
+        motion.error[i] = goal[0, i] - positions[i]
+        motion.rate[i] = kinematics.v[first + i]
 
 
 @dataclass(frozen=True)
@@ -177,24 +188,6 @@ class JointDamping(JointTask):
             lower[rows] = upper[rows] = self.reference_acceleration(state)
 
         return write
-
-
-class _Parameters(NamedTuple):
-    target: Array
-    stiffness: float
-    damping: float
-    gain: float
-    acceleration: bool
-
-
-@compiled
-def _write(q, v, parameters, A, lower, upper, row):
-    target, stiffness, damping, gain, acceleration = parameters
-    write_identity(A, row, len(target))
-    for i in range(len(target)):
-        error = target[i] - q[i]
-        b = stiffness * error - damping * v[i] if acceleration else gain * error
-        write_equality(lower, upper, row + i, b)
 
 
 @compiled

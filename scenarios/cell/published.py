@@ -11,12 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from hierarchy import HierarchyError, State, Task
-from hierarchy.jit import compiled
-from hierarchy.kinematics import subtract_over_period, write_point_jacobian
+from hierarchy import HierarchyError, State
+from hierarchy.jit.sources import Kernel
+from hierarchy.kinematics import row_times, write_point_jacobian
+from hierarchy.measured import measured
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.task import Level
@@ -43,37 +45,45 @@ class PublishedAvoidance(Avoidance):
         from_elbow = [(0.0, -i / 4 * 0.39, 0.0) for i in range(4)]
         set_frozen(self, offsets=np.array([*from_shoulder, *from_elbow]))
 
-    def jacobian(self, state: State) -> Array:
-        """J_c (3, n) or r^T J_c (1, n) of the active point, with the errors."""
-        seen, k = self._seen(state)
-        J_c = np.empty((3, state.n))
-        _write_jacobian(state.J, state.placements, state.supports, self.joints[k],
-                        self.offsets[k], k < _UPPER_ARM_POINTS, J_c)
-        return J_c if self.rows == 3 else seen.direction[k][None] @ J_c
+    def measure(self, state: State) -> tuple[Kernel, Any]:
+        """See `Measured.measure`: J_c or r^T J_c with the errors, and the repulsion."""
+        return _published, super().measure(state)[1]
 
     def jacobian_derivative(self, state: State) -> Array:
         """Backward difference of the wrong Jacobian (rows, n), the direction held."""
-        if state.period == 0.0:
-            raise HierarchyError("avoidance.jacobian = 'published' has no exact derivative; set "
-                                 "control.jacobian_derivative = 'difference'")
-        seen, k = self._seen(state)
-        now, before = np.empty((2, 3, state.n))
-        for J, placements, out in ((state.J, state.placements, now),
-                                   (state.previous_J, state.previous_placements, before)):
-            _write_jacobian(J, placements, state.supports, self.joints[k], self.offsets[k],
-                            k < _UPPER_ARM_POINTS, out)
-        subtract_over_period(now, before, state.period)
-        return now if self.rows == 3 else seen.direction[k][None] @ now
+        _expect_differences(state)
+        return super().jacobian_derivative(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        return Task.writer(self, state, level, A, lower, upper, row)
+        if level == "acceleration":
+            _expect_differences(state)
+        return super().writer(state, level, A, lower, upper, row)
 
 
-@compiled
-def _write_jacobian(J, placements, supports, joint, offset, upper_arm, out):
-    write_point_jacobian(J, placements, supports, joint, offset, out, 0)
-    if upper_arm:
+def _expect_differences(state: State) -> None:
+    """Raise a HierarchyError for exact derivatives."""
+    if state.period == 0.0:
+        raise HierarchyError("avoidance.jacobian = 'published' has no exact derivative; set "
+                             "control.jacobian_derivative = 'difference'")
+
+
+@measured
+def _published(kinematics, reads, goal, J, motion):
+    joints, offsets, seen = reads
+    k, placements = max(seen.active[0], 0), kinematics.placements
+    offset, r, of_point = offsets[k], seen.direction[k], np.empty((3, J.shape[1]))
+    write_point_jacobian(kinematics.J, placements, kinematics.supports, joints[k], offset,
+                         of_point, 0)
+    if k < _UPPER_ARM_POINTS:
         c1, c2 = placements[1, 0], placements[2, 5]
-        out[1, 0] = -offset[1] * c1 * c2  # the published entry; c1 s2 is right
+        of_point[1, 0] = -offset[1] * c1 * c2  # the published entry; c1 s2 is right
+    if len(motion.error) == 3:
+        J[:] = of_point
+    else:
+        for c in range(J.shape[1]):
+            J[0, c] = r[0] * of_point[0, c] + r[1] * of_point[1, c] + r[2] * of_point[2, c]
+    for i in range(len(motion.error)):
+        motion.error[i] = seen.magnitude[k] * (r[i] if len(motion.error) == 3 else 1.0)
+        motion.rate[i] = row_times(J, i, kinematics.v)

@@ -98,6 +98,6 @@ def compiled_rows(task, state, level, rtol=1e-12):
     task.writer(state, level, *written, row=1)()
     Task.writer(task, state, level, *plain, row=1)()
     for a, b in zip(written, plain, strict=True):
-        np.testing.assert_allclose(a, b, rtol=rtol, atol=1e-11)
+        np.testing.assert_allclose(a, b, rtol=rtol, atol=1e-9)  # dJ by differences
         assert (a[[0, -1]] == 5.0).all(), "rows of others are left alone"
     return [a[1:-1] for a in written]

@@ -110,7 +110,6 @@ class Own(Task):
     (lambda: ROBOT.integrate(np.zeros(7), np.full(7, NAN)), "step: expected 7 finite numbers"),
     (lambda: Hierarchy.from_levels([([[1.0, 0.0]], [1.0])]).violations([0.0, NAN]),
      "x, entry 1: nan is not finite"),
-    (lambda: Position(FRAME, THERE).repulsion("x"), "'position': state: expected a State"),
     (lambda: RelativePose(FRAME, "joint_1", (0, 0, 0)), "to is the name 'joint_1'"),
     (lambda: RelativePose(FRAME, FRAME, (0, 0)), "position: expected 3 finite numbers"),
     (lambda: BaseDynamics("x"), "contacts: expected a Contacts, got str 'x'"),

@@ -81,7 +81,7 @@ class ExactDistances:
         self._laws = laws(body, tip) if body and tip else _NO_LAWS
         self.measurement = Measurement(len(robot.control_points))
         self._followed: State | None = None
-        self._measure: Callable[[], None]
+        self._measure: Callable[[], object]
         if pairs:
             self.measurement.pairs = Pairs(len(self.points), len(obstacles))
 

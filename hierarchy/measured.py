@@ -1,0 +1,246 @@
+"""Tasks whose error, Jacobian and drift one compiled function measures.
+
+What a task measures is apart from what is asked of it: one kernel, here, makes rows of the measures
+of all such tasks, for their gains and at each level.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.jit import bind, compiled, inlined
+from hierarchy.jit.sources import Kernel
+from hierarchy.kinematics import Kinematics
+from hierarchy.paths import Path
+from hierarchy.problem import Array
+from hierarchy.state import State
+from hierarchy.task import Level, Task
+
+_NONE, _EXACT, _DIFFERENCE = 0, 1, 2  # the derivative of the Jacobian
+_STEP = 2.0**-10  # [s] of the differences that give the derivative of a Jacobian
+
+
+class Motion(NamedTuple):
+    """What a measure writes beside the Jacobian, (m,) each and zero before.
+
+    The error p_d - p, the rate J v, its drift dJ/dt v with the exact dJ/dt, and a `push` that is
+    added to the reference at both levels.
+    """
+
+    error: Array
+    rate: Array
+    drift: Array
+    push: Array
+
+
+class _Asked(NamedTuple):
+    """What is asked of a task, and room to measure it; few arrays, because each costs 15 ns a call.
+
+    goal (3, k) is p_d, dp_d/dt and d2p_d/dt2. By row of the task, `settings` (5, m) has stiffness,
+    damping and gain, what the upper side is above the lower, and the column of the goal, -1 for
+    none. `motion` (8, m) has the `Motion` of this tick and of the one before.
+    """
+
+    goal: Array
+    settings: Array
+    derivative: int  # _NONE, _EXACT or _DIFFERENCE
+    motion: Array
+    J_before: Array
+
+
+class Measured(Task):
+    """A task that one compiled function measures, for all levels. Abstract.
+
+    A new one needs `dimension` and `measure`. A task with a `path` follows it: rows i of the task
+    and of the path belong together, see `columns`.
+    """
+
+    path: Path | None = None
+    exact: ClassVar[bool] = False  # derivatives, also where the state has differences
+
+    @abstractmethod
+    def measure(self, state: State) -> tuple[Kernel, Any]:
+        """Return the function, see `measured`, and what it reads beside the kinematics.
+
+        That is a tuple of numbers and arrays; an array that moves with the state, such as
+        `state.q`, is read anew each time.
+        """
+
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """The coordinate of the path that each row follows (m,), -1 for a row that follows none."""
+        columns = np.full(self.dimension, -1)
+        if self.path is not None:
+            columns[:3] = range(len(columns[:3]))
+        return columns
+
+    def goal(self, state: State) -> Array:
+        """Return an array for p_d, dp_d/dt and d2p_d/dt2 (3, k), which `follow` may move."""
+        return np.zeros((3, 3))
+
+    def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
+        """Return a function of t [s] that moves `goal`; None where it rests."""
+        return None if self.path is None else self.path.writer(goal)
+
+    def error(self, state: State) -> Array:
+        """Error p_d - p at a state: (m,), in the task's unit."""
+        return self._measured(state)[1].error
+
+    def jacobian(self, state: State) -> Array:
+        """Jacobian J = dp/dq at a state: (m, n)."""
+        return self._measured(state)[0]
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Time derivative of the Jacobian at a state: (m, n), exact to rounding.
+
+        With `State.period` it is a backward difference.
+        """
+        now = state.kinematics
+        if state.period > 0.0:
+            before = now._replace(J=now.previous_J, placements=now.previous_placements)
+            return np.asarray((self.jacobian(state) - self._measured(state, before)[0])
+                              / state.period)
+        coarse, fine = (
+            (self._measured(state, _moved(now, h))[0] - self._measured(state, _moved(now, -h))[0])
+            / (2.0 * h) for h in (_STEP, _STEP / 2.0))
+        return np.asarray((4.0 * fine - coarse) / 3.0)
+
+    def desired_velocity(self, state: State) -> Array:
+        """Feedforward dp_d/dt: (m,)."""
+        return np.asarray(self._goal(state)[1])
+
+    def desired_acceleration(self, state: State) -> Array:
+        """Feedforward d2p_d/dt2: (m,)."""
+        return np.asarray(self._goal(state)[2])
+
+    def reference_velocity(self, state: State) -> Array:
+        """Closed loop and push (m,)."""
+        return super().reference_velocity(state) + self._measured(state)[1].push
+
+    def reference_acceleration(self, state: State) -> Array:
+        """Closed loop and push (m,)."""
+        return super().reference_acceleration(state) + self._measured(state)[1].push
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        return self._writer(state, state.kinematics, level, np.zeros((8, self.dimension)),
+                            (A, lower, upper, row))
+
+    def _writer(self, state: State, kinematics: Kinematics, level: Level, motion: Array,
+                rows: tuple[Array, Array, Array, int]) -> Callable[[], object]:
+        function, reads = self.measure(state)
+        m, goal = self.dimension, self.goal(state)
+        settings = np.array([np.broadcast_to(value, m) for value in (
+            self.stiffness, self.damping, self.gain,
+            np.inf if self.kind == "inequality" else 0.0, self.columns)], dtype=float)
+        derivative = (_NONE if level == "velocity" else
+                      _EXACT if self.exact or kinematics.period == 0.0 else _DIFFERENCE)
+        asked = _Asked(goal, settings, derivative, motion, np.zeros((m, state.n)))
+        write_rows = bind(function, kinematics, reads, asked, *rows)
+        move_goal = self.follow(state, goal)
+        if move_goal is None:
+            return write_rows
+
+        def write() -> None:
+            move_goal(state.t)
+            write_rows()
+
+        return write
+
+    def _measured(self, state: State, kinematics: Kinematics | None = None) -> tuple[Array, Motion]:
+        """The Jacobian (m, n) and the rest of what is measured."""
+        m = self.dimension
+        J, sides, motion = np.zeros((m, state.n)), np.zeros((2, m)), np.zeros((8, m))
+        self._writer(state, kinematics or state.kinematics, "velocity", motion, (J, *sides, 0))()
+        return J, Motion(*motion[:4])
+
+    def _goal(self, state: State) -> Array:
+        """p_d, dp_d/dt and d2p_d/dt2 (3, m), zero where no path leads."""
+        goal = self.goal(state)
+        move_goal = self.follow(state, goal)
+        if move_goal is not None:
+            move_goal(state.t)
+        return np.hstack([goal, np.zeros((3, 1))])[:, self.columns]
+
+
+def measured(function: Kernel) -> Kernel:
+    """Make of a function that measures a kernel that writes rows, for `Measured.measure`.
+
+    function(kinematics, reads, goal, J, motion) writes J (m, n), zero before, and `Motion`; see
+    `Kinematics`. `goal` (3, 3) is p_d, dp_d/dt and d2p_d/dt2 of the path now.
+    """
+    # A copy of the kernel below with this function, so that both are compiled into one.
+    about = {**globals(), "_measure": compiled(function), "__name__": function.__module__}
+    rows = FunctionType(_rows.__code__, about, function.__name__)
+    rows.__module__, rows.__qualname__ = function.__module__, function.__qualname__
+    rows.__doc__ = function.__doc__
+    return compiled(rows)
+
+
+_measure: Any = None  # what a copy of `_rows` calls
+
+
+def _rows(kinematics, reads, asked, A, lower, upper, row):
+    """Write the rows that a measure makes with what is asked."""
+    goal, settings, derivative, room, J_before = asked
+    m = settings.shape[1]
+    J, motion = A[row:row + m], Motion(room[0], room[1], room[2], room[3])
+    clear(J, motion)
+    _measure(kinematics, reads, goal, J, motion)
+    if derivative == _DIFFERENCE:
+        v, _, dJ, _, supports, previous, placements, period = kinematics
+        before = Motion(room[4], room[5], room[6], room[7])
+        clear(J_before, before)
+        # Made here: what a function without reference counts returns, its caller would release.
+        _measure(Kinematics(v, previous, dJ, placements, supports, previous, placements, period),
+                 reads, goal, J_before, before)
+        for i in range(m):
+            motion.drift[i] = (motion.rate[i] - before.rate[i]) / period
+    for i in range(m):
+        close(motion, goal, settings, derivative, lower, upper, row + i, i)
+
+
+@inlined
+def clear(J, motion):
+    """Write zeros."""
+    for i in range(J.shape[0]):
+        for c in range(J.shape[1]):
+            J[i, c] = 0.0
+        motion.error[i], motion.rate[i] = 0.0, 0.0
+        motion.drift[i], motion.push[i] = 0.0, 0.0
+
+
+@inlined
+def close(motion, goal, settings, derivative, lower, upper, row, i):
+    """Write the sides of row i: equations (7) and (12), and (21) for one side."""
+    speed, acceleration, k = 0.0, 0.0, int(settings[4, i])
+    if k >= 0:
+        speed, acceleration = goal[1, k], goal[2, k]
+    if derivative == _NONE:
+        b = speed + settings[2, i] * motion.error[i]
+    else:
+        b = (acceleration + settings[1, i] * (speed - motion.rate[i])
+             + settings[0, i] * motion.error[i] - motion.drift[i])
+    lower[row] = b + motion.push[i]
+    upper[row] = lower[row] + settings[3, i]
+
+
+def _moved(kinematics: Kinematics, step: float) -> Kinematics:
+    """Return Jacobian and placements moved along their derivatives by `step` [s]."""
+    v, J, dJ, placements, supports = kinematics[:5]
+    motion = (supports * v) @ J.T  # of each body: velocity at the world's origin, turning
+    rates = np.empty_like(placements)
+    for k in range(4):  # three axes, and the origin
+        rates[:, 3 * k:3 * k + 3] = np.cross(motion[:, 3:], placements[:, 3 * k:3 * k + 3])
+    rates[:, 9:] += motion[:, :3]
+    return kinematics._replace(J=np.asfortranarray(J + step * dJ),
+                               placements=placements + step * rates)
