@@ -188,12 +188,11 @@ class AvoidanceSection(_Avoiding):
     jacobian: Literal["exact", "published"] = "exact"
     """"published": that of the published code, with its error."""
     place: Literal["stack", "null-space"] = "stack"
-    """"null-space": the body's repulsion is no task; that of all control points within `far` is
-    added up as joint commands in the null-space term, and `near` has no effect, see
-    hierarchy.tasks.CumulatedRepulsion."""
+    """"null-space": the null-space term is the sum of the repulsion of all control points within
+    `far`, as joint commands, and `near` has no effect, see hierarchy.tasks.CumulatedRepulsion."""
     asked: Length | None = None
-    """Distance of body and end effector that metrics judge by, without effect on the run; by
-    default `near`, of the body."""
+    """Distance that metrics check for body and end effector, without effect on the run; by
+    default `near`, for the body."""
 
     @model_validator(mode="after")
     def _areas_nested(self) -> Self:

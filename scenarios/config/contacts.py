@@ -47,8 +47,8 @@ class ContactSection(Section):
     open: tuple[tuple[Time, Time], ...] = ()
     """Intervals in which the contact is lifted."""
     ramp: Time = 0.1
-    """Time before such an interval in which the load falls, and after it in which it rises as far
-    as the robot's weight."""
+    """Time in which the load falls before such an interval, and rises after it to at most the
+    robot's weight."""
     slides: Flag = False
     """Whether a point may move along its surface."""
 
@@ -76,4 +76,4 @@ class ForcesSection(Section):
     edge: Annotated[float, Field(strict=True, gt=0.0), Unit("m")] | None = None
     """How far inside a sole its centre of pressure stays; without it just inside."""
     damping: Gain = 20.0
-    """Of what velocity a contact has."""
+    """Gain that damps the velocity of contacts."""

@@ -77,25 +77,22 @@ class ControlSection(Section):
     jacobian_derivative: Literal["exact", "difference"] = "exact"
     """How dJ/dt is found: "exact", or by the "difference" of two ticks."""
     resolver: str
-    """Its name, see `hierarchy list`, or that of a plugin."""
+    """Name of a resolver, see `hierarchy list`, or of a plug-in."""
     options: dict[str, Any] = Field(default_factory=dict)
     """Settings of the resolver. A table in it with a resolver's name, such as
     `[control.options.tpm]`, applies to that resolver only, so that changing `resolver` is enough to
     swap it. Plain settings override those from such a table."""
     damping: NotNegative = 1.0
-    """At velocity level: of tasks where they cannot be met in time, near singularities and for
-    targets out of reach, which come to rest; 0 for none. Elsewhere it changes nothing. Not that of
-    a resolver, which is in `options`."""
+    """Damping, at velocity level, of tasks that cannot be met: near singularities and out of
+    reach, where they come to rest. 0 for none. The damping of a resolver is in `options`."""
     metric: Literal["identity", "mass"] = "identity"
-    """"mass": of the commands that serve the tasks equally well, the one nearest to the null-space
-    term in the robot's inertia M(q), at acceleration level that of operational-space control.
-    "identity": in the plain sum of squares over the joints."""
+    """Measure of the distance to the null-space term: "identity", the sum of squares over the
+    joints; or "mass", the inertia M(q), at acceleration level that of operational-space control."""
     policy: PolicySection = PolicySection()
     """The command in a tick with a problem."""
     transition: Literal["none", "blend"] = "none"
     """"blend": when the order of the stack or the active control point changes, the command moves
-    from the old stack's to the new one's within `transition_time` [s], and a new task has its full
-    effect only after that time. "none": it changes at once."""
+    to that of the new stack within `transition_time`. "none": it changes at once."""
     transition_time: Span = 0.02
     """How long "blend" takes."""
 

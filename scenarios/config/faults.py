@@ -31,7 +31,7 @@ class FaultSection(Section):
                     "inaccurate"] | None = None
     """What the resolver reports."""
     takes: Span | None = None
-    """By how much a tick takes longer."""
+    """Time that a tick takes longer."""
     centre: Point | None = None
     """Middle of the sphere."""
     place: ControlPointSection | None = None

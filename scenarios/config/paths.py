@@ -55,8 +55,7 @@ class _AnyPath(Section):
     jitter: JitterSection | None = None
     """A random motion that is added to the path."""
     out_of_reach: tuple[tuple[Time, Time], ...] | None = None
-    """Spans of time in which the robot cannot be on the path. The loop ignores them; metrics say
-    how the robot comes back."""
+    """Intervals in which the robot cannot be on the path, for metrics of its return."""
 
     @model_validator(mode="after")
     def _spans_are_in_order(self) -> Self:

@@ -50,9 +50,8 @@ class AnyPlant(PartSection):
     follows: ClassVar[bool] = False  # whether its state is what its commands add up to
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration", "torque")
     feedback: Literal["measured", "commanded"] = "measured"
-    """"commanded": the controller receives its own commands, integrated to a joint position
-    reference, instead of a measurement, as when commands through FRI are integrated blindly: it
-    sees neither noise nor the real joints. Both are stable with the letter's gains."""
+    """"measured": the controller receives the measured joints. "commanded": it receives its own
+    commands, integrated to a joint position reference, as through FRI."""
     measurement: MeasurementSection = MeasurementSection()
     """Errors of the measured joints."""
 

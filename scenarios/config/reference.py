@@ -113,7 +113,8 @@ def sections() -> Iterator[tuple[str, type[Section]]]:
 def page() -> str:
     """Return all keys as Markdown; a key that several sections have is described in the first."""
     places = {section.__name__: place for place, section in sections()}
-    parts, first = [], dict[tuple[str, ...], tuple[str, str]]()
+    parts: list[str] = []
+    first: dict[tuple[str, ...], tuple[str, str]] = {}
     for place, section in sections():
         head = title_of(section, f"`{place}`") if place else "top of the file"
         parts += [f"## {head[:1].upper()}{head[1:]}", "", _escaped(about(section)), ""]

@@ -244,7 +244,7 @@ class LimitsSection(Section):
     resolver handles bounds, otherwise a guard. "bounds": in the stack, above all else, as far as
     they bound single unknowns: without torque limits and the limits of contact forces."""
     margin: Annotated[NotNegative, Unit("rad")] = 0.0
-    """By which the position limits shrink, on both sides."""
+    """Distance by which the position limits shrink on both sides."""
     horizon: Annotated[NotNegative, Unit("s")] | None = None
     """Time in which the sides come to a limit, see docs/theory/joint-limits.md; by default 0.05 s
     at level "torque", and one tick elsewhere and if it is shorter than that."""
@@ -278,8 +278,8 @@ class Listed(Made):
     name: TaskName | None = None
     """Its name in messages, tables and figures; by default its kind."""
     give: NotNegative = 0.0
-    """By how much each of its rows may miss beyond its least miss for the sake of the tasks below,
-    in the unit of the rows: [1/s] or [1/s^2] times that of the task, or [N] of forces."""
+    """Additional violation that each row may have, for the benefit of the tasks below, in the unit
+    of the rows: [1/s] or [1/s^2] times that of the task, or [N] of forces."""
     kind: str
     """Which kind it is."""
 

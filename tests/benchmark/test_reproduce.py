@@ -23,11 +23,13 @@ def test_a_page_has_what_its_rows_and_commands_say(name):
     assert pages.filled(text, ROOT, name, STORED) == text
 
 
-def test_every_output_that_is_stored_stands_in_a_page():
-    asked = {pages.file_of(found["command"], ROOT).name for name in PAGES
-             for found in pages._OUTPUT.finditer((ROOT / name).read_text(encoding="utf-8"))}
+def test_every_output_that_is_stored_stands_in_a_page_or_is_linked():
+    texts = [path.read_text("utf-8") for path in (ROOT / "README.md", *ROOT.glob("docs/**/*.md"))]
+    shown = {pages.file_of(found["command"], ROOT).name for text in texts
+             for found in pages._OUTPUT.finditer(text)}
+    linked = {name for text in texts for name in re.findall(r"output/([\w.-]+\.txt)\)", text)}
     assert {"README.md", "docs/results/problems.md", "docs/results/loops.md"} <= set(PAGES)
-    assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == asked
+    assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == shown | linked
 
 
 def test_an_unknown_block_is_named(tmp_path):
@@ -149,11 +151,11 @@ def test_a_seed_that_has_ended_is_stored_whatever_ends_the_command(
 
 
 def test_an_output_is_written_as_its_command_ends(documents, monkeypatch):
-    command = "hierarchy bench batch --seconds 4"
-    monkeypatch.setattr(whole, "outputs", ending_with(KeyboardInterrupt(), (command, "ten\n")))
+    command, printed = "hierarchy bench batch --seconds 4", "Batches on ten\n"
+    monkeypatch.setattr(whole, "outputs", ending_with(KeyboardInterrupt(), (command, printed)))
     assert whole.run(["docs/batch.md"], documents / "out", root=documents) == 130
-    assert pages.file_of(command, documents).read_text() == "ten\n"
-    assert "```\nten\n```" in (documents / "docs/batch.md").read_text()
+    assert pages.file_of(command, documents).read_text() == printed
+    assert f"```\n{printed}```" in (documents / "docs/batch.md").read_text()
 
 
 def test_a_page_that_cannot_be_filled_does_not_keep_others_from_it(documents):

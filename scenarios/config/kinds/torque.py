@@ -70,7 +70,7 @@ class TorqueSection(AnyPlant):
     softness: Span = 0.005
     """Time constant of a contact."""
     joint_friction: Annotated[NotNegative, Unit("N m")] = 0.0
-    """Coulomb's friction of every joint."""
+    """Coulomb friction of every joint."""
     armature: Annotated[NotNegative, Unit("kg m^2")] = 0.0
     """Inertia of the drive of every joint beyond the robot's own."""
     joint_damping: Annotated[NotNegative, Unit("N m s/rad")] = 0.0
