@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from types import FunctionType
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,7 +132,8 @@ class Measured(Task):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        return self._writer(state, state.kinematics, level, np.zeros((8, self.dimension)),
+        task = cast("Measured", self.on(state.robot))
+        return task._writer(state, state.kinematics, level, np.zeros((8, task.dimension)),
                             (A, lower, upper, row))
 
     def _writer(self, state: State, kinematics: Kinematics, level: Level, motion: Array,
@@ -158,18 +159,20 @@ class Measured(Task):
 
     def _measured(self, state: State, kinematics: Kinematics | None = None) -> tuple[Array, Motion]:
         """The Jacobian (m, n) and the rest of what is measured."""
-        m = self.dimension
+        task = cast("Measured", self.on(state.robot))
+        m = task.dimension
         J, sides, motion = np.zeros((m, state.n)), np.zeros((2, m)), np.zeros((8, m))
-        self._writer(state, kinematics or state.kinematics, "velocity", motion, (J, *sides, 0))()
+        task._writer(state, kinematics or state.kinematics, "velocity", motion, (J, *sides, 0))()
         return J, Motion(*motion[:4])
 
     def _goal(self, state: State) -> Array:
         """p_d, dp_d/dt and d2p_d/dt2 (3, m), zero where no path leads."""
-        goal = self.goal(state)
-        move_goal = self.follow(state, goal)
+        task = cast("Measured", self.on(state.robot))
+        goal = task.goal(state)
+        move_goal = task.follow(state, goal)
         if move_goal is not None:
             move_goal(state.t)
-        return np.hstack([goal, np.zeros((3, 1))])[:, self.columns]
+        return np.hstack([goal, np.zeros((3, 1))])[:, task.columns]
 
 
 def measured(function: Kernel) -> Kernel:

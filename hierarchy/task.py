@@ -235,18 +235,6 @@ def writer_in_stack(task: Task, state: State, level: Level, A: Array, lower: Arr
     return task.writer(state, level, A, lower, upper, row)
 
 
-def along(path: Path, target: Array, state: State,
-          write_rows: Callable[[], object]) -> Callable[[], object]:
-    """Return a function that updates `target` (3, 3) from `path`, then calls `write_rows`."""
-    move_target = path.writer(target)
-
-    def write() -> None:
-        move_target(state.t)
-        write_rows()
-
-    return write
-
-
 def _shaped(task: Task, what: str, value: Array, shape: tuple[int, ...]) -> Array:
     try:
         array = np.asarray(value, dtype=float)

@@ -114,12 +114,12 @@ class Posture(Measured):
         """See `Measured.goal`: the target, or the step there."""
         robot, m = state.robot, self.dimension
         goal = np.zeros((3, m))
-        goal[0] = self.on(robot).rest[robot.nq - m:] if _plain(robot) else 0.0
+        goal[0] = self.rest[robot.nq - m:] if _plain(robot) else 0.0
         return goal
 
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
         """See `Measured.follow`."""
-        robot, rest = state.robot, self.on(state.robot).rest
+        robot, rest = state.robot, self.rest
         if _plain(robot):
             return None
 
