@@ -78,7 +78,7 @@ def linked(libraries: Iterable[Any], visible: set[str]) -> Any:
     """Return one optimised module of these and all behind them; only these names are visible."""
     whole = llvm.parse_assembly("")
     for library in _all_behind(libraries):
-        module = library._final_module.clone()
+        module = (library._shared_module or library._final_module).clone()  # the first if cached
         for one in (*module.functions, *module.global_variables):
             if not one.is_declaration and one.linkage in _SHARED:
                 one.linkage = "weak_odr"  # or the linker drops what nothing refers to yet
