@@ -6,8 +6,7 @@ environment when this process starts; only the machine code is made once, of all
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from importlib import import_module
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,34 +14,31 @@ import numpy as np
 
 from hierarchy.jit.ahead import PROCESSOR, Entry, Part
 from hierarchy.jit.dispatching import Cached
-from hierarchy.jit.exporting import hide, machine, object_code
-from hierarchy.jit.inside import global_compiler_lock, llvm, registry
+from hierarchy.jit.exporting import machine, object_code
+from hierarchy.jit.inside import global_compiler_lock, registry
+from hierarchy.jit.linking import Call, found, linked
 from hierarchy.jit.sources import described, source_digest
 
 ENVIRONMENT = {"NUMBA_CPU_NAME": PROCESSOR, "NUMBA_CPU_FEATURES": "",
                "NUMBA_DISABLE_INTEL_SVML": "1"}  # of a process that builds
-
-_SHARED = {llvm.Linkage.external, llvm.Linkage.linkonce_odr, llvm.Linkage.common}
-
-Call = tuple[str, tuple[Any, ...]]  # the name of a kernel with its module, types of arguments
 
 
 @global_compiler_lock  # type: ignore[untyped-decorator]
 def build(file: Path, jobs: str, calls: Sequence[Call], say: Callable[[int], None]) -> None:
     """Write an object file with these calls, and its index; `say` takes the number compiled."""
     _without_machine_code()
-    libraries: dict[Any, None] = {}
+    libraries: list[Any] = []
     kernels: dict[str, tuple[str, dict[str, Entry]]] = {}
     for count, (name, kinds) in enumerate(calls):
         say(count)
-        kernel = _kernel(name)
+        kernel = found(name)
         kernel.compile(kinds)
         made = kernel.overloads[kinds]
         if (entry := _entry(made)) is not None:
-            _gather(made.library, libraries)
+            libraries.append(made.library)
             kernels.setdefault(name, (source_digest(kernel), {}))[1][described(kinds)] = entry
     entries = [entry for _, those in kernels.values() for entry in those.values()]
-    whole = _linked(libraries, {name for one in entries for name in (one.wrapper, one.environment)})
+    whole = linked(libraries, {name for one in entries for name in (one.wrapper, one.environment)})
     here = machine()
     code = object_code(whole, here.triple, here.processor, here.features)
     Part(file, jobs, kernels, _externals(whole)).write(code)
@@ -52,15 +48,10 @@ def is_current(file: Path, jobs: str) -> bool:
     """Whether an object file was made by these jobs from the sources as they are."""
     try:
         part = Part.read(file)
-        return part.jobs == jobs and all(digest == source_digest(_kernel(name))
+        return part.jobs == jobs and all(digest == source_digest(found(name))
                                          for name, (digest, _) in part.kernels.items())
     except (OSError, ValueError, LookupError, ImportError, AttributeError):
         return False
-
-
-def _kernel(name: str) -> Any:
-    module, _, short = name.rpartition(".")
-    return getattr(import_module(module), short)
 
 
 def _entry(made: Any) -> Entry | None:
@@ -70,27 +61,6 @@ def _entry(made: Any) -> Entry | None:
         return None
     return Entry(made.fndesc.llvm_cpython_wrapper_name, made.fndesc.env_name,
                  tuple(one.str for one in constants))
-
-
-def _gather(library: Any, libraries: dict[Any, None]) -> None:
-    """Add a library of numba's and those that it calls to a set in order."""
-    if library not in libraries:
-        libraries[library] = None
-        for further in library._linking_libraries:
-            _gather(further, libraries)
-
-
-def _linked(libraries: Iterable[Any], visible: set[str]) -> Any:
-    """Return one module in which only these names are visible."""
-    whole = llvm.parse_assembly("")
-    for library in libraries:
-        module = library._final_module.clone()
-        for one in (*module.functions, *module.global_variables):
-            if not one.is_declaration and one.linkage in _SHARED:
-                one.linkage = "weak_odr"  # or the linker drops what nothing refers to yet
-        whole.link_in(module)
-    hide(whole, visible)
-    return whole
 
 
 def _externals(module: Any) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ import llvmlite
 import numba
 
 from hierarchy.jit.inside import CompileResult, NullCache, dumps, llvm, nrt_helpers
+from hierarchy.jit.linking import found
 from hierarchy.jit.saying import say
 from hierarchy.jit.sources import described, source_digest
 
@@ -49,7 +50,13 @@ class KernelCache(NullCache):  # type: ignore[misc]
         body = None if file is None else _read(file)
         if body is not None:
             with suppress(Exception):  # whatever a pickle of another day raises: compiled anew
-                return CompileResult._rebuild(context, *pickle.loads(body))
+                calls, state = pickle.loads(body)
+                for name, kinds in calls:
+                    found(name).compile(kinds)
+                made = CompileResult._rebuild(context, *state)
+                made.library.calls = {found(name).overloads[kinds].library: None
+                                      for name, kinds in calls}
+                return made
         _prepare_compilation()
         return None
 
@@ -60,7 +67,8 @@ class KernelCache(NullCache):  # type: ignore[misc]
             _say_lost("their sources or a home folder are not to be found")
         elif not made.library.has_dynamic_globals:  # addresses of this process
             try:
-                _write(file, dumps(made._reduce()))
+                calls = [library.kernel for library in made.library.calls]
+                _write(file, dumps((calls, made._reduce())))
             except OSError as error:
                 _say_lost(f"{file.parent}: {error.strerror}")
 

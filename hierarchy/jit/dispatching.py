@@ -11,6 +11,7 @@ import numba
 from hierarchy.jit.ahead import find
 from hierarchy.jit.caching import KernelCache
 from hierarchy.jit.inside import CPUDispatcher, NumbaError, global_compiler_lock
+from hierarchy.jit.linking import name_of, naming
 
 if hasattr(os, "register_at_fork"):  # a child of a thread that waits would wait for ever
     os.register_at_fork(before=global_compiler_lock.acquire,
@@ -22,6 +23,7 @@ class Cached(CPUDispatcher):  # type: ignore[misc]
     """A kernel that looks for its files when it is first needed; most are only compiled in."""
 
     kept = True  # on disk
+    is_named = True  # in code that calls it, not linked into it
     ready: dict[Any, Any]  # entries for Python by types of arguments, compiled ahead
     _cache: Any
 
@@ -47,6 +49,8 @@ class Cached(CPUDispatcher):  # type: ignore[misc]
 
     def add_overload(self, made: Any) -> None:
         """Take code in; where there is an entry compiled ahead, only for kernels that call this."""
+        if self.is_named and (name := name_of(self)):
+            made.library.kernel = name, made.signature.args
         if made.signature.args in self.ready:
             self.overloads[made.signature.args] = made
         else:
@@ -57,11 +61,14 @@ class Cached(CPUDispatcher):  # type: ignore[misc]
         with global_compiler_lock:
             if self.kept and not isinstance(self._cache, KernelCache):
                 self._cache = KernelCache(self.py_func)
-            return super().compile(signature)
+            with naming():
+                return super().compile(signature)
 
 
 class OnlyInlined(Cached):
     """A kernel without an entry for Python, where a call would end the process."""
+
+    is_named = False
 
     def __call__(self, *arguments: Any) -> Any:
         """Raise a TypeError."""

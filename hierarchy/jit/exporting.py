@@ -23,6 +23,7 @@ from hierarchy.jit.inside import (
     registry,
     types,
 )
+from hierarchy.jit.linking import linked, naming
 from hierarchy.jit.sources import Kernel
 
 INTEGER, STATUS = types.int64, types.int32  # of arguments and results; a pointer is an INTEGER too
@@ -70,25 +71,10 @@ def compiles() -> bool:
 def lowered(entries: Mapping[str, Entry]) -> Any:
     """Return one optimised LLVM module in which only the entries are visible, under their names."""
     library = registry.cpu_target.target_context.codegen().create_library("entries")
-    for name, entry in entries.items():
-        _add(library, name, entry)
-    library.finalize()  # all at once: most kernels are behind several entries
-    whole = llvm.parse_bitcode(library._get_module_for_linking().as_bitcode())
-    hide(whole, set(entries))
-    return whole
-
-
-def hide(module: Any, visible: set[str]) -> None:
-    """Keep the functions of these names visible in a module, and drop what none of them uses."""
-    for one in (*module.functions, *module.global_variables):
-        if not one.is_declaration:
-            one.linkage = "external" if one.name in visible else "internal"
-    manager = llvm.create_new_module_pass_manager()
-    manager.add_global_dead_code_eliminate_pass()
-    manager.add_strip_dead_prototype_pass()
-    codegen = registry.cpu_target.target_context.codegen()
-    manager.run(module, llvm.create_pass_builder(
-        codegen._tm, llvm.create_pipeline_tuning_options()))
+    with naming():
+        for name, entry in entries.items():
+            _add(library, name, entry)
+    return linked([library], set(entries))
 
 
 def object_code(module: Any, triple: str, processor: str, features: str) -> bytes:

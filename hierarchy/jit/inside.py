@@ -11,6 +11,8 @@ try:
     from numba.core import cgutils, compiler, event, registry, types
     from numba.core.base import _load_global_helpers as load_helpers
     from numba.core.caching import NullCache
+    from numba.core.codegen import JITCodeLibrary as CodeLibrary
+    from numba.core.codegen import JITCPUCodegen as Codegen
     from numba.core.compiler import CompileResult
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.environment import Environment
@@ -27,6 +29,7 @@ except (ImportError, AttributeError) as error:
     raise ImportError(f"task-hierarchy works inside numba {_KNOWN}, not {numba.__version__}: "
                       f"{error}") from error
 
-__all__ = ["BaseTuple", "CPUDispatcher", "CompileResult", "Environment", "NullCache", "NumbaError",
-           "cgutils", "compiler", "dumps", "event", "global_compiler_lock", "intrinsic", "llvm",
-           "load_helpers", "make_function", "nrt_helpers", "registry", "types"]
+__all__ = ["BaseTuple", "CPUDispatcher", "CodeLibrary", "Codegen", "CompileResult",
+           "Environment", "NullCache", "NumbaError", "cgutils", "compiler", "dumps", "event",
+           "global_compiler_lock", "intrinsic", "llvm", "load_helpers", "make_function",
+           "nrt_helpers", "registry", "types"]

@@ -90,7 +90,8 @@ def emit(resolvers: Sequence[str], target: str, version: str) -> Emitted:
     import llvmlite.binding as llvm
 
     from hierarchy.jit import announce_compilation
-    from hierarchy.jit.exporting import compiles, hide, lowered, machine, object_code
+    from hierarchy.jit.exporting import compiles, lowered, machine, object_code
+    from hierarchy.jit.linking import hide
     from solvers.library import entries
 
     if not compiles():

@@ -1,0 +1,116 @@
+"""How kernels are linked: each is optimised once, with those inlined in it; callers name the rest.
+
+numba links the code of all callees into a caller and optimises the whole again, at every level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from hierarchy.jit.inside import Codegen, CodeLibrary, llvm, registry
+
+Call = tuple[str, tuple[Any, ...]]  # the name of a kernel with its module, types of arguments
+
+_SHARED = {llvm.Linkage.external, llvm.Linkage.linkonce_odr, llvm.Linkage.common}
+
+
+class Library(CodeLibrary):  # type: ignore[misc]
+    """Compiled code that is linked into its callers, or named there if it is that of a kernel.
+
+    kernel : what `found` finds it by; None if it is linked into callers.
+    calls : the libraries that the code names.
+    """
+
+    naming = False  # while a kernel compiles; numba's own cache knows no names
+
+    def __init__(self, *about: Any) -> None:
+        super().__init__(*about)
+        self.kernel: Call | None = None
+        self.calls: dict[Any, None] = {}
+
+    def add_linking_library(self, library: Any) -> None:
+        """Link a library when this one is finished, or note that its names are needed."""
+        further = getattr(library, "calls", {})
+        if not Library.naming:
+            for one in (library, *(one for one in _all_behind(further) if one.kernel)):
+                super().add_linking_library(one)
+            return
+        self.calls.update(further)
+        if getattr(library, "kernel", None) is None:
+            super().add_linking_library(library)
+        else:
+            self.calls[library] = None
+
+
+Codegen._library_class = Library
+
+
+@contextmanager
+def naming() -> Iterator[None]:
+    """Let code that is compiled now name the kernels that it calls."""
+    before, Library.naming = Library.naming, True
+    try:
+        yield
+    finally:
+        Library.naming = before
+
+
+def name_of(kernel: Any) -> str:
+    """Return the name of a kernel with its module, "" if it is not to be found there."""
+    function = kernel.py_func
+    name = f"{function.__module__}.{function.__qualname__}"
+    try:
+        return name if found(name) is kernel else ""
+    except (ImportError, AttributeError):
+        return ""
+
+
+def found(name: str) -> Any:
+    """Return the kernel with this name."""
+    module, _, short = name.rpartition(".")
+    return getattr(import_module(module), short)
+
+
+def linked(libraries: Iterable[Any], visible: set[str]) -> Any:
+    """Return one optimised module of these and all behind them; only these names are visible."""
+    whole = llvm.parse_assembly("")
+    for library in _all_behind(libraries):
+        module = (library._shared_module or library._final_module).clone()  # the first if cached
+        for one in (*module.functions, *module.global_variables):
+            if not one.is_declaration and one.linkage in _SHARED:
+                one.linkage = "weak_odr"  # or the linker drops what nothing refers to yet
+        whole.link_in(module)
+    codegen = registry.cpu_target.target_context.codegen()
+    whole.data_layout = str(codegen.target_data)
+    hide(whole, visible)
+    manager, builder = codegen._module_pass_manager()
+    manager.run(whole, builder)
+    return whole
+
+
+def hide(module: Any, visible: set[str]) -> None:
+    """Keep the functions of these names visible in a module, and drop what none of them uses."""
+    for one in (*module.functions, *module.global_variables):
+        if not one.is_declaration:
+            one.linkage = "external" if one.name in visible else "internal"
+    manager = llvm.create_new_module_pass_manager()
+    manager.add_global_dead_code_eliminate_pass()
+    manager.add_strip_dead_prototype_pass()
+    codegen = registry.cpu_target.target_context.codegen()
+    manager.run(module, llvm.create_pass_builder(
+        codegen._tm, llvm.create_pipeline_tuning_options()))
+
+
+def _all_behind(libraries: Iterable[Any]) -> list[Any]:
+    """Return libraries and all that they link or name."""
+    seen: dict[Any, None] = {}
+    waiting = list(libraries)
+    while waiting:
+        library = waiting.pop()
+        if library not in seen:
+            seen[library] = None
+            waiting += [*library._linking_libraries, *getattr(library, "calls", ())]
+    return list(seen)
