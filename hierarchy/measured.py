@@ -182,7 +182,7 @@ def measured(function: Kernel) -> Kernel:
     `Kinematics`. `goal` (3, 3) is p_d, dp_d/dt and d2p_d/dt2 of the path now.
     """
     # A copy of the kernel below with this function, so that both are compiled into one.
-    about = {**globals(), "_measure": compiled(function), "__name__": function.__module__}
+    about = {**globals(), "_measure": inlined(function), "__name__": function.__module__}
     rows = FunctionType(_rows.__code__, about, function.__name__)
     rows.__module__, rows.__qualname__ = function.__module__, function.__qualname__
     rows.__doc__ = function.__doc__
