@@ -133,21 +133,10 @@ class Measured(Task):
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
         task = cast("Measured", self.on(state.robot))
-        return task._writer(state, state.kinematics, level, np.zeros((8, task.dimension)),
-                            (A, lower, upper, row))
-
-    def _writer(self, state: State, kinematics: Kinematics, level: Level, motion: Array,
-                rows: tuple[Array, Array, Array, int]) -> Callable[[], object]:
-        function, reads = self.measure(state)
-        m, goal = self.dimension, self.goal(state)
-        settings = np.array([np.broadcast_to(value, m) for value in (
-            self.stiffness, self.damping, self.gain,
-            np.inf if self.kind == "inequality" else 0.0, self.columns)], dtype=float)
-        derivative = (_NONE if level == "velocity" else
-                      _EXACT if self.exact or kinematics.period == 0.0 else _DIFFERENCE)
-        asked = _Asked(goal, settings, derivative, motion, np.zeros((m, state.n)))
-        write_rows = bind(function, kinematics, reads, asked, *rows)
-        move_goal = self.follow(state, goal)
+        function, reads = task.measure(state)
+        asked = task._asked(state, level, np.zeros((8, task.dimension)))
+        write_rows = bind(function, state.kinematics, reads, asked, A, lower, upper, row)
+        move_goal = task.follow(state, asked.goal)
         if move_goal is None:
             return write_rows
 
@@ -157,12 +146,27 @@ class Measured(Task):
 
         return write
 
+    def _asked(self, state: State, level: Level, motion: Array) -> _Asked:
+        m = self.dimension
+        settings = np.array([np.broadcast_to(value, m) for value in (
+            self.stiffness, self.damping, self.gain,
+            np.inf if self.kind == "inequality" else 0.0, self.columns)], dtype=float)
+        derivative = (_NONE if level == "velocity" else
+                      _EXACT if self.exact or state.period == 0.0 else _DIFFERENCE)
+        return _Asked(self.goal(state), settings, derivative, motion, np.zeros((m, state.n)))
+
     def _measured(self, state: State, kinematics: Kinematics | None = None) -> tuple[Array, Motion]:
         """The Jacobian (m, n) and the rest of what is measured."""
         task = cast("Measured", self.on(state.robot))
+        function, reads = task.measure(state)
         m = task.dimension
         J, sides, motion = np.zeros((m, state.n)), np.zeros((2, m)), np.zeros((8, m))
-        task._writer(state, kinematics or state.kinematics, "velocity", motion, (J, *sides, 0))()
+        asked = task._asked(state, "velocity", motion)
+        move_goal = task.follow(state, asked.goal)
+        if move_goal is not None:
+            move_goal(state.t)
+        # Called, not bound: to bind takes 0.5 ms.
+        function(kinematics or state.kinematics, reads, asked, J, *sides, 0)
         return J, Motion(*motion[:4])
 
     def _goal(self, state: State) -> Array:
@@ -182,7 +186,7 @@ def measured(function: Kernel) -> Kernel:
     `Kinematics`. `goal` (3, 3) is p_d, dp_d/dt and d2p_d/dt2 of the path now.
     """
     # A copy of the kernel below with this function, so that both are compiled into one.
-    about = {**globals(), "_measure": compiled(function), "__name__": function.__module__}
+    about = {**globals(), "_measure": inlined(function), "__name__": function.__module__}
     rows = FunctionType(_rows.__code__, about, function.__name__)
     rows.__module__, rows.__qualname__ = function.__module__, function.__qualname__
     rows.__doc__ = function.__doc__
