@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from functools import cache
 from time import monotonic
@@ -45,4 +46,5 @@ def say(what: str) -> None:
 @cache
 def announce_compilation() -> None:
     """Let the compilation of kernels be announced on stderr: it makes a program wait."""
-    event.register("numba:compile", _Compilations())
+    if "TASK_HIERARCHY_WORKER" not in os.environ:  # what started a worker has said it
+        event.register("numba:compile", _Compilations())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,8 +74,7 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     `kept` is the cell of a scenario that differs only in its resolver or task settings: its robot,
     start, state, plant and obstacles are reused, and its sensor if the sensor settings are equal.
     """
-    if "TASK_HIERARCHY_WORKER" not in os.environ:  # what started this process has said it
-        announce_compilation()
+    announce_compilation()
     at = References(State.at(kept.robot, *kept.start), kept.contacts) if kept else placed(scenario)
     sensor = sensor_of(scenario, at.start, (kept.scenario, kept.sensor) if kept else None)
     plant = kept.plant if kept else plant_of(
