@@ -50,13 +50,16 @@ class KernelCache(NullCache):  # type: ignore[misc]
         body = None if file is None else _read(file)
         if body is not None:
             with suppress(Exception):  # whatever a pickle of another day raises: compiled anew
-                calls, state = pickle.loads(body)
+                calls, symbols, state = pickle.loads(body)
                 for name, kinds in calls:
                     found(name).compile(kinds)
-                made = CompileResult._rebuild(context, *state)
-                made.library.calls = {found(name).overloads[kinds].library: None
-                                      for name, kinds in calls}
-                return made
+                made = [found(name).overloads[kinds] for name, kinds in calls]
+                # Another process may have stored a callee since, under a symbol of its own, and
+                # LLVM ends this one at a symbol that is missing.
+                if symbols == [one.fndesc.llvm_func_name for one in made]:
+                    loaded = CompileResult._rebuild(context, *state)
+                    loaded.library.calls = {one.library: None for one in made}
+                    return loaded
         _prepare_compilation()
         return None
 
@@ -68,7 +71,9 @@ class KernelCache(NullCache):  # type: ignore[misc]
         elif not made.library.has_dynamic_globals:  # addresses of this process
             try:
                 calls = [library.kernel for library in made.library.calls]
-                _write(file, dumps((calls, made._reduce())))
+                symbols = [found(name).overloads[kinds].fndesc.llvm_func_name
+                           for name, kinds in calls]
+                _write(file, dumps((calls, symbols, made._reduce())))
             except OSError as error:
                 _say_lost(f"{file.parent}: {error.strerror}")
 

@@ -33,10 +33,10 @@ def ask(tmp_path):
     (tmp_path / "helper.py").write_text(HELPER)
     (tmp_path / "user.py").write_text(USER)
 
-    def asked(**settings):
+    def asked(code=SOLVE, **settings):
         kept = {name: value for name, value in os.environ.items()
                 if name not in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
-        done = subprocess.run([sys.executable, "-c", SOLVE], cwd=tmp_path, text=True, check=True,
+        done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, text=True, check=True,
                               capture_output=True, env={**kept, **settings})
         return done.stdout.split(), done.stderr
 
@@ -54,6 +54,17 @@ def test_a_changed_helper_is_noticed_wherever_the_cache_is(ask, tmp_path):
         assert ask(XDG_CACHE_HOME=str(folder))[0] == ["11.0", "1"]
         (tmp_path / "helper.py").write_text(HELPER.replace("1.0", "91.0"))
         assert ask(XDG_CACHE_HOME=str(folder))[0] == ["101.0", "1"]
+
+
+def test_a_helper_that_was_compiled_again_is_found_by_its_callers(ask, tmp_path):
+    """Its symbol has the number of functions that a process compiled before it."""
+    cache = tmp_path / "cache"
+    ask(XDG_CACHE_HOME=str(cache))
+    (stored,) = (file for file in files(cache) if file.name.startswith("helper.f-"))
+    stored.unlink()
+    later = f"import numba; [numba.njit(lambda x: x)(1) for _ in range(9)]; {SOLVE}"
+    assert ask(later, XDG_CACHE_HOME=str(cache))[0] == ["11.0", "1"]
+    assert ask(XDG_CACHE_HOME=str(cache))[0] == ["11.0", "0"]
 
 
 @pytest.mark.parametrize("settings", [{}, {"XDG_CACHE_HOME": ""}, {"XDG_CACHE_HOME": "here"},
