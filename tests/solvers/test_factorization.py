@@ -1,6 +1,5 @@
 """A factored stack after any edits is the stack factored afresh, and that of `tpm`."""
 
-
 import numpy as np
 import oracle
 import pytest
@@ -189,8 +188,6 @@ def test_a_mistake_is_named_and_changes_nothing(mistake, text):
     assert factored.names == ("hand", "elbow")
     np.testing.assert_allclose(factored.solve([[1.0, 2.0], [3.0]]).x, [1.0, 2.0, 3.0])
 
-
-# -- the benchmark ---------------------------------------------------------------------------------
 
 # -- any sequence of edits that hypothesis can think of --------------------------------------------
 

@@ -173,24 +173,6 @@ def test_no_way_of_breaking_an_array_ends_the_process():
     assert "lower has shape (6, 9), expected (9, 6)" in said
 
 
-@pytest.mark.parametrize("name", ["hcod", "tpm", "weighted"])
-def test_a_memory_of_any_numbers_leads_to_the_same_answer(name):
-    rng = np.random.default_rng(3)
-    odd = np.array([np.nan, np.inf, -np.inf, 1e300, -1.0, 0.0, 1.0, 2.0, 3.0, 0.5, 1e18, -7.0])
-    h = Hierarchy.from_levels([(np.eye(7), -np.ones(7), np.ones(7)),
-                               (rng.normal(size=(3, 7)), 5.0 * rng.normal(size=3))])
-    cold = make(name).solve(h)
-    for trial in range(60):
-        memory = cold.memory.copy()
-        at = rng.choice(len(memory), rng.integers(1, len(memory)), replace=False)
-        memory[at] = rng.choice(odd, len(at))
-        if trial % 2:
-            memory[-3:-1] = 1.0
-        warm = make(name).solve(h, memory)
-        assert warm.status is cold.status
-        np.testing.assert_allclose(warm.x, cold.x, atol=1e-7)
-
-
 @pytest.fixture
 def file(tmp_path):
     path = tmp_path / "problems.npz"
