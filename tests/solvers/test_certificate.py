@@ -147,15 +147,6 @@ def test_a_small_hierarchy_is_judged_at_the_level_at_fault(case):
         certify(h, np.zeros(9))
 
 
-def test_the_verdict_names_the_level():
-    h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0]), ([[0.0, 1.0]], [2.0])],
-                              names=("position", "pointing"))
-    verdict = certify(h, [1.0, 2.1])
-    assert verdict.level == 1
-    assert str(verdict).startswith("not optimal at pointing: residual ")
-    assert str(certify(h, [1.0, 2.0])).startswith("certified: ")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("scale", "level"), [(1e-6, 0), (1e6, 1), (1e-6, 2), (1e6, 3), (1e6, 4)])
 def test_the_unit_of_a_level_does_not_matter(scale, level):

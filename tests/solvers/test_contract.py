@@ -10,7 +10,8 @@ import tracemalloc
 import numpy as np
 import oracle
 import pytest
-from rank_cases import CASES, build, family, generic, rng
+from rank_cases import CASES, build, family, generic, random_levels, rng
+from sequences import moved
 
 from hierarchy import Hierarchy, HierarchyError
 from scenarios.problems import reference as families
@@ -158,6 +159,58 @@ def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(resolver)
             assert not res.x.any()
 
 
+# Levels, a reference, and the x and violations that are right; x is None where it is not unique.
+INF = np.inf
+LIMITS = (np.eye(3), [-1.0] * 3, [1.0] * 3)
+BOX = (np.eye(2), [-1.0, -1.0], [1.0, 1.0])
+BY_HAND = {
+    "an inequality above an equality": ([BOX, ([[1.0, 1.0]], [5.0])], None, [1, 1], [0, 3]),
+    "an inequality below an equality": (
+        [([[1.0, 0.0]], [2.0]), (np.eye(2), [-1.0, 3.0], [1.0, 4.0])], None, [2, 3], [0, 1]),
+    "inequalities that cannot all hold": (
+        [([[1.0, 0.0], [1.0, 0.0]], [-INF, 1.0], [0.0, INF]), ([[1.0, 1.0]], [9.0])],
+        None, [0.5, 8.5], [np.sqrt(0.5), 0]),
+    "an equality between inequalities": (
+        [([[1.0, 0, 0]], [-1.0], [1.0]), ([[1.0, 1.0, 0]], [3.0]),
+         ([[0, 1.0, 0]], [-INF], [1.5]), ([[0, 0, 1.0]], [2.0])], None, [1, 2, 2],
+        [0, 0, 0.5, 0]),
+    "nearest to the reference": ([LIMITS, ([[1.0, 1.0, 0.0]], [0.5])], [3.0, 0.0, -5.0],
+                                 [1, -0.5, -1], [0, 0]),
+    "rows without sides": ([([[1.0, 0.0]], [-INF], [INF]), ([[0.0, 0.0]], [-1.0], [1.0]),
+                            ([[1.0, 1.0]], [2.0], [INF])], [0.5, 0.0], [1.25, 0.75], [0, 0, 0]),
+    "a row opposite to one above": (  # dividing by what is left of it led to 5e14
+        [([[0.74016879, 0.67242112]], [0.938], [1.75]),
+         ([[-0.74016879, -0.67242112]], [-0.518])], [-1.9, 0.5], None, [0, 0.42]),
+    "limits with just room for each other": (
+        [BOX, ([[1.0, 1.0], [1.0, -1.0]], [1.5, 0.2], [INF, INF])], None, None, [0, 0]),
+    "a zero row that cannot be met": (
+        [(np.zeros((1, 2)), [1.0], [2.0]), ([[1.0, 1.0]], [4.0])], None, [2.0, 2.0], [1, 0]),
+    "sides that exclude each other": ([([[1.0], [1.0]], [1.0, -INF], [INF, -1.0])], None, [0.0],
+                                      [np.sqrt(2.0)]),
+    "a reference out of reach": ([([[1.0, 0.0]], [-1.0], [1.0])], [5.0, 7.0], [1.0, 7.0], [0]),
+    "every number met is zero": (
+        [([[2.0], [1.0], [1.0]], [0.0, 1.0, -1.0]), ([[1.0]], [-9.0], [9.0])], None, [0.0],
+        [np.sqrt(2.0), 0])}
+
+
+@every(INEQUALITIES)
+@pytest.mark.parametrize("case", BY_HAND)
+@pytest.mark.filterwarnings("error")
+def test_small_hierarchies_have_the_answer_found_by_hand(resolver, case):
+    levels, reference, x, norms = BY_HAND[case]
+    h = Hierarchy.from_levels(levels, reference)
+    res = resolver.solve(h)
+    assert_close(resolver, h.violations(res.x), np.array(norms))
+    assert np.linalg.norm(res.x) < 10.0
+    if x is not None:
+        assert_close(resolver, res.x, np.array(x))
+    if resolver not in HQP:
+        assert res.status is Status.SOLVED
+        assert certify(h, res.x).certified
+        np.testing.assert_allclose(h.violations(res.x), norms, atol=1e-12)
+        np.testing.assert_allclose(res.x, res.x if x is None else x, atol=1e-12)
+
+
 @every(EQUALITIES_ONLY + BOUNDS)
 def test_an_inequality_is_refused_by_level_and_row(resolver):
     h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0]), ([[1.0, 1.0], [0.0, 1.0]], [0, 0], [0, 2])],
@@ -166,37 +219,103 @@ def test_an_inequality_is_refused_by_level_and_row(resolver):
         resolver.solve(h)
 
 
+@every(BOUNDS)
+@pytest.mark.parametrize(("levels", "said"), [
+    ([(np.eye(2), [0, 0]), BOX], "level 2, row 0: an inequality, -1 <= a x <= 1"),
+    ([BOX, ([[1, 1]], [0], [INF])], "level 2, row 0: an inequality"),
+    ([([[1, 0], [1, 1]], [-1, 0], [1, 2])], "level 1, row 1: an inequality, 0 <= a x <= 2"),
+    ([([[1, 1], [0, 1]], [1, -1], [1, 1])], "level 1, row 1: an inequality, -1 <= a x <= 1"),
+    ([([[1, 0], [0, 0]], [-1, 0], [1, 2])], "level 1, row 1: an inequality, 0 <= a x <= 2")])
+def test_a_first_level_that_is_more_than_bounds_is_refused_by_level_and_row(resolver, levels, said):
+    with pytest.raises(HierarchyError, match=said) as error:
+        resolver.solve(Hierarchy.from_levels(levels))
+    assert "single unknowns" in str(error.value)
+
+
 @on_cases(BOUNDS, 1)
 def test_bounds_of_a_first_level_are_kept_and_change_nothing_where_they_are_far(resolver, case):
     h = build(case, True)
-    for room in (1e6, 0.3):
+    for room, damping in ((1e6, 0.0), (1e6, 0.05), (0.3, 0.0)):
         side = np.full(h.n, room)
         levels = [(np.eye(h.n), -side, side), *((A, b) for A, b, _ in h.levels())]
-        res = resolver.solve(Hierarchy.from_levels(levels, h.reference))
+        damped = dataclasses.replace(resolver, damping=damping, threshold=3.0)
+        res = damped.solve(Hierarchy.from_levels(levels, h.reference))
         assert res.status is Status.SOLVED
         assert np.abs(res.x).max() <= room * (1.0 + 1e-12)
         if room > 1.0:
-            assert_close(resolver, res.x, oracle.solve(h))
+            assert_close(resolver, res.x, oracle.solve(h, damping, 3.0))
 
 
-@every(BOUNDS)
-def test_a_first_level_that_is_more_than_bounds_is_refused_by_level_and_row(resolver):
-    h = Hierarchy.from_levels([([[1.0, 0.0], [1.0, 1.0]], [-1, 0], [1, 2])], names=["limits"])
-    with pytest.raises(HierarchyError, match="limits, row 1: an inequality, 0 <= a x <= 2"):
-        resolver.solve(h)
+# -- memory ----------------------------------------------------------------------------------------
+
+REMEMBER = [make("hcod"), make("tpm"), make("weighted")]
+ODD = [np.nan, np.inf, -np.inf, 1e300, -1.0, 0.0, 1.0, 2.0, 3.0, 0.5, 1e18, -7.0]
+
+
+def remembered(resolver):
+    """Hierarchies whose limits act, of kinds that a resolver handles."""
+    for seed in range(5 if PROBLEMS < 50 else 40):
+        levels = random_levels(7, (3, 1, 1), seed)
+        yield Hierarchy.from_levels([(np.eye(7), [-0.3] * 7, [0.3] * 7), *levels])
+    if resolver.handles == "inequalities":
+        for name in ("INEQ7", "HUM38"):
+            yield from (h for h, _, _ in list(family(name))[:PROBLEMS if resolver.strict else 3])
+
+
+@every(REMEMBER)
+def test_no_memory_changes_the_answer_and_its_own_leaves_little_to_do(resolver):
+    """Of a tick before, of rows at random sides, of numbers of any size, of another hierarchy."""
+    r = rng(3)
+    tried = 0
+    for h in remembered(resolver):
+        cold = resolver.solve(h)
+        if cold.memory is None:  # no limit acted
+            continue
+        kept, odd = cold.memory.copy(), cold.memory.copy()
+        spoilt = r.random(len(odd)) < 0.5
+        odd[spoilt] = r.choice(ODD, spoilt.sum())
+        sides = r.integers(-1, 2, len(odd)).astype(float)
+        for memory in (odd, sides):
+            memory[-3:-1] = 1.0  # said to be a memory
+        warm = resolver.solve(h, cold.memory)
+        assert np.array_equal(cold.memory, kept)
+        assert warm.iterations == 1 or (resolver.name == "weighted" and warm.iterations < 5)
+        for memory in (kept, resolver.solve(moved(h)).memory, odd, sides, -odd[::-1],
+                       1e200 * r.normal(size=len(odd)), np.full(len(odd), np.nan), np.zeros(3)):
+            again = resolver.solve(h, memory)
+            assert again.status is cold.status
+            assert np.abs(again.x - cold.x).max() <= 1e-8 * (1.0 + np.abs(cold.x).max())
+        assert np.abs(warm.x - cold.x).max() <= 1e-9 * (1.0 + np.abs(cold.x).max())
+        tried += 1
+        if resolver.name == "hcod":
+            np.testing.assert_array_equal(warm.holds_back, cold.holds_back)
+            np.testing.assert_allclose(warm.multipliers, cold.multipliers, atol=1e-6)
+    assert tried > 3
+
+
+@every(HQP)
+def test_a_memory_of_programs_does_no_harm(resolver):
+    for h, x, _ in list(family("INEQ7"))[:3]:
+        res = resolver.solve(h, resolver.solve(moved(h)).memory)
+        if res.status is Status.SOLVED:
+            assert_close(resolver, res.x, x)
+    h = Hierarchy.from_levels(generic())
+    for levels in (generic()[:2], [(np.eye(2), [1.0, 2.0])]):
+        memory = resolver.solve(Hierarchy.from_levels(levels)).memory
+        assert_close(resolver, resolver.solve(h, memory).x, resolver.solve(h).x)
 
 
 @pytest.mark.parametrize("name", names())
-def test_settings_of_every_resolver_are_checked_by_name(name):
-    assert isinstance(make(name, damping=1).damping, float)
-    with pytest.raises(HierarchyError, match="did you mean 'damping'"):
-        make(name, dampnig=0.1)
-    for setting, value in [("damping", -0.1), ("damping", float("nan")), ("damping", "0.1"),
-                           ("threshold", 0.0), ("threshold", float("inf")),
-                           ("rank_tolerance", -1e-9), ("rank_tolerance", 1.0),
-                           ("rank_tolerance", True)]:
-        with pytest.raises(HierarchyError, match=f"{name}: {setting} = "):
-            make(name, **{setting: value})
+def test_what_is_no_hierarchy_and_what_is_no_memory_are_refused(name):
+    h = Hierarchy.from_levels([BOX, ([[1.0, 0.0]], [1.0])])
+    for given in ([(np.eye(2), np.ones(2))], np.eye(2), "h", None):
+        with pytest.raises(HierarchyError, match=f"{name}: h: expected a Hierarchy, got"):
+            make(name).solve(given)
+    for memory in ([0.0] * 9, "memory", 7, np.zeros(9, dtype=np.int64), np.zeros(9, dtype=complex)):
+        with pytest.raises(HierarchyError, match=f"{name}: memory"):
+            make(name).solve(h, memory)
+    with pytest.raises(HierarchyError, match=r"give the memory of .* resolution, res\.memory"):
+        make("hcod").solve(h, make("hcod").solve(h))
 
 
 @every(RESOLVERS)

@@ -1,6 +1,5 @@
 """A factored stack after any edits is the stack factored afresh, and that of `tpm`."""
 
-
 import numpy as np
 import oracle
 import pytest
@@ -160,6 +159,7 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     (lambda f: f.reorder(["hand", "hand"]), "once, got"),
     (lambda f: f.delete("foot"), "unknown level 'foot'"),
     (lambda f: f.delete(-1), "index -1"),
+    (lambda f: f.delete(0.5), r"index 0.5 is outside 0 \.\. 1"),
     (lambda f: f.insert("hand", np.eye(3)), "hand: a level of this name exists"),
     (lambda f: f.insert("foot", np.eye(3), at=3), r"foot: index 3 is outside 0 \.\. 2"),
     (lambda f: f.insert("foot", np.eye(4)), r"foot: A has shape \(4, 4\), expected \(rows, 3\)"),
@@ -170,6 +170,8 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     (lambda f: f.solve({"hand": [1.0, 2.0], "elbow": [1.0], "foot": [1.0]}), "unknown level"),
     (lambda f: f.solve([[1.0, 2.0], [1.0, 2.0]]), r"elbow: b has shape \(2,\), expected \(1,\)"),
     (lambda f: f.solve([[1.0, 2.0]]), "1 targets for 2 levels"),
+    (lambda f: f.solve(1j * np.ones(3)), "it is complex"),
+    (lambda f: f.solve(3), "targets: expected a Sequence"),
     (lambda f: f.solve(np.zeros(2)), r"targets have shape \(2,\), expected \(3,\)"),
     (lambda f: f.solve([[1.0, np.inf], [1.0]]), "hand, row 1: target is inf"),
     (lambda f: f.solve(np.array([1.0, 1.0, np.nan])), "elbow, row 0: target is nan"),
@@ -178,6 +180,10 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     (lambda f: Factorization([np.eye(2)], names=["a", "b"]), "2 names for 1 levels"),
     (lambda f: Factorization([np.eye(2)] * 2, names=["a", "a"]), "2 levels are named 'a'"),
     (lambda f: Factorization([]), "no levels and no n"),
+    (lambda f: Factorization(3), "levels: expected a Sequence, got int 3"),
+    (lambda f: Factorization([], n=2.5), "n = 2.5, expected a whole number"),
+    (lambda f: Factorization([], n=-1), "n = -1"),
+    (lambda f: Factorization([1j * np.eye(2)]), "it is complex"),
     (lambda f: Factorization([[1.0]]), r"level 1: A has shape \(1,\), expected \(rows, n\)"),
     (lambda f: Factorization([np.eye(2), np.eye(3)]), r"level 2: A has shape \(3, 3\)"),
     (lambda f: Factorization([], n=2, settings=make("tpm-published")), "staircase form"),
@@ -189,8 +195,6 @@ def test_a_mistake_is_named_and_changes_nothing(mistake, text):
     assert factored.names == ("hand", "elbow")
     np.testing.assert_allclose(factored.solve([[1.0, 2.0], [3.0]]).x, [1.0, 2.0, 3.0])
 
-
-# -- the benchmark ---------------------------------------------------------------------------------
 
 # -- any sequence of edits that hypothesis can think of --------------------------------------------
 

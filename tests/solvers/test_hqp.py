@@ -8,7 +8,6 @@ import pytest
 from rank_cases import family, generic
 
 from hierarchy import Hierarchy, HierarchyError
-from hierarchy.errors import UnknownNameError
 from solvers import Status, certify, make, problems
 from solvers.qp import backends, programs, refinement
 from solvers.qp.refinement import Rows
@@ -50,42 +49,6 @@ def test_no_answer_to_a_generated_problem_is_called_solved_without_being_right(h
 
 
 # Levels, a reference, and the x and violations that are right; x is None where it is not unique.
-LIMITS = (np.eye(3), [-1.0] * 3, [1.0] * 3)
-BOX = (np.eye(2), [-1.0, -1.0], [1.0, 1.0])
-BY_HAND = {
-    "an inequality above an equality": ([BOX, ([[1.0, 1.0]], [5.0])], None, [1, 1], [0, 3]),
-    "an inequality below an equality": (
-        [([[1.0, 0.0]], [2.0]), (np.eye(2), [-1.0, 3.0], [1.0, 4.0])], None, [2, 3], [0, 1]),
-    "inequalities that cannot all hold": (
-        [([[1.0, 0.0], [1.0, 0.0]], [-np.inf, 1.0], [0.0, np.inf]), ([[1.0, 1.0]], [9.0])],
-        None, [0.5, 8.5], [np.sqrt(0.5), 0]),
-    "an equality between inequalities": (
-        [([[1.0, 0, 0]], [-1.0], [1.0]), ([[1.0, 1.0, 0]], [3.0]),
-         ([[0, 1.0, 0]], [-np.inf], [1.5]), ([[0, 0, 1.0]], [2.0])], None, [1, 2, 2],
-        [0, 0, 0.5, 0]),
-    "nearest to the reference": ([LIMITS, ([[1.0, 1.0, 0.0]], [0.5])], [3.0, 0.0, -5.0],
-                                 [1, -0.5, -1], [0, 0]),
-    "a row without a side": ([([[1.0, 0.0]], [-np.inf], [np.inf]), ([[0.0, 1.0]], [2.0])],
-                             None, [0, 2], [0, 0]),
-    "a row opposite to one above": (  # dividing by what is left of it led to 5e14
-        [([[0.74016879, 0.67242112]], [0.938], [1.75]),
-         ([[-0.74016879, -0.67242112]], [-0.518])], [-1.9, 0.5], None, [0, 0.42]),
-    "limits with just room for each other": (
-        [BOX, ([[1.0, 1.0], [1.0, -1.0]], [1.5, 0.2], [np.inf, np.inf])], None, None, [0, 0])}
-
-
-@every_backend
-@pytest.mark.parametrize("case", BY_HAND)
-def test_small_hierarchies_have_the_answer_found_by_hand(hqp, case):
-    levels, reference, x, norms = BY_HAND[case]
-    h = Hierarchy.from_levels(levels, reference)
-    res = hqp.solve(h)
-    assert_close(hqp, h.violations(res.x), norms)
-    assert np.linalg.norm(res.x) < 10.0
-    if x is not None:
-        assert_close(hqp, res.x, x)
-
-
 @every_backend
 def test_programs_are_put_to_the_backend_only_where_they_are_needed(hqp):
     assert hqp.solve(Hierarchy.from_levels(generic())).iterations == 3
@@ -100,34 +63,6 @@ def test_a_step_that_only_dust_of_rounding_asks_for_is_no_answer():
     found = make("hqp").solve(h)
     assert np.abs(found.x).max() < 10.0
     assert (found.status is Status.SOLVED) == certify(h, found.x).certified
-
-
-@pytest.mark.slow
-@every_backend
-@pytest.mark.parametrize("name", ["INEQ7"])
-def test_a_warm_start_does_not_change_the_answer(hqp, name):
-    for h, x, _ in list(family(name))[:PROBLEMS]:
-        moved = Hierarchy(h.A, 1.01 * h.lower, 1.01 * h.upper, h.sizes, h.reference, h.names)
-        res = hqp.solve(h, hqp.solve(moved).memory)
-        if res.status is Status.SOLVED:
-            assert_close(hqp, res.x, x)
-
-
-@every_backend
-def test_the_memory_of_another_hierarchy_does_no_harm(hqp):
-    h = Hierarchy.from_levels(generic())
-    for levels in (generic()[:2], [(np.eye(2), [1.0, 2.0])]):
-        memory = hqp.solve(Hierarchy.from_levels(levels)).memory
-        assert_close(hqp, hqp.solve(h, memory).x, hqp.solve(h).x)
-    with pytest.raises(HierarchyError, match="hqp: memory: got str 'not a memory'"):
-        hqp.solve(h, "not a memory")
-
-
-def test_an_unknown_backend_names_the_nearest():
-    with pytest.raises(UnknownNameError, match="'daqpp'; did you mean 'daqp'"):
-        make("hqp", backend="daqpp")
-    with pytest.raises(UnknownNameError, match="form of hqp 'slak'; did you mean 'slack'"):
-        make("hqp", form="slak")
 
 
 @pytest.mark.parametrize("name", backends.BACKENDS)

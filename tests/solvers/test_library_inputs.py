@@ -162,20 +162,6 @@ def test_settings_without_a_value_are_those_of_python_and_out_of_range_are_inval
 
 
 @pytest.mark.slow
-def test_a_spent_budget_keeps_the_finished_levels(library):
-    limited = 0
-    for problem in family("HUM38")[:5]:
-        h = problem.h
-        for budget in (1, 5, 20):
-            status, left = library.solve("hcod", h, c.settings_of(max_iterations=budget))
-            if status == c.ITERATION_LIMIT:
-                limited, unfinished = limited + 1, int(left.values[3 * h.m + 2])
-                np.testing.assert_allclose(h.violations(left.answer)[:unfinished],
-                                           problem.norms[:unfinished], atol=1e-8)
-    assert limited > 3
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "levels", "status"), [
     ("tpm", [(np.eye(2), [0.0, 0.0]), (np.ones((1, 2)), [0.0], [1.0])], c.REFUSED),
     ("sns", [(np.eye(2)[[0, 1, 0]], [0.0, 0.0, 2.0], [1.0, 1.0, 3.0])], c.CONTRADICTION)])

@@ -124,12 +124,6 @@ def test_a_stack_of_safety_levels_alone_is_refused():
         make("merged").solve(h)
 
 
-@pytest.mark.parametrize(("scales", "said"), [({"hand": 0.0}, "'hand' = 0.0"), (3.0, "scales = 3")])
-def test_scales_are_positive_numbers_by_name(scales, said):
-    with pytest.raises(HierarchyError, match=said):
-        make("merged", scales=scales)
-
-
 def test_scales_divide_the_weight_of_their_level():
     rows = [([[1.0]], [1.0]), ([[1.0]], [0.0])]
     h = Hierarchy.from_levels(rows, names=["hand", "posture"])

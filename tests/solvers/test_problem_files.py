@@ -1,5 +1,6 @@
 """Problems as files: written, read again in three languages, and refused where damaged."""
 
+import io
 import json
 import shutil
 import subprocess
@@ -9,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hierarchy.errors import HierarchyError
+from hierarchy import Hierarchy, HierarchyError
 from solvers import make, problems
 from solvers.problems.files import Collection, Head, ProblemFileError, read
 from solvers.proof import prove
 
+HUGE = 2**63 - 1
 READERS = Path(__file__).parents[2] / "examples" / "problems"
 
 
@@ -64,36 +66,97 @@ def test_the_reader_in_cpp_finds_the_same_numbers(collection, file, tmp_path):
         assert float(total) == pytest.approx(h.A.sum(), abs=1e-12)
 
 
-def changed(file, name, content):
-    """Write the file again with another member."""
-    with zipfile.ZipFile(file) as archive:
-        members = {one: archive.read(one) for one in archive.namelist()}
-    members[name] = content(members[name])
-    with zipfile.ZipFile(file, "w") as archive:
-        for one, data in members.items():
-            if data is not None:
-                archive.writestr(one, data)
+def rewritten(path, compression=zipfile.ZIP_STORED, **content):
+    """Write an archive anew with other members: arrays, bytes, or a function of the bytes."""
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    for name, value in content.items():
+        member = "head.json" if name == "head" else f"{name}.npy"
+        if isinstance(value, np.ndarray):
+            stream = io.BytesIO()
+            np.save(stream, value)
+            value = stream.getvalue()
+        members[member] = value(members[member]) if callable(value) else value
+    with zipfile.ZipFile(path, "w", compression) as archive:
+        for name, value in members.items():
+            if value is not None:
+                archive.writestr(name, value)
 
 
-@pytest.mark.parametrize(("name", "content", "said"), [
-    ("head.json", lambda _: b"{", "head.json is not JSON"),
-    ("head.json", lambda _: b"[]", 'does not say "format"'),
-    ("head.json", lambda head: head.replace(b'"version": 1', b'"version": 9'),
-     "version 9 of the format; known is 1$"),
-    ("head.json", lambda head: head.replace(b'"count": ', b'"count": 1'), "says 1"),
-    ("head.json", lambda head: head.replace(b'"seed": ', b'"seed": -0.'), "seed is -0"),
-    ("head.json", lambda head: head.replace(b'"family"', b'"famile"'), "family is missing"),
-    ("A.npy", lambda _: None, "not a file of problems: A.npy is missing$"),
-    ("head.json", lambda _: None, "not a file of problems: head.json is missing$"),
-    ("A.npy", lambda data: data[:-8] + b"\0\0\0\0\0\0\1\0", "SHA-256"),
-    ("n.npy", lambda data: data[:-8] + b"\xff" * 8, "n = -1"),
-    ("sizes.npy", lambda data: data[:-8] + b"\x7f" + b"\0" * 7, "too short"),
-    ("lower.npy", lambda data: data[:-8] + b"\xff" * 8, "lower is nan"),
-    ("upper.npy", lambda data: data.replace(b"<f8", b"<f4"), "expected one dimension")])
-def test_a_damaged_file_is_refused_and_the_reason_named(file, name, content, said):
-    changed(file, name, content)
-    with pytest.raises(ProblemFileError, match=said):
-        read(file)
+def header(shape):
+    stream = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        stream, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    return stream.getvalue()
+
+
+def three_rows():
+    """Three rows in two unknowns."""
+    return Hierarchy([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], [1.0, 2.0, -np.inf], [1.0, 2.0, 9.0],
+                     [2, 1])
+
+
+@pytest.fixture
+def small(tmp_path):
+    path = tmp_path / "small.npz"
+    Collection(Head("mixed", "", "fresh", 3), (three_rows(),) * 2).save(path)
+    return path
+
+
+@pytest.mark.parametrize(("content", "said"), [
+    ({"head": b"{"}, "head.json is not JSON"), ({"head": b"[]"}, 'does not say "format"'),
+    ({"head": b"[" * 100_000}, "head.json is nested too deep"),
+    ({"head": None}, "not a file of problems: head.json is missing"),
+    ({"head": lambda head: head.replace(b'"version": 1', b'"version": 9')},
+     "version 9 of the format; known is 1"),
+    ({"head": lambda head: head.replace(b'"count": ', b'"count": 1')}, "says 1"),
+    ({"head": lambda head: head.replace(b'"seed": ', b'"seed": -0.')}, "seed is -0"),
+    ({"head": lambda head: head.replace(b'"family"', b'"famile"')}, "family is missing"),
+    ({"A": None}, "not a file of problems: A.npy is missing"),
+    ({"A": lambda data: data[:-8] + b"\0\0\0\0\0\0\1\0"}, "SHA-256"),
+    ({"A": header((10**15,))}, "A: its header says 8000000000000000 bytes, and 0 follow"),
+    ({"A": header((10**15,))[:-9]}, "A: "), ({"A": b""}, "A: "),
+    ({"upper": lambda data: data.replace(b"<f8", b"<f4")}, "expected one dimension"),
+    ({"sizes": np.array([10**9, 1, 2, 1])}, "problem 0 needs 2000000002 more numbers"),
+    ({"levels": np.array([3, 3]), "sizes": np.array([HUGE, HUGE, 5] * 2)}, "A is too short"),
+    ({"lower": np.zeros(5)}, "lower is too short: problem 1 needs 3 more numbers, there are 2"),
+    ({"upper": np.array([1.0, 2, 9, 1, 2, -np.inf])}, "problem 1, level 2, row 0: no value"),
+    ({"reference": np.array([0.0, np.nan, 0, 0])}, "problem 0, reference, entry 1: nan"),
+    ({"n": np.array([2**62, 2])}, "reference is too short"), ({"n": np.array([2, -1])}, "n = -1"),
+    ({"n": np.array([2])}, "n is of 1 problems and levels of 2"),
+    ({"levels": np.array([HUGE, 2])}, "sizes is too short")])
+def test_a_damaged_file_is_refused_and_the_reason_named(small, content, said):
+    rewritten(small, **content)
+    with pytest.raises(ProblemFileError) as error:
+        read(small)
+    assert str(small) in str(error.value)
+    assert said in str(error.value)
+
+
+def test_an_archive_is_refused_that_unpacks_to_more_than_it_may(small, monkeypatch):
+    rewritten(small, zipfile.ZIP_DEFLATED, more=bytes(2**22))
+    assert small.stat().st_size < 2**14
+    assert len(read(small).problems) == 2
+    monkeypatch.setattr("hierarchy.archives.LARGEST", 2**21)
+    with pytest.raises(ProblemFileError, match=r"it unpacks to 419.* bytes, more than 2097152"):
+        read(small)
+
+
+def test_a_single_hierarchy_in_a_file_passes_the_same_gate(tmp_path):
+    path, h = tmp_path / "one.npz", problems.generate(3)
+    problems.save(h, path)
+    again = problems.load(path)
+    assert again.names == h.names
+    for part in ("A", "lower", "upper", "sizes", "offsets", "reference"):
+        np.testing.assert_array_equal(getattr(again, part), getattr(h, part))
+    for content, said in (({"lower": np.zeros(2)}, "lower has shape (2,), expected (3,)"),
+                          ({"sizes": np.array([2, 10**9])}, "level 2: size 1000000000"),
+                          ({"A": header((10**15, 2))}, "A.npy: its header says")):
+        problems.save(three_rows(), path)
+        rewritten(path, **content)
+        with pytest.raises(HierarchyError) as error:
+            problems.load(path)
+        assert f"{path} cannot be read as a hierarchy: {said}" in str(error.value)
 
 
 def test_what_is_no_file_of_problems_is_refused(tmp_path):
@@ -115,8 +178,6 @@ def test_a_byte_that_changed_is_noticed(file):
 @pytest.mark.parametrize(("what", "said"), [({"metric": [[2.0]]}, "has a metric"),
                                             ({"give": [0.1]}, "gives")])
 def test_a_metric_and_levels_that_give_cannot_be_written(tmp_path, what, said):
-    from hierarchy import Hierarchy
-
     h = Hierarchy.from_levels([([[1.0]], [1.0])], **what)
     with pytest.raises(HierarchyError, match=f"problem 0 {said}"):
         Collection(Head("one", "", "public", 0), (h,)).save(tmp_path / "one.npz")

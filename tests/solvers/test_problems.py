@@ -25,14 +25,15 @@ def unit(h):
 
 
 def test_every_problem_is_a_valid_hierarchy():
-    for h in everything(Recipe()):
+    found = everything(Recipe())
+    for h in found:
         Hierarchy.from_levels(list(h.levels()), h.reference)
+    assert not all(h.is_equality for h in found)
 
 
 @pytest.mark.slow
 def test_equalities_alone_can_be_asked_for():
     assert all(h.is_equality for h in everything(Recipe(equalities_only=True)))
-    assert not all(h.is_equality for h in everything(Recipe()))
 
 
 @pytest.mark.slow
@@ -57,15 +58,6 @@ def test_near_parallel_rows_have_the_angle_asked_for(angle):
 def test_a_knob_out_of_range_is_named(knob, value):
     with pytest.raises(HierarchyError, match=f"recipe: {knob} = "):
         Recipe(**{knob: value})
-
-
-def test_a_file_gives_back_what_was_written(tmp_path):
-    h = Hierarchy.from_levels(list(generate(3).levels()), names=None)
-    problems.save(h, tmp_path / "h.npz")
-    same = problems.load(tmp_path / "h.npz")
-    assert same.names == h.names
-    for part in ("A", "lower", "upper", "sizes", "offsets", "reference"):
-        assert np.array_equal(getattr(same, part), getattr(h, part))
 
 
 @pytest.mark.slow

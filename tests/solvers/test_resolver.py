@@ -3,6 +3,7 @@
 import ast
 import dataclasses
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,9 @@ import numpy as np
 import pytest
 
 from hierarchy import Hierarchy, HierarchyError
+from hierarchy.errors import UnknownNameError
 from solvers import Resolution, Status, make, names
+from solvers.resolvers.set_based import SetBased
 
 ROOT = Path(__file__).parents[2]
 
@@ -74,10 +77,57 @@ def test_a_count_is_a_whole_number_that_a_kernel_can_hold(resolver):
             make(resolver, max_iterations=wrong)
 
 
-def test_labels_name_what_makes_another_method():
-    assert make("tpm").label == "tpm"
-    assert make("tpm-published").label == "tpm-published"
-    assert make("hqp").label == "hqp proxqp"
+@pytest.mark.parametrize("name", [*names(), "smooth"])
+def test_settings_of_every_resolver_are_checked_by_name(name):
+    assert isinstance(make(name, damping=1).damping, float)
+    with pytest.raises(HierarchyError, match="did you mean 'damping'"):
+        make(name, dampnig=0.1)
+    with pytest.raises(HierarchyError, match="unknown setting"):
+        make(name, _settings=1)
+    for setting, value in [("damping", -0.1), ("damping", float("nan")), ("damping", "0.1"),
+                           ("threshold", 0.0), ("threshold", float("inf")),
+                           ("rank_tolerance", -1e-9), ("rank_tolerance", 1.0),
+                           ("rank_tolerance", True)]:
+        with pytest.raises(HierarchyError, match=f"{name}: {setting} = "):
+            make(name, **{setting: value})
+
+
+@pytest.mark.parametrize(("name", "settings"), [
+    ("hcod", {"tolerance": 0.0}), ("smooth", {"eta": 0.0}),
+    ("recursive", {"largest": 1.0}), ("recursive", {"method": "selective", "largest": 0.0}),
+    ("recursive", {"method": "nakamura", "isotropic": 0.1}), ("merged", {"scales": 3.0}),
+    *(("weighted", {setting: value}) for setting, value in [
+        ("weights", [1.0, 0.0]), ("weights", [1.0, "2"]), ("weights", "12"), ("weights", 3.0),
+        ("ratio", 0.5), ("regularisation", 0.0), ("hard_levels", -1), ("hard_levels", True),
+        ("guesses", 0), ("tolerance", 0.0)])], ids=str)
+def test_a_setting_that_makes_no_sense_is_named_with_its_value(name, settings):
+    setting, value = list(settings.items())[-1]
+    with pytest.raises(HierarchyError, match=re.escape(f"{name}: {setting} = {value!r}")):
+        make(name, **settings)
+
+
+def test_settings_of_parts_are_named():
+    with pytest.raises(HierarchyError, match="merged: scales: 'hand'"):
+        make("merged", scales={"hand": 0.0})
+    for wrong in ({"tolerance": -1.0}, {"most": 0}):
+        with pytest.raises(HierarchyError, match=next(iter(wrong))):
+            SetBased(inner=make("tpm"), **wrong)
+
+
+@pytest.mark.parametrize(("name", "setting", "value"), [
+    ("hqp", "backend", "daqpp"), ("hqp", "form", "slak"), ("reverse", "form", "in-oder"),
+    ("recursive", "method", "nakamora")])
+def test_an_unknown_choice_names_the_nearest(name, setting, value):
+    with pytest.raises(UnknownNameError, match=f"unknown {setting} of {name} '{value}'; did you"):
+        make(name, **{setting: value})
+
+
+@pytest.mark.parametrize(("name", "settings", "label"), [
+    ("tpm", {}, "tpm"), ("tpm-published", {}, "tpm-published"), ("hqp", {}, "hqp proxqp"),
+    ("weighted", {}, "weighted"), ("weighted", {"weights": (10, 1)}, "weighted 10/1"),
+    ("weighted", {"ratio": 1e3, "backend": "daqp"}, "weighted 1000 daqp")])
+def test_labels_name_what_makes_another_method(name, settings, label):
+    assert make(name, **settings).label == label
 
 
 @pytest.mark.slow
@@ -110,14 +160,14 @@ def test_a_first_hierarchy_is_solved_without_pinocchio_matplotlib_and_qpsolvers(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", sorted((ROOT / "solvers").rglob("*.py")), ids=lambda f: f.stem)
-def test_scipy_qpsolvers_and_pinocchio_are_imported_where_first_needed(file):
-    top = [node for node in ast.parse(file.read_text()).body
-           if isinstance(node, (ast.Import, ast.ImportFrom))]
-    names = {name for node in top for name in (
-        [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module])}
-    assert {name.partition(".")[0] for name in names}.isdisjoint(
-        {"scipy", "qpsolvers", "pinocchio", "matplotlib"})
+def test_scipy_qpsolvers_and_pinocchio_are_imported_where_first_needed():
+    late = {"scipy", "qpsolvers", "pinocchio", "matplotlib"}
+    for file in (ROOT / "solvers").rglob("*.py"):
+        for node in ast.parse(file.read_text()).body:
+            if isinstance(node, ast.Import):
+                assert late.isdisjoint(one.name.partition(".")[0] for one in node.names), file
+            if isinstance(node, ast.ImportFrom):
+                assert (node.module or "").partition(".")[0] not in late, file
 
 
 def output_of(code):

@@ -8,7 +8,6 @@ import pytest
 from rank_cases import CASES, build, family, rng
 
 from hierarchy import Hierarchy
-from hierarchy.errors import UnknownNameError
 from solvers import make
 
 REVERSE, IN_ORDER, STRICT = make("reverse"), make("reverse", form="in-order"), make("tpm")
@@ -83,8 +82,3 @@ def test_damping_bounds_the_answer_where_a_level_hardly_clears_those_below():
     h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0]), ([[1.0, 1e-7]], [0.0])])
     assert np.abs(REVERSE.solve(h).x).max() > 1e6
     assert np.abs(make("reverse", damping=0.05).solve(h).x).max() < 10.0
-
-
-def test_an_unknown_form_names_the_known():
-    with pytest.raises(UnknownNameError, match="form of reverse"):
-        make("reverse", form="in-oder")

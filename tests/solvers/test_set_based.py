@@ -122,12 +122,6 @@ def test_a_row_with_two_sides_is_refused_with_its_level_and_sides():
         SET_BASED.solve(h)
 
 
-@pytest.mark.parametrize("setting", [{"tolerance": -1.0}, {"most": 0}])
-def test_a_setting_out_of_range_is_refused(setting):
-    with pytest.raises(HierarchyError, match=next(iter(setting))):
-        SetBased(inner=make("tpm"), **setting)
-
-
 def test_in_closed_loop_the_tip_stops_at_the_wall_and_the_joint_at_its_limit():
     """An arm of three joints that is sent beyond a wall; then it is called back."""
     q, period, wall, limit = np.array([0.6, 0.9, 0.5]), 0.006, 1.5, 1.2

@@ -166,20 +166,6 @@ def test_a_level_without_any_scaling_adds_nothing_and_scaling_what_is_missed_hel
     np.testing.assert_allclose([target.scaling[2], miss.scaling[2]], [0.0, 0.25])
 
 
-@pytest.mark.parametrize(("levels", "said"), [
-    ([(np.eye(2), [0, 0]), (np.eye(2), [-1, -1], [1, 1])], "level 2, row 0: an inequality, -1 <="),
-    ([([[1, 0], [1, 1]], [-1, -1], [1, 1])], "level 1, row 1: an inequality"),
-    ([([[1, 1], [0, 1]], [1, -1], [1, 1])], "level 1, row 1: an inequality"),
-    ([([[0, 0]], [-1], [1])], "level 1, row 0: an inequality"),
-    ([(np.eye(2), [-1, -1], [1, 1]), ([[1, 1]], [0], [np.inf])], "level 2, row 0: an inequality"),
-])
-@pytest.mark.parametrize("resolver", [BASIC, OPTIMAL], ids=str)
-def test_other_inequalities_are_refused_by_level_and_row(resolver, levels, said):
-    with pytest.raises(HierarchyError, match=said) as error:
-        resolver.solve(Hierarchy.from_levels(levels))
-    assert "bounds on single unknowns" in str(error.value)
-
-
 def test_bounds_that_exclude_each_other_are_named():
     h = Hierarchy.from_levels([([[1, 0], [0, 1], [2, 0]], [-1, -1, 4], [1, 1, 6])],
                               names=["limits"])
@@ -187,13 +173,3 @@ def test_bounds_that_exclude_each_other_are_named():
         BASIC.solve(h)
     touching = Hierarchy.from_levels([([[3.0], [1.0]], [-1, 0.1], [0.3, 1])])
     assert BASIC.solve(touching).x == pytest.approx(0.1)
-
-
-def test_damping_without_saturation_is_that_of_recursive():
-    for seed in range(FEW):
-        levels = random_levels(6, (3, 2, 2), seed)
-        far, ref = np.full(6, 1e3), np.arange(6.0)
-        settings = {"damping": 0.05, "threshold": 3.0}
-        expected = make("recursive", **settings).solve(Hierarchy.from_levels(levels, ref)).x
-        x = make("sns", **settings).solve(boxed(-far, far, *levels, reference=ref)).x
-        np.testing.assert_allclose(x, expected, atol=1e-9)

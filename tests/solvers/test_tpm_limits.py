@@ -4,10 +4,10 @@ import os
 
 import numpy as np
 import pytest
-from rank_cases import CASES, build, generic, random_levels, rng
+from rank_cases import CASES, build, rng
 from scipy.optimize import lsq_linear
 
-from hierarchy import Hierarchy, HierarchyError
+from hierarchy import Hierarchy
 from solvers import Status, certify, make
 from solvers.problems import Recipe, generate
 
@@ -129,47 +129,6 @@ def test_bounds_that_exclude_each_other_give_the_point_of_least_violation():
     assert certify(h, res.x).certified
     assert res.saturated.tolist() == [2, 1]
     assert res.scaling[0] == 0.0
-
-
-@pytest.mark.slow
-def test_the_memory_of_another_tick_does_not_change_the_answer():
-    for seed in range(3 if SLOW else 40):
-        levels, r = random_levels(7, (3, 1, 1), seed), rng(seed)
-        before = TPM.solve(boxed(Hierarchy.from_levels(levels), -0.3, 0.3)).memory
-        moved = [(A, b + 0.1 * r.normal(size=b.shape)) for A, b in levels]
-        h = boxed(Hierarchy.from_levels(moved), -0.3, 0.3)
-        warm, cold = TPM.solve(h, before), TPM.solve(h)
-        np.testing.assert_allclose(warm.x, cold.x, rtol=0, atol=1e-10)
-        again = TPM.solve(h, warm.memory)
-        np.testing.assert_allclose(again.x, cold.x, rtol=0, atol=1e-10)
-        assert again.iterations == 1
-
-
-def test_a_memory_is_handed_over_unharmed_and_need_not_fit():
-    h = boxed(Hierarchy.from_levels(generic()), -0.3, 0.3)
-    cold = TPM.solve(h)
-    kept = cold.memory.copy()
-    TPM.solve(h, cold.memory)
-    assert np.array_equal(cold.memory, kept)
-    for memory in (np.zeros(3), np.full(len(kept), np.nan), np.full(len(kept), 9.0)):
-        np.testing.assert_allclose(TPM.solve(h, memory).x, cold.x, rtol=0, atol=1e-12)
-    free = Hierarchy.from_levels(generic())
-    assert np.array_equal(TPM.solve(free, cold.memory).x, TPM.solve(free).x)
-
-
-@pytest.mark.parametrize("form", ["staircase", "published"])
-def test_inequalities_that_are_no_bounds_are_refused_by_level_and_row(form):
-    tpm, bounds = make("tpm", form=form), (np.eye(2), [0.0, 0.0], [1.0, 1.0])
-    for levels, where in (
-            ([([[1.0, 0.0], [1.0, 1.0]], [0, 0], [1, 2])], "level 1, row 1: .* <= a x <= 2"),
-            ([([[1.0, 0.0], [0.0, 0.0]], [0, 0], [1, 2])], "level 1, row 1: .* <= a x <= 2"),
-            ([([[1.0, 1.0], [1.0, 0.0]], [0, 0], [0, 1])], "level 1, row 1: .* <= a x <= 1"),
-            ([bounds, ([[1.0, 0.0]], [0], [3])], "level 2, row 0: .* <= a x <= 3"),
-            ([([[1.0, 0.0]], [0.0]), bounds], "level 2, row 0: .* <= a x <= 1")):
-        if form == "published":
-            where = "an inequality"
-        with pytest.raises(HierarchyError, match=where):
-            tpm.solve(Hierarchy.from_levels(levels))
 
 
 @pytest.mark.slow

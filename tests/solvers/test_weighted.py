@@ -178,16 +178,6 @@ def test_rows_that_are_nearly_parallel_are_said_to_leave_a_doubt():
 # Settings ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["INEQ7", "HUM38"])
-def test_the_memory_of_a_tick_before_leaves_one_factorisation_and_the_same_answer(name):
-    weighted = make("weighted")
-    for h, _, _ in list(family(name))[:HUMANOIDS]:
-        cold = weighted.solve(h)
-        warm = weighted.solve(h, cold.memory)
-        assert warm.iterations < 5
-        assert gap(warm.x, cold.x) < EXACT
-
-
 def test_a_backend_that_fails_is_named_by_the_status_and_x_keeps_the_constraints(monkeypatch):
     monkeypatch.setattr("qpsolvers.solve_problem", lambda *a, **k: 1 / 0)
     h, _, _ = next(iter(family("HUM38")))
@@ -199,21 +189,3 @@ def test_a_backend_that_fails_is_named_by_the_status_and_x_keeps_the_constraints
 def test_weights_for_another_number_of_levels_are_refused():
     with pytest.raises(HierarchyError, match="2 weights for 3 levels"):
         make("weighted", weights=(2.0, 1.0)).solve(build(generic, True))
-
-
-@pytest.mark.parametrize(("setting", "value"), [
-    ("weights", [1.0, 0.0]), ("weights", [1.0, "2"]), ("weights", "12"), ("weights", 3.0),
-    ("ratio", 0.5), ("regularisation", 0.0), ("hard_levels", -1), ("hard_levels", True),
-    ("guesses", 0), ("max_iterations", 1.5), ("tolerance", 0.0)])
-def test_a_bad_setting_is_named_with_its_value(setting, value):
-    with pytest.raises(HierarchyError, match=f"weighted: {setting} = "):
-        make("weighted", **{setting: value})
-
-
-def test_labels_say_what_makes_another_method_of_it():
-    assert make("weighted").label == "weighted"
-    assert make("weighted", ratio=1e3, backend="daqp").label == "weighted 1000 daqp"
-    assert make("weighted", weights=(10, 1)).label == "weighted 10/1"
-
-
-# Work space --------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import CentreOfMass, JointLimits, Pointing, Pose, Position, Posture
 from scenarios import compare, simulate
-from solvers import Resolver, certify, explain, make, names
+from solvers import Resolver, certify, explain, make
 from solvers.batch import solve
 from solvers.factorization import Factorization
 
@@ -67,30 +67,6 @@ def refused(call):
 ])
 def test_a_wrong_type_is_answered_with_what_was_given_and_expected(call, said):
     assert said in refused(call)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", names())
-@pytest.mark.parametrize("given", [[(A, B)], A, "h", None, ROBOT])
-def test_every_resolver_says_that_it_solves_a_hierarchy(name, given):
-    assert f"{name}: h: expected a Hierarchy, got" in refused(lambda: make(name).solve(given))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("memory", [[0.0] * 9, "memory", 7, np.zeros(9, dtype=np.int64),
-                                    np.zeros(9, dtype=complex)])
-def test_a_memory_of_the_wrong_kind_is_refused(memory):
-    h = Hierarchy.from_levels([(A, -B, B), (A[:1], B[:1])])
-    for name in names():
-        assert f"{name}: memory" in refused(lambda n=name: make(n).solve(h, memory))
-
-
-@pytest.mark.slow
-def test_a_resolution_in_place_of_its_memory_is_refused():
-    h = Hierarchy.from_levels([(A, -B, B)])
-    found = make("hcod").solve(h)
-    assert "give the memory of an earlier resolution, res.memory" in refused(
-        lambda: make("hcod").solve(h, found))
 
 
 def test_errors_inside_a_resolver_are_not_hidden():
