@@ -1,5 +1,7 @@
 """What a user reads who wrote something wrong: the place, the mend, the nearest name."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -56,9 +58,8 @@ def test_a_file_with_a_byte_order_mark_and_names_in_any_alphabet_is_read(tmp_pat
     ("avoidance.zzz=1", "unknown key 'avoidance.zzz'. Known:"),
     ("name='a b'", "a name has letters, digits")])
 def test_a_wrong_value_is_told_with_what_it_may_be(change, said):
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         load("ellipse", [change])
-    assert said in str(error.value)
 
 
 @pytest.mark.parametrize(("asked", "said"), [
@@ -118,9 +119,8 @@ def test_what_a_resolver_of_a_plugin_returns_is_judged(returned, said, an_arm_hi
         def solve(self, h, memory=None):
             return returned(h)
 
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         Mine().solve(an_arm_hierarchy)
-    assert said in str(error.value)
 
 
 def test_a_nan_of_a_resolver_of_a_plugin_is_a_failure(an_arm_hierarchy):

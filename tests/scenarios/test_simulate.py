@@ -1,3 +1,4 @@
+import re
 import signal
 
 import numpy as np
@@ -80,9 +81,8 @@ def test_a_scenario_may_have_any_of_its_tasks():
     (["avoidance.jacobian=published"], "has no exact derivative"),
 ])
 def test_a_scenario_that_does_not_fit_its_robot_is_named(changes, said):
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         simulate(load("ellipse", [*SHORT, *changes]))
-    assert said in str(error.value)
 
 
 def test_an_interrupted_run_keeps_what_was_run():

@@ -40,9 +40,6 @@ def server():
     opened.stop()
 
 
-# Time
-
-
 # The moment that is drawn
 
 

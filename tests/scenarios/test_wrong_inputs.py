@@ -1,5 +1,7 @@
 """Wrong files, values and command lines: each with the message that a user gets."""
 
+import re
+
 import pytest
 
 from hierarchy import HierarchyError
@@ -79,9 +81,8 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
     ("faults=[{kind='no_frames', at=0.0, duration=1.0}]", "need a sensor of kind \"camera\""),
 ])
 def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         load("ellipse", [change])
-    assert said in str(error.value)
 
 
 @pytest.mark.parametrize(("changes", "said"), [
