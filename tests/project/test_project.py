@@ -73,6 +73,7 @@ def make_set_up(folder, interpreter):
     ("import scenarios", {"numpy", "pydantic"}),
     ("import hierarchy", {"pinocchio"}), ("from hierarchy import Hierarchy", {"pinocchio"}),
     ("import solvers", {"pinocchio"}),
+    ("import scenarios.cli.main", {"numpy", "numba", "pinocchio", "scipy", "matplotlib"}),
     ("from scenarios.cli.main import run_command; run_command(['--help'])",
      {"numpy", "numba", "pinocchio", "pydantic", "matplotlib"})])
 def test_a_program_loads_no_heavy_package_that_it_does_not_need(statement, heavy):

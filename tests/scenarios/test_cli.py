@@ -81,26 +81,6 @@ def test_compare_writes_page_numbers_and_a_folder_for_each_run_in_80_columns(tmp
     assert numbers["runs"][0]["settings"]["damping"] == 0.05
 
 
-@pytest.mark.parametrize(("arguments", "says"), [
-    (["compare", "ellipse", "ellipse"], "2 scenarios are named 'ellipse'"),
-    (["run", "ellipse", "--resolver", "recursiv"], "did you mean 'recursive'"),
-    (["run", "ellipse", "--duration", "-1"], "control.duration"),
-    (["run", "missing.toml"], "missing.toml"),
-    (["compare", "ellipse", "--resolvers", ","], "an empty name in ','"),
-    (["compare", "ellipse", "--resolvers", "tpm,,hcod"], "an empty name in 'tpm,,hcod'"),
-    (["run", "ellipse", "--speed", "2"], "--speed: needs --live"),
-    (["run", "ellipse", "--out", ""], "'--out': the path is empty"),
-    (["bench", "tick", "--out", " "], "'--out': the path is empty"),
-    (["rnu", "ellipse"], "rnu"),
-    (["run"], "Missing argument"),
-    (["run", "ellipse", "--bogus"], "--bogus"),
-    (["bench", "[red]nothing[/red]"], "[red]nothing[/red]"),
-])
-def test_a_mistake_is_named_before_anything_is_run(arguments, says, capsys, tmp_path):
-    assert says in fails(arguments, capsys)
-    assert not list(tmp_path.rglob("run.npz"))
-
-
 def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, capsys, monkeypatch):
     simulation_is(must_not_run, monkeypatch)
     (tmp_path / "precious").mkdir()

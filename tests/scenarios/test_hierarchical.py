@@ -55,7 +55,6 @@ def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row
     (["control.level=velocity", "limits.torque=0.5"], "needs control.level"),
     (["limits.acceleration=0"], "limits.acceleration"),
     (["limits.acceleration=[1.0, 2.0]"], "expected a number or"),
-    (["avoidance.distanc=1"], "did you mean 'avoidance.distance'"),
 ])
 def test_what_does_not_go_together_is_said(changes, says):
     with pytest.raises(HierarchyError, match=says):

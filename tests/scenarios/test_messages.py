@@ -50,18 +50,6 @@ def test_a_file_with_a_byte_order_mark_and_names_in_any_alphabet_is_read(tmp_pat
     assert load(file).name == "Größe-模型"
 
 
-@pytest.mark.parametrize(("change", "said"), [
-    ("tasks=[{kind='postion'}]", "tasks.0: unknown kind 'postion'; did you mean 'position'?"),
-    ("control.level=torqe", "unknown value 'torqe'; did you mean 'torque'?"),
-    ("tasks={kind='pose'}", "tasks: expected a list: for tables write [[tasks]] above each"),
-    ("control=[{period=0.1}]", "control: expected one table, as below [control]"),
-    ("avoidance.zzz=1", "unknown key 'avoidance.zzz'. Known:"),
-    ("name='a b'", "a name has letters, digits")])
-def test_a_wrong_value_is_told_with_what_it_may_be(change, said):
-    with pytest.raises(HierarchyError, match=re.escape(said)):
-        load("ellipse", [change])
-
-
 @pytest.mark.parametrize(("asked", "said"), [
     ("elipse", "did you mean 'ellipse'? The nearest of "), ("m.urdf", "'m.urdf' is a robot"),
     ("a.py", "to be run by `python a.py`"), (".", "'.' is a folder"), ("tpm", "is a resolver"),
