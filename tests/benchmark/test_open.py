@@ -165,13 +165,6 @@ def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path
     assert [row["warm_right"] for row in found] == [None, True, True]
 
 
-def test_each_library_needs_a_name_and_a_file(tmp_path):
-    with pytest.raises(HierarchyError, match="1 libraries and 0 names"):
-        compiled([tmp_path / "a.so"], [])
-    with pytest.raises(HierarchyError, match=r"a\.so does not exist"):
-        compiled([tmp_path / "a.so"], ["a"])
-
-
 def test_the_worker_reads_the_problems_that_were_written(tmp_path):
     from solvers import problems
 
@@ -267,19 +260,25 @@ def test_the_three_sentences_name_who_solves_most_and_who_is_faster():
         "As often right as hcod, and faster: simple (other, 1.00 µs against 4.00 µs)."]
 
 
+@pytest.mark.parametrize(("call", "said"), [
+    (lambda: compiled([Path("a.so")], []), "1 libraries and 0 names"),
+    (lambda: compiled([Path("a.so")], ["a"]), r"a\.so does not exist"),
+    (lambda: chosen(["hcodd"]), "did you mean 'hcod'"),
+    (lambda: chosen(["no/such/file.py:Mine"]), "does not exist")])
+def test_an_entrant_that_is_not_there_is_refused(call, said):
+    with pytest.raises(HierarchyError, match=said):
+        call()
+
+
+def test_entrants_are_chosen_in_the_order_that_is_asked_for():
+    assert [row.label for row in chosen(["tpm", "hcod"])] == ["tpm", "hcod"]
+
+
 def test_a_file_of_rows_that_is_damaged_is_named(tmp_path):
     (tmp_path / "rows").mkdir()
     (tmp_path / "rows" / "old.jsonl.gz").write_bytes(b"no gzip")
     with pytest.raises(HierarchyError, match=r"old\.jsonl\.gz cannot be read .*; remove it"):
         Store(tmp_path).rows()
-
-
-def test_an_unknown_entrant_and_a_missing_file_are_refused():
-    with pytest.raises(HierarchyError, match="did you mean 'hcod'"):
-        chosen(["hcodd"])
-    with pytest.raises(HierarchyError, match="does not exist"):
-        chosen(["no/such/file.py:Mine"])
-    assert [row.label for row in chosen(["tpm", "hcod"])] == ["tpm", "hcod"]
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ import pytest
 
 from benchmark.solve import resolvers
 from benchmark.solve.entrants import HIERARCHICAL, NUMPY
-from scenarios.cli.main import run_command
 from scenarios.problems import reference
 from scenarios.problems.reference import family
 from solvers.qp import backends
@@ -67,12 +66,3 @@ def test_fresh_problems_are_timed_and_reported_apart(few):
     assert {row["entrant"] for row in rows} == {NUMPY, HIERARCHICAL, "hcod", "hcod warm"}
     assert all(row["wrong"] == 0 for row in rows if row["entrant"] in ("hcod", "hcod warm"))
     assert [table.title for table in found.sections[1].tables] == ["EQ7, fresh", "INEQ7, fresh"]
-
-
-@pytest.mark.parametrize(("asked", "says"), [
-    (["--family", "EQ8"], "unknown family 'EQ8'; did you mean 'EQ7'"),
-    (["--resolver", "hqod"], "unknown resolver 'hqod'; did you mean 'hcod'"),
-])
-def test_an_unknown_family_or_resolver_is_named(asked, says, tmp_path, capsys):
-    assert run_command(["bench", "resolvers", *asked, "--out", str(tmp_path / "out")]) == 2
-    assert says in capsys.readouterr().err

@@ -1,5 +1,3 @@
-import subprocess
-import sys
 
 import pytest
 
@@ -53,10 +51,3 @@ def test_everything_measured_is_told(monkeypatch):
     assert [row["verdict"] for row in found.rows["start"]] == ["met", "", "not met"]
     assert found.rows["compilation"] == [{"kernel": "solvers.kernels.a.b", "seconds": 2.0}]
     assert "a.b 2.0" in found.sections[0].text
-
-
-def test_importing_the_command_line_imports_nothing_heavy():
-    code = ("import sys, scenarios.cli.main; "
-            "print({'numpy', 'numba', 'pinocchio', 'scipy', 'matplotlib'} & set(sys.modules))")
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "set()\n"

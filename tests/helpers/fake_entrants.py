@@ -64,16 +64,6 @@ class Doomed(LeastSquares):
         os._exit(3)
 
 
-class Starting(LeastSquares):
-    """Starts from an earlier answer, which it adds nothing to."""
-
-    warm = True
-
-    def solve_from(self, prepared, before):
-        assert before.shape == prepared.reference.shape
-        return self.solve(prepared)
-
-
 class Moody(LeastSquares):
     """Never gives the same bits twice, and never calls its answer solved."""
 

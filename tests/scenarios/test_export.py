@@ -63,19 +63,15 @@ def test_an_mcap_file_has_every_signal_of_every_tick(run, messages):
                                       np.where(np.isfinite(signal), signal, np.nan))
 
 
-def test_schemas_tell_units_and_foxglove_what_it_can_draw(messages):
-    _, schemas, _ = messages
-    assert schemas["/joints"][1]["properties"]["v"]["description"].split() == ["rad/s"] * 7
-    assert schemas["/tf"][0] == "foxglove.FrameTransforms"
-    assert schemas["/scene"][0] == "foxglove.SceneUpdate"
-    assert schemas["/events"][0] == "foxglove.Log"
-
-
-def test_every_message_is_as_its_schema_says(messages):
+def test_every_message_is_as_its_schema_says_which_tells_units_and_what_foxglove_draws(messages):
     found, schemas, _ = messages
     for topic, entries in found.items():
         for _, message in entries:
             assert_fits(message, schemas[topic][1], topic)
+    assert schemas["/joints"][1]["properties"]["v"]["description"].split() == ["rad/s"] * 7
+    assert {topic: schemas[topic][0] for topic in ("/tf", "/scene", "/events")} == {
+        "/tf": "foxglove.FrameTransforms", "/scene": "foxglove.SceneUpdate",
+        "/events": "foxglove.Log"}
 
 
 def assert_fits(value, schema, where):

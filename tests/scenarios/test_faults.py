@@ -1,6 +1,7 @@
 """Faults put into a run: every command is finite, the run says what happened, and goes on."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -159,15 +160,10 @@ def test_the_command_line_says_what_happened_and_fails_only_where_the_run_ended(
      "unknown joint 'elbow'"),
 ])
 def test_a_fault_that_cannot_be_put_in_is_named(fault, said):
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         simulate(load("ellipse", [f"faults=[{fault}]"]))
-    assert said in str(error.value)
 
 
-def test_a_fault_of_distances_needs_a_sensor(tmp_path):
-    path = tmp_path / "blind.toml"
-    path.write_text('name = "blind"\n[robot]\nmodel = "kuka_lwr"\n[control]\nresolver = "tpm"\n'
-                    'duration = 1.0\n[position.path]\nkind = "still"\nposition = [0.0, 0.6, 0.0]\n'
-                    '[[faults]]\nkind = "nan_distance"\nat = 0.1\nduration = 0.1\n')
+def test_a_fault_of_distances_needs_a_sensor():
     with pytest.raises(HierarchyError, match="'nan_distance' needs"):
-        load(path)
+        load("strictness", ["faults=[{kind='nan_distance', at=0.1, duration=0.1}]"])

@@ -20,7 +20,8 @@ def names_of(*changes, scenario="ellipse-hqp"):
 @pytest.mark.parametrize("resolver", ["hcod", "weighted"])
 def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
     scenario = load("ellipse-hqp", [SHORT, f"control.level={level}"]).with_resolver(resolver)
-    run = simulate(scenario)
+    certified = (level, resolver) == ("acceleration", "hcod")
+    run = simulate(scenario, certified=certified)
     assert run.fault is None
     assert (run["status"] == 0).all()
     excess = np.maximum(run["q"] - run["joint_upper"], run["joint_lower"] - run["q"])
@@ -28,12 +29,7 @@ def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
     assert (np.abs(run["v"]) - run["velocity_limit"]).max() <= 1e-9
     assert np.abs(run["a"]).max() <= 10.0 * (1.0 + 1e-6)
     assert run["minimal_distance"].min() >= scenario.avoidance.distance - 1e-4
-
-
-@pytest.mark.slow
-def test_every_tick_of_hcod_is_certified():
-    run = simulate(load("ellipse-hqp", [SHORT]), certified=True)
-    assert run["certified"].all()
+    assert not certified or run["certified"].all()
 
 
 def test_the_order_is_fixed_and_limits_come_first():
@@ -55,7 +51,6 @@ def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row
     (["control.level=velocity", "limits.torque=0.5"], "needs control.level"),
     (["limits.acceleration=0"], "limits.acceleration"),
     (["limits.acceleration=[1.0, 2.0]"], "expected a number or"),
-    (["avoidance.distanc=1"], "did you mean 'avoidance.distance'"),
 ])
 def test_what_does_not_go_together_is_said(changes, says):
     with pytest.raises(HierarchyError, match=says):

@@ -1,5 +1,6 @@
 """Every kind of `[[tasks]]` in a scenario: what it reaches, and what is refused."""
 
+import re
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -136,9 +137,8 @@ def test_a_path_is_followed(path, tmp_path):
     ({"kind": "look_at", "frame": "end_effector"}, "'look-at'"),
 ])
 def test_wrong_values_are_named(task, said, tmp_path):
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         scenario_of(tmp_path, task)
-    assert said in str(error.value)
 
 
 @pytest.mark.parametrize(("task", "said"), [
@@ -156,9 +156,8 @@ def test_wrong_values_are_named(task, said, tmp_path):
      "blend 2.0 s must be positive and at most 1 s"),
 ])
 def test_what_does_not_fit_the_robot_is_named(task, said, tmp_path):
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         build(scenario_of(tmp_path, task))
-    assert said in str(error.value)
 
 
 @pytest.mark.slow
@@ -187,9 +186,8 @@ def test_tasks_over_forces_have_their_rows():
 def test_a_key_of_a_path_in_the_list_is_named_as_it_is_written(change, said, tmp_path):
     scenario_of(tmp_path, {"kind": "position", "frame": "end_effector", "path": {
         "kind": "circle", "centre": [0.3, 0.5, 0.1], "radius": 0.05}})
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         load(tmp_path / "listed.toml", [f"tasks.0.path.{change}"])
-    assert said in str(error.value)
 
 
 def test_every_kind_has_a_test_here(request):

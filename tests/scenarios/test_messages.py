@@ -1,5 +1,7 @@
 """What a user reads who wrote something wrong: the place, the mend, the nearest name."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -46,19 +48,6 @@ def test_a_file_with_a_byte_order_mark_and_names_in_any_alphabet_is_read(tmp_pat
     file = tmp_path / "größe.toml"
     file.write_bytes('extends = "ellipse"\nname = "Größe-模型"\n'.encode("utf-8-sig"))
     assert load(file).name == "Größe-模型"
-
-
-@pytest.mark.parametrize(("change", "said"), [
-    ("tasks=[{kind='postion'}]", "tasks.0: unknown kind 'postion'; did you mean 'position'?"),
-    ("control.level=torqe", "unknown value 'torqe'; did you mean 'torque'?"),
-    ("tasks={kind='pose'}", "tasks: expected a list: for tables write [[tasks]] above each"),
-    ("control=[{period=0.1}]", "control: expected one table, as below [control]"),
-    ("avoidance.zzz=1", "unknown key 'avoidance.zzz'. Known:"),
-    ("name='a b'", "a name has letters, digits")])
-def test_a_wrong_value_is_told_with_what_it_may_be(change, said):
-    with pytest.raises(HierarchyError) as error:
-        load("ellipse", [change])
-    assert said in str(error.value)
 
 
 @pytest.mark.parametrize(("asked", "said"), [
@@ -118,9 +107,8 @@ def test_what_a_resolver_of_a_plugin_returns_is_judged(returned, said, an_arm_hi
         def solve(self, h, memory=None):
             return returned(h)
 
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         Mine().solve(an_arm_hierarchy)
-    assert said in str(error.value)
 
 
 def test_a_nan_of_a_resolver_of_a_plugin_is_a_failure(an_arm_hierarchy):

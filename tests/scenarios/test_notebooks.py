@@ -4,11 +4,11 @@ import json
 import re
 import sys
 import types
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from balanced import Balanced
 
 import hierarchy
 import scenarios
@@ -35,34 +35,12 @@ def h():
                                  names=["<limits>", "hand & arm"])
 
 
-class Balanced(HTMLParser):
-    """Fails unless every tag is closed in order."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.cells = [], []
-        self.feed(text)
-        assert self.open == []
-
-    def handle_starttag(self, tag, attributes):
-        self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, text):
-        self.cells.append(text)
-
-
-def test_a_table_escapes_every_value_and_marks_the_best():
+def test_a_table_escapes_every_value_marks_the_best_and_says_how_much_is_left_out():
     text = html_table("<b>", ("a&b",), [("<i>",), (2,)], best={(1, 0)})
     assert "&lt;b&gt;" in text
     assert "a&amp;b" in text
     assert "<td>&lt;i&gt;</td>" in text
     assert "<td><b>2</b></td>" in text
-
-
-def test_a_long_table_says_how_much_is_left_out():
     assert "... and 70 more" in html_table("t", ("n",), [(i,) for i in range(100)])
 
 
@@ -96,15 +74,10 @@ def test_texts_of_objects_are_one_short_line(h, run):
 
 
 @pytest.mark.slow
-def test_a_recording_shows_what_ran_and_its_signals(run):
+def test_a_recording_shows_its_signals_and_a_comparison_a_column_for_each_run(run):
     cells = Balanced(run._repr_html_()).cells
     assert {"scenario", "resolver", "position_error", "20 x 7"} <= set(cells)
-
-
-@pytest.mark.slow
-def test_a_comparison_shows_a_column_for_each_run():
-    found = compare([load("ellipse", SHORT)], ["tpm", "recursive"])
-    cells = Balanced(found._repr_html_()).cells
+    cells = Balanced(compare([run.scenario], ["tpm", "recursive"])._repr_html_()).cells
     assert "recursive" in cells
     assert any(cell.startswith("Position error, rms [") for cell in cells)
 
@@ -153,15 +126,11 @@ def test_without_a_library_a_data_frame_says_what_to_install(run, monkeypatch):
 
 
 @pytest.mark.parametrize("package", [hierarchy, solvers, scenarios])
-def test_dir_lists_every_public_name_and_each_can_be_had(package):
+def test_dir_lists_every_public_name_and_each_can_be_had_without_another_import(package):
     assert set(package.__all__) <= set(dir(package))
     for name in dir(package):
         getattr(package, name)
-
-
-def test_parts_of_hierarchy_need_no_import_of_their_own():
     assert {"tasks", "paths", "avoidance"} <= set(dir(hierarchy))
-    assert hierarchy.tasks.Posture is Posture
 
 
 @pytest.mark.slow

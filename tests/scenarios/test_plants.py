@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from pendulum import LIMIT, URDF
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles
@@ -215,12 +216,11 @@ def test_the_controller_sees_what_is_measured_and_nothing_else(changes):
         np.testing.assert_array_equal(command, run["command"][k])
 
 
-@pytest.mark.parametrize(("feedback", "period"), [("commanded", 0.005)])
-def test_the_ellipse_away_from_obstacles_is_tracked(mujoco, period, feedback):
-    changes = ["control.duration=3.0", f"control.period={period}", "limits.acceleration=10.0",
+def test_the_ellipse_away_from_obstacles_is_tracked(mujoco):
+    changes = ["control.duration=3.0", "control.period=0.005", "limits.acceleration=10.0",
                "control.resolver=tpm", "avoidance.obstacles=[[5.0, 5.0, 5.0]]"]
     exact = simulate(load("ellipse", changes))
-    run = simulate(load("ellipse", [*changes, "plant.kind=mujoco", f"plant.feedback={feedback}"]))
+    run = simulate(load("ellipse", [*changes, "plant.kind=mujoco", "plant.feedback=commanded"]))
     settled = run["t"] > 2.0
     assert np.linalg.norm(exact["position_error"][settled], axis=1).max() < 0.4e-3
     error = np.linalg.norm(run["desired_position"] - run["true_ee_position"], axis=1)[settled]
@@ -269,8 +269,10 @@ def test_without_mujoco_the_extra_is_named(monkeypatch, capsys):
 
 
 def test_only_an_arm_given_as_a_table_has_physics(mujoco, tmp_path):
+    (tmp_path / "arm.urdf").write_text(URDF.format(kind="revolute", limit=LIMIT))
     with pytest.raises(ScenarioError, match="robot 'arm' is not one of kuka_lwr"):
-        build(load(on_file(tmp_path, "revolute"), ["plant.kind=mujoco"]))
+        build(load("ellipse", ["plant.kind=mujoco", f"robot.model={tmp_path}/arm.urdf",
+                               "robot.end_effector=hand", "start={q=[0.0]}"]))
 
 
 @pytest.mark.parametrize("setting", ["servo.bandwidth", "joints.friction", "joints.armature"])
@@ -282,21 +284,3 @@ def test_a_setting_with_too_few_entries_is_named(mujoco, setting):
 def skip_without_mujoco(changes):
     if any("mujoco" in change for change in changes):
         pytest.importorskip("mujoco")
-
-
-def on_file(folder, kind):
-    """A scenario of an arm of two joints of a URDF file."""
-    link = ("<link name='{0}'><inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' "
-            "iyz='0' izz='1'/></inertial></link>")
-    joint = ("<joint name='j{1}' type='{2}'><parent link='l{0}'/><child link='l{1}'/>"
-             "<origin xyz='0.5 0 0'/><axis xyz='0 0 1'/>"
-             "<limit lower='-1' upper='1' effort='10' velocity='2'/></joint>")
-    (folder / "arm.urdf").write_text(
-        "<robot name='arm'>" + "".join(link.format(f"l{i}") for i in range(3))
-        + "".join(joint.format(i, i + 1, kind) for i in range(2)) + "</robot>")
-    path = folder / "arm.toml"
-    path.write_text("name = 'arm'\n[robot]\nmodel = 'arm.urdf'\n[control]\nduration = 0.1\n"
-                    "resolver = 'recursive'\n[position]\npath = { kind = 'still', "
-                    "position = [0.8, 0.2, 0.0] }\n" + (
-                        "[start]\nq = [1.0, 0.0, 1.0, 0.0]\n" if kind == "continuous" else ""))
-    return path

@@ -121,11 +121,6 @@ def test_check_finds_an_answer_that_is_not_proved(capsys, tmp_path):
     assert "problem 1: level 1: least violation" in capsys.readouterr().out
 
 
-def test_an_unknown_family_is_refused_with_the_nearest_name(capsys):
-    assert run_command(["problems", "show", "HUM39"]) == 2
-    assert "did you mean 'HUM38'" in capsys.readouterr().err
-
-
 def test_problems_as_others_make_them_are_what_their_makers_describe():
     for h in family("of-daqp").half(3, 5).problems:
         x = make("hcod").solve(h).x

@@ -91,11 +91,13 @@ def test_an_empty_or_new_folder_can_be_claimed_with_its_parents(tmp_path):
     assert (tmp_path / "a").is_dir()
 
 
-def test_what_is_written_whole_leaves_nothing_else(tmp_path):
+def test_what_is_written_whole_leaves_nothing_else_and_has_the_usual_permissions(tmp_path):
     with whole(claim(tmp_path / "run")) as partial:
         (partial / "file").touch()
         assert not (tmp_path / "run").exists()
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
+    (tmp_path / "usual").mkdir()
+    assert (tmp_path / "run").stat().st_mode == (tmp_path / "usual").stat().st_mode
 
 
 def write_to_a_full_disk(folder):
@@ -123,16 +125,7 @@ def test_numbered_folders_fill_the_first_gap(tmp_path):
     assert next_free(tmp_path / "run") == tmp_path / "run-2"
 
 
-def test_a_whole_folder_has_the_usual_permissions(tmp_path):
-    (tmp_path / "usual").mkdir()
-    with whole(tmp_path / "new") as partial:
-        (partial / "file").touch()
-    assert (tmp_path / "new").stat().st_mode == (tmp_path / "usual").stat().st_mode
-
-
 def test_a_folder_that_another_process_has_locked_cannot_be_claimed(tmp_path):
-    from scenarios.files import OutputError, claim
-
     code = ("import sys; from pathlib import Path; from scenarios.files import lock\n"
             "lock(Path(sys.argv[1])); print(); sys.stdin.read()")
     with subprocess.Popen([sys.executable, "-c", code, str(tmp_path / "run")],

@@ -203,21 +203,8 @@ def test_embedded_it_is_as_tall_as_its_content_whatever_the_frame(browser, runs,
     assert browser.complaints == []
 
 
-# On the command line.
-
-
-@pytest.fixture(scope="module")
-def short():
-    return simulate(load("ellipse", ["control.duration=0.2"]))
-
-
-@pytest.fixture
-def folder(short, tmp_path):
-    return save(short, tmp_path / "run")
-
-
-def test_the_command_takes_several_runs_and_a_name(folder, short, tmp_path):
-    other = save(short, tmp_path / "other")
+def test_the_command_takes_several_runs_and_a_name(runs, tmp_path):
+    folders = [str(save(run, tmp_path / label)) for label, run in runs.items()]
     file = tmp_path / "new" / "two.html"
-    assert run_command(["replay", str(folder), str(other), "--out", str(file)]) == 0
+    assert run_command(["replay", *folders, "--out", str(file)]) == 0
     assert len(data_of(file.read_text(encoding="utf-8"))["runs"]) == 2

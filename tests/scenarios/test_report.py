@@ -3,10 +3,10 @@ import itertools
 import re
 import shlex
 from functools import cache
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from balanced import Balanced
 from hand_made import HandMadeScenario, recording
 from headless import chromium
 
@@ -91,7 +91,7 @@ def test_a_run_that_never_began_has_empty_cells_and_loses_nobody_else_theirs():
         "no tasks but position"])
 def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
     text = page(comparison(*runs))
-    balanced(text)
+    Balanced(text)
     assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//""", text)
     assert not re.search(r"<(?:link|img|(?:iframe|script)[^>]* src)\b|@import|url\((?!#)", text)
 
@@ -195,19 +195,3 @@ def test_text_from_a_scenario_file_cannot_become_markup():
     text = page(comparison(made(LETTER, scenario=scenario)))
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert" in text
-
-
-def balanced(text):
-    """Fail unless every element that is opened is closed, in order."""
-    open_ones = []
-
-    class Checker(HTMLParser):
-        def handle_starttag(self, tag, attrs):
-            if tag not in ("meta", "br"):
-                open_ones.append(tag)
-
-        def handle_endtag(self, tag):
-            assert open_ones.pop() == tag
-
-    Checker().feed(text)
-    assert open_ones == []

@@ -13,7 +13,6 @@ from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import PhysicsArm
-from scenarios.cli.main import run_command
 
 pytestmark = pytest.mark.slow
 
@@ -134,10 +133,9 @@ def test_an_arm_comes_to_rest_without_frames_and_goes_on_when_they_return(name, 
     assert not touched(found)
 
 
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES[2:])
-def test_at_velocity_level_it_comes_to_rest_without_frames_too(name, resolver):
+def test_at_velocity_level_it_comes_to_rest_without_frames_too():
     put = f"faults=[{{kind='no_frames', at={STOP}, duration={BACK - STOP}}}]"
-    found = run(name, resolver, VISIT, put, seconds=2.5, parts="camera", level="velocity")
+    found = run(*SCHEMES[2], VISIT, put, seconds=2.5, parts="camera", level="velocity")
     blind = [event.tick for event in found.events if event.kind == "stale"]
     assert speed(found)[blind[0]] > 0.05
     np.testing.assert_array_equal(found["command"][blind[-1]], 0.0)
@@ -171,9 +169,8 @@ def test_what_is_near_at_the_start_is_left_at_once(name, resolver, near, level, 
     assert not touched(found)
 
 
-@pytest.mark.parametrize(("name", "resolver"), SCHEMES[1:2])
-def test_what_the_camera_sees_near_at_the_start_is_left_at_once(name, resolver):
-    found = run(name, resolver, sphere(NEAR), seconds=0.75, parts="camera")
+def test_what_the_camera_sees_near_at_the_start_is_left_at_once():
+    found = run(*SCHEMES[1], sphere(NEAR), seconds=0.75, parts="camera")
     assert found.events == () or {event.kind for event in found.events} == {"beyond_limits"}
     assert speed(found)[20] > 0.02
     exact = distances(found)
@@ -218,14 +215,13 @@ def test_separation_rests_at_its_distance_from_an_obstacle_on_the_target(level, 
     assert not touched(found)
 
 
-@pytest.mark.parametrize(("resolver", "parts"), [("tpm", "physics")])
-def test_repulsion_holds_the_end_effector_off_an_obstacle_on_the_target(resolver, parts):
+def test_repulsion_holds_the_end_effector_off_an_obstacle_on_the_target():
     """Switched, limits in the stack: it stays where repulsion and stiffness are even, 0.196 m off.
 
     It does not swing there. The body does: it is pushed by acceleration alone, which nothing damps,
     so the null motion goes on at up to the velocity limits. Nothing is touched.
     """
-    found = run("human", resolver, ONTO, seconds=8.0, parts=parts)
+    found = run("human", "tpm", ONTO, seconds=8.0, parts="physics")
     late = found["ee_distance"][600:]
     assert 0.17 < found["ee_distance"].min()
     assert late.min() > 0.19
@@ -321,12 +317,3 @@ def test_a_short_visit_in_physics_seen_by_the_camera(name, resolver):
     assert speed(found).max() > 0.1
     assert error(found)[-100:].max() < 1e-3
     assert not [event for event in found.events if event.kind != "beyond_limits"]
-
-
-def test_what_the_system_refuses_ends_without_a_traceback(monkeypatch, capsys):
-    def refused(*_):
-        raise OSError(28, "No space left on device", "a/file")
-
-    monkeypatch.setattr("scenarios.cli.doctor.doctor_command", refused)
-    assert run_command(["doctor"]) == 1
-    assert capsys.readouterr().err == "hierarchy: fault: a/file: No space left on device\n"

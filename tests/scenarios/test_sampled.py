@@ -19,7 +19,6 @@ from scenarios import load, shipped, simulate
 from scenarios.cli.main import run_command
 from scenarios.config.sampling import changed, drawn
 from scenarios.measure import metrics
-from scenarios.measure.statistics import wilson
 from scenarios.results import cluster, pool
 from scenarios.results.plan import load_sweep, plan, shipped_sweeps
 from scenarios.results.run import Job, Outcome, outcome
@@ -328,9 +327,3 @@ def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_sa
         assert f"worst/{name.name}" in page
         again = metrics.measure(simulate(load(name)))
         assert again[metric.name].value == metric.value
-
-
-@pytest.mark.parametrize(("met", "of", "low", "high"), [
-    (0, 10, 0.0, 0.2775), (5, 10, 0.2366, 0.7634), (81, 263, 0.2553, 0.3662), (0, 0, 0.0, 1.0)])
-def test_the_interval_of_a_share_is_wilsons(met, of, low, high):
-    assert wilson(met, of) == pytest.approx((low, high), abs=1e-4)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import scenarios.loop.simulation
-from hierarchy import HierarchyError
 from scenarios.config import load
 from scenarios.loop.simulation import simulate
 
@@ -64,25 +63,6 @@ def test_a_scenario_may_have_any_of_its_tasks():
     assert set(cone.orders) <= {"pointing", ""}
     assert "position_error" not in cone
     assert cone["pointing_error"][-1] < 0.01
-
-
-@pytest.mark.parametrize(("changes", "said"), [
-    (["start.end_effector=[2, 0, 0]"], "start.end_effector [2.0, 0.0, 0.0] m cannot be reached"),
-    (["start.q=[0, 0, 0]"], "start: 3 values for 7 joint positions of robot 'kuka_lwr'"),
-    (["start.v=[0, 0]"], "start: robot 'kuka_lwr': v has shape (2,)"),
-    (["avoidance.obstacles=[[5, 5, 5], [0.0, 0.0, 0.0]]", "start.q=[0, 0, 0, 0, 0, 0, 0]",
-      "robot.control_points=[{joint='joint_2', offset=[0, 0, 0]}]"],
-     "obstacle 2 at [0.0, 0.0, 0.0] m touches control point 1"),
-    (["robot.model=kuka_lvr"], "did you mean 'kuka_lwr'"),
-    (["robot.end_effector=tool"], "unknown frame 'tool'"),
-    (["robot.control_points=[]"], "has no control points"),
-    (["robot.control_points=[{joint='elbow', offset=[0, 0, 0]}]"], "unknown joint 'elbow'"),
-    (["avoidance.jacobian=published"], "has no exact derivative"),
-])
-def test_a_scenario_that_does_not_fit_its_robot_is_named(changes, said):
-    with pytest.raises(HierarchyError) as error:
-        simulate(load("ellipse", [*SHORT, *changes]))
-    assert said in str(error.value)
 
 
 def test_an_interrupted_run_keeps_what_was_run():

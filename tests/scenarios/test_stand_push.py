@@ -38,12 +38,9 @@ def changed(**keys):
     ({"control__stack": "switched"}, "goes with control.stack = \"hierarchical\", got"),
     ({"contacts__0__y": None}, "a sole has x and y, a point neither"),
     ({"contacts__0__friction": 0.0}, "contacts.0.friction: .* greater than 0"),
-    ({"contacts__0__friction": True}, "contacts.0.friction: .* valid number, got True"),
-    ({"contacts__0__frame": 3}, "contacts.0.frame: .* valid string, got 3"),
     ({"plant__friction": 0.0}, "plant.friction: .* greater than 0"),
     ({"limits__torque": 0.0}, "limits.torque: .* greater than 0"),
     ({"limits__torque_step": 0.0}, "limits.torque_step: .* greater than 0"),
-    ({"limits__torque_step": "big"}, "limits.torque_step: .* valid number, got 'big'"),
 ])
 def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
     with pytest.raises(ScenarioError, match=said):

@@ -26,33 +26,29 @@ def by_hand(robot, q, centre, radius):
     return np.array(found)
 
 
-def sphere(radius=0.06, centre=(0.1, 0.75, 0.3)):
+def sphere(radius, centre):
     return ["avoidance.obstacles=[{shape = 'sphere', "
             f"radius = {radius}, centre = {list(centre)}}}]"]
 
 
-def test_measured_joints_leave_the_true_distances_on_record():
-    asked = load("ellipse", ["control.duration=0.05", *sphere(0.05, (0.1, 0.5, 0.1)),
-                             "plant.measurement.position_noise=0.01"])
-    run = simulate(asked)
-    robot = Robot.named("kuka_lwr")
+NEAR, BESIDE = (0.1, 0.5, 0.1), (0.1, 0.75, 0.3)
+
+
+@pytest.mark.parametrize(("name", "changes", "centre", "radius", "q"), [
+    ("ellipse", ["control.duration=0.05", *sphere(0.05, NEAR),
+                 "plant.measurement.position_noise=0.01"], NEAR, 0.05, "true_q"),
+    pytest.param("human-hqp", [*HAND, *sphere(0.06, BESIDE),
+                               "plant.measurement.velocity_noise=0.0",
+                               "plant.measurement.quantisation=0.0"], BESIDE, 0.06, "q",
+                 marks=pytest.mark.slow)], ids=["noise of the joints", "camera"])
+def test_true_distances_are_on_record_beside_the_measured(name, changes, centre, radius, q):
+    run, robot = simulate(load(name, changes)), Robot.named("kuka_lwr")
     for k in (0, 7, run.ticks - 1):
-        wanted = by_hand(robot, run["true_q"][k], (0.1, 0.5, 0.1), 0.05)
+        wanted = by_hand(robot, run[q][k], centre, radius)
         np.testing.assert_allclose(run["true_control_point_distance"][k], wanted[:-1], atol=1e-12)
         assert run["true_ee_distance"][k] == pytest.approx(wanted[-1], abs=1e-12)
         assert run["true_minimal_distance"][k] == pytest.approx(wanted[:-1].min(), abs=1e-12)
     assert np.abs(run["true_ee_distance"] - run["ee_distance"]).max() > 1e-3
-
-
-@pytest.mark.slow
-def test_a_camera_leaves_the_true_distances_on_record():
-    run = simulate(load("human-hqp", [*HAND, *sphere(), "plant.measurement.velocity_noise=0.0",
-                                      "plant.measurement.quantisation=0.0"]))
-    robot = Robot.named("kuka_lwr")
-    for k in (0, run.ticks - 1):
-        wanted = by_hand(robot, run["q"][k], (0.1, 0.75, 0.3), 0.06)
-        np.testing.assert_allclose(run["true_control_point_distance"][k], wanted[:-1], atol=1e-12)
-        assert run["true_ee_distance"][k] == pytest.approx(wanted[-1], abs=1e-12)
 
 
 def test_an_exact_sensor_measures_the_true_distances_and_nothing_is_recorded_twice():

@@ -40,9 +40,6 @@ def server():
     opened.stop()
 
 
-# Time
-
-
 # The moment that is drawn
 
 
@@ -238,17 +235,6 @@ def test_a_live_run_is_kept_at_ctrl_c(tmp_path, monkeypatch, capsys):
     out, err = capsys.readouterr()
     assert "21 ticks in" in out
     assert "fault: interrupted at tick 21" in err
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("arguments", [
-    ["view", "nowhere", "--no-browser"], ["view", "nowhere", "--port", "70000"],
-    ["run", "ellipse", "--live", "--certify"], ["run", "ellipse", "--live", "--json"]])
-def test_a_wrong_command_line_is_told_before_anything_is_opened(arguments, capsys, tmp_path,
-                                                                monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert run_command(arguments) == 2
-    assert capsys.readouterr().err.startswith("hierarchy: error: ")
 
 
 # In a browser

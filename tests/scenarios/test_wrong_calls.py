@@ -1,5 +1,7 @@
 """Wrong arguments to what `scenarios` and `solvers` offer: each with what it says."""
 
+import re
+
 import pytest
 
 from hierarchy import Hierarchy, HierarchyError, Robot
@@ -46,9 +48,8 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: Hierarchy.from_levels([([[10**400]], [1.0])]), "level 1"),
 ])
 def test_a_wrong_argument_is_refused_and_named(call, said):
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         call()
-    assert said in str(error.value)
 
 
 def test_one_scenario_is_compared_like_a_list_of_one():

@@ -1,5 +1,8 @@
 """Wrong files, values and command lines: each with the message that a user gets."""
 
+import re
+import shlex
+
 import pytest
 
 from hierarchy import HierarchyError
@@ -18,16 +21,13 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
     ("control.policy.patience=1.5", "control.policy.patience"),
     ("pointing.alpha_d=true", "pointing.alpha_d: Input should be a valid number, got True deg"),
     ("pointing.axis=[0, 0, '1']", "pointing.axis.2"),
-    ("position.from_start='no'", "position.from_start"),
     ("avoidance.dimension=2", "avoidance.dimension"),
-    ("robot.model=7", "robot.model"),
     ("name=''", "name"),
     # Values that cannot be.
     ("control.period=0", "control.period: Input should be greater than 0, got 0 s"),
     ("control.period=nan", "control.period"),
     ("control.duration=inf", "control.duration"),
     ("control.duration=1e9", "1e+12 ticks; a recording keeps at most 10,000,000"),
-    ("control.period=1e-12", "a recording keeps at most 10,000,000"),
     ("pointing.alpha_d=200", "pointing.alpha_d"),
     ("position.stiffness=-1", "position.stiffness"),
     ("avoidance.near=0.5", "near = 0.5 m is beyond far = 0.15 m"),
@@ -38,7 +38,6 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
     ("control.options.recursive.form=published", "unknown setting of recursive 'form'"),
     ("control.options.tpm=3", "unknown setting of tpm 'tpm'"),
     ("control.options.form=printed", "published, staircase"),
-    ("control.resolver=hcdo", "did you mean 'hcod'"),
     ("control.level=torque", "control.level"),
     ("avoidance.obstacles=[[1, 2]]", "avoidance.obstacles.0"),
     ("avoidance.obstacles=[{shape='point'}]", "either a centre or a path"),
@@ -65,23 +64,27 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
     ("avoidance.distance=0.1", "only kind 'separation' has it; the kind here is 'repulsion'"),
     ("sensor.kind=radar", "sensor: unknown kind 'radar'. Known: camera, exact, frames."),
     ("plant.kind=real", "plant: unknown kind 'real'. Known: kinematic, mujoco, torque."),
-    ("position.path.kind=spiral", "position.path: unknown kind 'spiral'"),
     ("position.path.kind=waypoints", "position.path.times: Field required"),
     ("avoidance.obstacles.0.shape=sphere", "a sphere takes radius"),
     ("avoidance.obstacles.0.shape=cone", "avoidance.obstacles.0.shape"),
     ("sensor={kind='camera', width=1180591620717411303424}", "sensor.width"),
-    ("sensor={kind='camera', folder='x'}", "only kind 'frames' has it; the kind here is 'camera'"),
     # What goes together.
     ("control.stack=hierarchical", "avoidance.kind = \"repulsion\" goes with"),
     ("limits={acceleration=10, torque=0.5, place='guard'}", "need limits.place = \"stack\""),
     ("posture={}", "give [damping] or [posture], not both"),
     ("tasks=[{kind='posture'}]", "[[tasks]] goes with control.stack"),
     ("faults=[{kind='no_frames', at=0.0, duration=1.0}]", "need a sensor of kind \"camera\""),
+    # What it may be.
+    ("tasks=[{kind='postion'}]", "tasks.0: unknown kind 'postion'; did you mean 'position'?"),
+    ("control.level=torqe", "unknown value 'torqe'; did you mean 'torque'?"),
+    ("tasks={kind='pose'}", "tasks: expected a list: for tables write [[tasks]] above each"),
+    ("control=[{period=0.1}]", "control: expected one table, as below [control]"),
+    ("avoidance.zzz=1", "unknown key 'avoidance.zzz'. Known:"),
+    ("name='a b'", "a name has letters, digits"),
 ])
 def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         load("ellipse", [change])
-    assert said in str(error.value)
 
 
 @pytest.mark.parametrize(("changes", "said"), [
@@ -99,6 +102,13 @@ def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
     (["robot.model=ur5"], "example_robot_data:ur5_robot"),
     (["damping.value=0", "limits={acceleration=10}", "control.resolver=recursive"], "row"),
     (["robot.control_points=[]"], "no control points"),
+    (["robot.control_points=[{joint='elbow', offset=[0, 0, 0]}]"], "unknown joint 'elbow'"),
+    (["robot.model=kuka_lvr"], "did you mean 'kuka_lwr'"),
+    (["start.v=[0, 0]"], "start: robot 'kuka_lwr': v has shape (2,)"),
+    (["avoidance.obstacles=[[5, 5, 5], [0.0, 0.0, 0.0]]", "start.q=[0, 0, 0, 0, 0, 0, 0]",
+      "robot.control_points=[{joint='joint_2', offset=[0, 0, 0]}]"],
+     "obstacle 2 at [0.0, 0.0, 0.0] m touches control point 1"),
+    (["avoidance.jacobian=published"], "has no exact derivative"),
     (["limits={acceleration=10, margin=3}"], "margin 3 leaves joint_1 no room between"),
 ])
 def test_what_does_not_fit_the_robot_is_said_by_check_and_run(changes, said, capsys, tmp_path):
@@ -216,9 +226,33 @@ def test_check_warns_of_a_start_that_is_too_near(capsys):
     ("bench stress --resolver nope", "unknown resolver 'nope'"),
     ("bench resolvers --seconds 0", "got '0'"),
     (f"check ellipse --set name={'n' * 101}", "at most 100 characters"),
+    ("compare ellipse ellipse", "2 scenarios are named 'ellipse'"),
+    ("run ellipse --resolver recursiv", "did you mean 'recursive'"),
+    ("run ellipse --duration -1", "control.duration"),
+    ("run missing.toml", "missing.toml"),
+    ("compare ellipse --resolvers ,", "an empty name in ','"),
+    ("compare ellipse --resolvers tpm,,hcod", "an empty name in 'tpm,,hcod'"),
+    ("run ellipse --speed 2", "--speed: needs --live"),
+    ("run ellipse --out ''", "'--out': the path is empty"),
+    ("bench tick --out ' '", "'--out': the path is empty"),
+    ("rnu ellipse", "rnu"),
+    ("run", "Missing argument"),
+    ("run ellipse --bogus", "--bogus"),
+    ("bench [red]nothing[/red]", "[red]nothing[/red]"),
+    ("bench resolvers --family EQ8", "unknown family 'EQ8'; did you mean 'EQ7'"),
+    ("bench resolvers --resolver hqod", "unknown resolver 'hqod'; did you mean 'hcod'"),
+    ("problems show HUM39", "did you mean 'HUM38'"),
+    ("view nowhere --no-browser", "nowhere"),
+    ("view nowhere --port 70000", "--port"),
+    ("run ellipse --live --certify", "--certify"),
+    ("run ellipse --live --json", "--json"),
 ])
 def test_a_wrong_command_line_says_what_was_given(line, said, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert run_command(line.split()) == 2
-    assert said in capsys.readouterr().err
+    assert run_command(shlex.split(line)) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("hierarchy: error: ")
+    assert said in err
+    assert "Traceback" not in err
     assert not list(tmp_path.rglob("*.npz"))
