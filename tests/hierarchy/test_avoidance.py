@@ -3,7 +3,7 @@ import pytest
 from scene import BODY, OBSTACLES, ROBOT, TIP, states
 
 from hierarchy import HierarchyError, State
-from hierarchy.avoidance import Obstacle, Obstacles, Repulsion, SurveillanceAreas
+from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.paths import Waypoints
 from scenarios.cell.sensors import ExactDistances
@@ -76,17 +76,6 @@ def test_moving_obstacles_follow_their_path():
     np.testing.assert_allclose(obstacles.at(3.0)[0, 4:7], [1, 0, 0])
 
 
-@pytest.mark.parametrize(("arguments", "said"), [
-    (("cone", (0, 0, 0)), "unknown obstacle shape 'cone'"),
-    (("sphere", (0, 0, 0)), "takes 1 positive"),
-    (("box", (0, 0, 0), (1, 1, -1)), "takes 3 positive"),
-    (("point", (0, np.nan, 0)), "not finite"),
-])
-def test_bad_obstacles_are_named(arguments, said):
-    with pytest.raises(HierarchyError, match=said):
-        Obstacle(*arguments)
-
-
 def test_magnitude_reaches_its_maximum_at_contact_and_vanishes_at_the_reach():
     """Equation (24), which the letter's (23) as printed contradicts."""
     law = Repulsion(maximum=2.0, reach=0.15, shape=20.0)
@@ -96,20 +85,6 @@ def test_magnitude_reaches_its_maximum_at_contact_and_vanishes_at_the_reach():
     values = [law(D) for D in np.linspace(0, 1, 50)]
     assert (np.diff(values) <= 0).all()
     assert law(1e6) == 0.0
-
-
-@pytest.mark.parametrize("bad", [{"maximum": 0}, {"reach": -1}, {"shape": np.nan},
-                                 {"scale": np.inf}])
-def test_bad_repulsion_is_named(bad):
-    with pytest.raises(HierarchyError, match=next(iter(bad))):
-        Repulsion(**({"maximum": 1.0, "reach": 1.0, "shape": 1.0} | bad))
-
-
-def test_areas_must_be_nested():
-    with pytest.raises(HierarchyError, match="near"):
-        SurveillanceAreas(0.2, 0.1, 0.1)
-    with pytest.raises(HierarchyError, match="end_effector"):
-        SurveillanceAreas(0.1, 0.2, -0.1)
 
 
 def test_the_active_point_is_the_nearest_one_without_the_end_effector():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scene import ROBOT, state_at, states
 
-from hierarchy import HierarchyError, Stack, State
+from hierarchy import Stack, State
 from hierarchy.tasks import CumulatedRepulsion, JointDamping, Posture
 
 WITHIN = 0.5
@@ -68,15 +68,3 @@ def test_far_from_everything_it_is_the_base():
     task = CumulatedRepulsion(7, ROBOT.control_points, 0.0, JointDamping(7, 2.0))
     q, v = states(1)[0]
     np.testing.assert_array_equal(task.reference_acceleration(state_at(q, v)), -2.0 * v)
-
-
-@pytest.mark.parametrize(("make", "says"), [
-    (lambda: CumulatedRepulsion(7, (), 0.1), "at least one control point"),
-    (lambda: CumulatedRepulsion(7, ROBOT.control_points, 0.1, lever=0.0), "lever 0.0 m"),
-    (lambda: CumulatedRepulsion(7, ROBOT.control_points, 0.1, JointDamping(6)), "has 6 rows"),
-    (lambda: CumulatedRepulsion(7, ROBOT.control_points, 0.1).reference_velocity(
-        State.at(ROBOT, np.zeros(7))), "no measurement"),
-])
-def test_what_does_not_fit_is_said(make, says):
-    with pytest.raises(HierarchyError, match=says):
-        make()

@@ -94,16 +94,6 @@ def test_the_rows_are_the_identity_with_the_box_as_sides(level):
         np.testing.assert_array_equal(task().error(state), LIMITS.error(state))
 
 
-@pytest.mark.parametrize(("settings", "said"), [
-    ({"reach": 0.0}, "task 'danger bounds': repulsion reach must be positive"),
-    ({"shape": -1.0}, "task 'danger bounds': repulsion shape must be positive"),
-    ({"lever": -1.0}, "task 'danger bounds': lever -1.0 m must not be negative"),
-])
-def test_bad_settings_are_named(settings, said):
-    with pytest.raises(HierarchyError, match=said):
-        task(**settings)
-
-
 def test_what_it_cannot_do_without_is_named(monkeypatch):
     with pytest.raises(HierarchyError, match="needs at least one control point"):
         DangerBounds(LIMITS, ())

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from scene import PATH, ROBOT, state_at, states
 
-from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy import Robot, Stack, State
 from hierarchy.errors import RobotError
 from hierarchy.jit import compiled
 from hierarchy.limits import Limits, write_box
@@ -254,11 +254,6 @@ def test_a_horizon_of_at_most_a_tick_changes_nothing(level):
         np.testing.assert_array_equal(box, same)
 
 
-def test_a_horizon_is_not_negative():
-    with pytest.raises(HierarchyError, match=r"limits: horizon \[s\] = -1: expected"):
-        JointLimits(ROBOT, 10.0, 1e-3, horizon=-1.0)
-
-
 # ---- from outside -----------------------------------------------------------------------------
 
 def wide(joints, T, velocity=np.inf):
@@ -432,35 +427,6 @@ def test_a_limit_on_coordinates_that_are_no_angles_is_refused():
         JointLimits(Robot(model, "cart"), 10.0, 1e-3)
 
 
-@pytest.mark.parametrize(("settings", "said"), [
-    ({"acceleration": 0.0}, "joint 0: acceleration must be positive and finite, got 0.0"),
-    ({"acceleration": np.inf}, "acceleration must be positive and finite, got inf"),
-    ({"acceleration": [1, 1, 1, np.nan, 1, 1, 1]}, "joint 3: acceleration must be positive"),
-    ({"acceleration": [1.0, 2.0]}, "acceleration has shape (2,), expected a number or (7,)"),
-    ({"period": 0.0}, "period 0.0 s must be positive"),
-    ({"period": np.nan}, "period [s] = nan"),
-    ({"margin": -0.1}, "margin -0.1 must not be negative"),
-    ({"margin": 2.2}, "margin 2.2 leaves joint_2 no room between -2.094 and 2.094"),
-])
-def test_settings_that_make_no_sense_are_named(settings, said):
-    with pytest.raises(HierarchyError) as error:
-        JointLimits(**({"robot": ROBOT, "acceleration": 10.0, "period": 1e-3} | settings))
-    assert said in str(error.value)
-    assert "task 'joint limits'" in str(error.value)
-
-
-@pytest.mark.parametrize(("limits", "said"), [
-    (([0, 0], [1], [1], [1]), "have 2, 1, 1, 1 entries"),
-    (([0], [np.nan], [1], [1]), "joint 0: no position lies between lower and upper, got 0.0, nan"),
-    (([0], [1], [0], [1]), "joint 0: velocity must be positive, got 0.0"),
-    (([0], [1], [np.nan], [1]), "joint 0: velocity must be positive, got nan"),
-])
-def test_limits_that_make_no_sense_are_named(limits, said):
-    with pytest.raises(HierarchyError) as error:
-        Limits(*limits, period=1e-3)
-    assert said in str(error.value)
-
-
 def test_torque_rows_hold_exactly_where_inverse_dynamics_does():
     task, rng = TorqueLimits(ROBOT, fraction=0.5), np.random.default_rng(11)
     data, held = ROBOT.model.createData(), []
@@ -491,11 +457,3 @@ def test_the_other_methods_of_the_torque_task_say_the_same():
         np.testing.assert_allclose(task.jacobian_derivative(state), (later - before) / 2e-6,
                                    atol=1e-7)
     assert (task.dimension, task.kind) == (7, "inequality")
-
-
-def test_torque_limits_need_the_acceleration_level_and_a_share():
-    with pytest.raises(HierarchyError, match="'torque limits': torque limits need the acceler"):
-        Stack([TorqueLimits(ROBOT)], "velocity").hierarchy(state_at(*states(1)[0]))
-    for fraction in (0.0, -1.0, 80.0, np.nan):
-        with pytest.raises(HierarchyError, match=f"fraction {fraction} is not more than 0"):
-            TorqueLimits(ROBOT, fraction)

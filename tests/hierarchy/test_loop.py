@@ -8,8 +8,8 @@ from threading import Event
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Stack, State
 from hierarchy import Robot as Kuka
+from hierarchy import Stack, State
 from hierarchy.loop import Loop
 from hierarchy.loop.watchdog import Watchdog
 from hierarchy.tasks import Posture
@@ -216,17 +216,6 @@ def test_a_safe_stop_that_fails_in_the_watchdog_is_reported():
     assert any("safe_stop failed in the watchdog" in note for note in loop.log.notes)
 
 
-@pytest.mark.parametrize(("settings", "text"), [
-    ({"period": 0.0}, "period 0.0 s must be positive"),
-    ({"overrun": "skipp"}, "did you mean 'skip'"),
-    ({"behind": 0}, "behind = 0"), ({"spin": -1.0}, "spin -1.0 s"),
-    ({"watchdog": 0.1}, "watchdog 0.1 s must be longer than the period 0.25 s")],
-    ids=["period", "overrun", "behind", "spin", "watchdog"])
-def test_settings_that_make_no_sense_are_refused(settings, text):
-    with pytest.raises(HierarchyError, match=text):
-        Loop(**{"period": PERIOD, **settings})
-
-
 # --- the examples -------------------------------------------------------------------------------
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -260,14 +249,3 @@ def test_readings_that_are_not_finite_stop_the_robot_even_if_nobody_looks_at_mov
     assert "is not finite" in log.ended
     state.move(1.0, np.zeros(7), np.zeros(7))
     assert (stack.hierarchy(state).lower == 0.0).all()
-
-
-@pytest.mark.parametrize(("arguments", "said"), [
-    ((lambda t: None, None, 1.0), "safe_stop: expected a function, got NoneType None"),
-    ((None, print, 1.0), "step: expected a function"),
-    ((lambda t: None, print, 1.0, 5), "send: expected a function, got int 5"),
-    ((lambda t: None, print, np.nan), "loop: duration")])
-def test_what_the_loop_is_given_is_checked_before_the_first_tick(arguments, said):
-    with pytest.raises(HierarchyError) as error:
-        Loop(PERIOD).run(*arguments)
-    assert said in str(error.value)

@@ -90,18 +90,3 @@ def test_a_wrong_csv_file_is_named_with_its_line(text, said, tmp_path):
     assert said in str(error.value)
     with pytest.raises(HierarchyError, match="cannot be read"):
         Recorded.from_csv(tmp_path / "none.csv")
-
-
-@pytest.mark.parametrize(("make", "said"), [
-    (lambda: Blended(TIMES, POINTS, 0.0), "blend 0.0 s must be positive"),
-    (lambda: Blended(TIMES, POINTS, 0.71), "at most 0.7 s, the shortest interval"),
-    (lambda: Blended(TIMES[:2], POINTS, 0.1), "2 times for 4 points"),
-    (lambda: line(POINTS[0], POINTS[1], 0.0), "duration 0.0 s must be positive"),
-    (lambda: line(POINTS[0], (1, 2), 1.0), "points[1] must be three finite numbers"),
-    (lambda: circle((0, 0, 0), -0.1), "circle: radius -0.1"),
-    (lambda: circle((0, 0, 0), 0.1, (0, 0, 0)), "normal [0, 0, 0]"),
-    (lambda: circle((0, 0), 0.1), "centre must be three finite numbers")])
-def test_wrong_values_are_named(make, said):
-    with pytest.raises(HierarchyError) as error:
-        make()
-    assert said in str(error.value)

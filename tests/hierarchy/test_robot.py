@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
-from pendulum import LIMIT, URDF
 from pinned import leaves, read, robot_facts
 
-from hierarchy import HierarchyError, Robot, State
-from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy import Robot, State
+from hierarchy.errors import RobotError
 from hierarchy.robots import TABLES
 
 ROBOT = Robot.named("kuka_lwr")
@@ -63,35 +62,6 @@ def test_an_entry_of_a_floating_robot_is_named_by_its_own_joint(what, entry, nam
     with pytest.raises(RobotError) as error:
         State.at(robot, **given)
     assert f"{what}[{entry}] ({name}) is nan" in str(error.value)
-
-
-def test_unknown_names_come_with_the_nearest_known():
-    with pytest.raises(UnknownNameError, match="did you mean 'kuka_lwr'"):
-        Robot.named("kuka_lvr")
-    with pytest.raises(UnknownNameError, match="did you mean 'end_effector'"):
-        ROBOT.frame("end_efector")
-    with pytest.raises(UnknownNameError, match="unknown joint 'elbow'"):
-        ROBOT.control_point("elbow", (0, 0, 0))
-
-
-@pytest.fixture
-def pendulum(tmp_path):
-    def write(kind="revolute", limit=LIMIT):
-        path = tmp_path / f"{kind}.urdf"
-        path.write_text(URDF.format(kind=kind, limit=limit))
-        return path
-    return write
-
-
-def test_bad_robot_files_are_named(tmp_path, pendulum):
-    (tmp_path / "broken.urdf").write_text("<robot")
-    (tmp_path / "arm.stl").write_text("solid")
-    for path, said in [("none.urdf", "does not exist"), ("broken.urdf", "not valid XML"),
-                       ("arm.stl", "expected a URDF")]:
-        with pytest.raises(HierarchyError, match=said):
-            Robot.from_file(tmp_path / path)
-    with pytest.raises(HierarchyError, match="unknown frame 'tool'"):
-        Robot.from_file(pendulum(), end_effector="tool")
 
 
 @pytest.mark.parametrize("name", TABLES)

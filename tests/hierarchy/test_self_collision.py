@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from scene import ROBOT, compiled_rows, states
 
-from hierarchy import HierarchyError, Stack, State
+from hierarchy import Stack, State
 from hierarchy.avoidance import Barrier, Capsule
 from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules
 from hierarchy.robots import TABLES, link_capsules
@@ -179,17 +179,3 @@ def test_an_arm_driven_into_its_foot_stops_before(level, period, differences):
     assert d.min() > 0.02 - 1e-6
     assert d[-1].min() == pytest.approx(0.02, abs=1e-4)
     assert np.abs(plant.v).max() < 0.1
-
-
-@pytest.mark.parametrize(("make_it", "said"), [
-    (lambda: Capsule("x", 1, (0, 0, 0), (0, 0, 1), -1.0), "capsule 'x': radius .m. = -1"),
-    (lambda: Capsule("x", 1, (0, 0, np.nan), (0, 0, 1), 1.0), "capsule 'x': start"),
-    (lambda: Capsule("x", 1, (0, 0, 0), (0, 1), 1.0), "capsule 'x': end"),
-    (lambda: SelfSeparation(ARM[:2], EVERYWHERE), "'self-separation': no pair among 2"),
-    (lambda: SelfSeparation(ARM, EVERYWHERE, ((0, 4),)), r"pair \(0, 4\) is no pair among 4"),
-    (lambda: SelfSeparation(ARM, EVERYWHERE, ((1, 1),)), r"pair \(1, 1\) is no pair"),
-    (lambda: SelfSeparation(ARM, EVERYWHERE, kind="equality"), "are inequalities"),
-])
-def test_bad_input_is_named(make_it, said):
-    with pytest.raises(HierarchyError, match=said):
-        make_it()

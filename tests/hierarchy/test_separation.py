@@ -160,20 +160,6 @@ def test_a_hand_that_slides_along_an_obstacle_keeps_the_distance(level, period):
     assert 0.05 - 1e-6 < d.min() < 0.052
 
 
-@pytest.mark.parametrize(("make_task", "said"), [
-    (lambda: Barrier(-0.1), "distance = -0.1"),
-    (lambda: Barrier(0.1, rate=0.0), "rate = 0.0"),
-    (lambda: Barrier(0.1, recovery=np.nan), "recovery = nan"),
-    (lambda: Barrier(0.1, limit=np.inf), "limit = inf"),
-    (lambda: Barrier(0.1, influence=0.1), "influence = 0.1 m must be more"),
-    (lambda: Separation((), EVERYWHERE), "'separation': needs at least one point"),
-    (lambda: Separation(SENSOR.points, EVERYWHERE, 3, kind="equality"), "are inequalities"),
-])
-def test_bad_settings_are_named(make_task, said):
-    with pytest.raises(HierarchyError, match=said):
-        make_task()
-
-
 @pytest.mark.parametrize(("pairs", "obstacles", "said"), [
     (None, 1, "'separation': the state carries no measurement of pairs"),
     (Pairs(9, 2), 1, "9 points are measured against 2 obstacles, expected 9 against 1"),

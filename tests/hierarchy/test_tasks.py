@@ -7,7 +7,6 @@ from scene import (
     FRAME,
     PATH,
     ROBOT,
-    SENSOR,
     TASKS,
     TIP,
     Elbow,
@@ -24,17 +23,11 @@ from hierarchy.paths import Ellipse
 from hierarchy.robots import TABLES as ROBOT_TABLES
 from hierarchy.robots import link_capsules
 from hierarchy.tasks import (
-    Avoidance,
     DangerBounds,
     FrameLog,
-    JointCoupling,
     JointDamping,
     JointLimits,
-    LookAt,
-    Manipulability,
-    Pointing,
     Position,
-    RelativePose,
     SelfSeparation,
     Separation,
     TorqueLimits,
@@ -240,26 +233,6 @@ def test_a_wrong_task_is_named(method, value, said, monkeypatch):
     assert said in str(error.value)
 
 
-def test_bad_settings_of_tasks_are_named():
-    for make, said in [
-        (lambda: Pointing(FRAME, (0.0, 0.0, 0.0), 0.1), "axis"),
-        (lambda: Pointing(FRAME, (1e-12, 0.0, 0.0), 0.1), "axis"),
-        (lambda: Pointing(FRAME, (1.0, 0.0, 0.0), 4.0), "half_angle"),
-        (lambda: Avoidance(ROBOT.control_points, 2), "rows must be 1 or 3"),
-        (lambda: Avoidance(()), "control point"),
-        (lambda: JointDamping(7, 1.0, "momentum"), "weight"),
-        (lambda: JointDamping(7, -1.0), "damping"),
-    ]:
-        with pytest.raises(HierarchyError, match=said):
-            make()
-
-
-def test_avoidance_without_a_measurement_is_an_error():
-    with pytest.raises(HierarchyError, match="no measurement"):
-        TASKS["avoidance 1-D"].jacobian(State.at(ROBOT, *STATES[0]))
-    assert SENSOR.measurement is not None
-
-
 MADE = [*TASKS.values(), JointLimits(ROBOT, 10.0, 1e-3), TorqueLimits(ROBOT),
         DangerBounds(JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
         Separation(ROBOT.control_points, Barrier(0.05)),
@@ -297,20 +270,3 @@ def test_manipulability_has_no_row_at_a_singular_posture():
     assert task.value(straight) < 1e-12
     assert not task.jacobian(straight).any()
     assert not task.jacobian_derivative(straight).any()
-
-
-@pytest.mark.parametrize(("make", "said"), [
-    (lambda: RelativePose(FRAME, "joint_3", (0, 0, 0)), "to is the name 'joint_3'"),
-    (lambda: RelativePose("joint_3", FRAME, (0, 0, 0)), "frame is the name 'joint_3'"),
-    (lambda: JointCoupling(ROBOT, {"joint_9": 1.0}), "unknown joint 'joint_9'"),
-    (lambda: JointCoupling(ROBOT, {"joint_1": 0.0}), "no factor other than zero"),
-    (lambda: JointCoupling("kuka_lwr", {"joint_1": 1.0}), "robot is the name 'kuka_lwr'"),
-    (lambda: LookAt(FRAME, (0, 0)), "target must be three finite numbers [m], got [0, 0]"),
-    (lambda: LookAt(FRAME, (0, 0, 1), gain=-1), "gain = -1"),
-    (lambda: Manipulability(FRAME, -0.1), "least = -0.1"),
-    (lambda: Manipulability(FRAME, 0.1, "speed"), "part must be 'position' or 'pose'"),
-])
-def test_wrong_values_of_new_tasks_are_named(make, said):
-    with pytest.raises(HierarchyError) as error:
-        make()
-    assert said in str(error.value)

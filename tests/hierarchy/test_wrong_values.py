@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State, Task
-from hierarchy.avoidance import Barrier, Capsule, Obstacles, Repulsion, SurveillanceAreas
+from hierarchy.avoidance import Barrier, Capsule, Obstacle, Obstacles, Repulsion, SurveillanceAreas
 from hierarchy.limits import Limits
 from hierarchy.loop import Loop
-from hierarchy.paths import Ellipse, Jittered, Still, Waypoints, line
+from hierarchy.paths import Blended, Ellipse, Jittered, Still, Waypoints, circle, line
+from hierarchy.robots import TABLES, link_capsules
 from hierarchy.tasks import (
     Avoidance,
     BaseDynamics,
-    ContactForce,
+    CumulatedRepulsion,
     DangerBounds,
-    Friction,
     JointCoupling,
     JointDamping,
     JointLimits,
@@ -27,6 +27,7 @@ from hierarchy.tasks import (
     SelfSeparation,
     Separation,
     Together,
+    TorqueLimits,
 )
 
 NAN, INF = float("nan"), float("inf")
@@ -34,6 +35,13 @@ ROBOT = Robot.load("kuka_lwr")
 STATE = State.at(ROBOT, [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0])
 FRAME = ROBOT.frame("end_effector")
 THERE = Still([0.3, 0.5, 0.1])
+LIMITS, POINTS = JointLimits(ROBOT, 10.0, 0.01), ROBOT.control_points
+ARM, KEPT = link_capsules(TABLES["kuka_lwr"], foot=0.3105), Barrier(0.02)
+TIMES, CORNERS = (0.5, 1.2), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2))
+
+
+def limits(**settings):
+    return JointLimits(**({"robot": ROBOT, "acceleration": 10.0, "period": 1e-3} | settings))
 
 
 class Own(Task):
@@ -56,7 +64,6 @@ class Own(Task):
 
 @pytest.mark.parametrize(("make", "said"), [
     (lambda: Still("a"), "must be three finite numbers [m], got"),
-    (lambda: Still(None), "got None"),
     (lambda: Ellipse("c", "a", "b"), "centre must be three finite numbers"),
     (lambda: Ellipse([0] * 3, [1] * 3, [2] * 3, rate="x"), "ellipse: rate = 'x'"),
     (lambda: Ellipse([0] * 3, [1] * 3, [2] * 3, rate=NAN), "ellipse: rate"),
@@ -70,16 +77,12 @@ class Own(Task):
     (lambda: Position(FRAME, THERE, damping=INF), "damping = inf, expected a number >= 0"),
     (lambda: Posture("abc"), "task 'posture': target: expected finite numbers, got str 'abc'"),
     (lambda: Posture((NAN,) * 7), "task 'posture': target"),
-    (lambda: Posture(3), "target: expected finite numbers, got int 3"),
     (lambda: Posture(()), "target: expected finite numbers"),
     (lambda: Posture((1j,) * 7), "target: expected finite numbers"),
     (lambda: JointLimits(ROBOT, "a", 0.01), "acceleration: expected numbers, got str 'a'"),
     (lambda: JointLimits(ROBOT, 10.0, 0.01, margin="x"), "task 'joint limits': margin"),
-    (lambda: Pointing(FRAME, "x", half_angle=0.1), "task 'pointing': axis"),
     (lambda: Pointing(FRAME, (1, 0, 0), half_angle="a"), "half_angle [rad] = 'a'"),
     (lambda: Pointing(FRAME, (1, 0, 0), half_angle=0.1, kind="no"), "kind must be 'equality'"),
-    (lambda: LookAt(FRAME, "a"), "target must be three finite numbers [m], got 'a'"),
-    (lambda: Manipulability(FRAME, "a"), "least = 'a': expected a finite number from 0 on"),
     (lambda: JointCoupling(ROBOT, "joint_1", 0.0), "joints: expected a Mapping"),
     (lambda: JointCoupling(ROBOT, {"joint_1": NAN}, 0.0), "joints.joint_1"),
     (lambda: Pose(FRAME, THERE, np.zeros((3, 3))), "expected a rotation matrix (3, 3)"),
@@ -110,11 +113,8 @@ class Own(Task):
     (lambda: ROBOT.integrate(np.zeros(7), np.full(7, NAN)), "step: expected 7 finite numbers"),
     (lambda: Hierarchy.from_levels([([[1.0, 0.0]], [1.0])]).violations([0.0, NAN]),
      "x, entry 1: nan is not finite"),
-    (lambda: RelativePose(FRAME, "joint_1", (0, 0, 0)), "to is the name 'joint_1'"),
     (lambda: RelativePose(FRAME, FRAME, (0, 0)), "position: expected 3 finite numbers"),
     (lambda: BaseDynamics("x"), "contacts: expected a Contacts, got str 'x'"),
-    (lambda: Friction(3), "contacts: expected a Contacts, got int 3"),
-    (lambda: ContactForce([NAN], "x", (1.0,)), "contacts: expected a Contacts, got list [nan]"),
     (lambda: JointDamping("x"), "task 'damping': joints: expected an int, got str 'x'"),
     (lambda: Avoidance(["x"]), "control points[0]: expected a ControlPoint, got str 'x'"),
     (lambda: Avoidance(3), "control points: expected a Sequence, got int 3"),
@@ -122,20 +122,98 @@ class Own(Task):
     (lambda: SelfSeparation(["x"] * 3, Barrier(0.1)), "capsules[0]: expected a Capsule"),
     (lambda: DangerBounds(3, ROBOT.control_points), "limits: expected a JointLimits, got int 3"),
     (lambda: Together([3]), "tasks[0]: expected a Task, got int 3"),
-    (lambda: Barrier("x"), "barrier: distance = 'x'"),
-    (lambda: Repulsion(1.0, "x", 1.0), "repulsion reach = 'x'"),
-    (lambda: SurveillanceAreas("x", 0.1, 0.1), "surveillance area near = 'x'"),
     (lambda: Capsule("arm", 1, (0, 0, 0), (0, 0, 1), "x"), "capsule 'arm': radius [m] = 'x'"),
     (lambda: Obstacles(["x"]), "obstacles[0]: expected an Obstacle, got str 'x'"),
     (lambda: Limits("x", 1, 1, 1, 1), "limits: lower, upper, velocity and acceleration must be"),
-    (lambda: Loop("x"), "loop: period = 'x'"),
-    (lambda: Loop(0.1).run(print, print, "x"), "loop: duration = 'x'"),
-    (lambda: Jittered(THERE, "x", 1.0, 1), "jitter: amplitude = 'x'"),
     (lambda: Jittered(3, 0.1, 1.0, 1), "jitter: path: expected a Path, got int 3"),
-    (lambda: line((0, 0, 0), (1, 0, 0), "x"), "line: duration [s] = 'x'"),
     (lambda: Stack([Posture((0.0,) * 7)]).reorder(3), "order of a stack: expected a Sequence"),
     (lambda: Stack([Posture((0.0,) * 7)]).row_names(3), "order of a stack: expected a Sequence"),
     (lambda: Stack([Posture((0.0,) * 7)]).remove([]), "unknown task []"),
+    # values out of their range
+    (lambda: Obstacle("cone", (0, 0, 0)), "unknown obstacle shape 'cone'"),
+    (lambda: Obstacle("sphere", (0, 0, 0)), "takes 1 positive"),
+    (lambda: Obstacle("box", (0, 0, 0), (1, 1, -1)), "takes 3 positive"),
+    (lambda: Obstacle("point", (0, NAN, 0)), "not finite"),
+    (lambda: Repulsion(0.0, 1.0, 1.0), "maximum"), (lambda: Repulsion(1.0, -1.0, 1.0), "reach"),
+    (lambda: Repulsion(1.0, "x", 1.0), "repulsion reach = 'x'"),
+    (lambda: Repulsion(1.0, 1.0, NAN), "shape"), (lambda: Repulsion(1.0, 1.0, 1.0, INF), "scale"),
+    (lambda: SurveillanceAreas("x", 0.1, 0.1), "surveillance area near = 'x'"),
+    (lambda: SurveillanceAreas(0.2, 0.1, 0.1), "near"),
+    (lambda: SurveillanceAreas(0.1, 0.2, -0.1), "end_effector"),
+    (lambda: Barrier(-0.1), "distance = -0.1"), (lambda: Barrier("x"), "distance = 'x'"),
+    (lambda: Barrier(0.1, rate=0.0), "rate = 0.0"),
+    (lambda: Barrier(0.1, recovery=NAN), "recovery = nan"),
+    (lambda: Barrier(0.1, limit=INF), "limit = inf"),
+    (lambda: Barrier(0.1, influence=0.1), "influence = 0.1 m must be more"),
+    (lambda: Capsule("x", 1, (0, 0, 0), (0, 0, 1), -1.0), "capsule 'x': radius [m] = -1"),
+    (lambda: Capsule("x", 1, (0, 0, NAN), (0, 0, 1), 1.0), "capsule 'x': start"),
+    (lambda: Capsule("x", 1, (0, 0, 0), (0, 1), 1.0), "capsule 'x': end"),
+    (lambda: SelfSeparation(ARM[:2], KEPT), "'self-separation': no pair among 2"),
+    (lambda: SelfSeparation(ARM, KEPT, ((0, 4),)), "pair (0, 4) is no pair among 4"),
+    (lambda: SelfSeparation(ARM, KEPT, ((1, 1),)), "pair (1, 1) is no pair"),
+    (lambda: SelfSeparation(ARM, KEPT, kind="equality"), "are inequalities"),
+    (lambda: Separation((), KEPT), "'separation': needs at least one point"),
+    (lambda: Separation(POINTS, KEPT, 3, kind="equality"), "are inequalities"),
+    (lambda: CumulatedRepulsion(7, (), 0.1), "at least one control point"),
+    (lambda: CumulatedRepulsion(7, POINTS, 0.1, lever=0.0), "lever 0.0 m"),
+    (lambda: CumulatedRepulsion(7, POINTS, 0.1, JointDamping(6)), "has 6 rows"),
+    (lambda: CumulatedRepulsion(7, POINTS, 0.1).reference_velocity(STATE), "no measurement"),
+    (lambda: DangerBounds(LIMITS, POINTS, reach=0.0), "bounds': repulsion reach must be positive"),
+    (lambda: DangerBounds(LIMITS, POINTS, shape=-1.0), "bounds': repulsion shape must be positive"),
+    (lambda: DangerBounds(LIMITS, POINTS, lever=-1.0), "lever -1.0 m must not be negative"),
+    (lambda: Pointing(FRAME, (0.0, 0.0, 0.0), 0.1), "axis"),
+    (lambda: Pointing(FRAME, (1e-12, 0.0, 0.0), 0.1), "axis"),
+    (lambda: Pointing(FRAME, (1.0, 0.0, 0.0), 4.0), "half_angle"),
+    (lambda: Avoidance(POINTS, 2), "rows must be 1 or 3"),
+    (lambda: Avoidance(()), "control point"),
+    (lambda: Avoidance(POINTS, 1).jacobian(STATE), "no measurement"),
+    (lambda: JointDamping(7, 1.0, "momentum"), "weight"),
+    (lambda: JointDamping(7, -1.0), "damping"),
+    (lambda: RelativePose(FRAME, "joint_3", (0, 0, 0)), "to is the name 'joint_3'"),
+    (lambda: RelativePose("joint_3", FRAME, (0, 0, 0)), "frame is the name 'joint_3'"),
+    (lambda: JointCoupling(ROBOT, {"joint_9": 1.0}), "unknown joint 'joint_9'"),
+    (lambda: JointCoupling(ROBOT, {"joint_1": 0.0}), "no factor other than zero"),
+    (lambda: JointCoupling("kuka_lwr", {"joint_1": 1.0}), "robot is the name 'kuka_lwr'"),
+    (lambda: LookAt(FRAME, (0, 0)), "target must be three finite numbers [m], got [0, 0]"),
+    (lambda: LookAt(FRAME, (0, 0, 1), gain=-1), "gain = -1"),
+    (lambda: Manipulability(FRAME, -0.1), "least = -0.1"),
+    (lambda: Manipulability(FRAME, 0.1, "speed"), "part must be 'position' or 'pose'"),
+    (lambda: limits(acceleration=0.0), "joint 0: acceleration must be positive and finite, got 0"),
+    (lambda: limits(acceleration=INF), "acceleration must be positive and finite, got inf"),
+    (lambda: limits(acceleration=[1, 1, 1, NAN, 1, 1, 1]), "joint 3: acceleration must be pos"),
+    (lambda: limits(acceleration=[1.0, 2.0]), "has shape (2,), expected a number or (7,)"),
+    (lambda: limits(period=0.0), "period 0.0 s must be positive"),
+    (lambda: limits(period=NAN), "period [s] = nan"),
+    (lambda: limits(margin=-0.1), "margin -0.1 must not be negative"),
+    (lambda: limits(margin=2.2), "margin 2.2 leaves joint_2 no room between -2.094 and 2.094"),
+    (lambda: limits(horizon=-1.0), "limits: horizon [s] = -1: expected"),
+    (lambda: Limits([0, 0], [1], [1], [1], 1e-3), "have 2, 1, 1, 1 entries"),
+    (lambda: Limits([0], [NAN], [1], [1], 1e-3), "joint 0: no position lies between lower and upp"),
+    (lambda: Limits([0], [1], [0], [1], 1e-3), "joint 0: velocity must be positive, got 0.0"),
+    (lambda: Limits([0], [1], [NAN], [1], 1e-3), "joint 0: velocity must be positive, got nan"),
+    (lambda: Stack([TorqueLimits(ROBOT)], "velocity").hierarchy(STATE),
+     "'torque limits': torque limits need the acceler"),
+    *((lambda fraction=fraction: TorqueLimits(ROBOT, fraction),
+       f"fraction {fraction} is not more than 0") for fraction in (0.0, -1.0, 80.0, NAN)),
+    (lambda: Blended(TIMES, CORNERS, 0.0), "blend 0.0 s must be positive"),
+    (lambda: Blended(TIMES, CORNERS, 0.71), "at most 0.7 s, the shortest interval"),
+    (lambda: Blended(TIMES[:1], CORNERS, 0.1), "1 times for 2 points"),
+    (lambda: line(*CORNERS, 0.0), "duration 0.0 s must be positive"),
+    (lambda: line(CORNERS[0], (1, 2), 1.0), "points[1] must be three finite numbers"),
+    (lambda: circle((0, 0, 0), -0.1), "circle: radius -0.1"),
+    (lambda: circle((0, 0, 0), 0.1, (0, 0, 0)), "normal [0, 0, 0]"),
+    (lambda: circle((0, 0), 0.1), "centre must be three finite numbers"),
+    (lambda: Loop(0.0), "period 0.0 s must be positive"), (lambda: Loop(0.1, behind=0), "behind"),
+    (lambda: Loop(0.1, overrun="skipp"), "did you mean 'skip'"),
+    (lambda: Loop(0.1, spin=-1.0), "spin -1.0 s"),
+    (lambda: Loop(0.25, watchdog=0.1), "watchdog 0.1 s must be longer than the period 0.25 s"),
+    (lambda: Loop(0.1).run(print, None, 1.0), "safe_stop: expected a function, got NoneType None"),
+    (lambda: Loop(0.1).run(None, print, 1.0), "step: expected a function"),
+    (lambda: Loop(0.1).run(print, print, 1.0, 5), "send: expected a function, got int 5"),
+    (lambda: Loop(0.1).run(print, print, NAN), "loop: duration"),
+    (lambda: Robot.named("kuka_lvr"), "did you mean 'kuka_lwr'"),
+    (lambda: ROBOT.frame("end_efector"), "did you mean 'end_effector'"),
+    (lambda: ROBOT.control_point("elbow", (0, 0, 0)), "unknown joint 'elbow'"),
 ])
 def test_a_wrong_value_is_refused_and_named(make, said):
     with pytest.raises(HierarchyError) as error:

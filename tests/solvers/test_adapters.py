@@ -197,18 +197,6 @@ def test_a_configuration_outside_its_limits_is_refused_as_in_pink(robot):
     assert np.isfinite(back).all()
 
 
-def test_weights_against_all_tasks_are_refused_where_levels_are_exact(configuration):
-    from pink.barriers import PositionBarrier
-
-    hand = frame_task(configuration)
-    hand.lm_damping = 1.0
-    with pytest.raises(HierarchyError, match="FrameTask of end_effector: lm_damping = 1"):
-        pink_hierarchy(configuration, [hand], DT)
-    barrier = PositionBarrier("end_effector", p_max=np.ones(3), safe_displacement_gain=2.0)
-    with pytest.raises(HierarchyError, match="PositionBarrier: safe_displacement_gain = 2"):
-        pink_hierarchy(configuration, [posture_task(Q)], DT, barriers=[barrier])
-
-
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):
     import inspect
 
@@ -241,25 +229,42 @@ def test_a_solver_of_qpsolvers_is_answered_by_hcod_with_a_note(configuration):
                                expected)
 
 
-def test_wrong_arguments_are_named(configuration):
-    hand = [posture_task(Q)]
-    with pytest.raises(HierarchyError, match="unknown resolver 'proxpq'"):
-        solve_ik(configuration, hand, DT, solver="proxpq")
-    with pytest.raises(HierarchyError, match="unknown setting of hcod 'guess'"):
-        solve_ik(configuration, hand, DT, solver="hcod", guess=1)
-    with pytest.raises(HierarchyError, match="damping -1 must not be negative"):
-        solve_ik(configuration, hand, DT, damping=-1)
-    with pytest.raises(HierarchyError, match="period 0"):
-        solve_ik(configuration, hand, 0.0)
+def damped(configuration):
+    hand = frame_task(configuration)
+    hand.lm_damping = 1.0
+    return hand
 
 
-def test_numbers_that_are_not_finite_are_named(configuration):
-    posture = posture_task(np.full(7, np.nan))
-    with pytest.raises(HierarchyError, match="PostureTask"):
-        solve_ik(configuration, [posture], DT)
-    wrong = SimpleNamespace(compute_qp_inequalities=lambda *_: (np.eye(7)[:1] * np.nan, np.ones(1)))
-    with pytest.raises(HierarchyError, match="SimpleNamespace, row 0"):
-        solve_ik(configuration, [posture_task(Q)], DT, limits=[wrong])
+def renamed(robot):
+    import pink
+
+    model = robot.model.copy()
+    model.names[1] = "other"
+    return pink.Configuration(model, model.createData(), Q)
+
+
+def rows_at(robot, configuration, level):
+    task = PinkTask(posture_task(Q), configuration, DT)
+    return Stack([task], level).hierarchy(State.at(robot, Q))
+
+
+@pytest.mark.parametrize(("call", "said"), [
+    (lambda c, r: solve_ik(c, [posture_task(Q)], DT, solver="proxpq"), "unknown resolver 'proxpq'"),
+    (lambda c, r: solve_ik(c, [posture_task(Q)], DT, solver="hcod", guess=1),
+     "unknown setting of hcod 'guess'"),
+    (lambda c, r: solve_ik(c, [posture_task(Q)], DT, damping=-1), "damping -1 must not be neg"),
+    (lambda c, r: solve_ik(c, [posture_task(Q)], 0.0), "period 0"),
+    (lambda c, r: solve_ik(c, [posture_task(np.full(7, np.nan))], DT), "PostureTask"),
+    (lambda c, r: solve_ik(c, [posture_task(Q)], DT, limits=[limit((0, np.nan, 1.0))]),
+     "SimpleNamespace, row 0"),
+    (lambda c, r: pink_hierarchy(c, [damped(c)], DT), "FrameTask of end_effector: lm_damping = 1"),
+    (lambda c, r: pink_hierarchy(c, [posture_task(Q)], DT, barriers=[wall(c, 1.0, 1.0, 2.0)]),
+     "Backing: safe_displacement_gain = 2"),
+    (lambda c, r: rows_at(r, c, "acceleration"), "pink does not support accelerations"),
+    (lambda c, r: rows_at(r, renamed(r), "velocity"), "has the joints other")])
+def test_what_cannot_be_resolved_is_named(robot, configuration, call, said):
+    with pytest.raises(HierarchyError, match=said):
+        call(configuration, robot)
 
 
 def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, configuration):
@@ -292,19 +297,6 @@ def test_rows_of_a_frame_task_are_those_of_our_position_task(robot, configuratio
     np.testing.assert_allclose(to_frame @ rows.lower, theirs.lower, atol=1e-9)
     if not shift:  # away from the target its Jacobian has the derivative of the logarithm too
         np.testing.assert_allclose(to_frame @ rows.A, theirs.A, atol=1e-9)
-
-
-def test_a_task_of_pink_refuses_another_robot_and_accelerations(robot, configuration):
-    import pink
-
-    task = PinkTask(posture_task(Q), configuration, DT)
-    with pytest.raises(HierarchyError, match="pink does not support accelerations"):
-        Stack([task], "acceleration").hierarchy(State.at(robot, Q))
-    renamed = robot.model.copy()
-    renamed.names[1] = "other"
-    strange = pink.Configuration(renamed, renamed.createData(), Q)
-    with pytest.raises(HierarchyError, match="has the joints other"):
-        Stack([PinkTask(posture_task(Q), strange, DT)], "velocity").hierarchy(State.at(robot, Q))
 
 
 def test_costs_may_change_but_not_which_rows_cost_something(robot, configuration):

@@ -3,34 +3,14 @@
 import numpy as np
 import oracle
 import pytest
-from rank_cases import rng
 
 from hierarchy import Hierarchy
 from solvers import make
+from solvers.problems import Recipe, generate
 
-
-def stacks(count, seed):
-    """Yield random stacks of every shape: rows dropped in rank, repeated, zero, nearly parallel."""
-    r = rng(seed)
-    for _ in range(count):
-        n = int(r.integers(1, 10))
-        sizes = r.integers(0, 5, size=r.integers(1, 5))
-        A = r.normal(size=(sizes.sum(), n))
-        for i in range(len(A)):
-            kind = r.integers(0, 8)
-            if kind == 0 and i:
-                A[i] = r.normal(size=i) @ A[:i]
-            elif kind == 1 and i:
-                A[i] = A[r.integers(0, i)]
-            elif kind == 2:
-                A[i] = 0.0
-            elif kind == 3 and i:
-                A[i] = A[r.integers(0, i)] + 1e-2 * r.normal(size=n)
-        b, first, levels = r.normal(size=len(A)), 0, []
-        for size in sizes:
-            levels.append((A[first:first + size], b[first:first + size]))
-            first += size
-        yield Hierarchy.from_levels(levels, r.normal(size=n))
+ANY_SHAPE = Recipe(equalities_only=True, joints=(1, 10), levels=(1, 5), rows=(0, 5), duplicates=0.3,
+                   zero_rows=0.2, near_parallel=0.2, angles=(1e-2, 1e-1), scales=(1.0, 1.0),
+                   spread=1.0)
 
 
 @pytest.mark.slow
@@ -38,7 +18,8 @@ def stacks(count, seed):
 @pytest.mark.parametrize("threshold", [0.1, 2.0])
 def test_recursion_staircase_and_oracle_agree_on_random_stacks(damping, threshold):
     settings = {"damping": damping, "threshold": threshold}
-    for h in stacks(60, seed=11):
+    for seed in range(60):
+        h = generate(seed, ANY_SHAPE)
         expected = oracle.solve(h, **settings)
         for name in ("recursive", "tpm"):
             x = make(name, **settings).solve(h).x
