@@ -73,6 +73,12 @@ def state_at(q, v, t=0.7, differences=None):
     return state
 
 
+def place_of(point, q):
+    """Where a control point is at q, independent of the Jacobians."""
+    rotation, translation = State.at(ROBOT, q)._placement(point.joint)
+    return translation + rotation @ point.offset
+
+
 @dataclass(frozen=True)
 class Elbow(Task):
     """A user's task in plain numpy: the fourth joint's angle."""
