@@ -101,6 +101,17 @@ def build(case, with_reference):
     return Hierarchy.from_levels(levels, reference)
 
 
+def boxed(h, low, high):
+    """Return h with the bounds low <= x <= high as its first level."""
+    box = np.eye(h.n), np.broadcast_to(low, h.n), np.broadcast_to(high, h.n)
+    return Hierarchy.from_levels([box, *((A, b) for A, b, _ in h.levels())], h.reference)
+
+
+def gap(x, expected):
+    """Return the largest difference, relative to 1 + the largest entry expected."""
+    return np.abs(x - expected).max(initial=0.0) / (1.0 + np.abs(expected).max(initial=0.0))
+
+
 def family(name):
     """Yield (hierarchy, x, norms) of a reference family; see scenarios/problems/data/README.md."""
     for problem in families.family(name):

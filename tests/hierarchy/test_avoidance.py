@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from scene import BODY, OBSTACLES, ROBOT, TIP, states
+from scene import BODY, OBSTACLES, ROBOT, TIP, place_of, states
 
 from hierarchy import HierarchyError, State
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
@@ -93,9 +93,7 @@ def test_the_active_point_is_the_nearest_one_without_the_end_effector():
         state = State.at(ROBOT, q, v)
         seen = sensor.measure(state)
         for k, point in enumerate(sensor.points):
-            rotation, translation = state._placement(point.joint)
-            np.testing.assert_allclose(seen.points[k], translation + rotation @ point.offset,
-                                       atol=1e-14)
+            np.testing.assert_allclose(seen.points[k], place_of(point, q), atol=1e-14)
             each = [distance(o, seen.points[k])[0] for o in OBSTACLES.obstacles]
             assert seen.distance[k] == pytest.approx(min(each))
             assert seen.nearest[k] == int(np.argmin(each))
@@ -108,8 +106,7 @@ def test_the_active_point_is_the_nearest_one_without_the_end_effector():
 
 def test_an_obstacle_at_a_control_point_is_refused_at_the_start():
     state = State.at(ROBOT, np.full(7, 0.4))
-    rotation, translation = state._placement(ROBOT.control_points[4].joint)
-    point = translation + rotation @ ROBOT.control_points[4].offset
+    point = place_of(ROBOT.control_points[4], state.q)
     obstacles = Obstacles([Obstacle("point", (5, 5, 5)),
                            Obstacle("point", tuple(point), name="obstacle 2")])
     with pytest.raises(HierarchyError, match=r"obstacle 2 .* touches control point 5"):

@@ -2,19 +2,12 @@
 
 import numpy as np
 import pytest
-from scene import ROBOT, state_at, states
+from scene import ROBOT, place_of, state_at, states
 
-from hierarchy import Stack, State
+from hierarchy import Stack
 from hierarchy.tasks import CumulatedRepulsion, JointDamping, Posture
 
 WITHIN = 0.5
-
-
-def place_of(q, k):
-    """Where control point k is at q: independent of the Jacobians."""
-    state = State.at(ROBOT, q)
-    rotation, translation = state._placement(ROBOT.control_points[k].joint)
-    return translation + rotation @ ROBOT.control_points[k].offset
 
 
 def by_hand(state, acceleration, lever, h=1e-5):
@@ -25,10 +18,9 @@ def by_hand(state, acceleration, lever, h=1e-5):
             continue
         r = seen.direction[k].copy()
 
-        def row(q, k=k, r=r):
-            steps = h * np.eye(7)
-            return np.array([r @ (place_of(q + s, k) - place_of(q - s, k)) / (2 * h)
-                             for s in steps])
+        def row(q, point=ROBOT.control_points[k], r=r):
+            return np.array([r @ (place_of(point, q + s) - place_of(point, q - s)) / (2 * h)
+                             for s in h * np.eye(7)])
 
         J = row(state.q)
         drift = (row(state.q + 1e-4 * state.v) - row(state.q - 1e-4 * state.v)) @ state.v / 2e-4

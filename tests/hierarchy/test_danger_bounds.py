@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
-from scene import BODY, FRAME, ROBOT, SENSOR, TIP, state_at, states
+from scene import BODY, FRAME, ROBOT, SENSOR, TIP, driven, state_at, states
 
 from hierarchy import HierarchyError, Stack, State
 from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.paths import Still
 from hierarchy.tasks import JointDamping, JointLimits, Position
 from hierarchy.tasks.danger_bounds import DangerBounds
-from scenarios.cell.plants import KinematicArm
 from scenarios.cell.sensors import ExactDistances
-from solvers import Status, make
+from solvers import make
 
 PERIOD, REACH, SHAPE = 1e-3, 0.5, 6.0
 LIMITS = JointLimits(ROBOT, 30.0, PERIOD)
@@ -113,16 +112,10 @@ def closest(level, first, resolver, obstacles, goal, ticks=1500):
     """Go to a goal; return the least distance of all points and the least slack of the box."""
     sensor = ExactDistances(ROBOT, obstacles, BODY, TIP)
     stack = Stack([first, Position(FRAME, goal)], level, reference=JointDamping(7, 5.0))
-    plant, state = KinematicArm(ROBOT, START, np.zeros(7), PERIOD, level), State.at(ROBOT, START)
     nearest, slack = np.inf, np.inf
-    for tick in range(ticks):
-        state.move(tick * PERIOD, plant.q, plant.v)
-        nearest = min(nearest, sensor.measure(state).distance.min())
-        h = stack.hierarchy(state)
-        res = resolver.solve(h)
-        assert res.status is Status.SOLVED
+    for state, h, res in driven(stack, ticks, PERIOD, START, resolver, sensor=sensor):
+        nearest = min(nearest, state.measurement.distance.min())
         slack = min(slack, (h.upper[:7] - res.x).min(), (res.x - h.lower[:7]).min())
-        plant.act(res.x)
     return nearest, slack
 
 

@@ -43,39 +43,36 @@ def kernel(folder, share):
     return importlib.import_module("kernel_of_test_jit").outer
 
 
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder of modules, with a cache of its own."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    caching.cache_folder.cache_clear()
+    yield tmp_path
+    caching.cache_folder.cache_clear()
+
+
 @pytest.mark.parametrize("damage", [lambda kept: kept[:50], lambda kept: b"",
                                     lambda kept: kept[:-1] + bytes([kept[-1] ^ 1])])
-def test_a_damaged_cache_is_compiled_again(tmp_path, monkeypatch, damage):
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    caching.cache_folder.cache_clear()
-    try:
-        assert kernel(tmp_path, 0.5)(4.0) == 4.0
-        (kept,) = (tmp_path / "cache").rglob("kernel_of*outer*")
-        whole = kept.read_bytes()
-        kept.write_bytes(damage(whole))
-        assert kernel(tmp_path, 0.5)(4.0) == 4.0
-        assert kept.read_bytes() != damage(whole)
-    finally:
-        caching.cache_folder.cache_clear()
+def test_a_damaged_cache_is_compiled_again(folder, damage):
+    assert kernel(folder, 0.5)(4.0) == 4.0
+    (kept,) = (folder / "cache").rglob("kernel_of*outer*")
+    whole = kept.read_bytes()
+    kept.write_bytes(damage(whole))
+    assert kernel(folder, 0.5)(4.0) == 4.0
+    assert kept.read_bytes() != damage(whole)
 
 
-def test_a_kernel_knows_what_helpers_below_it_use(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    caching.cache_folder.cache_clear()
-    try:
-        half, whole = kernel(tmp_path, 0.5), kernel(tmp_path, 1.25)
-        if hasattr(half, "constants"):  # plain functions under NUMBA_DISABLE_JIT
-            assert "SHARE = 0.5" in half.constants
-            assert "SHARE = 1.25" in whole.constants
-            assert all(name.partition(" ")[0].isupper() for name in half.constants)
-            assert str(tmp_path / "helper_of_test_jit.py") in half.source_files
-        assert (half(4.0), whole(4.0)) == (4.0, 10.0)
-    finally:
-        caching.cache_folder.cache_clear()
+def test_a_kernel_knows_what_helpers_below_it_use(folder):
+    half, whole = kernel(folder, 0.5), kernel(folder, 1.25)
+    if hasattr(half, "constants"):  # plain functions under NUMBA_DISABLE_JIT
+        assert "SHARE = 0.5" in half.constants
+        assert "SHARE = 1.25" in whole.constants
+        assert all(name.partition(" ")[0].isupper() for name in half.constants)
+        assert str(folder / "helper_of_test_jit.py") in half.source_files
+    assert (half(4.0), whole(4.0)) == (4.0, 10.0)
 
 
 KEPT = """

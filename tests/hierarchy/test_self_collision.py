@@ -1,7 +1,6 @@
-
 import numpy as np
 import pytest
-from scene import ROBOT, compiled_rows, states
+from scene import ROBOT, compiled_rows, driven, states
 
 from hierarchy import Stack, State
 from hierarchy.avoidance import Barrier, Capsule
@@ -9,8 +8,6 @@ from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules
 from hierarchy.robots import TABLES, link_capsules
 from hierarchy.tasks import Posture
 from hierarchy.tasks.self_separation import SelfSeparation
-from scenarios.cell.plants import KinematicArm
-from solvers import Status, make
 
 LEVELS = ["velocity", "acceleration"]
 ARM = link_capsules(TABLES["kuka_lwr"], foot=0.3105)
@@ -146,23 +143,6 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
     assert 0 < sided < 8 * task.dimension
 
 
-def drive(level, period, start, goal, barrier, differences=False, duration=2.5):
-    """Distances [m] of the arm's pairs on the way to a posture below it, tick after tick."""
-    task = SelfSeparation(ARM, barrier)
-    stack = Stack([task, Posture(goal, stiffness=25.0, damping=10.0, gain=5.0)], level)
-    state = State(ROBOT, period if differences else None)
-    plant = KinematicArm(ROBOT, np.array(start), np.zeros(7), period, level)
-    resolver, memory, seen = make("hcod"), None, []
-    for k in range(round(duration / period)):
-        state.move(k * period, plant.q, plant.v)
-        seen.append(task.distances(state))
-        done = resolver.solve(stack.hierarchy(state), memory)
-        assert done.status is Status.SOLVED
-        memory = done.memory
-        plant.act(done.x)
-    return np.array(seen), plant
-
-
 OPEN = (0.3, 0.5, 0.4, -0.9, 0.2, 0.5, 0.0)
 INTO_THE_FOOT = (0.3, 2.05, 0.1, -2.05, 0.2, 1.8, 0.0)
 
@@ -174,8 +154,13 @@ INTO_THE_FOOT = (0.3, 2.05, 0.1, -2.05, 0.2, 1.8, 0.0)
 def test_an_arm_driven_into_its_foot_stops_before(level, period, differences):
     collides = TASKS["arm"].distances(State.at(ROBOT, INTO_THE_FOOT)).min()
     assert collides < 0
-    d, plant = drive(level, period, OPEN, INTO_THE_FOOT, Barrier(0.02), differences)
+    task = SelfSeparation(ARM, Barrier(0.02))
+    below = Posture(INTO_THE_FOOT, stiffness=25.0, damping=10.0, gain=5.0)
+    ticks = driven(Stack([task, below], level), round(2.5 / period), period, OPEN,
+                   differences=differences)
+    d, v = zip(*((task.distances(state), state.v.copy()) for state, _, _ in ticks), strict=True)
+    d = np.array(d)
     assert d[0].min() > 0.1
     assert d.min() > 0.02 - 1e-6
     assert d[-1].min() == pytest.approx(0.02, abs=1e-4)
-    assert np.abs(plant.v).max() < 0.1
+    assert np.abs(v[-1]).max() < 0.1

@@ -1,14 +1,13 @@
 import numpy as np
 import pytest
-from scene import BODY, FRAME, ROBOT, TIP, compiled_rows, states
+from scene import BODY, FRAME, ROBOT, TIP, compiled_rows, driven, states
 
 from hierarchy import HierarchyError, Stack, State
 from hierarchy.avoidance import Barrier, Measurement, Obstacle, Obstacles, Pairs
 from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import JointDamping, Position, Separation
-from scenarios.cell.plants import KinematicArm
 from scenarios.cell.sensors import ExactDistances
-from solvers import Status, make
+from solvers import make
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 ROUND = Ellipse((0.3, 0.5, 0.2), (0.2, 0.1, 0.0), (0.0, 0.1, 0.3), rate=2.0)
@@ -106,33 +105,16 @@ def test_rows_beyond_the_influence_change_nothing():
                                    make("hcod").solve(without).x, rtol=1e-12)
 
 
-def drive(level, period, obstacles, tasks, barrier, duration=2.0, start=START, differences=False):
-    """Distances [m], joint velocities and what is sent, tick after tick; separation is on top."""
+def kept_apart(level, period, obstacles, task, duration, differences=False):
+    """Distances [m] (ticks, 9, obstacles) on the way, with separation above a task."""
     sensor = sensor_of(obstacles)
-    stack = Stack([Separation(sensor.points, barrier, len(obstacles)), *tasks], level,
+    stack = Stack([Separation(sensor.points, Barrier(0.05), len(obstacles)), task], level,
                   JointDamping(7))
-    state = State(ROBOT, period if differences else None)
-    plant = KinematicArm(ROBOT, start, np.zeros(7), period, level)
-    resolver, memory, log = make("hcod"), None, []
-    for k in range(round(duration / period)):
-        state.move(k * period, plant.q, plant.v)
-        sensor.measure(state)
-        done = resolver.solve(stack.hierarchy(state), memory)
-        assert done.status is Status.SOLVED
-        memory = done.memory
-        log.append((sensor.measurement.pairs.distance.copy(), plant.v.copy(), done.x))
-        plant.act(done.x)
-    return [np.array(signal) for signal in zip(*log, strict=True)]
+    ticks = driven(stack, round(duration / period), period, START, None, differences, sensor)
+    return np.array([state.measurement.pairs.distance.copy() for state, _, _ in ticks])
 
 
-HAND = State.at(ROBOT, START).position(FRAME)
-
-
-def beside_the_hand(*offset):
-    return tuple((HAND + np.array(offset)).tolist())
-
-
-GOAL = beside_the_hand(-0.25, 0.05, 0.1)
+GOAL = tuple(State.at(ROBOT, START).position(FRAME) + np.array([-0.25, 0.05, 0.1]))
 
 
 @pytest.mark.slow
@@ -143,8 +125,7 @@ def test_a_hand_driven_into_an_obstacle_stops_at_the_distance(level, period, dif
     obstacles = [Obstacle("sphere", GOAL, (0.05,)),
                  Obstacle("box", (-0.2, 0.3, 0.2), (0.1, 0.02, 0.03)),
                  Obstacle("capsule", (-0.1, 0.4, -0.1), (0.02, 0.1))]
-    d, _, _ = drive(level, period, obstacles, [Position(FRAME, Still(GOAL))], Barrier(0.05),
-                    3.0, differences=differences)
+    d = kept_apart(level, period, obstacles, Position(FRAME, Still(GOAL)), 3.0, differences)
     assert d.min() >= 0.05 - 1e-9
     assert d[-1, 8, 0] == pytest.approx(0.05, abs=1e-6)
 
@@ -156,7 +137,7 @@ def test_a_hand_that_slides_along_an_obstacle_keeps_the_distance(level, period):
     path = Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0))
     obstacles = [Obstacle("point", c) for c in ((0.1, 0.5, 0.1), (-0.2, 0.3, 0.2),
                                                 (-0.1, 0.4, -0.1))]
-    d, _, _ = drive(level, period, obstacles, [Position(FRAME, path)], Barrier(0.05), 6.5)
+    d = kept_apart(level, period, obstacles, Position(FRAME, path), 6.5)
     assert 0.05 - 1e-6 < d.min() < 0.052
 
 

@@ -12,6 +12,7 @@ from scene import (
     Elbow,
     FastElbow,
     compiled_rows,
+    place_of,
     state_at,
     states,
 )
@@ -71,13 +72,8 @@ def test_avoidance_jacobian_is_that_of_the_active_control_point(rows):
         seen = state.measurement
         point = ROBOT.control_points[seen.active]
         away = seen.direction[seen.active].copy()
-
-        def position(q, point=point):
-            rotation, translation = State.at(ROBOT, q)._placement(point.joint)
-            return translation + rotation @ point.offset
-
-        J = np.transpose([(position(q + STEP * e) - position(q - STEP * e)) / (2 * STEP)
-                          for e in np.eye(7)])
+        J = np.transpose([place_of(point, q + STEP * e) - place_of(point, q - STEP * e)
+                          for e in np.eye(7)]) / (2 * STEP)
         np.testing.assert_allclose(task.jacobian(state), J if rows == 3 else away[None] @ J,
                                    atol=1e-9)
 

@@ -211,6 +211,8 @@ class Own(Task):
     (lambda: Loop(0.1).run(None, print, 1.0), "step: expected a function"),
     (lambda: Loop(0.1).run(print, print, 1.0, 5), "send: expected a function, got int 5"),
     (lambda: Loop(0.1).run(print, print, NAN), "loop: duration"),
+    (lambda: Stack(metric="inertia"), "'mass' or None, got 'inertia'"),
+    (lambda: Stack(metric=-np.eye(7)), "not positive definite"),
     (lambda: Robot.named("kuka_lvr"), "did you mean 'kuka_lwr'"),
     (lambda: ROBOT.frame("end_efector"), "did you mean 'end_effector'"),
     (lambda: ROBOT.control_point("elbow", (0, 0, 0)), "unknown joint 'elbow'"),

@@ -88,11 +88,12 @@ def test_an_answer_that_is_inaccurate_alone_is_so_in_a_batch():
     assert Status.INACCURATE in statuses
 
 
-@both
+@pytest.mark.parametrize("resolver", [
+    *(make(name, damping=damping) for name in ("tpm", "hcod") for damping in (0.0, 0.1)),
+    make("merged", scales={"level 3": 3.0})], ids=str)
 @pytest.mark.parametrize("half", [0.05, 0.3, 3.0])
-@pytest.mark.parametrize("settings", [{}, {"damping": 0.1}], ids=["undamped", "damped"])
-def test_bounds_and_their_memory_are_those_of_each_alone(name, half, settings):
-    resolver, hs = make(name, **settings), [bounded(seed, half) for seed in range(20)]
+def test_bounds_and_their_memory_are_those_of_each_alone(resolver, half):
+    hs = [bounded(seed, half) for seed in range(20)]
     cold = solve(Batch.of(hs), resolver)
     alone = [resolver.solve(h) for h in hs]
     assert_same(cold, alone)
@@ -141,6 +142,8 @@ def arrays(**wrong):
     (lambda: arrays(sizes=[2, 2]), "sizes sum to 4"), (lambda: arrays(sizes=[1.5, 1.5]), "whole"),
     (lambda: Batch.of([Hierarchy.from_levels([(np.eye(3)[:k], np.ones(k))]) for k in (2, 1)]),
      "problem 1"), (lambda: Batch.of([]), "no hierarchies"),
+    (lambda: Batch.of([Hierarchy.from_levels([([[1.0, 0.3]], [1.0])], metric=np.eye(2))]),
+     "problem 0 has a metric"),
     (lambda: solve(arrays(), make("recursive")), "recursive resolves no batches"),
     (lambda: solve(arrays(), make("tpm-published")), "tpm-published resolves no batches"),
     (lambda: solve(arrays(), threads=0), "threads = 0"),

@@ -10,7 +10,7 @@ import tracemalloc
 import numpy as np
 import oracle
 import pytest
-from rank_cases import CASES, build, family, generic, random_levels, rng
+from rank_cases import CASES, boxed, build, family, generic, random_levels, rng
 from sequences import moved
 
 from hierarchy import Hierarchy, HierarchyError
@@ -236,10 +236,8 @@ def test_a_first_level_that_is_more_than_bounds_is_refused_by_level_and_row(reso
 def test_bounds_of_a_first_level_are_kept_and_change_nothing_where_they_are_far(resolver, case):
     h = build(case, True)
     for room, damping in ((1e6, 0.0), (1e6, 0.05), (0.3, 0.0)):
-        side = np.full(h.n, room)
-        levels = [(np.eye(h.n), -side, side), *((A, b) for A, b, _ in h.levels())]
         damped = dataclasses.replace(resolver, damping=damping, threshold=3.0)
-        res = damped.solve(Hierarchy.from_levels(levels, h.reference))
+        res = damped.solve(boxed(h, -room, room))
         assert res.status is Status.SOLVED
         assert np.abs(res.x).max() <= room * (1.0 + 1e-12)
         if room > 1.0:
@@ -255,8 +253,7 @@ ODD = [np.nan, np.inf, -np.inf, 1e300, -1.0, 0.0, 1.0, 2.0, 3.0, 0.5, 1e18, -7.0
 def remembered(resolver):
     """Hierarchies whose limits act, of kinds that a resolver handles."""
     for seed in range(5 if PROBLEMS < 50 else 40):
-        levels = random_levels(7, (3, 1, 1), seed)
-        yield Hierarchy.from_levels([(np.eye(7), [-0.3] * 7, [0.3] * 7), *levels])
+        yield boxed(Hierarchy.from_levels(random_levels(7, (3, 1, 1), seed)), -0.3, 0.3)
     if resolver.handles == "inequalities":
         for name in ("INEQ7", "HUM38"):
             yield from (h for h, _, _ in list(family(name))[:PROBLEMS if resolver.strict else 3])

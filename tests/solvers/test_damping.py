@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import oracle
 import pytest
-from rank_cases import family, rng
+from rank_cases import family, gap, rng
 
 from hierarchy import Hierarchy
 from scenarios.config import load
@@ -71,10 +71,6 @@ def equalities(request):
 @pytest.fixture(scope="module", params=BOUNDED)
 def bounded(request):
     return BOUNDED[request.param]()
-
-
-def gap(x, y):
-    return np.abs(x - y).max() / (1.0 + np.abs(y).max())
 
 
 def test_strict_resolvers_that_damp_each_level_find_the_x_of_the_definition(equalities):

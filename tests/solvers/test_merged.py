@@ -131,20 +131,6 @@ def test_scales_divide_the_weight_of_their_level():
     np.testing.assert_allclose(x, [0.5], atol=1e-5)
 
 
-def test_a_batch_gives_the_bits_of_single_solves_and_carries_their_memories():
-    from solvers.batch.stacked import Batch, solve
-
-    levels, resolver = arm(2), make("merged", scales={"level 4": 3.0})
-    hs = [with_targets(levels, targets(seed)) for seed in range(5)]
-    first = solve(Batch.of(hs), resolver)
-    again = solve(Batch.of(hs), resolver, memory=first.memory)
-    for h, x, memory, later in zip(hs, first.x, first.memory, again.x, strict=True):
-        one = solved(resolver, h)
-        assert one.x.tobytes() == x.tobytes()
-        assert one.memory.tobytes() == memory.tobytes()
-        assert solved(resolver, h, one.memory).x.tobytes() == later.tobytes()
-
-
 def test_weights_below_strict_levels_are_one_level_of_weighted_rows():
     h, w = with_targets(arm(4), targets(4)), np.repeat([1.0, 1.0, 9.0, 4.0, 0.5], [1, N, 2, 3, N])
     by_hand = h.changed(A=h.A * w[:, None], lower=h.lower * w, upper=h.upper * w,

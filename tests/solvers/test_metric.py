@@ -7,7 +7,6 @@ from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import JointDamping, Position
 from solvers import Status, certify, make, names
-from solvers.batch import Batch
 
 STRICT = [make(name) for name in names() if make(name).strict]
 INEQUALITIES = [r for r in STRICT if r.handles == "inequalities"]
@@ -122,16 +121,3 @@ def test_a_metric_that_loses_definiteness_is_a_numerical_failure(name):
     assert res.status is Status.NUMERICAL_FAILURE
     assert not res.x.any()
     assert not certify(h, [1.0, 0.0]).certified
-
-
-def test_a_stack_refuses_a_metric_that_it_cannot_give():
-    with pytest.raises(HierarchyError, match="'mass' or None, got 'inertia'"):
-        Stack(metric="inertia")
-    with pytest.raises(HierarchyError, match="not positive definite"):
-        Stack(metric=-np.eye(7))
-
-
-def test_a_batch_has_no_metric():
-    h = Hierarchy.from_levels([([[1.0, 0.3]], [1.0])], metric=np.eye(2))
-    with pytest.raises(HierarchyError, match="problem 0 has a metric"):
-        Batch.of([h])

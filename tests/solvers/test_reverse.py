@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import oracle
 import pytest
-from rank_cases import CASES, build, family, rng
+from rank_cases import CASES, build, family, gap, rng
 
 from hierarchy import Hierarchy
 from solvers import make
@@ -25,10 +25,6 @@ def by_pseudoinverses(h, tolerance=1e-9):
         x = x + T @ np.linalg.pinv(J @ T, rcond=tolerance) @ (h.lower[first:last] - J @ x)
     P = np.eye(h.n) - np.linalg.pinv(h.A, rcond=tolerance) @ h.A
     return x + P @ h.reference
-
-
-def gap(a, b):
-    return np.abs(a - b).max(initial=0.0) / (1.0 + np.abs(b).max(initial=0.0))
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c.__name__ != "unequal_scales"],

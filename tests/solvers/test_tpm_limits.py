@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from rank_cases import CASES, build, rng
+from rank_cases import CASES, boxed, build, rng
 from scipy.optimize import lsq_linear
 
 from hierarchy import Hierarchy
@@ -20,12 +20,6 @@ TAME = Recipe(equalities_only=True, joints=(1, 20), levels=(1, 5), rows=(0, 10),
 WILD = Recipe(equalities_only=True, joints=(1, 20), levels=(1, 5), rows=(0, 10))
 
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
-
-
-def boxed(h, low, high):
-    """h with the bounds low <= x <= high as its first level."""
-    levels = [(np.eye(h.n), np.broadcast_to(low, h.n), np.broadcast_to(high, h.n))]
-    return Hierarchy.from_levels([*levels, *((A, b) for A, b, _ in h.levels())], h.reference)
 
 
 def limited(seed, recipe=TAME):

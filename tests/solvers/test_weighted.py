@@ -5,7 +5,7 @@ import os
 import numpy as np
 import oracle
 import pytest
-from rank_cases import CASES, build, family, generic, more_rows_than_joints
+from rank_cases import CASES, boxed, build, family, gap, generic, more_rows_than_joints
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make, problems
@@ -16,15 +16,6 @@ every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
 LIMIT = 0.7
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"  # everything some hundred times slower
 HUMANOIDS = 1 if PLAIN else 3
-
-
-def within_limits(h, limit=LIMIT):
-    box = (np.eye(h.n), [-limit] * h.n, [limit] * h.n)
-    return Hierarchy.from_levels([box, *((A, b) for A, b, _ in h.levels())], h.reference)
-
-
-def gap(x, expected):
-    return np.abs(x - expected).max(initial=0.0) / (1.0 + np.abs(expected).max(initial=0.0))
 
 
 def as_two_levels(h, resolver, hard):
@@ -46,7 +37,7 @@ def as_two_levels(h, resolver, hard):
 @every_case
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3])
 def test_within_limits_it_is_the_minimiser_and_shown_to_be(case, ratio):
-    h, weighted = within_limits(build(case, True)), make("weighted", ratio=ratio)
+    h, weighted = boxed(build(case, True), -LIMIT, LIMIT), make("weighted", ratio=ratio)
     res = weighted.solve(h)
     assert res.status is Status.SOLVED
     assert certify(as_two_levels(h, weighted, 1), res.x).optimal
