@@ -53,23 +53,19 @@ def row(runs, label):
     return next(row for row in table(runs) if row.label.startswith(label))
 
 
-def test_the_best_of_each_row_is_marked():
-    runs = [made(LETTER, minimal_distance=np.full(5, 0.2)), made("hqp")]
-    assert best(row(runs, "Body distance")) == {1}  # 1 m beats 0.2 m: more is better
-    runs = [made(LETTER, a=np.ones((5, 7))), made("hqp")]
-    assert best(row(runs, "Joint acceleration")) == {1}
+ONES = np.ones((5, 7))
 
 
-def test_values_within_a_percent_are_equally_good():
-    runs = [made(LETTER, a=np.full((5, 7), 1.005)), made("hqp", a=np.ones((5, 7))),
-            made("recursive", a=np.full((5, 7), 2.0))]
-    assert best(row(runs, "Joint acceleration")) == {0, 1}
-
-
-def test_a_run_that_stopped_early_wins_nothing():
-    runs = [made(LETTER, fault="diverged at tick 5"), made("hqp", a=np.ones((5, 7))),
-            made("recursive", a=np.full((5, 7), 2.0))]
-    assert best(row(runs, "Joint acceleration")) == {1}
+@pytest.mark.parametrize(("runs", "label", "marked"), [
+    ([made(LETTER, minimal_distance=np.full(5, 0.2)), made("hqp")], "Body distance", {1}),
+    ([made(LETTER, a=ONES), made("hqp")], "Joint acceleration", {1}),
+    ([made(LETTER, a=1.005 * ONES), made("hqp", a=ONES), made("recursive", a=2.0 * ONES)],
+     "Joint acceleration", {0, 1}),
+    ([made(LETTER, fault="diverged at tick 5"), made("hqp", a=ONES),
+      made("recursive", a=2.0 * ONES)], "Joint acceleration", {1}),
+], ids=["more is better", "less is better", "equal within a percent", "stopped early"])
+def test_the_best_of_each_row_is_marked(runs, label, marked):
+    assert best(row(runs, label)) == marked
 
 
 def test_a_run_that_never_began_has_empty_cells_and_loses_nobody_else_theirs():

@@ -11,20 +11,13 @@ from scenarios.config import ScenarioError
 from scenarios.config.kinds.torque import PushSection, TorqueSection
 from solvers import certify, make
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("with_mujoco")]
 
 CONTACTS = feet()
 
 
 def plant_with(**section):
     return TorqueSection(kind="torque", **section)
-
-
-@pytest.fixture(autouse=True)
-def _with_mujoco(tmp_path, monkeypatch):
-    """MuJoCo writes a log into the folder in which it warns of a run that diverges."""
-    pytest.importorskip("mujoco")
-    monkeypatch.chdir(tmp_path)
 
 
 def in_the_air(seed):
