@@ -72,19 +72,18 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, task, level, diffe
         np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10)
 
 
-@pytest.mark.parametrize(("axes", "said"), [((), "axes"), ((1, 0), "in this order"),
-                                            ((0, 3), "must be some of 0, 1, 2")])
-def test_axes_that_make_no_sense_are_refused(axes, said):
+BARE = ('<robot name="bare"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
+        '<parent link="a"/><child link="b"/></joint></robot>')
+
+
+@pytest.mark.parametrize(("robot", "axes", "said"), [
+    ("humanoid", (), "axes"), ("humanoid", (1, 0), "in this order"),
+    ("humanoid", (0, 3), "must be some of 0, 1, 2"), ("bare.urdf", (0,), "'bare' has no masses")])
+def test_a_centre_of_mass_that_makes_no_sense_is_refused(robot, axes, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bare.urdf").write_text(BARE)
     with pytest.raises(HierarchyError, match=said):
-        CentreOfMass(ROBOTS["humanoid"], PATH, axes)
-
-
-def test_a_robot_without_masses_has_no_centre_of_mass(tmp_path):
-    path = tmp_path / "bare.urdf"
-    path.write_text('<robot name="bare"><link name="a"/><link name="b"/><joint name="j" '
-                    'type="continuous"><parent link="a"/><child link="b"/></joint></robot>')
-    with pytest.raises(HierarchyError, match="'bare' has no masses"):
-        CentreOfMass(Robot.from_file(path), PATH)
+        CentreOfMass(Robot.load(robot), PATH, axes)
 
 
 @pytest.fixture(scope="module")
