@@ -2,7 +2,6 @@ import dataclasses
 import itertools
 import re
 import shlex
-from functools import cache
 
 import numpy as np
 import pytest
@@ -33,16 +32,6 @@ def made(spec="tpm-published", fault=None, error=None, scenario=None, **signals)
 
 def comparison(*runs):
     return Comparison(runs, "hierarchy compare hand-made", {"python": "3.11"})
-
-
-def with_events(run, *events):
-    recorded = dataclasses.replace(run.recording, events=tuple(Event(*one) for one in events))
-    return dataclasses.replace(run, recording=recorded)
-
-
-@cache
-def page_of_two():
-    return page(comparison(made(LETTER), made("hqp")))
 
 
 def best(row):
@@ -104,7 +93,7 @@ def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
 
 @pytest.mark.slow
 def test_the_page_shows_verdict_replay_table_stack_panels_commands_settings():
-    text = page_of_two()
+    text = page(comparison(made(LETTER), made("hqp")))
     places = [text.index(mark) for mark in (
         'class="verdict"', "<h2>Replay", "<h2>In numbers", "<h2>The stack over time",
         "<h2>Side by side", "<h2>How to reproduce this<", "<h2>Settings",
@@ -124,7 +113,9 @@ def test_runs_of_the_same_motion_are_drawn_once_and_named_together():
 
 @pytest.mark.slow
 def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
-    run = with_events(made(LETTER, contacts=[0, 1, 0, 0, 0], **SOFTLY), (3, "not_finite", "hold"))
+    run = made(LETTER, contacts=[0, 1, 0, 0, 0], **SOFTLY)
+    run = dataclasses.replace(run, recording=dataclasses.replace(
+        run.recording, events=(Event(3, "not_finite", "hold"),)))
     text = page(comparison(run, made("hqp")))
     cells = re.search(r"<td>not finite</td><td>hold</td><td>1</td><td>([^<]*)</td>", text)
     assert cells is not None
@@ -156,23 +147,16 @@ def test_the_numbers_as_data_hold_the_verdicts():
     assert both.as_plain_data()["verdicts"] == {"hand-made": list(lines(verdicts(both.runs)))}
 
 
-@pytest.fixture(scope="module")
-def short_comparison(tmp_path_factory):
-    """A page on disk, of real runs of which two are the same motion."""
-    short = [load("ellipse", ["control.duration=0.3"]).with_resolver(spec)
-             for spec in ("tpm-published", "recursive", "augmented")]
-    runs = tuple(Run(one, spec, spec, simulate(one)) for one, spec in
-                 zip(short, ("tpm-published", "recursive", "augmented"), strict=True))
-    file = tmp_path_factory.mktemp("report") / "index.html"
-    file.write_text(page(comparison(*runs)), encoding="utf-8")
-    return file
-
-
 @pytest.mark.slow
-def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(short_comparison):
+def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(tmp_path):
+    """Of real runs, two of which are the same motion."""
+    short, specs = load("ellipse", ["control.duration=0.3"]), (LETTER, "recursive", "augmented")
+    runs = [Run(one, spec, spec, simulate(one)) for spec in specs
+            for one in [short.with_resolver(spec)]]
+    (tmp_path / "index.html").write_text(page(comparison(*runs)), encoding="utf-8")
     with chromium() as tab:
         for width, dark in itertools.product((360, 1400), (False, True)):
-            tab.look_at(short_comparison.as_uri(), width=width, dark=dark)
+            tab.look_at((tmp_path / "index.html").as_uri(), width=width, dark=dark)
             assert tab.run("document.documentElement.scrollWidth") <= width
             assert not tab.run("document.querySelector('iframe').srcdoc") or width == 1400
             tab.run("document.querySelector('iframe').scrollIntoView()")
