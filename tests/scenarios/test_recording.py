@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -47,9 +48,7 @@ def test_a_run_folder_holds_arrays_metrics_scenario_and_versions(tmp_path):
 
 
 def test_a_save_that_breaks_leaves_nothing_behind(tmp_path):
-    def broken():
-        raise KeyboardInterrupt
-
+    broken = mock.Mock(side_effect=KeyboardInterrupt)
     scenario = SimpleNamespace(pointing=None, to_toml=broken, tasks=(),
                                control=SimpleNamespace(period=1.0))
     with pytest.raises(KeyboardInterrupt):
