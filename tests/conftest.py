@@ -50,6 +50,13 @@ def no_plugins(monkeypatch):
     plugins._points.cache_clear()
 
 
+@pytest.fixture
+def with_mujoco(tmp_path, monkeypatch):
+    """MuJoCo is there, and logs runs that diverge into a folder of the test's own."""
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+
+
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
     """The folder of the C library, made once by the first worker that needs it."""

@@ -54,16 +54,10 @@ def answered(entrant, questions, *calls):
 
 # -- the robots ------------------------------------------------------------------------------------
 
-@pytest.fixture
-def arm(tmp_path):
-    robot = Robot.named("kuka_lwr")
-    file = tmp_path / "arm.urdf"
-    file.write_text(urdf(robot))
-    return robot, Robot.from_file(file, robot.end_effector)
-
-
-def test_the_arm_read_from_its_urdf_moves_and_weighs_as_ours(arm):
-    ours, read = arm
+def test_the_arm_read_from_its_urdf_moves_and_weighs_as_ours(tmp_path):
+    ours, file = Robot.named("kuka_lwr"), tmp_path / "arm.urdf"
+    file.write_text(urdf(ours))
+    read = Robot.from_file(file, ours.end_effector)
     rng = np.random.default_rng(0)
     for _ in range(50):
         q, v = rng.uniform(ours.lower, ours.upper), rng.uniform(-1.0, 1.0, ours.n)

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -98,10 +99,7 @@ def test_what_the_certificate_refuses_is_proved_right_or_wrong(monkeypatch):
 
 
 def test_an_answer_that_an_oracle_cannot_judge_is_a_failure(monkeypatch):
-    def raises(h, x):
-        raise ZeroDivisionError
-
-    monkeypatch.setattr(stress, "certify", raises)
+    monkeypatch.setattr(stress, "certify", mock.Mock(side_effect=ZeroDivisionError))
     assert stress.outcome(make("hcod"), problem())[0] == stress.UNJUDGED
     assert stress.UNJUDGED in stress.FAILURES
 

@@ -14,11 +14,8 @@ ROOT = Path(__file__).parents[2]
 LINK = re.compile(r"\[[^\]]*\]\((?!https?://|#|mailto:)([^)#\s]+)")
 
 
-def documents():
-    return sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
-
-
-@pytest.mark.parametrize("document", documents(), ids=lambda path: str(path.relative_to(ROOT)))
+@pytest.mark.parametrize("document", [*ROOT.glob("*.md"), *sorted(ROOT.glob("docs/**/*.md"))],
+                         ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_document_points_only_at_files_that_exist(document):
     missing = [link for link in LINK.findall(document.read_text(encoding="utf-8"))
                if not (document.parent / link).exists()]

@@ -82,7 +82,7 @@ def test_compare_writes_page_numbers_and_a_folder_for_each_run_in_80_columns(tmp
 
 
 def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, capsys, monkeypatch):
-    simulation_is(must_not_run, monkeypatch)
+    simulation_is(mock.Mock(side_effect=AssertionError("the run began")), monkeypatch)
     (tmp_path / "precious").mkdir()
     (tmp_path / "precious" / "thesis.tex").touch()
     for command in ("run", "compare"):
@@ -93,10 +93,6 @@ def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, capsys
 def simulation_is(stand_in, monkeypatch):
     for module in ("scenarios.loop.simulation", "scenarios.results.comparing"):
         monkeypatch.setattr(importlib.import_module(module), "simulate", stand_in)
-
-
-def must_not_run(*_, **__):
-    raise AssertionError("the run began")
 
 
 def test_a_fault_is_reported_and_the_run_kept(tmp_path, capsys, monkeypatch):
@@ -207,10 +203,8 @@ def test_runs_side_by_side_are_those_made_one_by_one_and_are_timed_alone(tmp_pat
 
 
 def test_an_error_in_the_page_costs_no_run_and_says_where_they_are(tmp_path, monkeypatch, capsys):
-    def broken(*_):
-        raise LookupError("no such style")
-
-    monkeypatch.setattr("scenarios.results.page.comparison_page", broken)
+    monkeypatch.setattr("scenarios.results.page.comparison_page",
+                        mock.Mock(side_effect=LookupError("no such style")))
     assert run_command(["compare", "ellipse", "--resolvers", "tpm,hcod", *SHORT, "--out", "b"]) == 1
     assert "no such style; the runs are in b" in capsys.readouterr().err
     assert len(list((tmp_path / "b").rglob("run.npz"))) == 2

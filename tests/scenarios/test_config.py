@@ -6,11 +6,13 @@ from scenarios.config import ScenarioError, load, shipped
 
 
 @pytest.mark.parametrize("name", shipped())
-def test_every_shipped_scenario_loads_under_its_own_name(name):
+def test_every_shipped_scenario_loads_under_its_own_name_and_reads_back_the_same(name, tmp_path):
     scenario = load(name)
     assert scenario.name == name
     assert scenario.title
     scenario.make_resolver()
+    (tmp_path / "scenario.toml").write_text(scenario.to_toml())
+    assert load(tmp_path / "scenario.toml") == scenario
 
 
 def test_a_variant_has_two_names_and_those_of_a_file_extend_it(tmp_path):
@@ -23,14 +25,6 @@ def test_a_variant_has_two_names_and_those_of_a_file_extend_it(tmp_path):
     assert wide.limits == load("ellipse-limits").limits
     with pytest.raises(HierarchyError, match="wide"):
         load(f"{tmp_path}/mine.toml:wid")
-
-
-@pytest.mark.parametrize("name", shipped())
-def test_a_scenario_as_run_reads_back_the_same(name, tmp_path):
-    scenario = load(name)
-    path = tmp_path / "scenario.toml"
-    path.write_text(scenario.to_toml())
-    assert load(path) == scenario
 
 
 def test_changes_are_toml_values_at_dotted_keys():

@@ -17,11 +17,7 @@ from scenarios.loop.first_tick import contact_warnings, first_tick
 STANDING = load("stand-push")
 ANKLE = ROBOT.rest[ROBOT.coordinate("left_ankle_pitch")]
 
-
-@pytest.fixture(autouse=True)
-def _with_mujoco(tmp_path, monkeypatch):
-    pytest.importorskip("mujoco")
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("with_mujoco")
 
 
 def changed(**keys):

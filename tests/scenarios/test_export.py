@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from hierarchy import HierarchyError, Robot, State
 from scenarios import load, simulate
@@ -101,15 +102,9 @@ def test_frames_are_where_the_robot_is(run, messages):
         for i, name in enumerate(robot.joint_names, 1):
             np.testing.assert_allclose([*frames[name]["translation"].values()],
                                        state.placements[i, 9:], atol=1e-12)
-            np.testing.assert_allclose(rotation(frames[name]["rotation"]),
+            turned = Rotation.from_quat([frames[name]["rotation"][axis] for axis in "xyzw"])
+            np.testing.assert_allclose(turned.as_matrix(),
                                        state.placements[i, :9].reshape(3, 3).T, atol=1e-9)
-
-
-def rotation(q):
-    x, y, z, w = (q[name] for name in "xyzw")
-    return np.eye(3) + 2 * np.array([[-y * y - z * z, x * y - z * w, x * z + y * w],
-                                     [x * y + z * w, -x * x - z * z, y * z - x * w],
-                                     [x * z - y * w, y * z + x * w, -x * x - y * y]])
 
 
 @pytest.mark.parametrize("every", [1, 7])

@@ -24,14 +24,9 @@ def beside(panel, recordings):
     return side_by_side(panel, recordings, palette.looks(recordings))
 
 
-def spiky(ticks=20_000):
-    values = np.sin(np.linspace(0, 9, ticks))
-    values[12_345] = 7.0
-    return values
-
-
 def test_a_thinned_curve_keeps_its_ends_and_every_peak():
-    y = spiky()
+    y = np.sin(np.linspace(0, 9, 20_000))
+    y[12_345] = 7.0
     kept = drawing.envelope(y)
     assert len(kept) < 1_000
     assert {0, 12_345, len(y) - 1} <= set(kept.tolist())
@@ -126,21 +121,9 @@ def test_a_run_far_beyond_the_others_is_cut_and_says_so():
     assert drawn["a"].axes[0].get_ylim()[1] < 10.0
 
 
-@pytest.fixture(scope="module")
-def drawn(tmp_path_factory):
-    """The folder of all figures of a run."""
-    folder = tmp_path_factory.mktemp("drawn")
-    letter.write_all([recording()], folder)
-    return folder
-
-
 def letters(name, **changed):
     """A run made by hand that passes for the whole run of a shipped scenario."""
     return recording(load(name), **changed)
-
-
-def headings(fig):
-    return [ax.get_title(loc="left") for ax in fig.axes]
 
 
 def test_only_the_letters_own_runs_have_the_numbers_of_its_figures():
@@ -165,7 +148,8 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
     drawn = dict(letter._together(runs))
     assert list(drawn) == ["figure-4-joint-velocities", "figure-5-distances",
                            "figure-6-velocities-and-distance", "figure-7-pointing-error"]
-    assert [text[:4] for text in headings(drawn["figure-5-distances"])] == ["(a) ", "(b) ", "Body"]
+    headings = [ax.get_title(loc="left")[:4] for ax in drawn["figure-5-distances"].axes]
+    assert headings == ["(a) ", "(b) ", "Body"]
     speeds = [ax.lines[0].get_ydata()[0] for ax in drawn["figure-4-joint-velocities"].axes]
     assert speeds == [2.0, 1.0]  # the velocity level is (a)
 

@@ -72,19 +72,18 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, task, level, diffe
         np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10)
 
 
-@pytest.mark.parametrize(("axes", "said"), [((), "axes"), ((1, 0), "in this order"),
-                                            ((0, 3), "must be some of 0, 1, 2")])
-def test_axes_that_make_no_sense_are_refused(axes, said):
+BARE = ('<robot name="bare"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
+        '<parent link="a"/><child link="b"/></joint></robot>')
+
+
+@pytest.mark.parametrize(("robot", "axes", "said"), [
+    ("humanoid", (), "axes"), ("humanoid", (1, 0), "in this order"),
+    ("humanoid", (0, 3), "must be some of 0, 1, 2"), ("bare.urdf", (0,), "'bare' has no masses")])
+def test_a_centre_of_mass_that_makes_no_sense_is_refused(robot, axes, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bare.urdf").write_text(BARE)
     with pytest.raises(HierarchyError, match=said):
-        CentreOfMass(ROBOTS["humanoid"], PATH, axes)
-
-
-def test_a_robot_without_masses_has_no_centre_of_mass(tmp_path):
-    path = tmp_path / "bare.urdf"
-    path.write_text('<robot name="bare"><link name="a"/><link name="b"/><joint name="j" '
-                    'type="continuous"><parent link="a"/><child link="b"/></joint></robot>')
-    with pytest.raises(HierarchyError, match="'bare' has no masses"):
-        CentreOfMass(Robot.from_file(path), PATH)
+        CentreOfMass(Robot.load(robot), PATH, axes)
 
 
 @pytest.fixture(scope="module")
@@ -124,15 +123,9 @@ def test_strict_resolvers_agree_over_a_short_run(name, resolver):
     assert (other["status"] == 0).all()
 
 
-@pytest.fixture(scope="module")
-def reaching():
-    scenario = load("humanoid-reach", ["control.duration=4.0"])
-    return {name: simulate(scenario.with_resolver(name)) for name in ("tpm", "hcod", "augmented")}
-
-
 @pytest.mark.parametrize("name", ["tpm", "hcod"])
-def test_out_of_reach_strict_resolvers_keep_the_feet(reaching, name):
-    run = reaching[name]
+def test_out_of_reach_strict_resolvers_keep_the_feet(name):
+    run = simulate(load("humanoid-reach", ["control.duration=4.0"]).with_resolver(name))
     for foot in ("left_foot", "right_foot"):
         assert np.linalg.norm(run[f"task_error_{foot}"][:, :3], axis=1).max() < 0.003
     assert np.linalg.norm(run["task_error_centre_of_mass"], axis=1).max() < 0.003
@@ -149,18 +142,11 @@ def test_the_picture_of_a_robot_that_branches_shows_its_body(standing):
     assert all(len(body.get_paths()) == 16 for body in bodies)
 
 
-def listed(*entries, **control):
-    return {"name": "own", "robot": {"model": "dual_arm"},
-            "control": {"duration": 0.02, "resolver": "tpm", "stack": "hierarchical", **control},
-            "tasks": list(entries)}
-
-
-HAND = {"kind": "position", "frame": "left_hand"}
-
-
 def test_tasks_stand_behind_limits_position_and_pointing_in_their_order():
-    data = listed({**HAND, "name": "b"}, {**HAND, "name": "a"}, {"kind": "com", "axes": "z"})
-    data["limits"] = {"acceleration": 10.0}
-    data["position"] = {"path": {"kind": "still", "position": [0.5, -0.4, 0.8]}}
-    cell = build(Scenario.model_validate(data))
+    hand = {"kind": "position", "frame": "left_hand"}
+    cell = build(Scenario.model_validate({
+        "name": "own", "robot": {"model": "dual_arm"}, "limits": {"acceleration": 10.0},
+        "control": {"duration": 0.02, "resolver": "tpm", "stack": "hierarchical"},
+        "position": {"path": {"kind": "still", "position": [0.5, -0.4, 0.8]}},
+        "tasks": [hand | {"name": "b"}, hand | {"name": "a"}, {"kind": "com", "axes": "z"}]}))
     assert cell.stack.names == ("joint limits", "position", "b", "a", "com")

@@ -95,29 +95,23 @@ def test_a_rotation_is_told_by_how_much_it_is_off():
         check_rotation("task 'hand': rotation", np.diag([1.0, 1.0, -1.0]))
 
 
+def mine(returned):
+    """A resolver of a plugin that returns what a function makes of a hierarchy."""
+    return type("Mine", (Resolver,), {
+        "name": "mine", "solve": lambda self, h, memory=None: returned(h)})()
+
+
 @pytest.mark.parametrize(("returned", "said"), [
     (lambda h: np.zeros(h.n), "solve: expected a Resolution, got ndarray"),
     (lambda h: 1.0, "got float 1.0; return solvers.Resolution(x)"),
     (lambda h: Resolution(1.0), "solve: x: expected an array of 7 floats, got float 1.0"),
     (lambda h: Resolution(np.zeros(3)), "expected an array of 7 floats")])
 def test_what_a_resolver_of_a_plugin_returns_is_judged(returned, said, an_arm_hierarchy):
-    class Mine(Resolver):
-        name = "mine"
-
-        def solve(self, h, memory=None):
-            return returned(h)
-
     with pytest.raises(HierarchyError, match=re.escape(said)):
-        Mine().solve(an_arm_hierarchy)
+        mine(returned).solve(an_arm_hierarchy)
 
 
 def test_a_nan_of_a_resolver_of_a_plugin_is_a_failure(an_arm_hierarchy):
-    class Mine(Resolver):
-        name = "mine"
-
-        def solve(self, h, memory=None):
-            return Resolution(np.full(h.n, np.nan))
-
-    found = Mine().solve(an_arm_hierarchy)
+    found = mine(lambda h: Resolution(np.full(h.n, np.nan))).solve(an_arm_hierarchy)
     assert found.status is Status.NUMERICAL_FAILURE
     assert (found.x == 0.0).all()

@@ -42,31 +42,23 @@ def arm(mujoco, q=START, v=STILL, obstacles=(), level="velocity", period=PERIOD,
     return PhysicsArm(ROBOT, np.array(q), np.array(v), period, level, Obstacles(obstacles), section)
 
 
-def states(count=20):
-    rng = np.random.default_rng(5)
-    return [(rng.uniform(ROBOT.lower, ROBOT.upper), rng.normal(size=7)) for _ in range(count)]
-
-
 # The physics is that of the robot's model.
 
 
 def test_inertia_gravity_and_coriolis_forces_are_those_of_the_robots_model(mujoco):
     plant = arm(mujoco, joints={"armature": 0.0})
     model, data = plant.model, plant.data
-    for q, v in states():
+    rng, M = np.random.default_rng(5), np.zeros((7, 7))
+    for _ in range(20):
+        q, v = rng.uniform(ROBOT.lower, ROBOT.upper), rng.normal(size=7)
         data.qpos[:], data.qvel[:] = q, v
         mujoco.mj_forward(model, data)
-        M = np.array([inertia_times(mujoco, plant, e) for e in np.eye(7)])
+        for row, unit in zip(M, np.eye(7), strict=True):
+            mujoco.mj_mulM(model, data, row, unit)
         state = State.at(ROBOT, q, v)
         upper = np.triu(state.mass_matrix())
         np.testing.assert_allclose(M, upper + np.triu(upper, 1).T, rtol=0, atol=1e-9)
         np.testing.assert_allclose(data.qfrc_bias, state.bias_effort(), rtol=0, atol=1e-9)
-
-
-def inertia_times(mujoco, plant, vector):
-    product = np.zeros(7)
-    mujoco.mj_mulM(plant.model, plant.data, product, vector)
-    return product
 
 
 # The servos.
@@ -111,10 +103,6 @@ def test_the_reference_keeps_the_joint_range(mujoco, level):
 # Contacts.
 
 
-def sphere_at(centre, radius=0.05, path=None):
-    return Obstacle("sphere", tuple(centre), (radius,), path=path)
-
-
 def forearm(q=START):
     """The middle of the forearm, a capsule along the z axis of the frame of joint 5."""
     placed = State.at(ROBOT, q).placements[5]
@@ -123,7 +111,8 @@ def forearm(q=START):
 
 def test_a_moving_obstacle_is_at_each_step_where_its_path_has_it(mujoco):
     path = Waypoints((0.0, 1.0), ((1.0, -1.0, 0.0), (1.0, 1.0, 0.0)))
-    plant = arm(mujoco, obstacles=[sphere_at((0.0, 0.0, 0.0), path=path)])
+    plant = arm(mujoco, obstacles=[
+        Obstacle("sphere", (0.0, 0.0, 0.0), (0.05,), path=path)])
     step, seen = plant._step, []
 
     def watched(model, data):
@@ -204,8 +193,7 @@ def test_a_filtered_velocity_lags_by_the_time_of_its_filter():
 
 @pytest.mark.parametrize("changes", [[*SHORT, *NOISY], [*PHYSICS, *NOISY]],
                          ids=["kinematic", "mujoco"])
-def test_the_controller_sees_what_is_measured_and_nothing_else(changes):
-    skip_without_mujoco(changes)
+def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
     scenario = load("ellipse", changes)
     run = simulate(scenario)
     assert np.std(run["q"] - run["true_q"]) == pytest.approx(1e-4, rel=0.1)
@@ -279,8 +267,3 @@ def test_only_an_arm_given_as_a_table_has_physics(mujoco, tmp_path):
 def test_a_setting_with_too_few_entries_is_named(mujoco, setting):
     with pytest.raises(HierarchyError, match=f"plant.{setting} has 2 entries"):
         build(load("ellipse", ["plant.kind=mujoco", f"plant.{setting}=[1.0, 2.0]"]))
-
-
-def skip_without_mujoco(changes):
-    if any("mujoco" in change for change in changes):
-        pytest.importorskip("mujoco")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Robot, State
+from hierarchy import Robot, State
 from hierarchy.tasks import JointLimits
 from scenarios.config import load
 from scenarios.config.control import PolicySection
@@ -83,14 +83,6 @@ def test_a_stop_is_at_rest_after_one_tick_and_says_why_the_run_ends(level):
     np.testing.assert_allclose(x if level == "velocity" else V + x * PERIOD, 0.0, atol=1e-12)
     assert p.stopped
     assert "0.250 s: not_finite" in p.fault
-
-
-@pytest.mark.parametrize(("key", "value"), [
-    ("stale", "brke"), ("stail", "brake"), ("not_finite", "use"), ("numerical_failure", "use"),
-    ("patience", "-1"), ("deadline", "0"), ("stale_after", "nan")])
-def test_a_policy_that_does_not_exist_is_named(key, value):
-    with pytest.raises(HierarchyError, match=f"control.policy.{key}"):
-        load("ellipse", [f"control.policy.{key}={value}"])
 
 
 class Saying:

@@ -70,12 +70,6 @@ def test_an_arrow_goes_to_the_middle_of_a_pushed_body_while_it_is_pushed():
     assert shaft[1, 2] > rest[:, 11].mean()  # in the trunk
 
 
-@pytest.fixture(scope="module")
-def run():
-    pytest.importorskip("mujoco")
-    return simulate(load("stand-push").with_changes({"control.duration": 0.02}))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["reach-torque", "stand-momentum", "wipe", "step", "crawl"])
 def test_every_shipped_scenario_of_torques_can_be_replayed(name):
@@ -96,7 +90,9 @@ def test_every_shipped_scenario_of_torques_can_be_replayed(name):
             np.testing.assert_allclose(goal, path.wanted[0], atol=1e-9)
 
 
-def test_the_viewers_show_the_same_live_and_afterwards(run):
+def test_the_viewers_show_the_same_live_and_afterwards():
+    pytest.importorskip("mujoco")
+    run = simulate(STANDING.with_changes({"control.duration": 0.02}))
     live = Live(run.scenario)
     live.tick()
     assert [one.name for one in live.curves(1.0)[1]] == [one.name for one in scene(run).series]

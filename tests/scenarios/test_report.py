@@ -2,7 +2,6 @@ import dataclasses
 import itertools
 import re
 import shlex
-from functools import cache
 
 import numpy as np
 import pytest
@@ -35,16 +34,6 @@ def comparison(*runs):
     return Comparison(runs, "hierarchy compare hand-made", {"python": "3.11"})
 
 
-def with_events(run, *events):
-    recorded = dataclasses.replace(run.recording, events=tuple(Event(*one) for one in events))
-    return dataclasses.replace(run, recording=recorded)
-
-
-@cache
-def page_of_two():
-    return page(comparison(made(LETTER), made("hqp")))
-
-
 def best(row):
     return {i for i, cell in enumerate(row.cells) if cell.kind == "best"}
 
@@ -53,23 +42,19 @@ def row(runs, label):
     return next(row for row in table(runs) if row.label.startswith(label))
 
 
-def test_the_best_of_each_row_is_marked():
-    runs = [made(LETTER, minimal_distance=np.full(5, 0.2)), made("hqp")]
-    assert best(row(runs, "Body distance")) == {1}  # 1 m beats 0.2 m: more is better
-    runs = [made(LETTER, a=np.ones((5, 7))), made("hqp")]
-    assert best(row(runs, "Joint acceleration")) == {1}
+ONES = np.ones((5, 7))
 
 
-def test_values_within_a_percent_are_equally_good():
-    runs = [made(LETTER, a=np.full((5, 7), 1.005)), made("hqp", a=np.ones((5, 7))),
-            made("recursive", a=np.full((5, 7), 2.0))]
-    assert best(row(runs, "Joint acceleration")) == {0, 1}
-
-
-def test_a_run_that_stopped_early_wins_nothing():
-    runs = [made(LETTER, fault="diverged at tick 5"), made("hqp", a=np.ones((5, 7))),
-            made("recursive", a=np.full((5, 7), 2.0))]
-    assert best(row(runs, "Joint acceleration")) == {1}
+@pytest.mark.parametrize(("runs", "label", "marked"), [
+    ([made(LETTER, minimal_distance=np.full(5, 0.2)), made("hqp")], "Body distance", {1}),
+    ([made(LETTER, a=ONES), made("hqp")], "Joint acceleration", {1}),
+    ([made(LETTER, a=1.005 * ONES), made("hqp", a=ONES), made("recursive", a=2.0 * ONES)],
+     "Joint acceleration", {0, 1}),
+    ([made(LETTER, fault="diverged at tick 5"), made("hqp", a=ONES),
+      made("recursive", a=2.0 * ONES)], "Joint acceleration", {1}),
+], ids=["more is better", "less is better", "equal within a percent", "stopped early"])
+def test_the_best_of_each_row_is_marked(runs, label, marked):
+    assert best(row(runs, label)) == marked
 
 
 def test_a_run_that_never_began_has_empty_cells_and_loses_nobody_else_theirs():
@@ -108,7 +93,7 @@ def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
 
 @pytest.mark.slow
 def test_the_page_shows_verdict_replay_table_stack_panels_commands_settings():
-    text = page_of_two()
+    text = page(comparison(made(LETTER), made("hqp")))
     places = [text.index(mark) for mark in (
         'class="verdict"', "<h2>Replay", "<h2>In numbers", "<h2>The stack over time",
         "<h2>Side by side", "<h2>How to reproduce this<", "<h2>Settings",
@@ -128,7 +113,9 @@ def test_runs_of_the_same_motion_are_drawn_once_and_named_together():
 
 @pytest.mark.slow
 def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
-    run = with_events(made(LETTER, contacts=[0, 1, 0, 0, 0], **SOFTLY), (3, "not_finite", "hold"))
+    run = made(LETTER, contacts=[0, 1, 0, 0, 0], **SOFTLY)
+    run = dataclasses.replace(run, recording=dataclasses.replace(
+        run.recording, events=(Event(3, "not_finite", "hold"),)))
     text = page(comparison(run, made("hqp")))
     cells = re.search(r"<td>not finite</td><td>hold</td><td>1</td><td>([^<]*)</td>", text)
     assert cells is not None
@@ -160,23 +147,16 @@ def test_the_numbers_as_data_hold_the_verdicts():
     assert both.as_plain_data()["verdicts"] == {"hand-made": list(lines(verdicts(both.runs)))}
 
 
-@pytest.fixture(scope="module")
-def short_comparison(tmp_path_factory):
-    """A page on disk, of real runs of which two are the same motion."""
-    short = [load("ellipse", ["control.duration=0.3"]).with_resolver(spec)
-             for spec in ("tpm-published", "recursive", "augmented")]
-    runs = tuple(Run(one, spec, spec, simulate(one)) for one, spec in
-                 zip(short, ("tpm-published", "recursive", "augmented"), strict=True))
-    file = tmp_path_factory.mktemp("report") / "index.html"
-    file.write_text(page(comparison(*runs)), encoding="utf-8")
-    return file
-
-
 @pytest.mark.slow
-def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(short_comparison):
+def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(tmp_path):
+    """Of real runs, two of which are the same motion."""
+    short, specs = load("ellipse", ["control.duration=0.3"]), (LETTER, "recursive", "augmented")
+    runs = [Run(one, spec, spec, simulate(one)) for spec in specs
+            for one in [short.with_resolver(spec)]]
+    (tmp_path / "index.html").write_text(page(comparison(*runs)), encoding="utf-8")
     with chromium() as tab:
         for width, dark in itertools.product((360, 1400), (False, True)):
-            tab.look_at(short_comparison.as_uri(), width=width, dark=dark)
+            tab.look_at((tmp_path / "index.html").as_uri(), width=width, dark=dark)
             assert tab.run("document.documentElement.scrollWidth") <= width
             assert not tab.run("document.querySelector('iframe').srcdoc") or width == 1400
             tab.run("document.querySelector('iframe').scrollIntoView()")

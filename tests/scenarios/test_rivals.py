@@ -144,8 +144,6 @@ def test_a_frozen_task_is_recorded_as_met_and_one_inside_its_set_as_free():
 @pytest.mark.parametrize(("name", "changes", "says"), [
     ("ellipse-set-based", ["control.level=acceleration"],
      r'needs control.level = "velocity", got "acceleration"'),
-    ("ellipse-smooth", ["control.level=acceleration"],
-     r'needs control.level = "velocity", got "acceleration"'),
     ("ellipse-set-based", ["avoidance.rate=3.0"], r"avoidance.rate = 3 does not go with"),
     ("ellipse-set-based", ["avoidance.recovery=0.3"], r"avoidance.recovery = 0.3 does not go with"),
     ("ellipse-set-based", ["pointing.gain=2.0"], r"pointing.gain = 2 does not go with"),

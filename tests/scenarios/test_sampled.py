@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections import Counter
 from contextlib import suppress
+from unittest import mock
 
 import numpy as np
 import psutil
@@ -267,11 +268,8 @@ def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path,
         store.add(jobs[1], Outcome("b", 0, "broke,\nfor once", 0.1))
         assert {key: one.reason for key, one in store.outcomes().items()} == {
             "a": None, "c": None, "b": "broke,\nfor once"}
-
-        def full(_):
-            raise OSError(28, os.strerror(28))
-
-        monkeypatch.setattr(os, "fsync", full)
+        full = OSError(28, os.strerror(28))
+        monkeypatch.setattr(os, "fsync", mock.Mock(side_effect=full))
         with pytest.raises(FullError, match=r"out/runs/all\.csv cannot be written: No space"):
             store.add(jobs[0], Outcome("d", 20, None, 0.1))
 

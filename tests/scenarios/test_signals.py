@@ -23,16 +23,13 @@ def run():
     return simulate(load("dual-arm", ["control.duration=0.01"]))
 
 
-def test_a_misspelt_signal_is_an_error_that_names_the_nearest(run):
+def test_a_signal_that_a_run_lacks_is_absent_and_a_misspelt_one_an_error_with_the_nearest(run):
+    assert "minimal_distance" not in run
+    assert run.get("minimal_distance", np.zeros(1)).shape == (1,)
     for ask in (lambda: "minimal_distnce" in run, lambda: run["minimal_distnce"],
                 lambda: run.get("minimal_distnce", np.zeros(0))):
         with pytest.raises(UnknownNameError, match="minimal_distance"):
             ask()
-
-
-def test_a_known_signal_that_a_run_lacks_is_absent(run):
-    assert "minimal_distance" not in run
-    assert run.get("minimal_distance", np.zeros(1)).shape == (1,)
 
 
 def test_every_recorded_signal_is_in_the_table_with_its_number_of_axes(run):

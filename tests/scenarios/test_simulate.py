@@ -17,11 +17,6 @@ def run():
     return simulate(load("ellipse"))
 
 
-@pytest.fixture(scope="module")
-def velocity_run():
-    return simulate(load("ellipse-velocity"))
-
-
 def test_every_answer_is_certified_where_asked_and_nothing_is_where_not(run):
     judged = simulate(load("ellipse", ["control.options.damping=0.0", "control.duration=0.4"]),
                       certified=True)
@@ -30,7 +25,7 @@ def test_every_answer_is_certified_where_asked_and_nothing_is_where_not(run):
     assert "certified" not in run
 
 
-def test_row_0_is_the_start_and_its_command_leads_to_the_state_of_the_next(run, velocity_run):
+def test_row_0_is_the_start_and_its_command_leads_to_the_state_of_the_next(run):
     np.testing.assert_array_equal(run["q"][0], load("ellipse").start.q)
     assert not run["v"][0].any()
     assert run.ticks == 18850
@@ -38,6 +33,7 @@ def test_row_0_is_the_start_and_its_command_leads_to_the_state_of_the_next(run, 
     np.testing.assert_allclose(np.diff(run["t"]), T)
     np.testing.assert_allclose(v[1:], v[:-1] + a[:-1] * T, atol=1e-15)
     np.testing.assert_allclose(q[1:], q[:-1] + v[:-1] * T + a[:-1] * T * T / 2, atol=1e-14)
+    velocity_run = simulate(load("ellipse-velocity"))
     np.testing.assert_array_equal(velocity_run["v"][1:], velocity_run["command"][:-1])
     np.testing.assert_allclose(velocity_run["a"][:-1], np.diff(velocity_run["v"], axis=0) / T,
                                atol=1e-9)

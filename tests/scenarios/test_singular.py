@@ -18,13 +18,10 @@ def jittered(seed=3):
     return Jittered(Still((1.0, 2.0, 3.0)), amplitude=0.002, rate=4.0, seed=seed)
 
 
-def test_jitter_is_bounded_and_moves_in_every_axis():
+def test_jitter_is_bounded_moves_in_every_axis_and_depends_on_its_seed_alone():
     offsets = np.array([jittered()(t)[0] for t in np.arange(0.0, 5.0, 0.01)]) - [1.0, 2.0, 3.0]
     assert np.abs(offsets).max() <= 0.002
     assert (np.abs(offsets).max(axis=0) > 0.0005).all()
-
-
-def test_jitter_depends_on_its_seed_alone():
     assert np.array_equal(jittered()(0.7), jittered()(0.7))
     assert not np.allclose(jittered()(0.7)[0], jittered(seed=4)(0.7)[0])
 

@@ -15,6 +15,8 @@ from scenarios.loop.simulation import tick
 from scenarios.measure.metrics import measure
 from solvers import Resolution, Status, make
 
+pytest.importorskip("mujoco")
+
 STANDING = load("stand-push")
 SHORT = STANDING.with_changes({"control.duration": 0.02, "plant.pushes.0.at": 0.005,
                                "plant.pushes.0.duration": 0.01})
@@ -49,7 +51,6 @@ def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
 
 def test_a_resolver_with_bounds_alone_keeps_those_of_single_joints_above_all_else():
     """Without torque limits and friction, which are no bounds."""
-    pytest.importorskip("mujoco")
     scenario = SHORT.with_changes({"limits.place": "bounds"}).with_resolver("tpm")
     assert scenario.asks == "bounds"
     cell = build(scenario)
@@ -75,13 +76,11 @@ def test_a_resolver_with_bounds_alone_keeps_those_of_single_joints_above_all_els
     ({"plant__delay": 0.0004}, "plant.delay = 0.0004 s is not a whole number of periods"),
 ])
 def test_what_the_robot_does_not_have_is_named(keys, said):
-    pytest.importorskip("mujoco")
     with pytest.raises(HierarchyError, match=said):
         build(changed(**keys))
 
 
 def test_a_resolver_for_equalities_gets_the_stack_without_limits():
-    pytest.importorskip("mujoco")
     assert (STANDING.asks, STANDING.forces_in_stack) == ("inequalities", True)
     assert build(STANDING).stack.names == LEVELS
     plain = STANDING.with_resolver("tpm")
@@ -94,7 +93,6 @@ def test_a_resolver_for_equalities_gets_the_stack_without_limits():
 
 @pytest.fixture(scope="module")
 def short():
-    pytest.importorskip("mujoco")
     return simulate(SHORT, certified=True)
 
 
@@ -131,7 +129,6 @@ def test_its_metrics_have_units_and_say_what_the_signals_do(short):
 @pytest.mark.parametrize("resolver", ["hcod", "tpm"])
 def test_no_torque_changes_by_more_than_its_step(resolver):
     """Under a resolver without rows for it the torques are cut off."""
-    pytest.importorskip("mujoco")
     run = simulate(SHORT.with_resolver(resolver).with_changes({
         "limits.torque_step": 0.3, "control.duration": 0.05}))
     steps = np.abs(np.diff(run["command"], axis=0))
@@ -141,7 +138,6 @@ def test_no_torque_changes_by_more_than_its_step(resolver):
 
 
 def test_noise_turns_and_moves_the_base_that_the_controller_sees():
-    pytest.importorskip("mujoco")
     noisy = simulate(SHORT.with_changes({"plant.measurement.position_noise": 1e-3,
                                          "plant.measurement.velocity_noise": 1e-2}))
     error = noisy["q"] - noisy["true_q"]
@@ -157,7 +153,6 @@ def test_noise_turns_and_moves_the_base_that_the_controller_sees():
 @pytest.mark.parametrize("name", ["stand-go2", "stand-g1", "stand-talos"])
 def test_a_robot_of_a_package_stands_where_it_is_put(name):
     from importlib.metadata import PackageNotFoundError, distribution
-    pytest.importorskip("mujoco")
     try:
         distribution("example-robot-data")
     except PackageNotFoundError:
@@ -186,7 +181,6 @@ class Failing:
 
 @pytest.mark.parametrize(("action", "patience"), [("hold", 10), ("brake", 0)])
 def test_without_an_answer_the_last_torques_are_held_or_damped(action, patience):
-    pytest.importorskip("mujoco")
     scenario = SHORT.with_changes({"control.policy.backend_failure": action})
     controller = Controller(scenario, resolver=Failing(Status.BACKEND_FAILURE, 8))
     recorder = Recorder(controller, 10)
@@ -205,7 +199,6 @@ def test_without_an_answer_the_last_torques_are_held_or_damped(action, patience)
     name for name in shipped() if load(name).control.level == "torque"
     and load(name).make_resolver().strict))
 def test_every_answer_of_a_shipped_scenario_of_torques_is_certified(name):
-    pytest.importorskip("mujoco")
     scenario = load(name, {"control.duration": 0.15})
     if scenario.robot.model.startswith("example_robot_data:"):
         pytest.importorskip("example_robot_data")

@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import asdict
+from unittest import mock
 
 import numpy as np
 import pinocchio as pin
@@ -90,9 +91,7 @@ def no_way_back(request, monkeypatch):
         return
     request.getfixturevalue("made")
 
-    def broken(*_, **__):
-        raise AssertionError("a reader went back to the scenario's robot or resolver")
-
+    broken = mock.Mock(side_effect=AssertionError("a reader went back to the robot or resolver"))
     monkeypatch.setattr("hierarchy.Robot.load", broken)
     monkeypatch.setattr("scenarios.config.Scenario.make_resolver", broken)
     monkeypatch.setattr("scenarios.cell.sensors.camera.DepthCamera.__init__", broken)

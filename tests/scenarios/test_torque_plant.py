@@ -11,20 +11,13 @@ from scenarios.config import ScenarioError
 from scenarios.config.kinds.torque import PushSection, TorqueSection
 from solvers import certify, make
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("with_mujoco")]
 
 CONTACTS = feet()
 
 
 def plant_with(**section):
     return TorqueSection(kind="torque", **section)
-
-
-@pytest.fixture(autouse=True)
-def _with_mujoco(tmp_path, monkeypatch):
-    """MuJoCo writes a log into the folder in which it warns of a run that diverges."""
-    pytest.importorskip("mujoco")
-    monkeypatch.chdir(tmp_path)
 
 
 def in_the_air(seed):
@@ -128,9 +121,7 @@ def test_it_says_where_the_soles_slip_and_how_near_the_edge_the_pressure_is():
     at_the_toes = next(k for k, margin in enumerate(margins) if margin < 0.005)
     assert 0.05 < supported[at_the_toes] < 0.105 + 1e-9  # half the length of a sole is 0.105 m
     assert plant.extra["slip"].max() < 0.01
-    before = com_of(pin.integrate(ROBOT.model, plant.q, -1e-3 * plant.v))  # the step began there
+    before = pin.centerOfMass(  # where the step began
+        ROBOT.model, ROBOT.model.createData(),
+        pin.integrate(ROBOT.model, plant.q, -1e-3 * plant.v))
     np.testing.assert_allclose(plant.extra["com"], before, atol=1e-6)
-
-
-def com_of(q):
-    return pin.centerOfMass(ROBOT.model, ROBOT.model.createData(), q)

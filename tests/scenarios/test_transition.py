@@ -71,10 +71,6 @@ def blended(before, after, h_of, resolver="recursive", level="acceleration", tas
     return stack, state, x, blend
 
 
-def answer(stack, state, order):
-    return oracle.solve(stack.hierarchy(state, order))
-
-
 @pytest.mark.parametrize("resolver", ["tpm", "recursive", "hcod"])
 @pytest.mark.parametrize(("upper", "lower"), [((), ("position",)), (("position",), ("avoidance",))])
 @pytest.mark.parametrize("entering", [True, False])
@@ -86,7 +82,7 @@ def test_one_task_that_enters_or_leaves_has_its_intermediate_desired_value(
     stack, state, x, blend = blended(*orders, h_of=0.3, resolver=resolver)
     h = blend.weight if entering else 1.0 - blend.weight
     assert 0.0 < h < 1.0
-    x_without = answer(stack, state, without)
+    x_without = oracle.solve(stack.hierarchy(state, without))
     levels = [list(level) for level in stack.hierarchy(state, with_it).levels()]
     J, b, _ = levels[len(upper)]
     levels[len(upper)] = [J, h * b + (1 - h) * J @ x_without]
@@ -130,14 +126,11 @@ def steps(run, signal):
     return np.abs(np.diff(run[signal][10:], axis=0)).max()
 
 
-def runs(name, *changes):
-    return (simulate(load(name, ["control.duration=8.0", *changes, *more]))
-            for more in ([], ["control.transition=blend", "control.transition_time=0.1"]))
-
-
 @pytest.mark.slow
 def test_at_velocity_level_the_speed_no_longer_jumps():
-    jumping, smooth = runs("ellipse-velocity")
+    jumping, smooth = (simulate(load("ellipse-velocity", ["control.duration=8.0", *more]))
+                       for more in ([], ["control.transition=blend",
+                                         "control.transition_time=0.1"]))
     assert steps(jumping, "v") > 1.0
     assert steps(smooth, "v") < 0.1
     assert jumping.switches().size > 10
