@@ -26,7 +26,7 @@ from benchmark.worker import Repeats
 from hierarchy import Hierarchy
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
-from solvers import certify, names
+from solvers import certify, make, names
 from solvers.problems.files import Collection, Head, read
 from solvers.proof import prove
 from solvers.qp.backends import BACKENDS
@@ -104,25 +104,6 @@ def test_an_entrant_that_cannot_start_is_missing_with_the_reason():
 
 
 CC = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-needs_c = pytest.mark.skipif(CC is None, reason="no compiler of C")
-LIBRARY = """
-#include "solver.h"
-#include <stdlib.h>
-
-void *prepare(int64_t n, int64_t levels, const int64_t *sizes, const double *A,
-              const double *lower, const double *upper, const double *reference) {
-  double *x = n == 2 ? malloc(2 * sizeof *x) : NULL;
-  if (x) x[0] = lower[0], x[1] = lower[1];
-  return x;
-}
-int solve(void *prepared, void *before, double *x, int64_t *iterations) {
-  const double *kept = prepared;
-  x[0] = kept[0], x[1] = kept[1], *iterations = before ? 1 : 7;
-  return 1;
-}
-void release(void *prepared) { free(prepared); }
-"""
-"""Solves levels of the identity with two unknowns."""
 
 
 def shared(source, out, *flags):
@@ -131,23 +112,8 @@ def shared(source, out, *flags):
     return out
 
 
-@needs_c
 @pytest.mark.slow
-def test_a_solver_in_a_library_is_timed_from_python_and_inside(tmp_path, equalities):
-    (tmp_path / "one.c").write_text(LIBRARY)
-    (one,) = compiled([shared(tmp_path / "one.c", tmp_path / "one.so")], ["one"])
-    answers = run_entrant(one, equalities)
-    assert [answer["x"] for answer in answers] == [[float(side), 1.0] for side in range(5)]
-    assert re.fullmatch("one, SHA-256 [0-9a-f]{12}", answers[0]["version"])
-    for answer in answers:
-        assert (answer["iterations"], answer["warm_iterations"]) == (7, 1)
-        if sys.platform == "linux":
-            assert 1 <= len(answer["cold_inside_ns"]) <= Repeats().most
-            assert 0 <= min(answer["cold_inside_ns"]) < min(answer["cold_ns"])
-
-
-@needs_c
-@pytest.mark.slow
+@pytest.mark.skipif(CC is None, reason="no compiler of C")
 @pytest.mark.skipif(sys.platform != "linux", reason="the C library is made on Linux")
 def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path):
     """The worked example of solver.h; tpm refuses inequalities beyond bounds."""
@@ -163,6 +129,13 @@ def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path
     found = judge(rows["hcod"], {made.digest: made})
     assert [row["verdict"] for row in found] == [judging.SOLVED] * 3
     assert [row["warm_right"] for row in found] == [None, True, True]
+    for h, row in zip(made.problems, rows["hcod"], strict=True):
+        res = make("hcod").solve(h)
+        assert (row["x"], row["iterations"]) == (res.x.tolist(), res.iterations)
+        assert re.fullmatch("ours, SHA-256 [0-9a-f]{12}", row["version"])
+        assert 1 <= len(row["cold_inside_ns"]) <= Repeats().most
+        assert 0 <= min(row["cold_inside_ns"]) < min(row["cold_ns"])
+    assert max(row["warm_iterations"] for row in rows["hcod"][1:]) < rows["hcod"][0]["iterations"]
 
 
 def test_the_worker_reads_the_problems_that_were_written(tmp_path):

@@ -1,6 +1,7 @@
 """The repository itself: what it promises about set-up, documents and imports."""
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -87,6 +88,26 @@ def test_what_a_package_says_it_exports_is_there(package):
         assert callable(getattr(module, name))
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = module.nothing
+
+
+def test_the_fourth_package_has_the_names_of_the_three():
+    three = [import_module(name) for name in ("hierarchy", "solvers", "scenarios")]
+    fourth = import_module("task_hierarchy")
+    assert set(fourth.__all__) == {name for module in three for name in module.__all__}
+    assert fourth.make is three[1].make
+
+
+@pytest.mark.parametrize("name", ["hierarchy", "solvers", "scenarios"])
+def test_a_package_of_the_same_name_is_named_in_one_line(name, tmp_path):
+    (tmp_path / name).mkdir()
+    file = tmp_path / name / "__init__.py"
+    file.touch()
+    done = subprocess.run([sys.executable, "-c", "from task_hierarchy import main"], text=True,
+                          env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+                          capture_output=True, check=False, cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith(
+        f"ImportError: the package {name!r} is {file}, not task-hierarchy's")
 
 
 @pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])

@@ -70,18 +70,18 @@ def test_three_sentences_say_the_end_the_promises_and_the_targets():
     assert targets == "Off in the median: position 0 mm (b) to 2 mm (a), 2 mm at worst."
 
 
-@pytest.mark.parametrize(("signals", "name", "flag", "worst"), [
-    (at([0.25, 0.5, 0.25, 0.25, 1.0]), "position", "met", 1e-3),
-    (at([90, 0.5, 0.5, 0.25, 0.5]), "position", "met", 0.5e-3),
-    (at([437] * 5), "position", "never met", 0.437),
-    (joint([0.0] * 5), "joint limits", "kept", 0.0),
+@pytest.mark.parametrize(("signals", "name", "flag", "worst", "unit"), [
+    (at([0.25, 0.5, 0.25, 0.25, 1.0]), "position", "met", 1e-3, "m"),
+    (at([90, 0.5, 0.5, 0.25, 0.5]), "position", "met", 0.5e-3, "m"),
+    (at([437] * 5), "position", "never met", 0.437, "m"),
+    (joint([0.0] * 5), "joint limits", "kept", 0.0, "rad"),
     ({"v": np.diag([0, 0, 4.0, 0, 0, 0, 0])[:5], "velocity_limit": np.full(7, 3.0)},
-     "speed limits", "broken", 1.0),
+     "speed limits", "broken", 1.0, "rad/s"),
     ({"contact_depth": [0, 2e-3, 0, 0, 0], "contacts": np.zeros(5)},
-     "no contact with obstacles", "broken", 2e-3)])
-def test_a_goal_has_a_flag_and_its_worst_distance(signals, name, flag, worst):
+     "no contact with obstacles", "broken", 2e-3, "m")])
+def test_a_goal_has_a_flag_and_its_worst_distance(signals, name, flag, worst, unit):
     one = goal(name, **signals)
-    assert (one.flag, one.worst) == (flag, pytest.approx(worst))
+    assert (one.flag, one.worst, one.unit) == (flag, pytest.approx(worst), unit)
 
 
 @pytest.mark.parametrize(("signals", "name", "said"), [

@@ -48,12 +48,15 @@ def _four_bar(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its log there
 
 
+def posture(joints):
+    """A task that brings joints to their values."""
+    return {"kind": "posture", "joints": joints, "stiffness": 100.0, "damping": 20.0, "gain": 10.0}
+
+
 def scenario(level="velocity", resolver="hcod", stack="hierarchical", **more):
     plant = "torque" if level == "torque" else "kinematic"
-    posture = {"kind": "posture", "joints": {"crank": -0.3, "finger": 0.5}, "stiffness": 100.0,
-               "damping": 20.0, "gain": 10.0}
     asks = {"position": {"offset": [0.05, 0.0, 0.05]}} if stack == "switched" else {
-        "tasks": [posture]}
+        "tasks": [posture({"crank": -0.3, "finger": 0.5})]}
     return Scenario.model_validate({
         "name": "bar", "robot": {"model": "four_bar"}, "damping": {"value": 5.0},
         "start": {"joints": {"crank": -0.8, "finger": 0.3}}, "plant": {"kind": plant},
@@ -143,8 +146,7 @@ def test_an_ankle_with_two_pushrods_stays_closed(level, rod, tmp_path):
     data = {"name": "ankle", "robot": {"model": str(path)}, "control": {
         "level": level, "stack": "hierarchical", "resolver": "hcod", "duration": 1.0,
         "period": 0.002}, "plant": {"kind": "torque" if level == "torque" else "kinematic"},
-        "tasks": [{"kind": "posture", "joints": joints, "stiffness": 100.0, "damping": 20.0,
-                   "gain": 10.0}]}
+        "tasks": [posture(joints)]}
     run = simulate(Scenario.model_validate(data))
     assert run.fault is None
     assert largest_residual(path, run["q"]) < 1e-9
@@ -229,8 +231,7 @@ def test_a_mobile_base_goes_to_a_posture_by_values(level, measurement, tmp_path)
             "start": {"joints": {"base": [0.1, 0.2, 0.3], "turn": 2.0}},
             "control": {"level": level, "stack": "hierarchical", "resolver": "hcod",
                         "duration": 2.0, "period": 0.002},
-            "tasks": [{"kind": "posture", "joints": goal, "stiffness": 100.0, "damping": 20.0,
-                       "gain": 10.0}]}
+            "tasks": [posture(goal)]}
     run = simulate(Scenario.model_validate(data))
     found = Robot.load("m.urdf").values(run["q"][-1])
     for name, value in goal.items():

@@ -35,8 +35,3 @@ def test_help_says_what_a_key_means(asked, said, capsys):
     assert run_command(["help", asked]) == 0
     text = capsys.readouterr().out
     assert all(one in text for one in said)
-
-
-def test_help_of_an_unknown_key_has_the_nearest(capsys):
-    assert run_command(["help", "avoidance.obstacles.pth"]) == 2
-    assert "did you mean 'avoidance.obstacles.path'?" in capsys.readouterr().err

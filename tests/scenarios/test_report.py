@@ -150,9 +150,9 @@ def test_the_numbers_as_data_hold_the_verdicts():
 @pytest.mark.slow
 def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(tmp_path):
     """Of real runs, two of which are the same motion."""
-    short, specs = load("ellipse", ["control.duration=0.3"]), (LETTER, "recursive", "augmented")
-    runs = [Run(one, spec, spec, simulate(one)) for spec in specs
-            for one in [short.with_resolver(spec)]]
+    short = load("ellipse", ["control.duration=0.3"])
+    asked = {spec: short.with_resolver(spec) for spec in (LETTER, "recursive", "augmented")}
+    runs = [Run(one, spec, spec, simulate(one)) for spec, one in asked.items()]
     (tmp_path / "index.html").write_text(page(comparison(*runs)), encoding="utf-8")
     with chromium() as tab:
         for width, dark in itertools.product((360, 1400), (False, True)):

@@ -81,6 +81,7 @@ def test_many_rivals_need_stronger_evidence():
 
 
 @pytest.mark.parametrize(("met", "of", "low", "high"), [
+    (18, 24, 0.551, 0.880),  # Wilson 1927
     (0, 10, 0.0, 0.2775), (5, 10, 0.2366, 0.7634), (81, 263, 0.2553, 0.3662), (0, 0, 0.0, 1.0)])
 def test_the_interval_of_a_share_is_wilsons(met, of, low, high):
     assert wilson(met, of) == pytest.approx((low, high), abs=1e-4)

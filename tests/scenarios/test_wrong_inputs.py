@@ -248,6 +248,7 @@ def test_check_warns_of_a_start_that_is_too_near(capsys):
     ("bench resolvers --family EQ8", "unknown family 'EQ8'; did you mean 'EQ7'"),
     ("bench resolvers --resolver hqod", "unknown resolver 'hqod'; did you mean 'hcod'"),
     ("problems show HUM39", "did you mean 'HUM38'"),
+    ("help avoidance.obstacles.pth", "did you mean 'avoidance.obstacles.path'?"),
     ("view nowhere --no-browser", "nowhere"),
     ("view nowhere --port 70000", "--port"),
     ("run ellipse --live --certify", "--certify"),
