@@ -100,3 +100,11 @@ def stepping(ramp, period=0.004, duration=2.6):
         a = contacts.accelerations(res.x)
         v = state.v + period * a
         state.move(state.t + period, ROBOT.integrate(state.q, period * (v - period * a / 2)), v)
+
+
+def written(task, state, level="acceleration", n=ROBOT.n):
+    """Return the rows A (dimension, n), lower and upper that a task writes."""
+    m = task.dimension
+    rows = np.zeros((m, n)), np.zeros(m), np.zeros(m)
+    task.writer(state, level, *rows, 0)()
+    return rows

@@ -12,6 +12,7 @@ from standing import (
     feet,
     moving_state,
     soles_and_palm,
+    written,
 )
 
 from hierarchy import HierarchyError, Robot, Stack, State
@@ -105,8 +106,7 @@ def test_base_rows_hold_exactly_where_forward_dynamics_does():
 def test_torque_rows_hold_up_to_both_limits():
     state, x = moving_state(6), random_x(6)
     task = TorqueLimits(ROBOT, 0.5, contacts=CONTACTS)
-    A, lower, upper = np.zeros((30, CONTACTS.unknowns)), np.zeros(30), np.zeros(30)
-    task.writer(state, "torque", A, lower, upper, 0)()
+    A, lower, upper = written(task, state, "torque", CONTACTS.unknowns)
     tau, limit = CONTACTS.torques(state, x), 0.5 * ROBOT.effort_limit[6:]
     np.testing.assert_allclose(upper - A @ x, limit - tau, atol=1e-9)
     np.testing.assert_allclose(A @ x - lower, tau + limit, atol=1e-9)
@@ -198,8 +198,7 @@ def test_an_open_contact_has_no_force_and_is_free_to_move(faces):
     closed = Friction(feet(), faces, largest=50.0).rows(state)
     for now, plain in zip((A, lower, upper), closed, strict=True):
         np.testing.assert_array_equal(now[:4 * (faces + 1)], plain[:4 * (faces + 1)])
-    A, lower, upper = np.zeros((12, N)), np.zeros(12), np.zeros(12)
-    ContactMotion(contacts).writer(state, "acceleration", A, lower, upper, 0)()
+    A, lower, upper = written(ContactMotion(contacts), state)
     assert A[:6].any(axis=1).all()
     for rows in (A[6:], lower[6:], upper[6:]):
         assert not rows.any()
@@ -289,8 +288,7 @@ def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_t
     start = State.at(ROBOT, ROBOT.rest)
     task = ContactMotion.at(start, CONTACTS, stiffness=100.0, damping=20.0)
     assert task.dimension == len(task.row_names) == 15
-    A, lower, upper = np.zeros((15, N)), np.zeros(15), np.zeros(15)
-    task.writer(state, "acceleration", A, lower, upper, 0)()
+    A, lower, upper = written(task, state)
     J, dJ = CONTACTS.jacobian(state)[12:15], CONTACTS.drift(state)[12:15]  # of the palm
     gone = (positions(start) - positions(state))[12:15]
     np.testing.assert_allclose(A[6:9], J, atol=1e-12)
@@ -302,13 +300,11 @@ def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_t
 def test_without_anchors_a_contact_is_damped_where_it_is():
     state = moving_state(13)
     task = ContactMotion(CONTACTS, damping=7.0)
-    rows = np.zeros((15, N)), np.zeros(15), np.zeros(15)
-    task.writer(state, "acceleration", *rows, 0)()
+    rows = written(task, state)
     drift = task.jacobian_derivative(state) @ state.v
     np.testing.assert_allclose(rows[1], -drift - 7.0 * rows[0] @ state.v, atol=1e-9)
     assert not task.error(state).any()
-    task.writer(state, "velocity", *rows, 0)()
-    assert not rows[1].any()
+    assert not written(task, state, "velocity")[1].any()
 
 
 @pytest.mark.parametrize("part", ["both", "linear", "angular"])
@@ -316,9 +312,7 @@ def test_momentum_rows_are_the_rate_of_the_momentum(part):
     state, a = moving_state(14), random_x(14)[:N]
     task = Momentum(part, damping=4.0)
     of_part = {"both": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}[part]
-    A, lower, upper = (np.zeros((task.dimension, N)), np.zeros(task.dimension),
-                       np.zeros(task.dimension))
-    task.writer(state, "acceleration", A, lower, upper, 0)()
+    A, lower, _ = written(task, state)
     data = ROBOT.model.createData()
     pin.computeCentroidalMomentumTimeVariation(ROBOT.model, data, state.q, state.v, a)
     rate, momentum = data.dhg.vector[of_part], data.hg.vector[of_part]
@@ -327,8 +321,7 @@ def test_momentum_rows_are_the_rate_of_the_momentum(part):
     Task.writer(task, state, "acceleration", *plain, 0)()
     np.testing.assert_allclose(plain[0], A)
     np.testing.assert_allclose(plain[1], lower, atol=1e-10)
-    task.writer(state, "velocity", A, lower, upper, 0)()
-    assert not lower.any()
+    assert not written(task, state, "velocity")[1].any()
     assert len(task.row_names) == task.dimension
 
 

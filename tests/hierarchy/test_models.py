@@ -104,22 +104,17 @@ def test_capsules_are_proposed_from_primitives(arm):
     assert (ball.joint, ball.radius, ball.start) == (2, 0.04, (0.0, 0.0, 0.15))
 
 
-def test_the_capsule_of_a_mesh_holds_its_corners(arm, tmp_path):
-    write_mesh(tmp_path / "part.stl", TETRAHEDRON)
-    robot = Robot.from_file(arm('<mesh filename="part.stl"/>'))
+@pytest.mark.parametrize("name", ["part.stl", "package://parts/meshes/part.stl"])
+def test_the_capsule_of_a_mesh_here_or_in_a_folder_above_holds_its_corners(arm, tmp_path, name):
+    path = tmp_path / name.partition("://")[2] if ":" in name else tmp_path / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_mesh(path, TETRAHEDRON)
+    robot = Robot.from_file(arm(f'<mesh filename="{name}"/>'))
     assert robot.missing == ()
     capsule = robot.capsules[2]
     for corner in TETRAHEDRON:
         assert holds(capsule, np.add(corner, (0, 0, 0.15)))
     assert capsule.radius < 0.06, "along the mesh, not across it"
-
-
-def test_a_mesh_of_a_package_is_found_in_the_folders_above(arm, tmp_path):
-    (tmp_path / "parts" / "meshes").mkdir(parents=True)
-    write_mesh(tmp_path / "parts" / "meshes" / "part.stl", TETRAHEDRON)
-    robot = Robot.from_file(arm('<mesh filename="package://parts/meshes/part.stl"/>'))
-    assert robot.missing == ()
-    assert len(robot.capsules) == 3
 
 
 @pytest.mark.parametrize("name", ["part.stl", "package://some/part.stl"])
@@ -296,26 +291,33 @@ def test_a_package_that_is_missing_is_named_with_its_extra(package, monkeypatch)
         Robot.load(f"{package}:panda")
 
 
-def test_a_robot_of_robot_descriptions_is_read_from_where_it_was_downloaded(arm, monkeypatch):
-    index, module = ModuleType("_descriptions"), ModuleType("some_description")
+@pytest.fixture
+def descriptions(monkeypatch):
+    """Puts modules in place of the package robot_descriptions, which knows one robot."""
+    index = ModuleType("_descriptions")
     index.DESCRIPTIONS = {"some_description": None}
+
+    def place(**modules):
+        for name, module in {"_descriptions": index, **modules}.items():
+            monkeypatch.setitem(sys.modules, f"robot_descriptions.{name}", module)
+
+    monkeypatch.setitem(sys.modules, "robot_descriptions", ModuleType("robot_descriptions"))
+    place()
+    return place
+
+
+def test_a_robot_of_robot_descriptions_is_read_from_where_it_was_downloaded(arm, descriptions):
+    module = ModuleType("some_description")
     module.URDF_PATH = str(arm())
-    package = ModuleType("robot_descriptions")
-    for name, value in [("robot_descriptions", package),
-                        ("robot_descriptions._descriptions", index),
-                        ("robot_descriptions.some_description", module)]:
-        monkeypatch.setitem(sys.modules, name, value)
+    descriptions(some_description=module)
     robot = Robot.load("robot_descriptions:some")
     assert (robot.name, robot.n) == ("some", 3)
     with pytest.raises(UnknownNameError, match="did you mean 'some_description'"):
         Robot.load("robot_descriptions:sum_description")
 
 
-def test_a_robot_that_cannot_be_downloaded_is_no_crash(monkeypatch):
-    index = ModuleType("_descriptions")
-    index.DESCRIPTIONS = {"some_description": None}
-    monkeypatch.setitem(sys.modules, "robot_descriptions", ModuleType("robot_descriptions"))
-    monkeypatch.setitem(sys.modules, "robot_descriptions._descriptions", index)
+@pytest.mark.usefixtures("descriptions")
+def test_a_robot_that_cannot_be_downloaded_is_no_crash():
     with pytest.raises(RobotError, match="could not be downloaded"):
         Robot.load("robot_descriptions:some_description")
 

@@ -38,6 +38,8 @@ RESOLVERS = ("hcod", "tpm", "hqp")
 # Or of the exact engine: levels missed by a fiftieth, 169 steps for 10 rows (certain but IN_DOUBT).
 STORED = sorted([*(FOLDER.parent / "stress").glob("*.npz"),
                  *(FOLDER.parent / "exact").glob("*.npz")])
+# The nearly-* have rows that are dependent up to 1e-8 rad: x was far off on the way, and levels
+# below, or the reference, moved it back along directions of which a row had a little left.
 IN_DOUBT = ("hcod_169_steps_9", "hcod_SOLVED_third_level_34")
 CERTAIN = ["contacts-50000500", "contacts-50067440", "contacts-50081046",
            "cycle-mixed_units-50103472", "cycle-tiny_rows-50015365", "cycle-tiny_rows-50031629",
@@ -81,7 +83,8 @@ def test_what_hcod_calls_solved_is_right_and_found_soon_with_its_memory_too(path
         assert res.status is not Status.SOLVED or is_right(h, res.x)
         if path.parent.name == "exact":
             assert res.status is Status.SOLVED or path.stem in IN_DOUBT
-    assert path.stem not in CERTAIN or certify(h, cold.x).certified
+    certain = path.stem in CERTAIN or path.stem.startswith("nearly-")
+    assert not certain or certify(h, cold.x).certified
 
 
 @pytest.mark.parametrize(("name", "resolver"), cases(RIGHT))

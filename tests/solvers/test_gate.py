@@ -113,6 +113,8 @@ def test_a_copy_and_a_pickle_pass_the_gate_too(again):
     other = again(h)
     for name in ("A", "lower", "upper", "sizes", "reference", "metric", "give"):
         np.testing.assert_array_equal(getattr(h, name), getattr(other, name))
+        if again is not copy.copy and name != "sizes":
+            assert not np.shares_memory(getattr(h, name), getattr(other, name))
     assert other.names == h.names
     assert make("hcod").solve(other).status.name == "SOLVED"
 

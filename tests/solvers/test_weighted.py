@@ -169,14 +169,6 @@ def test_rows_that_are_nearly_parallel_are_said_to_leave_a_doubt():
 # Settings ----------------------------------------------------------------------------------------
 
 
-def test_a_backend_that_fails_is_named_by_the_status_and_x_keeps_the_constraints(monkeypatch):
-    monkeypatch.setattr("qpsolvers.solve_problem", lambda *a, **k: 1 / 0)
-    h, _, _ = next(iter(family("HUM38")))
-    res = make("weighted", backend="proxqp").solve(h)
-    assert res.status is Status.BACKEND_FAILURE
-    assert h.violations(res.x)[0] < 1e-8
-
-
 def test_weights_for_another_number_of_levels_are_refused():
     with pytest.raises(HierarchyError, match="2 weights for 3 levels"):
         make("weighted", weights=(2.0, 1.0)).solve(build(generic, True))
