@@ -188,9 +188,8 @@ class Packed:
         """Write tasks as a level; if its step is weighed, n rows then stand for all of it."""
         last = self.write(level)
         if self.pull is not None and last > self.count:
-            weight, centre = self.pull
-            self.weight = damp(self.table, *self.last, weight, centre, self.A, self.sides,
-                               self.count, last)
+            self.weight = damp(self.table, *self.last, self.pull, self.A, self.sides, self.count,
+                               last)
             if self.weight > 0.0:
                 last = self.count + self.n
         self.keep(" + ".join([label(one[0]) for one in level]), last)

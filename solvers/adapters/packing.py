@@ -103,13 +103,15 @@ def largest_violation(A, lower, upper, x, first, last):
 
 
 @compiled
-def damp(table, first, last, weight, centre, A, sides, row, end):
+def damp(table, first, last, pull, A, sides, row, end):
     """Weigh the step in the level of these rows of the table, which was written from row to end.
 
-    `weight` is that of a pull to `centre` (n,); each task adds its lm_damping |gain cost e|^2.
+    `pull` is a weight, and the point (n,) that it pulls to; each task adds its lm_damping
+    |gain cost e|^2.
     Returns the sum; if it is not zero, n rows then stand for the level: what its best x misses says
     nothing of that x.
     """
+    weight, centre = pull
     n, total = A.shape[1], weight
     for i in range(first, last):
         total += table[i, n + 3] * (table[i, n + 2] * table[i, n + 1] * table[i, n]) ** 2
