@@ -103,15 +103,6 @@ def test_tasks_in_plain_numpy_stand_beside_compiled_ones():
         assert h.lower[4] == known.lower[3]
 
 
-def test_the_reference_is_the_null_space_term():
-    state = state_at(Q, V)
-    np.testing.assert_allclose(stack(reference=JointDamping(7, 5.0)).hierarchy(state).reference,
-                               -5 * V)
-    assert not stack(reference=None).hierarchy(state).reference.any()
-    velocity = stack("velocity", reference=TASKS["posture"]).hierarchy(state)
-    np.testing.assert_allclose(velocity.reference, TASKS["posture"].reference_velocity(state))
-
-
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("task", [JointDamping(7, 5.0), JointDamping(7, 2.0, "mass"),
                                   TASKS["posture"]], ids=["identity", "mass", "posture"])
@@ -124,6 +115,7 @@ def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
     np.testing.assert_array_equal(h.lower, h.reference)
     np.testing.assert_array_equal(h.upper, h.reference)
     np.testing.assert_array_equal(h.A, np.eye(7))
+    assert not Stack([task], level).hierarchy(state).reference.any()
 
 
 @pytest.mark.parametrize(("edit", "said"), [

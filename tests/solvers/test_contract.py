@@ -10,7 +10,7 @@ import tracemalloc
 import numpy as np
 import oracle
 import pytest
-from rank_cases import CASES, boxed, build, family, generic, random_levels, rng
+from rank_cases import CASES, boxed, build, family, gap, generic, random_levels, rng
 from sequences import moved
 
 from hierarchy import Hierarchy, HierarchyError
@@ -262,8 +262,7 @@ def remembered(resolver):
 @every(REMEMBER)
 def test_no_memory_changes_the_answer_and_its_own_leaves_little_to_do(resolver):
     """Of a tick before, of rows at random sides, of numbers of any size, of another hierarchy."""
-    r = rng(3)
-    tried = 0
+    r, tried, close = rng(3), 0, 1e-10 if resolver.name == "tpm" else 1e-8
     for h in remembered(resolver):
         cold = resolver.solve(h)
         if cold.memory is None:  # no limit acted
@@ -281,13 +280,15 @@ def test_no_memory_changes_the_answer_and_its_own_leaves_little_to_do(resolver):
                        1e200 * r.normal(size=len(odd)), np.full(len(odd), np.nan), np.zeros(3)):
             again = resolver.solve(h, memory)
             assert again.status is cold.status
-            assert np.abs(again.x - cold.x).max() <= 1e-8 * (1.0 + np.abs(cold.x).max())
+            assert np.abs(again.x - cold.x).max() <= close * (1.0 + np.abs(cold.x).max())
         assert np.abs(warm.x - cold.x).max() <= 1e-9 * (1.0 + np.abs(cold.x).max())
         tried += 1
         if resolver.name == "hcod":
             np.testing.assert_array_equal(warm.holds_back, cold.holds_back)
             np.testing.assert_allclose(warm.multipliers, cold.multipliers, atol=1e-6)
     assert tried > 3
+    free = Hierarchy.from_levels(generic())  # nothing of a memory is of use
+    assert gap(resolver.solve(free, cold.memory).x, resolver.solve(free).x) <= 1e-12
 
 
 @every(HQP)

@@ -72,11 +72,28 @@ def test_the_code_that_documents_show_is_that_of_the_examples():
     assert all(block in examples for block in shown)
 
 
+ONCE = {"once.c": ["-std=c99", *STRICT], "once.cpp": ["-std=c++17", "-fno-exceptions", *STRICT],
+        "eigen.cpp": ["-std=c++17", "-DTASK_HIERARCHY_EIGEN", "-isystem", "/usr/include/eigen3"]}
+
+
+def compiler_of(name):
+    found = CXX if name.endswith("cpp") else COMPILER
+    if found is None or (name == "eigen.cpp" and not Path("/usr/include/eigen3").exists()):
+        pytest.skip(f"no compiler or no library for {name}")
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ONCE)
+def test_the_examples_of_one_call_compile_without_a_warning_and_run(folder, tmp_path, name):
+    once = built(tmp_path / "once", EXAMPLES / name, folder, *ONCE[name],
+                 compiler=compiler_of(name))
+    assert said(once) == "status 0, x = 0.9 0.1\n"
+
+
 @needs_c
 @pytest.mark.slow
-def test_the_examples_compile_without_a_warning_and_run(folder, tmp_path):
-    once = built(tmp_path / "once", EXAMPLES / "once.c", folder, "-std=c99", *STRICT)
-    assert said(once) == "status 0, x = 0.9 0.1\n"
+def test_the_example_of_a_loop_keeps_its_bounds(folder, tmp_path):
     loop = built(tmp_path / "loop", EXAMPLES / "loop.c", folder, "-std=c99", *STRICT)
     assert re.match(r"6000 ticks, 0 braked, speeds at a bound [1-9]\d* times, error at most 0\.",
                     said(loop))
@@ -101,14 +118,6 @@ def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(replay
 
 @pytest.mark.slow
 @pytest.mark.skipif(CXX is None, reason="no compiler of C++")
-def test_the_header_of_cxx_compiles_without_exceptions(folder, tmp_path):
-    once = built(tmp_path / "once", EXAMPLES / "once.cpp", folder, "-std=c++17",
-                 "-fno-exceptions", *STRICT, compiler=CXX)
-    assert said(once) == "status 0, x = 0.9 0.1\n"
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(CXX is None, reason="no compiler of C++")
 def test_the_controller_of_ros2_control_sends_what_python_sends(folder, tmp_path):
     """Against stub headers: the same arm, tasks and period, with two writers of the rows."""
     program = built(tmp_path / "simulated", ROS2 / "simulated.cpp", folder, "-std=c++17", *STRICT,
@@ -128,14 +137,6 @@ def test_the_controller_of_ros2_control_sends_what_python_sends(folder, tmp_path
         q = q + period * v
     assert len(sent) == 2000
     assert np.abs(np.diff(sent, axis=0)).max() <= 10.0 * period * (1.0 + 1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(CXX is None or not Path("/usr/include/eigen3").exists(), reason="no Eigen")
-def test_the_example_with_eigen_compiles(folder, tmp_path):
-    program = built(tmp_path / "eigen", EXAMPLES / "eigen.cpp", folder, "-std=c++17",
-                    "-DTASK_HIERARCHY_EIGEN", "-isystem", "/usr/include/eigen3", compiler=CXX)
-    assert said(program) == "status 0, x = 0.9 0.1\n"
 
 
 @needs_c
@@ -170,11 +171,9 @@ def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, na
 @pytest.mark.parametrize(("name", "words"), [("loop.c", "6000 ticks, 0 braked"),
                                              ("once.cpp", "status 0, x = 0.9 0.1")])
 def test_the_examples_pass_the_address_sanitizer(folder, tmp_path, name, words):
-    compiler = CXX if name.endswith("cpp") else COMPILER
-    if compiler is None:
-        pytest.skip("no compiler of C++")
     program = built(tmp_path / "program", EXAMPLES / name, folder, "-g",
-                    "-fsanitize=address,undefined", "-fno-sanitize-recover=all", compiler=compiler)
+                    "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
+                    compiler=compiler_of(name))
     assert said(program).startswith(words)
 
 
