@@ -217,7 +217,7 @@ def test_what_is_left_out_is_said(written):
     for name in ("mocap bodies are left out: target", "left out (root = \"NAME\" takes one as the "
                  "robot): cube", "of tendons only couplings of joints are here: tie, rope",
                  "left out: pull", "left out: hold",
-                 "not active are left out: off", "'drag' is left out", "ball joints are not kept: "
+                 "not active are left out: off", "'drag' is left out", "ball joints are ignored: "
                  "b_joint", "no actuator moves the joint, and nothing limits its effort here: "
                  "a_joint", "stiffness and damping of joints", "'floor' is a plane"):
         assert name in said, name
