@@ -38,9 +38,11 @@ def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
 
 def progress(protocol: Protocol, rows: Rows) -> str:
     """Return how much of the protocol has been run."""
+    arms = f"starts on each of {len(rows.layouts)} arms, without and with noise."
+    if len(rows.seeds) == len(protocol.seeds) and rows.starts == protocol.starts:
+        return f"{len(rows.seeds)} seeds, {rows.starts} {arms}"
     return (f"Run so far: {len(rows.seeds)} of {len(protocol.seeds)} seeds, {rows.starts} of "
-            f"{protocol.starts} starts on each of {len(rows.layouts)} arms, without and with "
-            "noise.")
+            f"{protocol.starts} {arms} *Undecided* can change with more.")
 
 
 def faults(protocol: Protocol, rows: Rows) -> list[str]:
