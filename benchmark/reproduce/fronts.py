@@ -183,5 +183,7 @@ def figure(points: Sequence[Point]) -> Figure:
         ax.set(title=f"{name}: {sum(shares)} of {len(shares)} settings did not fail", xlabel=first,
                ylabel=second)
         ax.title.set_fontsize(9)
+        ax.locator_params(nbins=4)
+        ax.ticklabel_format(useOffset=False, scilimits=(-3, 4))
         ax.legend(title=f"size: {third}", fontsize=7, title_fontsize=7)
     return fig
