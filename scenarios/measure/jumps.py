@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hierarchy.errors import HierarchyError
-from hierarchy.problem import Hierarchy
+from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell, build
 from scenarios.cell.stacked import stack_resolver
-from scenarios.measure.causes import Cause, Tick, causes
+from scenarios.measure.causes import Cause, Solve, Tick, causes
 from scenarios.measure.judging import Rows
 from scenarios.measure.safety import STEPS
-from solvers import Status
+from solvers import Resolver, Status
 from solvers.resolvers.merged import Merged
 
 if TYPE_CHECKING:
@@ -57,18 +58,36 @@ def jumps(recording: Recording, tick: int | None = None,
         return []
     cell = build(recording.scenario)
     rows = Rows(recording, cell)
-    return [_jump(recording, cell, rows, int(k)) for k in (ticks if tick is None else [tick])]
+    solves = _solves(recording, cell, rows, list(map(int, ticks)) if tick is None else [tick])
+    return [_jump(recording, cell, rows, k, solve) for k, solve in solves.items()]
 
 
-def _jump(recording: Recording, cell: Cell, rows: Rows, k: int) -> Jump:
+def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
+            ) -> dict[int, Solve]:
+    """Return what answers as in each of these ticks; what `merged` carries comes from a replay."""
+    resolver = stack_resolver(recording.scenario, cell.stack, cell.activation)
+    carried: dict[int, Any] = {}
+    memory = None
+    for k in range(max(ticks) + 1 if isinstance(resolver, Merged) else 0):
+        carried[k] = memory
+        if (h := _hierarchy(recording, rows, k)) is not None:
+            memory = resolver.solve(h, memory).memory
+    return {k: partial(_answer, resolver, carried.get(k)) for k in ticks}
+
+
+def _answer(resolver: Resolver, memory: Any, h: Hierarchy) -> Array:
+    return resolver.solve(h, memory).x
+
+
+def _jump(recording: Recording, cell: Cell, rows: Rows, k: int, solve: Solve) -> Jump:
     change = np.nan_to_num(np.abs(recording["command"][k] - recording["command"][k - 1]))
     i, level = int(change.argmax()), recording.scenario.control.level
     joint = cell.robot.velocity_names[cell.robot.n - len(change) + i]
     return Jump(k, float(recording["t"][k]), f"{level} of {joint}", float(change[i]),
-                _UNITS[level], tuple(_causes(recording, cell, rows, k)))
+                _UNITS[level], tuple(_causes(recording, cell, rows, k, solve)))
 
 
-def _causes(recording: Recording, cell: Cell, rows: Rows, k: int) -> Iterator[Cause]:
+def _causes(recording: Recording, cell: Cell, rows: Rows, k: int, solve: Solve) -> Iterator[Cause]:
     """Yield what is known from the recording, and what the hierarchies of both ticks say."""
     for one in (k - 1, k):
         for event in recording.events:
@@ -77,16 +96,11 @@ def _causes(recording: Recording, cell: Cell, rows: Rows, k: int) -> Iterator[Ca
                                       f"{event.action}")
         if (status := Status(int(recording["status"][one]))) is not Status.SOLVED:
             yield Cause("status", f"tick {one} is {status.name}")
-    resolver = stack_resolver(recording.scenario, cell.stack, cell.activation)
-    memory = None
-    for one in range(k if isinstance(resolver, Merged) else 0):  # it moves the targets of tick k
-        if (h := _hierarchy(recording, rows, one)) is not None:
-            memory = resolver.solve(h, memory).memory
     before, after = (_tick(recording, cell, rows, one) for one in (k - 1, k))
     if before is None or after is None:
         yield Cause("other", "its rows do not follow from the recording")
         return
-    yield from causes(before, after, lambda h: resolver.solve(h, memory).x)
+    yield from causes(before, after, solve)
 
 
 def _hierarchy(recording: Recording, rows: Rows, k: int) -> Hierarchy | None:
