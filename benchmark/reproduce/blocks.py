@@ -22,7 +22,7 @@ ITEMS: Mapping[str, Mapping[str, Any]] = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["block"]
 """Sentences by the name of their block; see blocks.toml."""
 
-ROWS, POINTS = "docs/results/protocol.json", "docs/results/fronts.json"
+ROWS, POINTS = "docs/results/protocol.json.gz", "docs/results/fronts.json"
 FAMILIES = ("letter", "own")
 _WIDTH = 100     # columns of a page
 _NOTHING = "Not run yet: `hierarchy reproduce protocol`."

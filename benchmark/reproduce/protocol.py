@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
 import tomllib
@@ -21,7 +22,7 @@ from scenarios.config import Scenario, load
 from scenarios.config.distributions import Value
 from scenarios.config.sampling import changed, drawn
 from scenarios.config.scenario import OWN
-from scenarios.files import make_folder, write_text
+from scenarios.files import make_folder, write_bytes
 from scenarios.results.run import Job, Outcome, digest, key_of, outcome
 from scenarios.results.sampled import Progress, Workers, complete
 from scenarios.results.store import Store
@@ -253,12 +254,11 @@ def quick(protocol: Protocol) -> Protocol:
 
 
 def write(rows: Rows, path: Path) -> None:
-    """Write rows as JSON, a line for each metric of a column."""
+    """Write rows as compressed JSON; the same rows give the same bytes."""
     make_folder(path.parent)
-    text = json.dumps(asdict(rows), indent=1)
-    write_text(path, re.sub(r"\[[^][{}]*\]", lambda found: " ".join(found[0].split()), text) + "\n")
+    write_bytes(path, gzip.compress(json.dumps(asdict(rows)).encode(), mtime=0))
 
 
 def read(path: Path) -> Rows:
     """Return the rows of a file."""
-    return Rows(**json.loads(path.read_text(encoding="utf-8")))
+    return Rows(**json.loads(gzip.decompress(path.read_bytes())))
