@@ -1,15 +1,15 @@
-"""Torques from tick to tick, and what is given up for them: python -m benchmark.studies.smooth.
+"""Commands from tick to tick, and what is given up for them: python -m benchmark.studies.smooth.
 
-The scenarios at level torque from sampled starts, the same for all resolvers. Steps are those of
-runs in which the robot stands to the end; the others fall. Runs are kept in `out`: the same command
-continues.
+Scenarios from sampled starts, the same for all resolvers, also with `--set plant.delay=0.002` and
+other changes. Steps are those of runs that reach their end; in the others the robot falls. Runs are
+kept in `out`: the same command continues, and folders of several machines can be put together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -17,6 +17,7 @@ import typer
 from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import Column, Table, power, whole
+from scenarios.config import load
 from scenarios.results.columns import Results
 from scenarios.results.sampled import Workers, compare_starts
 
@@ -24,52 +25,62 @@ SCENARIOS = "reach-torque,stand-push,stand-momentum,stand-g1,stand-talos"
 RESOLVERS = ("hcod", "weighted", "merged")
 _COLUMNS = (
     Column("stood", "stood", str), Column("step", "step"), Column("largest", "largest"),
-    Column("> 5", "above", whole), Column("limits", "limits", power),
+    Column("ticks", "above", whole), Column("limits", "limits", power),
     Column("joints", "excess", power), Column("com", "com", power), Column("hand", "hand", power),
-    Column("com off", "end"), Column("time", "time"))
+    Column("off", "end"), Column("time", "time"))
 _WORDS = (
-    "Of the runs in which the robot stands to the end: torque step, largest of a run, median and "
-    "largest [N m]; ticks with a step above 5 N m; worst miss of torque and friction limits; worst "
-    "excess of a joint limit [rad]; mean miss of the centre of mass and of the worse hand, medians "
-    "[m/s2]; centre of mass off at the end [mm]; time of a solve over that of weighted.")
+    "Of the runs that reach their end: step of torque, acceleration or speed by level, largest "
+    "of a run, median and largest [N m, rad/s2, rad/s]; ticks with one above 5, 50 or 0.1; worst "
+    "miss of torque and friction limits; worst excess of a joint limit [rad]; mean miss of the "
+    "centre of mass and of the worse hand, medians [m/s2]; centre of mass off at the end, or error "
+    "of the position, medians [mm]; time of a solve over that of weighted.")
 
 
 def run(starts: int = 16, seed: int = 14, scenarios: str = SCENARIOS,
         resolvers: Sequence[str] = RESOLVERS, out: Path = Path("runs/smooth"),
-        workers: int | None = None) -> Report:
-    """Run the scenarios (names with commas between) and return a table for each."""
+        workers: int | None = None, changes: Sequence[str] = ()) -> Report:
+    """Run the scenarios (names with commas between) and return a table for each.
+
+    changes : KEY=VALUE of all scenarios, as of `hierarchy run --set`.
+    """
     tables: list[Table] = []
     rows: list[Row] = []
     for name in scenarios.split(","):
-        done = compare_starts([name], resolvers, starts, seed, out / f"{name}-{seed}",
+        scenario = load(name, changes)
+        done = compare_starts([scenario], resolvers, starts, seed, out / f"{name}-{seed}",
                               workers=Workers(workers))
         (results,) = done.found.values()
-        found = [_row(results, label) for label in results.labels]
+        found = [_row(results, label, f"{scenario.control.level}_step")
+                 for label in results.labels]
         usual = next((one["time"] for one in found if one["entrant"] == "weighted"), np.nan)
         for one in found:
             one["time"] /= usual
-        tables.append(Table(f"{name}, {starts} starts, seed {seed}", found, _COLUMNS))
-        rows += [{"scenario": name, **one} for one in found]
-    return Report("Torques from tick to tick", [Section("", tables, _WORDS)], {"smooth": rows})
+        title = ", ".join([name, *changes, f"{starts} starts", f"seed {seed}"])
+        tables.append(Table(title, found, _COLUMNS))
+        rows += [{"scenario": name, "set": " ".join(changes), **one} for one in found]
+    return Report("Commands from tick to tick", [Section("", tables, _WORDS)], {"smooth": rows})
 
 
-def _row(results: Results, label: str) -> dict[str, Any]:
+def _row(results: Results, label: str, step: str) -> dict[str, Any]:
     """Return what is shown of a resolver; runs that fall count only as such."""
     ended = np.array([reason is None for run, reason in zip(
         results.runs, results.reasons, strict=True) if run.label == label])
 
-    def of(metric: str) -> np.ndarray:
-        return results.column(metric, label)[ended] if metric in results.values else np.array([])
+    def of(*metrics: str) -> np.ndarray:
+        """Return the first of these metrics that is known."""
+        known = [name for name in metrics if name in results.values]
+        return results.column(known[0], label)[ended] if known else np.array([])
 
-    hands = np.maximum(of("miss_left_hand"), of("miss_right_hand"))
-    step = of("torque_step_max")
+    hands = [of(f"miss_{side}_hand") for side in ("left", "right")]
     return {"entrant": label.split()[0], "stood": f"{ended.sum()} of {len(ended)}",
-            "step": _median(step), "largest": step.max() if len(step) else np.nan,
-            "above": of("torque_step_ticks").sum(),
+            "step": _median(of(f"{step}_max")),
+            "largest": of(f"{step}_max").max(initial=0.0),
+            "above": of(f"{step}_ticks").sum(),
             "limits": of("miss_limits").max(initial=0.0),
             "excess": of("joint_limit_excess").max(initial=0.0),
-            "com": _median(of("miss_centre_of_mass")), "hand": _median(hands),
-            "end": 1e3 * _median(of("task_centre_of_mass_end")),
+            "com": _median(of("miss_centre_of_mass")),
+            "hand": _median(np.maximum(*hands)),
+            "end": 1e3 * _median(of("task_centre_of_mass_end", "position_error_median_settled")),
             "time": _median(of("time_resolve_median"))}
 
 
@@ -78,9 +89,11 @@ def _median(values: np.ndarray) -> float:
 
 
 def main(starts: int = 16, seed: int = 14, scenarios: str = SCENARIOS,
-         out: Path = Path("runs/smooth")) -> None:
+         resolvers: str = ",".join(RESOLVERS), out: Path = Path("runs/smooth"),
+         workers: int | None = None,
+         changes: Annotated[list[str] | None, typer.Option("--set")] = None) -> None:
     """Print the tables."""
-    run(starts, seed, scenarios, out=out).say()
+    run(starts, seed, scenarios, resolvers.split(","), out, workers, changes or ()).say()
 
 
 if __name__ == "__main__":

@@ -5,10 +5,11 @@ and become one level. Rows that draw x to the reference follow, for the unknowns
 level names alone, so that it has full column rank. The exact kernel solves this. A row with a
 memory y aims at sides moved by y, and then
 
-    z = a x - y,    y <- clip(y + step (clip(z, lower, upper) - a x), -cap, cap)             (a)
+    z = a x - y,  r = clip(z, lower, upper) - a x,  y <- clip(y + step clip(r))              (a)
 
-which for an equality a x = b is y <- clip(y + step (b - a x)): what the method of multipliers does
-to a multiplier, in the unit of the row. docs/theory/merged.md has the bounds.
+where clip without sides is to +-cap. For an equality a x = b this is what the method of multipliers
+does to a multiplier, y + step (b - a x), in the unit of the row; a miss beyond the cap moves y by
+step times cap. docs/theory/merged.md has the bounds.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -198,5 +199,5 @@ def _carry(A, lower, upper, sizes, x, y, strict, options):
         for i in range(first, first + sizes[k]):
             value = inner_product(A[i], x)
             miss = min(max(value - y[i], lower[i]), upper[i]) - value
-            y[i] = min(max(y[i] + options.step * miss, -cap), cap)
+            y[i] = min(max(y[i] + options.step * min(max(miss, -cap), cap), -cap), cap)
         first += sizes[k]

@@ -57,7 +57,8 @@ class Merged(Resolver):
     ratio : weight of a level over that of the level below; the lowest level has weight 1.
     scales : by name of a level, the miss [unit of its rows] that counts as 1; 1 where not given.
     cap : most that a target moves, times the scale of its level; not in the lowest level.
-    step : share of a miss, at most 1, by which the target moves in the next solve.
+    step : share of a miss, at most 1, by which the target moves in the next solve; what a miss has
+        beyond the cap does not count.
     strict_levels : levels that stay strict; None: the first run of inequalities, and all above.
     regularisation : weight of |x - reference|, for unknowns that no merged row names alone.
     tolerance, max_iterations : as in `hcod`, which solves.
@@ -67,7 +68,7 @@ class Merged(Resolver):
     handles: ClassVar[Handles] = "inequalities"
     damps: ClassVar[str] = "the merged level as a whole"
     damps_with_bounds: ClassVar[str] = damps
-    ratio: float = 5.0
+    ratio: float = 3.0
     scales: Mapping[str, float] | tuple[tuple[str, float], ...] = ()
     cap: float = 1.0
     step: float = 0.1

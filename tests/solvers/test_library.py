@@ -32,8 +32,8 @@ RESOLVERS = [
     ("sns", {}, {}),
     ("sns", {"form": "optimal", "scales": "miss"}, {"optimal": 1, "miss": 1}),
     ("merged", {}, {}),
-    ("merged", {"ratio": 3.0, "step": 1.0, "strict_levels": 1},
-     {"ratio": 3.0, "step": 1.0, "strict_levels": 1}),
+    ("merged", {"ratio": 2.0, "step": 1.0, "strict_levels": 1},
+     {"ratio": 2.0, "step": 1.0, "strict_levels": 1}),
 ]
 
 
