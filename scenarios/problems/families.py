@@ -130,6 +130,11 @@ _OTHERS = {
     "of-soth": (others.of_soth, "as soth is tested: ranks, rows of upper levels, all sides"),
     "of-lexls": (others.of_lexls, "as LexLS is tested: equalities that add a rank each"),
     "of-daqp": (others.of_daqp, "as DAQP is tested: a program whose acting rows are known")}
+_EXAMPLES = {
+    "of-pink": "examples of pink: limits, barriers, then each task a level",
+    "of-mink": "examples of mink: limits, then each task a level",
+    "of-placo": "examples of placo: limits, hard tasks, then each soft task a level",
+    "of-tsid": "examples of tsid: dynamics, contacts and limits above the weighted tasks"}
 
 
 def _all() -> dict[str, Family]:
@@ -145,6 +150,8 @@ def _all() -> dict[str, Family]:
              for name, what in _KINDS.items()]
     made += [Family(name, "others", what, partial(_other, make))
              for name, (make, what) in _OTHERS.items()]
+    made += [Family(name, "others", what, partial(others.of_examples, name))
+             for name, what in _EXAMPLES.items()]
     made.append(Family("recipe", "random", "random sizes, ranks, ties, scales", _recipe))
     return {one.name: one for one in made}
 

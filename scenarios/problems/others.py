@@ -3,18 +3,25 @@
 of-soth: stack-of-tasks/soth, unitTesting/RandomGenerator.cpp (randomProblem). of-lexls:
 jrl-umi3218/lexls, interfaces/matlab-octave/tests/lexlse/define_problem.m. of-daqp: darnstrom/daqp,
 interfaces/DAQP.jl/test/utils.jl (generate_test_QP), with the objective as the level below.
+
+Others were recorded in the examples of packages that own the robot's model: `data/README.md`.
 """
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
+from solvers.problems.files import read
 
 _UNKNOWNS = 4, 20       # of-soth, of-lexls: least and most
 _CONDITION = 100.0      # of-daqp: of the Hessian
 _BOUNDS, _ROWS, _ACTIVE, _SIZE = 6, 24, 8, 12  # of-daqp: simple bounds, all rows, acting, unknowns
 _GAP = 0.01, 1.01       # of-daqp: from a side that acts, or from the answer, to the other sides
+
+_DATA = Path(__file__).parent / "data"
 
 Level = tuple[Array, Array, Array]
 
@@ -83,3 +90,25 @@ def of_daqp(rng: np.random.Generator) -> Hierarchy:
 
 def _entries(rng: np.random.Generator, rows: int, columns: int) -> Array:
     return rng.uniform(-1.0, 1.0, (rows, columns))
+
+
+def of_examples(name: str, seed: int, count: int) -> list[Hierarchy]:
+    """Return recorded problems in turn; of another seed than 0, with other targets.
+
+    A new target of an equality below the first level is between -s and s, with s the largest
+    target of its level, or 1 where all are zero.
+    """
+    kept = read(_DATA / f"{name}.npz").problems
+    if not seed:
+        return list(kept[:count])
+    return [_aimed(kept[i % len(kept)], np.random.default_rng([seed, i])) for i in range(count)]
+
+
+def _aimed(h: Hierarchy, rng: np.random.Generator) -> Hierarchy:
+    lower, upper = h.lower.copy(), h.upper.copy()
+    for i, j in zip(h.offsets[1:-1], h.offsets[2:], strict=True):
+        equal = lower[i:j] == upper[i:j]
+        size = np.abs(lower[i:j][equal]).max(initial=0.0) or 1.0
+        target = rng.uniform(-size, size, j - i)
+        lower[i:j][equal] = upper[i:j][equal] = target[equal]
+    return h.changed(lower=lower, upper=upper)

@@ -5,8 +5,9 @@ import pytest
 
 from hierarchy import HierarchyError
 from scenarios.problems import reference as families
+from scenarios.problems.families import FAMILIES as FAMILIES_OF_ALL
 from scenarios.problems.postures import posed
-from solvers import Status, make
+from solvers import Status, certify, make
 from solvers.problems import FAMILIES, family
 
 SEEDS = range(40)
@@ -53,3 +54,15 @@ def test_at_singular_postures_no_limit_is_passed_and_answers_are_solved(name, co
         assert h.violations(res.x)[0] < 1e-12
         solved += res.status is Status.SOLVED
     assert solved >= count - (count // 3 if name == "singular-humanoid" else 2)
+
+
+@pytest.mark.parametrize("name", ["of-pink", "of-mink", "of-placo", "of-tsid"])
+def test_problems_of_other_packages_get_other_targets_with_a_seed_and_keep_rows_and_limits(name):
+    public, fresh = (FAMILIES_OF_ALL[name].half(seed, 12).problems for seed in (0, 26112682))
+    for h, new in zip(public, fresh, strict=True):
+        top = h.sizes[0]
+        assert np.array_equal(h.A, new.A)
+        assert np.array_equal(h.upper[:top], new.upper[:top])
+        assert not np.array_equal(h.lower, new.lower)
+        res = make("hcod").solve(new)
+        assert res.status is Status.SOLVED and certify(new, res.x).certified
