@@ -34,6 +34,7 @@ import sys
 import tempfile
 import time
 import traceback
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -220,6 +221,19 @@ def write_map(tests: list[str]) -> None:
 
 
 @cache
+def footprints() -> Counter[str]:
+    """Return how many lines each test runs."""
+    from coverage import CoverageData
+
+    data, found = CoverageData(str(MAP)), Counter[str]()
+    data.read()
+    for file in data.measured_files():
+        for tests in data.contexts_by_lineno(file).values():
+            found.update(tests)
+    return found
+
+
+@cache
 def lines_of(module: str) -> dict[int, tuple[str, ...]]:
     """Return the tests of each line of a module; of line 0 those that run any line of it."""
     from coverage import CoverageData
@@ -232,14 +246,20 @@ def lines_of(module: str) -> dict[int, tuple[str, ...]]:
 
 
 def tests_of(mutant: Mutant) -> tuple[str, ...]:
-    """Return the tests that run the line of a mutant, or some of them, spread over the files."""
+    """Return the tests that run the line of a mutant; of many, those that the module's text says."""
     line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
     records = ("tests/project/test_records.py",)
     if "frozen=" in line:
         return records
     known = lines_of(mutant.module)
-    tests = known.get(mutant.line) or known[0]
-    chosen = random.Random(mutant.line).sample(tests, min(MOST, len(tests)))
+    tests = [*(known.get(mutant.line) or known[0])]
+    random.Random(mutant.line).shuffle(tests)
+    seen, order = Counter[str](), dict[str, tuple[int, int]]()
+    for test in tests:
+        function = test.partition("[")[0]
+        order[test] = seen[function], footprints()[test]
+        seen[function] += 1
+    chosen = sorted(tests, key=order.__getitem__)[:MOST]
     return ("field(" in line) * records + tuple(sorted(chosen))
 
 
