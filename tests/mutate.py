@@ -246,7 +246,7 @@ def lines_of(module: str) -> dict[int, tuple[str, ...]]:
 
 
 def tests_of(mutant: Mutant) -> tuple[str, ...]:
-    """Return the tests that run the line of a mutant; of many, those that the module's text says."""
+    """Return the tests that run the line of a mutant, of many MOST: see the module's text."""
     line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
     records = ("tests/project/test_records.py",)
     if "frozen=" in line:
