@@ -57,8 +57,8 @@ def test_a_saved_run_says_itself_how_to_repeat_it(tmp_path):
 def test_compare_writes_page_numbers_and_a_folder_for_each_run_in_80_columns(tmp_path, capsys,
                                                                              monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    arguments = ["compare", "ellipse", "--resolvers", "tpm-published,tpm,recursive", *SHORT]
-    assert run_command([*arguments, "--out", "b"]) == 0
+    assert run_command(["compare", "ellipse", "--resolvers", "tpm-published,tpm,recursive", *SHORT,
+                        "--workers", "1", "--out", "b"]) == 0
     out = capsys.readouterr().out
     assert "Report: b/index.html" in out
     assert max(map(len, out.splitlines())) <= 80
@@ -193,7 +193,8 @@ def test_runs_side_by_side_are_those_made_one_by_one_and_are_timed_alone(tmp_pat
 def test_an_error_in_the_page_costs_no_run_and_says_where_they_are(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("scenarios.results.page.comparison_page",
                         mock.Mock(side_effect=LookupError("no such style")))
-    assert run_command(["compare", "ellipse", "--resolvers", "tpm,hcod", *SHORT, "--out", "b"]) == 1
+    assert run_command(["compare", "ellipse", "--resolvers", "tpm,hcod", *SHORT, "--workers", "1",
+                        "--out", "b"]) == 1
     assert "no such style; the runs are in b" in capsys.readouterr().err
     assert len(list((tmp_path / "b").rglob("run.npz"))) == 2
 
