@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 import sys
+from importlib.metadata import distributions
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -55,6 +56,13 @@ def with_mujoco(tmp_path, monkeypatch):
     """MuJoCo is there, and logs runs that diverge into a folder of the test's own."""
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def example_robot_data():
+    """The package with this name is there, which other packages may bring under another one."""
+    if not [*distributions(name="example-robot-data")]:
+        pytest.skip("example-robot-data is not installed")
 
 
 @pytest.fixture(scope="session")

@@ -6,13 +6,15 @@ from benchmark.strictness import AIM, entrants, run
 from solvers import make
 
 ENTRANTS = {one.label: one for one in entrants()}
+FEW = ("hcod", "sns optimal", "hqp proxqp", "weighted", "tpm, cut off")  # each in a process
 SHORT = 0.1  # [s]; the limits are active all the time, and a cascade needs ms for a solve
 
 
 @pytest.mark.slow
 def test_the_posture_moves_the_end_effector_only_where_levels_are_not_strict():
-    rows = {row["entrant"]: row for row in run(duration=SHORT).rows["strictness"]}
-    assert {*rows} == {*ENTRANTS} >= {"hcod", "hqp proxqp", "hqp osqp", "tpm, cut off"}
+    found = run([ENTRANTS[label] for label in FEW], SHORT)
+    rows = {row["entrant"]: row for row in found.rows["strictness"]}
+    assert tuple(rows) == FEW
     for label, found in rows.items():
         options = dict(ENTRANTS[label].options)
         resolver = make(options.pop("resolver"), **options) if options else None

@@ -322,15 +322,6 @@ def test_a_robot_that_cannot_be_downloaded_is_no_crash():
         Robot.load("robot_descriptions:some_description")
 
 
-@pytest.fixture
-def example_robot_data():
-    from importlib.metadata import PackageNotFoundError, distribution
-    try:
-        distribution("example-robot-data")
-    except PackageNotFoundError:
-        pytest.skip("example-robot-data is not installed")
-
-
 @pytest.mark.usefixtures("example_robot_data")
 @pytest.mark.parametrize(("name", "joints", "end"), [("panda", 9, "panda_hand_tcp"),
                                                      ("xarm7", 7, "link_eef")])

@@ -1,7 +1,5 @@
 """What `hierarchy check ROBOT` prints to paste makes a scenario that runs, of the same robot."""
 
-from importlib.metadata import PackageNotFoundError, distribution
-
 import pytest
 
 from hierarchy import Robot
@@ -88,12 +86,9 @@ def test_the_section_to_paste_runs_as_it_is(name, tmp_path, monkeypatch, capsys)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("example_robot_data")
 @pytest.mark.parametrize("name", ["pr2", "romeo"])
 def test_the_section_of_a_public_robot_runs_as_it_is(name, tmp_path, capsys):
-    try:
-        distribution("example-robot-data")
-    except PackageNotFoundError:
-        pytest.skip(f"{name} is not here: example-robot-data is not installed")
     expect_the_same(*pasted(f"example_robot_data:{name}", tmp_path, capsys))
 
 

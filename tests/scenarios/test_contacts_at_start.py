@@ -14,21 +14,17 @@ from scenarios.config.kinds.torque import TorqueSection
 from scenarios.config.reading import shipped
 from scenarios.loop.first_tick import contact_warnings, first_tick
 
-STANDING = load("stand-push")
+changed = load("stand-push").with_changes
 ANKLE = ROBOT.rest[ROBOT.coordinate("left_ankle_pitch")]
 
 pytestmark = pytest.mark.usefixtures("with_mujoco")
 
 
-def changed(**keys):
-    return STANDING.with_changes({key.replace("__", "."): value for key, value in keys.items()})
-
-
 def tilted(degrees):
     """Both soles turned by their ankles from where they are flat."""
     angle = float(ANKLE + np.radians(degrees))
-    return {"start__on_floor": True,
-            "start__joints": {"left_ankle_pitch": angle, "right_ankle_pitch": angle}}
+    return {"start.on_floor": True,
+            "start.joints": {"left_ankle_pitch": angle, "right_ankle_pitch": angle}}
 
 
 # At the start
@@ -38,41 +34,41 @@ def tilted(degrees):
     (tilted(13.5), "'left_foot' is not flat on the floor but tilted by 13.5 deg; its corner "
                    r"\(-0.05, -0.04, 0\) is 49 mm above the floor"),
     (tilted(0.7), "tilted by 0.7 deg; .* 2.57 mm above"),
-    ({"start__on_floor": True, "start__joints": {"right_ankle_roll": 0.1}},
+    ({"start.on_floor": True, "start.joints": {"right_ankle_roll": 0.1}},
      "'right_foot' is not flat .* 5.73 deg"),
-    ({"contacts__1__up": [1.0, 0.0, 0.0]},
+    ({"contacts.1.up": [1.0, 0.0, 0.0]},
      r"'right_foot' is turned on edge, 90 deg .* \[0, 0, 1\] here: set `up`"),
-    ({"contacts__0__up": [0.0, 0.0, -1.0]}, "'left_foot' is upside down, 180 deg"),
-    ({"plant__height": -0.05}, "'left_foot' is 50 mm above the floor. start.on_floor"),
-    ({"plant__height": 0.02}, "'left_foot' is 20 mm below the floor"),
-    ({"contacts__0__x": None, "contacts__0__y": None, "contacts__0__offset": [0.0, 0.0, 0.01]},
+    ({"contacts.0.up": [0.0, 0.0, -1.0]}, "'left_foot' is upside down, 180 deg"),
+    ({"plant.height": -0.05}, "'left_foot' is 50 mm above the floor. start.on_floor"),
+    ({"plant.height": 0.02}, "'left_foot' is 20 mm below the floor"),
+    ({"contacts.0.x": None, "contacts.0.y": None, "contacts.0.offset": [0.0, 0.0, 0.01]},
      "'left_foot' is 9 mm above the floor"),
 ])
 def test_a_contact_that_does_not_stand_on_the_floor_is_refused(keys, said):
     with pytest.raises(ScenarioError, match=f"contacts.*: at the start .*{said}"):
-        build(changed(**keys))
+        build(changed(keys))
 
 
 @pytest.mark.parametrize("keys", [
-    tilted(0.4), {"plant__height": -0.0015},
-    {**tilted(8.0), "contacts__0__open": [[0.0, 1.0]], "contacts__1__open": [[0.0, 1.0]]},
+    tilted(0.4), {"plant.height": -0.0015},
+    {**tilted(8.0), "contacts.0.open": [[0.0, 1.0]], "contacts.1.open": [[0.0, 1.0]]},
 ], ids=["a little", "a little above", "open at the start"])
 def test_what_comes_down_within_a_few_ticks_or_later_is_not_refused(keys):
-    build(changed(**keys))
+    build(changed(keys))
 
 
 # In the first tick
 
 
 def test_a_floor_with_less_friction_than_the_controller_counts_on_is_named():
-    found = first_tick(changed(plant__friction=0.4, contacts__1__friction=0.3)).warnings
+    found = first_tick(changed({"plant.friction": 0.4, "contacts.1.friction": 0.3})).warnings
     assert [line for line in found if "friction" in line] == [
         "contact 'left_foot': the controller counts on a friction of 0.7, and the plant has 0.4 "
         "(plant.friction): it may slip"]
 
 
 def test_a_normal_that_the_floor_does_not_have_is_named():
-    found = contact_warnings(changed(contacts__0__normal=[1.0, 0.0, 2.0]))
+    found = contact_warnings(changed({"contacts.0.normal": [1.0, 0.0, 2.0]}))
     assert found == ("contact 'left_foot': its normal is 26.6 deg from vertical, and the plant's "
                      "floor is horizontal",)
 
@@ -81,11 +77,11 @@ def test_an_acceleration_far_beyond_its_limit_is_named():
     """`tpm` has no limits in its stack: the hand is to stop from 40 rad/s within 1/20 s."""
     v = np.zeros(ROBOT.n)
     v[ROBOT.velocity_names.index("left_elbow")] = 40.0
-    found = contact_warnings(changed(start__v=v.tolist(), control__resolver="tpm"))
+    found = contact_warnings(changed({"start.v": v.tolist(), "control.resolver": "tpm"}))
     assert len(found) == 1
     assert "the first tick asks joint left_shoulder_pitch for -" in found[0]
     assert "times its limit of 300 (limits.acceleration)" in found[0]
-    assert contact_warnings(changed(start__v=v.tolist())) == ()
+    assert contact_warnings(changed({"start.v": v.tolist()})) == ()
 
 
 @pytest.mark.parametrize("name", [name for name in shipped() if load(name).contacts
@@ -101,7 +97,8 @@ def test_a_joint_that_passes_its_stop_ends_the_run_with_a_fault():
     """No torque within the limits stops an elbow at 40 rad/s within the way that it has."""
     v, name = np.zeros(ROBOT.n), "left_elbow"
     v[ROBOT.velocity_names.index(name)] = 40.0
-    run = simulate(changed(start__v=v.tolist(), plant__beyond_stop=0.1, control__duration=0.5))
+    run = simulate(changed({"start.v": v.tolist(), "plant.beyond_stop": 0.1,
+                            "control.duration": 0.5}))
     assert run.fault.startswith(f"joint {name} is 0.1")
     assert "beyond its stop at" in run.fault
     assert run.ticks < 300

@@ -14,6 +14,7 @@ from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
+from scenarios.cell.sensors.depth_sensor import _capsules
 from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
@@ -170,6 +171,12 @@ def test_the_arm_does_not_avoid_itself():
         space.find_obstacles(*camera.image(i, state), obstacles)
         assert (camera.scene < 3.9).mean() > 0.005
         assert np.isinf(space.measure(obstacles, state.placements).distance).all()
+
+
+@pytest.mark.parametrize(("robot", "foot", "more"), [
+    (ROBOT, 0.0, 0), (ROBOT, 0.31, 1), (Robot.named("kuka_lwr", "floating"), 0.31, 0)])
+def test_a_fixed_robot_may_stand_on_a_foot(robot, foot, more):
+    assert len(_capsules(robot, foot)) == len(robot.capsules) + more
 
 
 # The sensor in the loop.

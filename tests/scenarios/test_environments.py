@@ -16,16 +16,15 @@ RUN = [*COMMAND, "run", "ellipse", "--duration", "0.02", "--out", "a"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
-def test_a_terminal_that_cannot_show_a_character_gets_a_replacement(encoding, tmp_path):
+def test_a_terminal_that_cannot_show_a_character_gets_a_replacement(tmp_path):
     done = subprocess.run(RUN, cwd=tmp_path, capture_output=True, check=False,
-                          env={**os.environ, "PYTHONIOENCODING": encoding})
+                          env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, b"")
     assert b"20 ticks in a" in done.stdout
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("closed", ["0<&-", "1>&-", "2>&-", "0<&- 1>&- 2>&-"])
+@pytest.mark.parametrize("closed", ["1>&-", "0<&- 1>&- 2>&-"])
 def test_closed_streams_cost_no_run(closed, tmp_path):
     done = subprocess.run(["sh", "-c", f'"$@" {closed}', "sh", *RUN], cwd=tmp_path, check=False,
                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -56,7 +56,7 @@ def test_a_step_extends_the_one_before_and_changes_what_it_says_and_nothing_else
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
         tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert run_command(["compare", "ladder", "--duration", "0.02"]) == 0
+    assert run_command(["compare", "ladder", "--duration", "0.02", "--workers", "1"]) == 0
     out = capsys.readouterr().out
     assert "Step 2: joint limits above all tasks (tpm)" in out
     assert "Step 6: one-sided distances in place of repulsion (hcod)" in out

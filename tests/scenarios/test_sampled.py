@@ -23,7 +23,7 @@ from scenarios.measure import metrics
 from scenarios.results import cluster, pool
 from scenarios.results.plan import load_sweep, plan, shipped_sweeps
 from scenarios.results.run import Job, Outcome, outcome
-from scenarios.results.sampled import compare_starts, sweep
+from scenarios.results.sampled import Workers, compare_starts, sweep
 from scenarios.results.store import FullError, Store, read
 
 BODY = {"name": '"small"', "scenarios": '["ellipse"]', "resolvers": '["tpm", "recursive"]',
@@ -37,6 +37,7 @@ pointing.alpha_d = { choice = [5.0, 15.0] }
 plant.measurement.seed = { integers = [3, 5] }
 """
 SHORT = {"control.duration": 0.03}
+ALONE = Workers(1)
 
 
 def write(folder, parameters=PARAMETERS, **changed):
@@ -174,7 +175,7 @@ def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path):
     command = ["sweep", str(write(tmp_path)), "--out"]
     assert run_command([*command, str(tmp_path / "a"), "--workers", "2"]) == 0
     for part in ("1/2", "2/2"):
-        assert run_command([*command, str(tmp_path / "b"), "--part", part]) == 0
+        assert run_command([*command, str(tmp_path / "b"), "--part", part, "--workers", "1"]) == 0
     assert not (tmp_path / "b" / "results.csv").exists()
     assert run_command([*command, str(tmp_path / "b"), "--scheduler", "tcp://127.0.0.1:1"]) == 0
     with distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=None) as one:
@@ -198,9 +199,9 @@ def test_a_part_that_is_not_there_and_a_scheduler_that_does_not_answer_are_named
 
 @pytest.mark.slow
 def test_only_the_runs_that_are_not_there_are_made(tmp_path):
-    assert sweep(write(tmp_path), tmp_path / "out").made == 6
+    assert sweep(write(tmp_path), tmp_path / "out", ALONE).made == 6
     more = write(tmp_path, samples="4", resolvers='["hcod", "tpm"]')
-    assert sweep(more, tmp_path / "out").made == 5
+    assert sweep(more, tmp_path / "out", ALONE).made == 5
     assert set(made(tmp_path / "out").values()) == {1}
     assert len(read(tmp_path / "out" / "results.csv")) == 8
 
@@ -249,7 +250,7 @@ def test_a_sweep_that_is_killed_goes_on_where_it_stopped(tmp_path):
     assert psutil.wait_procs(alive(map(int, workers)), timeout=60.0)[1] == []
     before = made(out)
     assert 0 < len(before) < 16
-    assert sweep(path, out).made == 16 - len(before)
+    assert sweep(path, out, ALONE).made == 16 - len(before)
     assert made(out) == Counter(read(out / "results.csv").keys())
 
 
@@ -299,7 +300,7 @@ def test_a_folder_in_use_or_of_something_else_is_refused(tmp_path):
 def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("starts") / "out"
     found = compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], 7, 3,
-                           folder)
+                           folder, workers=ALONE)
     return found, json.loads((folder / "results.json").read_text()), folder
 
 

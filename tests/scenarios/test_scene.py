@@ -109,6 +109,12 @@ def test_marks_have_their_symbols_in_plain_text(ellipse):
     assert ellipse.stage.areas == (("ε₁", 0.05), ("ε₂", 0.15))
 
 
+def test_the_axis_of_a_cone_is_drawn_with_unit_length():
+    fixed = stage_of(load("ellipse", ["pointing.axis=[0, 3, 4]"]))
+    np.testing.assert_allclose(fixed.axis, [0.0, 0.6, 0.8])
+    assert fixed.half_angle == pytest.approx(np.radians(5.0))
+
+
 def test_frames_end_where_the_state_stops_being_finite():
     q = np.zeros((5, 7))
     q[3:] = np.nan

@@ -149,7 +149,7 @@ def test_the_unit_of_a_level_does_not_matter(resolver):
 
 @every(RESOLVERS)
 def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(resolver):
-    for bad in (np.nan, np.inf):
+    for bad in (np.nan, np.inf, -np.inf):
         for entry in (lambda h: h.A[3, 2:3], lambda h: h.upper[4:5], lambda h: h.reference[1:2]):
             h = build(generic, True)
             entry(h)[:] = bad

@@ -9,7 +9,6 @@ from solvers.problems import structured
 
 INF = np.inf
 HCOD = make("hcod")
-INEQUALITIES = ["INEQ7", "HUM38"]
 
 
 def two_joints(limit=1.0):
@@ -26,15 +25,6 @@ def test_an_answer_found_by_hand():
     assert res.active.tolist() == [1, 1, 2, 2, 2]
     assert res.holds_back[:2].tolist() == [1, 1]
     assert res.multipliers[:2] == pytest.approx([1.5, 0.75])
-
-
-@pytest.mark.parametrize("name", INEQUALITIES)
-def test_its_own_memory_needs_one_iteration(name):
-    for h, _, _ in list(family(name))[:20]:
-        cold = HCOD.solve(h)
-        warm = HCOD.solve(h, cold.memory)
-        assert warm.iterations == 1
-        np.testing.assert_allclose(warm.x, cold.x, atol=1e-9 * (1 + np.abs(cold.x).max()))
 
 
 @pytest.mark.parametrize("name", ["EQ7", "EQ7over", "EQ7sing", "EQ30L8"])

@@ -15,6 +15,7 @@ from hierarchy import Hierarchy, HierarchyError
 from hierarchy.errors import UnknownNameError
 from solvers import Resolution, Status, make, names
 from solvers.resolvers.set_based import SetBased
+from solvers.resolvers.settled import Settled
 
 ROOT = Path(__file__).parents[2]
 
@@ -112,6 +113,10 @@ def test_settings_of_parts_are_named():
     for wrong in ({"tolerance": -1.0}, {"most": 0}):
         with pytest.raises(HierarchyError, match=next(iter(wrong))):
             SetBased(inner=make("tpm"), **wrong)
+    for wrong in ({"period": 0.0}, {"softness": -1.0}):
+        with pytest.raises(HierarchyError, match=next(iter(wrong))):
+            Settled(inner=make("tpm"), **{"period": 0.1, **wrong})
+    assert Settled(inner=make("tpm"), period=0.1, softness=0.0).softness == 0.0
 
 
 @pytest.mark.parametrize(("name", "setting", "value"), [
