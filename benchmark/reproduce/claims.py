@@ -22,7 +22,9 @@ def asked(protocol: Protocol) -> list[str]:
 
 def untested(protocol: Protocol) -> list[str]:
     """Return the letter's claims that runs do not decide, with the reason."""
-    return [f"- “{said}”: {why}." for said, why in protocol.untested.items()]
+    parts = [(*said.removesuffix(")").rsplit(" (", 1), why)
+             for said, why in protocol.untested.items()]
+    return [f"- {section}: “{quotation}”: {why}." for quotation, section, why in parts]
 
 
 def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
