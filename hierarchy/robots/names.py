@@ -36,7 +36,8 @@ def elsewhere(name: str) -> str:
     if found:
         return f"The installed packages have {', '.join(sorted(found, key=len)[:3])}."
     return ("Others: a URDF or MJCF file, or with the extra `descriptions` "
-            "example_robot_data:NAME and robot_descriptions:NAME, such as example_robot_data:ur5_robot.")
+            "example_robot_data:NAME and robot_descriptions:NAME, such as "
+            "example_robot_data:ur5_robot.")
 
 
 def _installed() -> dict[str, list[str]]:

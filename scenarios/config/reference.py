@@ -92,8 +92,9 @@ def _bracketed(path: list[str]) -> str:
 
 def places_of(name: str) -> list[str]:
     """Return the dotted keys with a last part; of those below several sections the first."""
-    return [f"{place.strip('[]')}.{key.name}".lstrip(".") for place, section in sections()
-            for key in keys_of(section) if key.name == name]
+    return list(dict.fromkeys(
+        f"{place.strip('[]')}.{key.name}".lstrip(".") for place, section in sections()
+        for key in keys_of(section) if key.name == name))
 
 
 def sections() -> Iterator[tuple[str, type[Section]]]:
