@@ -129,7 +129,10 @@ def page() -> str:
                 other = f" (default {key.default or 'none'})" if key.default != default else ""
                 shared.setdefault(above.removeprefix(f"`{place}` with "), []).append(
                     f"`{key.name}`{other}")
-        parts += [f"- as in {above}: {', '.join(names)}" for above, names in shared.items()] + [""]
+        if shared:
+            as_in = [f"{above}: {', '.join(names)}" for above, names in shared.items()]
+            parts.append(f"- as in {'; '.join(as_in)}")
+        parts.append("")
     return "\n".join(parts).replace("(default required)", "(required)")
 
 
