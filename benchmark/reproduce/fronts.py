@@ -159,19 +159,18 @@ def table(points: Sequence[Point], name: str) -> list[str]:
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     own = [one for one in points if one.front == name]
     for method in dict.fromkeys(one.method for one in own):
-        failed = []
-        for one in (one for one in own if one.method == method):
-            if not np.isfinite(one.test).all():
-                failed.append(one.kept)
-                continue
+        tried = [one for one in own if one.method == method]
+        failed = [one.kept for one in tried if not np.isfinite(one.test).all()]
+        for one in (one for one in tried if np.isfinite(one.test).all()):
             settings = ", ".join(f"{'.'.join(key.split('.')[-2:])} = {x:g}"
                                  for key, x in one.settings.items())
             cells = [shown(x, unit) for x, unit in zip(one.test, one.units, strict=True)]
             lines.append(f"| {method} | {settings or '–'} | {one.kept} of {GIVEN['test']} | "
                          f"{' | '.join(cells)} |")
         if failed:
-            lines.append(f"| {method} | {len(failed)} failed | at most {max(failed)} |"
-                         + " |" * len(front.minimised))
+            several = f"{len(failed)} others" if len(failed) < len(tried) else f"all {len(tried)}"
+            lines.append(f"| {method} | {several if len(tried) > 1 else '–'} | at most {max(failed)}"
+                         f" of {GIVEN['test']} |" + " failed |" * len(front.minimised))
     return lines
 
 
