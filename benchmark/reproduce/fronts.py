@@ -169,8 +169,9 @@ def table(points: Sequence[Point], name: str) -> list[str]:
                          f"{' | '.join(cells)} |")
         if failed:
             several = f"{len(failed)} others" if len(failed) < len(tried) else f"all {len(tried)}"
-            lines.append(f"| {method} | {several if len(tried) > 1 else '–'} | at most {max(failed)}"
-                         f" of {GIVEN['test']} |" + " failed |" * len(front.minimised))
+            several = several if len(tried) > 1 else "–"
+            lines.append(f"| {method} | {several} | at most {max(failed)} of {GIVEN['test']} |"
+                         + " failed |" * len(front.minimised))
     return lines
 
 
