@@ -173,10 +173,10 @@ def peers(install: Install = False,
 def ik(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
                                           help="Poses of each kind and robot.")] = 1000,
        out: Out = None) -> int:
-    """Find configurations for poses beside pink, mink and placo.
+    """Compare inverse kinematics with pink, mink and placo.
 
-    Reachable and unreachable poses of UR5, Panda and both arms of G1, which need
-    example-robot-data; for placo run `hierarchy bench peers --install` first.
+    Reachable and unreachable poses of UR5, Panda and both arms of G1, which need the extra
+    `descriptions`; for placo run `hierarchy bench peers --install` first.
     """
     return _run(out, "peers.reaching", count=count)
 
@@ -190,26 +190,26 @@ def open_(family: Family = None,
               "--library", metavar="FILE.so", help="Also a solver in a shared library that has the "
               "functions of benchmark/solve/solver.h. May be repeated.")] = None,
           name: Annotated[list[str] | None, typer.Option(
-              "--name", metavar="NAME", help="What tables call it, one for each --library.")
+              "--name", metavar="NAME", help="Its name in tables, one for each --library.")
               ] = None,
           fresh: Annotated[list[int] | None, typer.Option(
               "--fresh", metavar="SEED", min=1, help="Seed of fresh problems. May be repeated. "
               "Default: 1.")] = None,
           count: Annotated[int | None, typer.Option(
-              "--count", min=1, metavar="N", help="Problems of the public set and of each fresh "
-              "one. Default: 50, or 200 consecutive ones.")] = None,
+              "--count", min=1, metavar="N", help="Problems in the public set and in each fresh "
+              "one. Default: 50, or 200 consecutive ticks.")] = None,
           public: Annotated[int | None, typer.Option(
               "--public", min=1, metavar="N", help="Problems of the public set. Default: that of "
               "--count.")] = None,
           limit: Annotated[float, typer.Option(
-              "--limit", min=0.1, metavar="S", help="Time for one problem; also kept by --check.")
+              "--limit", min=0.1, metavar="S", help="Time limit of a problem, also with --check.")
               ] = 10.0,
           python: Annotated[str, typer.Option(
               "--python", metavar="PATH", help="Interpreter that has your entrant's package.")
               ] = "",
           borders: Annotated[bool, typer.Option(
-              "--borders", help="Also prove the answers for other borders between what counts as "
-              "dependent and what does not, from 1e-12 to 1e-5; takes several times as long.")
+              "--borders", help="Also prove answers for other rank tolerances, 1e-12 to 1e-5; "
+              "takes several times as long.")
               ] = False,
           check: Annotated[bool, typer.Option(
               "--check", help="Try the entrants, or the libraries alone, on a few problems of each "

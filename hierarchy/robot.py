@@ -182,8 +182,8 @@ class Robot:
              root: str | Sequence[str] = ()) -> Robot:
         """Make a robot by a name of `ROBOTS`, a file, or "package:name".
 
-        Packages are example_robot_data and robot_descriptions (extra `robots`); the latter may
-        download files. `locked` and `root` are those of `from_file`. Raises RobotError and
+        Packages are example_robot_data and robot_descriptions (extra `descriptions`); the latter
+        may download files. `locked` and `root` are those of `from_file`. Raises RobotError and
         UnknownNameError.
         """
         if base not in (None, *get_args(Base)):

@@ -57,11 +57,11 @@ def block(name: str, stored: Stored, output: Callable[[str], str]) -> str:
     if name == "untested":
         return "\n".join(claims.untested(PROTOCOL))
     what, _, of = name.partition("-")
-    known = {"asked": FAMILIES, "found": FAMILIES, "front": fronts.FRONTS, "faults": ("",)}
+    known = {"asked": ("letter",), "found": FAMILIES, "front": fronts.FRONTS, "faults": ("",)}
     if of not in known[what]:
         raise KeyError(name)
     if what == "asked":
-        return "\n".join(claims.asked(PROTOCOL, of))
+        return "\n".join(claims.asked(PROTOCOL))
     if what == "front":
         return "\n".join(fronts.table(stored.points, of))
     if rows is None:

@@ -7,31 +7,38 @@ from benchmark.reproduce.verdicts import judged, shown
 from scenarios.measure.statistics import probability
 
 
-def asked(protocol: Protocol, family: str) -> list[str]:
-    """Return a table of the claims of a family, or of their quotations: what decides them."""
-    lines = [f"| {'section, quotation' if family == 'letter' else 'claim'} | decided by | "
-             "smallest effect |", "|---|---|---|"]
+def asked(protocol: Protocol) -> list[str]:
+    """Return a table of the quotations: what decides them."""
+    lines = ["| section, quotation | decided by | smallest effect |", "|---|---|---|"]
+    before = ""
     for one in protocol.claims:
-        if one.family == family:
-            said = f"{one.section}: “{one.quotation}”" if one.quotation else one.text
-            lines.append(f"| {said} | {_decider(one)} | {_least(protocol, one)} |")
+        if one.family == "letter":
+            said = f"{one.section}: “{one.quotation}”"
+            lines.append(f"| {'the same' if said == before else said} | {_decider(one)} | "
+                         f"{_least(protocol, one)} |")
+            before = said
     return lines
 
 
 def untested(protocol: Protocol) -> list[str]:
     """Return the letter's claims that runs do not decide, with the reason."""
-    return [f"- “{said}”: {why}." for said, why in protocol.untested.items()]
+    parts = [(*said.removesuffix(")").rsplit(" (", 1), why)
+             for said, why in protocol.untested.items()]
+    return [f"- {section}: “{quotation}”: {why}." for quotation, section, why in parts]
 
 
 def found(protocol: Protocol, rows: Rows, family: str) -> list[str]:
-    """Return a table of what was found about the claims of a family."""
-    head = ["claim", "effect [95 % interval]", ", ".join(rows.layouts), "Holm's p", "verdict"]
+    """Return a table of what was found about the claims of a family; of our own, what decides."""
+    own = family == "own"
+    head = ["claim", *(["decided by, smallest effect"] if own else []), "effect [95 % interval]",
+            ", ".join(rows.layouts), "Holm's p", "verdict"]
     lines = [f"| {' | '.join(head)} |",
              "|---" * len(head) + "|"]
     for one in judged(protocol, rows, family):
         each = ", ".join(shown(one.claim, rows, effect).partition(" [")[0]
                          for effect in one.layouts)
-        lines.append(f"| {one.claim.text} | {shown(one.claim, rows, one.effect)} | {each} | "
+        by = f" | {_decider(one.claim)}, {_least(protocol, one.claim)}" if own else ""
+        lines.append(f"| {one.claim.text}{by} | {shown(one.claim, rows, one.effect)} | {each} | "
                      f"{probability(one.p).removeprefix('p = ')} | {one.decided} |")
     return lines
 

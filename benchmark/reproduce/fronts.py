@@ -150,18 +150,28 @@ def read(path: Path) -> list[Point]:
 
 
 def table(points: Sequence[Point], name: str) -> list[str]:
-    """Return the table of a front: settings, scenes that did not fail, medians of the test."""
+    """Return the table of a front: settings, scenes that did not fail, medians of the test.
+
+    Settings of a method that failed are one line.
+    """
     front = FRONTS[name]
     head = [name, "settings", "did not fail", *(f"`{one}`" for one in front.minimised)]
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
-    for one in points:
-        if one.front == name:
-            settings = ", ".join(f"{key.split('.', 1)[1]} = {x:g}"
+    own = [one for one in points if one.front == name]
+    for method in dict.fromkeys(one.method for one in own):
+        tried = [one for one in own if one.method == method]
+        failed = [one.kept for one in tried if not np.isfinite(one.test).all()]
+        for one in (one for one in tried if np.isfinite(one.test).all()):
+            settings = ", ".join(f"{'.'.join(key.split('.')[-2:])} = {x:g}"
                                  for key, x in one.settings.items())
-            cells = [shown(x, unit) if np.isfinite(x) else "failed"
-                     for x, unit in zip(one.test, one.units, strict=True)]
-            lines.append(f"| {one.method} | {settings or '–'} | {one.kept} of {GIVEN['test']} | "
+            cells = [shown(x, unit) for x, unit in zip(one.test, one.units, strict=True)]
+            lines.append(f"| {method} | {settings or '–'} | {one.kept} of {GIVEN['test']} | "
                          f"{' | '.join(cells)} |")
+        if failed:
+            several = f"{len(failed)} others" if len(failed) < len(tried) else f"all {len(tried)}"
+            several = several if len(tried) > 1 else "–"
+            lines.append(f"| {method} | {several} | at most {max(failed)} of {GIVEN['test']} |"
+                         + " failed |" * len(front.minimised))
     return lines
 
 

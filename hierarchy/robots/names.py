@@ -35,8 +35,9 @@ def elsewhere(name: str) -> str:
              if name.lower() in known.lower()]
     if found:
         return f"The installed packages have {', '.join(sorted(found, key=len)[:3])}."
-    return ("Others: a URDF or MJCF file, or with the extra `robots` example_robot_data:NAME and "
-            "robot_descriptions:NAME, such as example_robot_data:ur5_robot.")
+    return ("Others: a URDF or MJCF file, or with the extra `descriptions` "
+            "example_robot_data:NAME and robot_descriptions:NAME, such as "
+            "example_robot_data:ur5_robot.")
 
 
 def _installed() -> dict[str, list[str]]:

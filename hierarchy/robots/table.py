@@ -106,4 +106,4 @@ def in_words(table: Table) -> str:
     if isinstance(table, DHTable):
         return f"an arm of {len(table.d)} joints"
     floating = ", on a floating base" if table.base == "floating" else ""
-    return f"{len(table.joints)} joints that branch{floating}"
+    return f"a tree of {len(table.joints)} joints{floating}"

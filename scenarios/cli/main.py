@@ -106,7 +106,7 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
 def library(out: Annotated[Path, output("Folder of the library: new or empty, or an existing one "
                                         "with --check.")],
             resolvers: Annotated[str, typer.Option(
-                "--resolvers", metavar="NAMES", help="hcod, tpm, recursive, sns.")
+                "--resolvers", metavar="NAMES", help="Of hcod, tpm, recursive, sns, merged.")
                 ] = "hcod,tpm,recursive,sns",
             target: Annotated[str, typer.Option(
                 "--target", metavar="TARGET", help="native, x86_64 (any) or aarch64 (any).")

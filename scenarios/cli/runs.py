@@ -51,7 +51,7 @@ def run(scenario: Annotated[str, typer.Argument(
             help="Use another resolver: name, or name:setting=value:setting=value.")] = None,
         changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
         out: Out = None, certify: Annotated[bool, typer.Option(
-            "--certify", help="Certify the answer of every tick; not part of the measured times.")
+            "--certify", help="Certify the answer of every tick, outside the measured times.")
             ] = False,
         figures: Annotated[bool, typer.Option(
             "--figures", help="Also draw the run's figures, like `hierarchy figures`.")

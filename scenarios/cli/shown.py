@@ -157,7 +157,7 @@ def replay(folders: Runs,
 @app.command()
 def why(folder: Run,
         tick: Annotated[int | None, typer.Option(
-            "--tick", metavar="N", help="The change into this tick. Default: the three largest.")
+            "--tick", metavar="N", help="The jump into this tick. Default: the three largest.")
             ] = None,
         plugin: Plugins = None, as_json: AsJson = False) -> None:
     """Say why the command of a run jumped: torque, acceleration or speed.

@@ -34,8 +34,7 @@ class PolicySection(Section):
     inaccurate: AnswerPolicy = "brake"
     """The answer does not reach the resolver's accuracy."""
     not_finite: BlindPolicy = "brake"
-    """A measured joint state is NaN or infinite or has a quaternion that is none, or a distance is
-    NaN."""
+    """A measured joint state is not finite or has an invalid quaternion, or a distance is NaN."""
     stale: BlindPolicy = "brake"
     """No new measurement for more than `stale_after`; before that, the last one is extrapolated
     from the commands sent."""

@@ -67,7 +67,7 @@ class KinematicSection(AnyPlant):
 
 
 class OwnPlant(AnyPlant, OwnSection):
-    """A plant of a plugin; further keys are those of the plugin."""
+    """A plant of a plug-in, with its keys."""
 
     group: ClassVar[Group] = "plants"
 

@@ -92,8 +92,9 @@ def _bracketed(path: list[str]) -> str:
 
 def places_of(name: str) -> list[str]:
     """Return the dotted keys with a last part; of those below several sections the first."""
-    return [f"{place.strip('[]')}.{key.name}".lstrip(".") for place, section in sections()
-            for key in keys_of(section) if key.name == name]
+    return list(dict.fromkeys(
+        f"{place.strip('[]')}.{key.name}".lstrip(".") for place, section in sections()
+        for key in keys_of(section) if key.name == name))
 
 
 def sections() -> Iterator[tuple[str, type[Section]]]:
@@ -128,7 +129,10 @@ def page() -> str:
                 other = f" (default {key.default or 'none'})" if key.default != default else ""
                 shared.setdefault(above.removeprefix(f"`{place}` with "), []).append(
                     f"`{key.name}`{other}")
-        parts += [f"- as in {above}: {', '.join(names)}" for above, names in shared.items()] + [""]
+        if shared:
+            as_in = [f"{above}: {', '.join(names)}" for above, names in shared.items()]
+            parts.append(f"- as in {'; '.join(as_in)}")
+        parts.append("")
     return "\n".join(parts).replace("(default required)", "(required)")
 
 

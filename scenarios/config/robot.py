@@ -66,7 +66,7 @@ class RobotSection(Section):
 
     model: str
     """A name of `hierarchy list`, a URDF or MJCF file, or "package:name" of example_robot_data or
-    robot_descriptions (extra `robots`)."""
+    robot_descriptions (extra `descriptions`)."""
     base: Base | None = None
     """Whether the base is "fixed" or "floating"; by default that of the model."""
     end_effector: str | None = None

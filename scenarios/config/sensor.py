@@ -34,7 +34,7 @@ class ExactSection(AnySensor):
 
 
 class OwnSensor(AnySensor, OwnSection):
-    """A sensor of a plugin; its keys are those of the plugin."""
+    """A sensor of a plug-in, with its keys."""
 
     group: ClassVar[Group] = "sensors"
     foot: ClassVar[float] = FOOT

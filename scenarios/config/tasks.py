@@ -290,7 +290,7 @@ class Listed(Made):
 
 
 class OwnTask(Listed, OwnSection):
-    """A task of a plugin; its keys are those of the plugin."""
+    """A task of a plug-in, with its keys."""
 
     group: ClassVar[Group] = "tasks"
     unit: ClassVar[str] = ""

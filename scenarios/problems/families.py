@@ -123,8 +123,8 @@ _POSTURES = {
     "singular-lwr": "KUKA LWR at and near singular postures",
     "singular-dual-arm": "an upper body with two arms, likewise",
     "singular-humanoid": "a humanoid on two feet, likewise",
-    "singular-panda": "Franka Panda, likewise (extra `robots`)",
-    "singular-romeo": "Romeo on two feet, likewise (extra `robots`)"}
+    "singular-panda": "Franka Panda, likewise (extra `descriptions`)",
+    "singular-romeo": "Romeo on two feet, likewise (extra `descriptions`)"}
 
 _OTHERS = {
     "of-soth": (others.of_soth, "as soth is tested: ranks, rows of upper levels, all sides"),

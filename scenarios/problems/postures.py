@@ -43,7 +43,7 @@ ROBOTS = {
     "singular-panda": Posed("example_robot_data:panda", ("panda_hand",)),
     "singular-romeo": Posed("example_robot_data:romeo", ("r_gripper", "l_gripper"),
                             ("l_ankle", "r_ankle"))}
-"""Families by name; the last two need the extra `robots`."""
+"""Families by name; the last two need the extra `descriptions`."""
 
 
 def posed(name: str, seed: int, count: int) -> list[Hierarchy]:

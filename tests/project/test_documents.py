@@ -163,7 +163,10 @@ def test_the_task_of_the_guide_serves_in_a_stack():
     from solvers import make
 
     names = {"__name__": "document"}
-    exec("\n".join(blocks("CONTRIBUTING.md", "python")), names)
-    state = State.at(Robot.named("kuka_lwr"), [0.1] * 7)
-    h = Stack([names["Elbow"](joint=3, angle=1.0)], "velocity").hierarchy(state)
-    assert make("tpm").solve(h).x[3] == pytest.approx(2.0 * 0.9)
+    exec("\n".join(blocks("docs/extending/task.md", "python")), names)
+    robot = Robot.named("kuka_lwr")
+    state, hand = State.at(robot, [0.1] * 7), robot.frame("end_effector")
+    height = state.position(hand)[2] + 0.1
+    for task in (names["Above"](hand, height), names["FastAbove"](hand, height)):
+        x = make("hcod").solve(Stack([task], "velocity").hierarchy(state)).x
+        assert task.jacobian(state)[0] @ x == pytest.approx(10.0 * 0.1)
