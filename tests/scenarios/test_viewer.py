@@ -279,16 +279,14 @@ def patient(monkeypatch):
 
 
 @pytest.mark.usefixtures("patient")
-def test_in_a_browser_play_moves_the_arm_on_a_page_as_dark_as_asked(server, recording):
+def test_in_a_browser_play_moves_the_arm(server, recording):
     from scenarios.draw.viewer.server import address
     from scenarios.draw.viewer.view import View
 
     view = View(server, {"tpm": recording})
     with chromium() as browser:
-        browser.look_at(address(server), *_WINDOW, dark=True)
+        browser.look_at(address(server), *_WINDOW)
         until(shown(browser, "Joint speeds"), view.step, "the curves are shown")
-        until(lambda: browser.run("document.querySelector('input[type=checkbox]').checked"),
-              view.step, "it is dark")
         until(shown(browser, "row met"), view.step, "the stack is shown")
         before = browser.screenshot()
         press(browser, "Play")
