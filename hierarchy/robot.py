@@ -112,7 +112,7 @@ class Robot:
         self.masses = np.array([0.0, *(float(inertia.mass) for inertia in inertias[1:])])
         self.centres = np.array([np.zeros(3), *(inertia.lever for inertia in inertias[1:])])
         self.end_effector = end_effector or self.frame_names[-1]
-        self.frame(self.end_effector)
+        self.frame(self.end_effector, "end_effector frame")
         self.control_points, self.capsules = control_points, capsules
         self.rest = np.array(pin.neutral(model)) if rest is None else rest
         self.missing = missing
@@ -201,7 +201,7 @@ class Robot:
                              "no other root")
         robot = cls.named(model, base)
         if end_effector is not None:
-            robot.end_effector = robot.frame(end_effector).name
+            robot.end_effector = robot.frame(end_effector, "end_effector frame").name
         return robot
 
     @classmethod
@@ -278,14 +278,14 @@ class Robot:
                                  "expected a number > 0")
         self.velocity_limit[:6] = np.repeat([linear, angular], 3)
 
-    def frame(self, name: str) -> Frame:
-        """Find the frame called `name`.
+    def frame(self, name: str, what: str = "frame") -> Frame:
+        """Find the frame called `name`, which an error calls `what`.
 
         Raises UnknownNameError if there is none, and RobotError if two places have that name.
         """
         found = frames_called(self.model, name)
         if not found:
-            raise UnknownNameError("frame", name, self.frame_names)
+            raise UnknownNameError(what, name, self.frame_names)
         if len(found) > 1:
             raise RobotError(f"robot {self.name!r}: {len(found)} frames are called {name!r}, "
                              f"{in_words(self.model, found)}; give one another name in the file")

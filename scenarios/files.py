@@ -43,6 +43,8 @@ def claim(folder: str | Path) -> Path:
     """
     path = _absolute(folder)
     with named(f"output folder {folder}"):
+        if not path.parent.exists():
+            atexit.register(_remove_empty, path.parent)  # if nothing is written in the end
         path.parent.mkdir(parents=True, exist_ok=True)
         with suppress(FileNotFoundError):
             if os.listdir(path):  # noqa: PTH208 - raises for a loop of links, a name too long
@@ -54,6 +56,11 @@ def claim(folder: str | Path) -> Path:
         Path(tempfile.mkdtemp(prefix=f"{_hidden(path)}.", suffix=".partial",
                               dir=path.parent)).rmdir()  # what `whole` will need
     return path
+
+
+def _remove_empty(folder: Path) -> None:
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def lock(path: Path) -> None:

@@ -33,7 +33,7 @@ from solvers.proof import prove
 STUBBED = ("meshcat", "meshcat.geometry", "meshcat.transformations", "meshcat_shapes",
            "pink.visualization", "loop_rate_limiters", "robot_descriptions",
            "robot_descriptions.loaders", "robot_descriptions.loaders.pinocchio", "viser",
-           "pinocchio.visualize")
+           "viser.uplot", "trimesh", "pinocchio.visualize")
 ROBOTS = {"ur3_official": "ur3_robot", "ur5_official": "ur5_robot", "ur10_official": "ur10_robot",
           "gen2": "kinova", "panda": "panda", "z1": "z1", "g1": "g1_29dof_rev_1_0", "go2": "go2"}
 PINK: Callable[..., Array] = pink.solve_ik
@@ -49,7 +49,12 @@ def least_squares(tasks: Iterable[Any], barriers: Iterable[Any], configuration: 
     n = configuration.model.nv
     rows, sides, weights = [], [], [(damping, np.zeros(n))]
     for task in tasks:
-        J, e = task.compute_jacobian(configuration), task.compute_error(configuration)
+        if not hasattr(task, "compute_error"):  # the kinetic energy of mink
+            rows.append(np.linalg.cholesky(task.compute_qp_objective(configuration)[0]).T)
+            sides.append(np.zeros(n))
+            continue
+        e = task.compute_error(configuration)
+        J = task.compute_jacobian(configuration).reshape(-1, n)  # pinocchio's of one joint is (k,)
         cost = np.broadcast_to(1.0 if task.cost is None else task.cost, len(e))
         rows.append(cost[:, None] * J)
         sides.append(-task.gain * cost * e)
@@ -130,9 +135,7 @@ def _robot(name: str, root_joint: Any = None, **_: Any) -> Any:
 
     path = str(file_of(f"example_robot_data:{ROBOTS[name.removesuffix('_description')]}"))
     model = pin.buildModelFromUrdf(path, *([] if root_joint is None else [root_joint]))
-    return SimpleNamespace(model=model, data=model.createData(), q0=pin.neutral(model),
-                           nv=model.nv,
-                           collision_model=MagicMock(), visual_model=MagicMock(), nq=model.nq)
+    return pin.RobotWrapper(model, pin.GeometryModel(), pin.GeometryModel())
 
 
 def run(path: Path, ticks: int, every: int) -> Asked:
@@ -150,7 +153,9 @@ def run(path: Path, ticks: int, every: int) -> Asked:
 
 def _stub() -> None:
     """Take viewers, clocks and downloads out of the way of the examples."""
-    stubs = {name: MagicMock() for name in STUBBED}
+    import coal
+
+    stubs = {name: MagicMock() for name in STUBBED} | {"hppfcl": coal}  # coal's former name
     stubs["loop_rate_limiters"].RateLimiter = lambda frequency=200.0, **_: SimpleNamespace(
         period=1.0 / frequency, dt=1.0 / frequency, sleep=lambda: None)
     stubs["robot_descriptions.loaders.pinocchio"].load_robot_description = _robot

@@ -17,6 +17,7 @@ from scenarios.loop.controller import Controller
 from scenarios.recording.recording import Recording
 from solvers import Resolution, Resolver, Status, certify
 from solvers.resolvers.saturation import SaturatedResolution
+from solvers.resolvers.settled import Settled
 from solvers.status import EQUAL, FREE
 
 Row = tuple[str, int, int]  # task, row of the task, side: 1 upper, -1 lower
@@ -108,16 +109,17 @@ class ActiveSets:
 
 @final
 class Certified:
-    """Whether `solvers.certify` accepts the answer."""
+    """Whether `solvers.certify` accepts the answer, to what the resolver was asked in the end."""
 
     def __init__(self, ticks: int) -> None:
         self._values = np.zeros(ticks, dtype=bool)
 
     def look(self, tick: int, controller: Controller) -> None:
         """Judge the answer of a tick."""
-        self._values[tick] = certify(
-            controller.hierarchy, controller.resolution.x,
-            witnesses=controller.resolution.witnesses).certified
+        h, resolver, found = controller.hierarchy, controller.resolver, controller.resolution
+        if isinstance(resolver, Settled) and h.plain:
+            h = resolver.asked(h)
+        self._values[tick] = certify(h, found.x, witnesses=found.witnesses).certified
 
     def signals(self, recording: Recording) -> Signals:
         """Return `certified` (T,)."""

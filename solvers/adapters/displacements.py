@@ -7,6 +7,7 @@ is the velocity, and priorities are strict.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from copy import copy
 from functools import partial
 from typing import Any, NamedTuple, Protocol
 
@@ -241,6 +242,8 @@ _Read = tuple[Task, Array, Array]  # a task, J (k, n), e (k,)
 
 
 def _read(task: Task, configuration: object, damped: bool) -> _Read:
+    if not hasattr(task, "compute_error") and hasattr(task, "compute_qp_residual"):
+        return _rows_of_cost(task, configuration)
     if not (hasattr(task, "compute_error") and hasattr(task, "compute_jacobian")):
         raise HierarchyError(f"{label(task)}: not a task with an error and a Jacobian, so it "
                              "cannot be a level")
@@ -252,6 +255,19 @@ def _read(task: Task, configuration: object, damped: bool) -> _Read:
     if J.ndim == 1 and e.ndim == 1:
         J = J.reshape(-1, 1)  # as pinocchio returns the Jacobian of a single joint
     return task, J, e
+
+
+def _rows_of_cost(task: Any, configuration: object) -> _Read:
+    """Read a task of mink that has only a cost 1/2 dq^T H dq + c^T dq: H = J^T J, c = J^T e."""
+    H, c = task.compute_qp_objective(configuration)
+    try:
+        J = np.linalg.cholesky(H).T
+    except np.linalg.LinAlgError:
+        raise HierarchyError(f"{label(task)}: its H is not positive definite, so it cannot be "
+                             "rows of a level") from None
+    rows = copy(task)
+    rows.cost = rows.gain = 1.0  # its cost is within H
+    return rows, J, np.linalg.solve(J.T, c)
 
 
 def residual(task: Task, configuration: object) -> tuple[Array, Array]:

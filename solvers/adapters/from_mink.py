@@ -33,7 +33,7 @@ def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task
     ------
     HierarchyError : limits of a joint that contradict each other (ContradictionError), as when it
         is further outside its range than its velocity limit makes good in dt; lm_damping without
-        `damping`, or a task without error and Jacobian (the kinetic-energy regularisation).
+        `damping`, or a task that has neither rows nor a cost that is positive definite.
     """
     if limits is None:
         from mink import ConfigurationLimit

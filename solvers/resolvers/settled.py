@@ -84,15 +84,25 @@ class Settled(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; where a curved level is not plainly met, some problems of the levels to it."""
+        above = self._calmed(h)
+        return self.inner.solve(h, memory) if above is None else above.resolve(h)
+
+    def asked(self, h: Hierarchy) -> Hierarchy:
+        """Return what the answer to h, a plain one, solves: the levels that were calmed as such."""
+        above = self._calmed(h)
+        return h if above is None else above.stacked(above.levels, h.reference)
+
+    def _calmed(self, h: Hierarchy) -> _Above | None:
+        """Return the levels of h with those out of reach calmed, or None if there are none."""
         half = 0.5 * self.softness * self.period
         least = np.array([half if name in self.curved else -1.0 for name in h.names])
         if half == 0.0 or plainly_met(h.A, h.lower, h.upper, h.offsets, least):
-            return self.inner.solve(h, memory)
+            return None
         above = _Above(self.inner, h)
         for k, (A, lower, upper) in enumerate(h.levels()):
             calm = least[k] > 0.0 and len(lower) and (lower == upper).all()
             above.add(*(above.calm(A, lower, half) if calm else (A, lower, upper)))
-        return above.resolve(h, memory)
+        return above if above.calmed else None
 
 
 class _Reached(NamedTuple):
@@ -154,11 +164,9 @@ class _Above:
         rows[:len(kept)] = kept
         return rows, rows @ found.x, rows @ found.x
 
-    def resolve(self, h: Hierarchy, memory: Array | None) -> Resolution:
+    def resolve(self, h: Hierarchy) -> Resolution:
         """Resolve all levels, those that were calmed in their new form."""
-        if not self.calmed:
-            return self.inner.solve(h, memory)
-        found = self.inner.solve(self._stacked(self.levels, h.reference))
+        found = self.inner.solve(self.stacked(self.levels, h.reference))
         if found.status is Status.SOLVED:
             found.status = self.status
         return _without_pace(found, h.n, not self.joined) if self.paced else found
@@ -175,7 +183,7 @@ class _Above:
         """Return, by mu, the x within the levels above of least |A x - b|^2 + mu |x - x0|^2."""
         n, x0 = len(self.x), self.x
         side = np.concatenate([b, x0])
-        h = self._stacked([*self.levels, (np.vstack([A, np.eye(n)]), side, side)],
+        h = self.stacked([*self.levels, (np.vstack([A, np.eye(n)]), side, side)],
                           np.zeros_like(x0))
         rows, lower, upper, _ = h.rows
         weights = rows[-n:].reshape(-1)[::n + 1]
@@ -190,7 +198,8 @@ class _Above:
 
         return probe
 
-    def _stacked(self, levels: list[tuple[Array, Array, Array]], reference: Array) -> Hierarchy:
+    def stacked(self, levels: list[tuple[Array, Array, Array]], reference: Array) -> Hierarchy:
+        """Return levels as a hierarchy, below how far they may change the speeds of joints."""
         names = self.names[:len(levels)]
         if self.calmed and self.paced:
             pace = np.eye(len(self.x)), *self.box

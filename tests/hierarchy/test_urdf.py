@@ -218,5 +218,5 @@ def test_a_folder_and_a_missing_file_are_no_unknown_robots(tmp_path):
 
 
 def test_an_end_effector_that_the_file_lacks_is_refused(load):
-    with pytest.raises(HierarchyError, match="unknown frame 'tool'"):
+    with pytest.raises(HierarchyError, match="unknown end_effector frame 'tool'"):
         load(*two_joints("revolute"), end_effector="tool")

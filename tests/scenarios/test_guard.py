@@ -20,7 +20,7 @@ def test_only_a_browser_of_this_machine_on_our_own_page_is_answered(headers, own
 
 
 @pytest.mark.slow
-def test_the_server_of_a_page_rejects_them():
+def test_the_server_of_a_page_rejects_them_and_its_page_has_a_title_and_is_as_dark_as_asked():
     pytest.importorskip("viser")
     import http.client
 
@@ -34,8 +34,10 @@ def test_the_server_of_a_page_rejects_them():
             with closing(http.client.HTTPConnection("127.0.0.1", server.get_port())) as connection:
                 connection.request("GET", "/", headers={"Host": host} if host else {})
                 answer = connection.getresponse()
-                answer.read()
-                found.append(answer.status)
-        assert found == [200, 403]
+                found.append((answer.status, answer.read().decode()))
+        (status, page), (rejected, _) = found
+        assert (status, rejected) == (200, 403)
+        assert "<title>test</title>" in page
+        assert 'matchMedia("(prefers-color-scheme: dark)")' in page
     finally:
         close(server)

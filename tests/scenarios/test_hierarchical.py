@@ -20,7 +20,7 @@ def names_of(*changes, scenario="ellipse-hqp"):
 @pytest.mark.parametrize("resolver", ["hcod", "weighted"])
 def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
     scenario = load("ellipse-hqp", [SHORT, f"control.level={level}"]).with_resolver(resolver)
-    certified = (level, resolver) == ("acceleration", "hcod")
+    certified = resolver == "hcod"  # at velocity level of levels that were calmed
     run = simulate(scenario, certified=certified)
     assert run.fault is None
     assert (run["status"] == 0).all()

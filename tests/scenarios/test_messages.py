@@ -66,7 +66,7 @@ def test_a_wrong_frame_is_told_with_file_and_key(tmp_path, capsys):
     file = tmp_path / "mine.toml"
     file.write_text('extends = "humanoid"\nname = "mine"\n[robot]\nend_effector = "left_fot"\n')
     assert run_command(["check", str(file)]) == 2
-    assert "mine.toml: robot: unknown frame 'left_fot'; did you mean 'left_foot'?" in (
+    assert "mine.toml: robot: unknown end_effector frame 'left_fot'; did you mean 'left_foot'?" in (
         capsys.readouterr().err)
 
 

@@ -118,6 +118,12 @@ def test_numbered_folders_fill_the_first_gap(tmp_path):
     assert next_free(tmp_path / "run") == tmp_path / "run-2"
 
 
+def test_a_command_that_writes_nothing_leaves_no_folder_that_it_made(tmp_path):
+    code = "from scenarios.files import claim; claim('runs/a'); raise SystemExit(2)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=False).returncode == 2
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_folder_that_another_process_has_locked_cannot_be_claimed(tmp_path):
     code = ("import sys; from pathlib import Path; from scenarios.files import lock\n"
             "lock(Path(sys.argv[1])); print(); sys.stdin.read()")

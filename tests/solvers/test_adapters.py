@@ -267,6 +267,14 @@ def test_what_cannot_be_resolved_is_named(robot, configuration, call, said):
         call(configuration, robot)
 
 
+def test_rows_are_named_by_joint_or_by_axis_of_the_frame_and_those_that_cost_nothing_are_left_out(
+        configuration):
+    hand = frame_task(configuration, orientation=0.0)
+    h = pink_hierarchy(configuration, [hand, posture_task(Q, cost=0.1)], DT)
+    joints = [f"joint_{i}" for i in range(1, 8)]
+    assert [*h.named()] == [*joints, *(f"end_effector {axis}" for axis in "xyz"), *joints]
+
+
 def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, configuration):
     hand, posture = frame_task(configuration), posture_task(Q + 0.3)
     stack = Stack([PinkTask(hand, configuration, DT), PinkTask(posture, configuration, DT, "rest")],
@@ -411,13 +419,14 @@ def test_levels_of_mink_are_strict(arm):
     assert h.violations(mink.solve_ik(configuration, [hand, posture], DT, "daqp"))[1] > 1e-3
 
 
-def test_a_task_of_mink_that_is_no_row_is_refused_by_name(arm):
+def test_a_cost_of_mink_that_is_no_row_is_refused_by_name(arm):
     mink = pytest.importorskip("mink")
     from solvers.adapters.from_mink import hierarchy
 
-    configuration = mink.Configuration(arm[0], q=POSE)
-    with pytest.raises(HierarchyError, match="KineticEnergyRegularizationTask: not a task with"):
-        hierarchy(configuration, [mink.KineticEnergyRegularizationTask(1.0)], DT)
+    nothing = mink.KineticEnergyRegularizationTask(0.0)
+    nothing.set_dt(DT)
+    with pytest.raises(HierarchyError, match="KineticEnergyRegularizationTask: its H is not pos"):
+        hierarchy(mink.Configuration(arm[0], q=POSE), [nothing], DT)
 
 
 # --- qpsolvers ----------------------------------------------------------------------------------

@@ -24,7 +24,9 @@ ARM = """
 ROBOT = f"""<mujoco><compiler angle="radian"/><worldbody>
 <body name="trunk" pos="0 0 1"><freejoint name="base"/>
 <geom type="box" size="0.1 0.2 0.3"/>{ARM.format(side="left", y=0.25)}
-{ARM.format(side="right", y=-0.25)}</body></worldbody></mujoco>"""
+{ARM.format(side="right", y=-0.25)}</body></worldbody><equality>
+<connect body1="left_fore" body2="right_fore" anchor="0.2 0 0"/>
+<joint joint1="left_b" joint2="right_b" polycoef="0.1 1 0 0 0"/></equality></mujoco>"""
 
 
 @pytest.fixture
@@ -51,10 +53,14 @@ def tasks_of(configuration):
     upright.set_target([0.6, 0.0, 0.8])
     look = mink.LookAtTask("left_tip", "site", axis=(1.0, 0.0, 0.0), cost=0.4, gain=0.7)
     look.set_target([2.0, 1.0, 0.5])
-    return [hand, mass, apart, posture, still, upright, look]
+    together = mink.EqualityConstraintTask(model, cost=[0.5, 0.2], gain=0.6, lm_damping=0.1)
+    energy = mink.KineticEnergyRegularizationTask(cost=1e-4)
+    energy.set_dt(DT)
+    return [hand, mass, apart, posture, still, upright, look, together, energy]
 
 
-@pytest.mark.parametrize("kinds", [(0,), (0, 1), (1, 2, 3), (2, 4), (5,), (5, 6), tuple(range(7))])
+@pytest.mark.parametrize("kinds", [(0,), (0, 1), (1, 2, 3), (2, 4), (5,), (5, 6), (7,), (0, 8),
+                                   tuple(range(9))])
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("damping", [1e-9, 1e-2])
 def test_one_level_is_the_minimum_of_minks_cost(configuration, kinds, held, damping):
@@ -77,3 +83,14 @@ def test_one_level_is_the_minimum_of_minks_cost(configuration, kinds, held, damp
     values = np.linalg.svd(A, compute_uv=False)
     rounding = 2e-16 * (values[0] / values[-1]) ** 2  # what doubles can tell of this minimum
     np.testing.assert_allclose(ours, x, atol=1e-7 + 10.0 * rounding)
+
+
+def test_kinetic_energy_below_a_hand_is_the_least_motion_that_moves_it(configuration):
+    hand, *_, energy = tasks_of(configuration)
+    hand.lm_damping = 0.0
+    h = from_mink.hierarchy(configuration, [hand, energy], DT, limits=[])
+    J, M = hand.compute_jacobian(configuration), configuration.get_inertia_matrix()
+    by_hand = np.linalg.solve(M, J.T)
+    x = by_hand @ np.linalg.solve(J @ by_hand, -hand.gain * hand.compute_error(configuration) / DT)
+    np.testing.assert_allclose(make("hcod").solve(h).x, x, atol=1e-9)
+    assert h.names == ("FrameTask of left_tip", "KineticEnergyRegularizationTask")

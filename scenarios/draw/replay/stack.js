@@ -17,7 +17,11 @@ class StackList {
     this.list = element("ol", {class: "order", style: `height: ${ROW * run.tasks.length}px`},
                         ...this.rows.map(parts => parts.row));
     this.near = element("p");
-    this.goals = element("div", {class: "goals"}, ...run.goals.map(goal => element("div", {}, goal)));
+    this.goals = element("div", {class: "goals"}, ...run.goals.map(goal => {
+      const [short, ...rest] = goal.split(";");
+      return rest.length ? element("div", {}, element("b", {}, short),
+                                   element("span", {}, `;${rest.join(";")}`)) : element("div", {}, goal);
+    }));
     this.note = element("p");
     const head = element("h2", {}, ...(several ? [sample(run)] : []), run.label, element("small", {}, run.scenario));
     this.card = element("article", {class: "card"}, head, this.goals, this.list, ...this.joint_row(),

@@ -28,7 +28,6 @@ _CURVES = 4.0   # updates of the curves per second
 _TRACE = 600    # length of the trace in frames, points of the path
 _BUSY = 0.05    # [s] of ticks between two frames, at most
 _HAND = 1.0     # [m/s] greatest speed of a dragged path
-_MARGIN = 0.12  # [m] margin of the initial camera view
 _NEAR = 1.0     # [m] from the base: obstacles in the initial camera view
 
 
@@ -195,8 +194,7 @@ class LivePage:
         stage, placements = self._stage, self.live.moment().placements
         arm = ends(stage.capsules, placements).reshape(-1, 3)
         near = [place for place in stage.obstacles.centres if np.linalg.norm(place) < _NEAR]
-        points = np.vstack([*paths, arm, *near])
-        look_at_all(self.server, np.vstack([points - _MARGIN, points + _MARGIN]), stage.azimuth)
+        look_at_all(self.server, np.vstack([*paths, arm, *near]), stage.azimuth)
 
     def _show_list(self, now: Moment) -> None:
         live = self.live

@@ -129,7 +129,6 @@ class LivePanel:
         add_speed(gui, requests, speed)
         self.choice = gui.add_dropdown("Resolver", list(labels), initial_value=labels[0])
         requests.when_changed(self.choice, "resolver")
-        gui.add_markdown("**Stack**, most important first")
         self._stack = gui.add_html("")
         if key:
             gui.add_html(key)

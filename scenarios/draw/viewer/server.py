@@ -19,6 +19,17 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 
 _TITLE = b"<title>Viser</title>"
+DARK = "Dark page"
+_FOLLOW = """<script>
+  // Once its switch is there, the page is as dark as the browser asks for.
+  const waiting = setInterval(() => {
+    const label = [...document.querySelectorAll("label")].find(one => one.textContent === "SWITCH");
+    const box = label && document.getElementById(label.htmlFor);
+    if (!box) return;
+    clearInterval(waiting);
+    if (matchMedia("(prefers-color-scheme: dark)").matches !== box.checked) box.click();
+  }, 200);
+</script>""".replace("SWITCH", DARK)
 NAMES = ("127.0.0.1", "localhost")
 
 
@@ -34,10 +45,10 @@ def is_own(headers: Mapping[str, str]) -> bool:
 
 
 def _titled(response: Any, title: str) -> Any:
-    """Give a page of viser another title."""
+    """Give a page of viser another title, and let it follow the browser into the dark."""
     if response is not None and response.body and _TITLE in response.body:
         response.body = response.body.replace(
-            _TITLE, f"<title>{escape(title)}</title>".encode(), 1)
+            _TITLE, f"<title>{escape(title)}</title>{_FOLLOW}".encode(), 1)
         del response.headers["Content-Length"]
         response.headers["Content-Length"] = str(len(response.body))
     return response
@@ -76,6 +87,7 @@ _FIELD_OF_VIEW = 38.0  # [deg]
 _ASPECT = 0.9  # width over height of the area between the panels
 _NARROW = 600  # [px] width of a window below which the panel hides its lower part
 _HIDDEN = 0.6  # of the height of such a window
+_MARGIN = 0.12  # [m] that bodies and labels reach beyond the points to see
 _ROOM = 1.06   # relative to the distance at which all points are just visible
 # Of the floor's cells, sections and plane. The dark one leaves black paths visible.
 _LIGHT = ((226, 230, 235), (196, 203, 211), (247, 248, 250))
@@ -105,7 +117,7 @@ def open_server(port: int, label: str) -> Any:
 
 def add_dark(server: Any, height: float) -> None:
     """Add a switch between the light and the dark page, with a floor at a height [m]."""
-    dark = server.gui.add_checkbox("Dark page", initial_value=False)
+    dark = server.gui.add_checkbox(DARK, initial_value=False)
 
     @dark.on_update  # type: ignore[untyped-decorator]
     def _(_: object) -> None:
@@ -142,10 +154,11 @@ def right(azimuth: float) -> Array:
 
 
 def look_at_all(server: Any, points: Array, azimuth: float) -> None:
-    """Place the camera at an azimuth [rad] so that points (N, 3) [m] fill the view.
+    """Place the camera at an azimuth [rad] so that what is at points (N, 3) [m] fills the view.
 
     That is what the panels leave free: in a narrow window one floats in its lower part.
     """
+    points = np.vstack([points - _MARGIN, points + _MARGIN])
     _place(server.initial_camera, points, azimuth, _ASPECT)
 
     def fit(client: Any) -> None:

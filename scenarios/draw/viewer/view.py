@@ -136,7 +136,6 @@ class View:
                                       initial_value=_BESIDE if side_by_side else _OVERLAID)
             self.requests.when_changed(layout, "layout")
         add_dark(self.server, min(one.stage.floor for one in self.scenes.values()))
-        gui.add_markdown("**Stack**, most important first")
         self._stacks = {label: gui.add_html("") for label in self.scenes}
 
     def _name_runs(self) -> list[Any]:
