@@ -66,11 +66,11 @@ def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
         "distance": scene.distance[frames, scene.linked], "fate": levels.fate,
         "violation": levels.violation, "saturated": levels.saturated}
     return {**about,
-            "radii": [capsule.radius for capsule in fixed.capsules],
+            "radii": [capsule.radius for capsule in fixed.robot.capsules],
             "obstacles": [{"shape": obstacle.shape, "size": list(obstacle.size),
                            "rotation": np.asarray(obstacle.rotation, float).ravel().tolist()}
                           for obstacle in fixed.obstacles.obstacles],
-            "areas": fixed.areas, "floor": fixed.floor, "azimuth": fixed.azimuth,
+            "areas": fixed.areas, "floor": fixed.robot.floor, "azimuth": fixed.azimuth,
             "halfAngle": fixed.half_angle,
             "wanted": None if fixed.axis is None else fixed.axis.tolist(),
             "orders": scene.orders, "tasks": levels.names, "units": levels.units,
