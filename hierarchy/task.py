@@ -23,6 +23,7 @@ Level = Literal["velocity", "acceleration", "torque"]
 Kind = Literal["equality", "inequality"]
 
 _ROUNDING = 1e-9  # of a period, relative
+_STEP = 2.0**-10  # [s] of the differences that give the derivative of a Jacobian
 _OF_STATE = ("error", "jacobian", "jacobian_derivative", "desired_velocity",
              "desired_acceleration", "reference_velocity", "reference_acceleration", "measure",
              "writer")
@@ -245,3 +246,48 @@ def _shaped(task: Task, what: str, value: Array, shape: tuple[int, ...]) -> Arra
         raise HierarchyError(f"task {task.name!r}: {what} has shape {array.shape}, "
                              f"expected {shape}")
     return array
+
+
+class Written(Task):
+    """A task whose equations are in its writer alone; the plain methods read them there. Abstract.
+
+    A new one needs `dimension`, `error` and `writer`.
+    """
+
+    @abstractmethod
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+
+    def rows(self, state: State, level: Level) -> tuple[Array, Array, Array]:
+        """The rows at a state: A (m, n), lower and upper (m,)."""
+        A = np.zeros((self.dimension, state.n))
+        lower, upper = np.zeros((2, self.dimension))
+        self.writer(state, level, A, lower, upper, 0)()
+        return A, lower, upper
+
+    def jacobian(self, state: State) -> Array:
+        """The rows over the velocities (m, n)."""
+        return self.rows(state, "velocity")[0]
+
+    def jacobian_derivative(self, state: State) -> Array:
+        """Their exact time derivative (m, n), by differences: to some 1e-9."""
+        coarse, fine = ((self.jacobian(_moved(state, h)) - self.jacobian(_moved(state, -h)))
+                        / (2.0 * h) for h in (_STEP, _STEP / 2.0))
+        return np.asarray((4.0 * fine - coarse) / 3.0)
+
+    def reference_velocity(self, state: State) -> Array:
+        """The least velocity of the task (m,)."""
+        return self.rows(state, "velocity")[1]
+
+    def reference_acceleration(self, state: State) -> Array:
+        """The least acceleration of the task (m,)."""
+        return self.rows(state, "acceleration")[1] + self.jacobian_derivative(state) @ state.v
+
+
+def _moved(state: State, step: float) -> State:
+    """Return a state moved by `step` [s] along its velocity; what it has measured stays."""
+    robot = state.robot
+    moved = State.at(robot, robot.integrate(state.q, state.v * step), state.v, state.t)
+    moved.measurement = state.measurement
+    return moved

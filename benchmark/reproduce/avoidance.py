@@ -9,6 +9,7 @@ import numpy as np
 
 from hierarchy.problem import Array
 from hierarchy.state import State
+from hierarchy.tasks.geometric import cross
 from scenarios.config import Scenario
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
@@ -59,13 +60,7 @@ def acceleration(state: State, joint: int, p: Array, a: Array) -> Array:
     moves = state.supports[joint]
     v, w = (state.J[:, moves] @ state.v[moves]).reshape(2, 3)
     dv, dw = (state.J[:, moves] @ a[moves] + state.dJ[:, moves] @ state.v[moves]).reshape(2, 3)
-    return np.asarray(dv + _cross(dw, p) + _cross(w, v + _cross(w, p)))
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Return a x b; `np.cross` takes longer than the rest of a tick."""
-    (x, y, z), (u, v, w) = a.tolist(), b.tolist()
-    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
+    return np.asarray(dv + cross(dw) @ p + cross(w) @ (v + cross(w) @ p))
 
 
 def measured(scenario: Scenario) -> tuple[Recording, tuple[Metric, ...]]:

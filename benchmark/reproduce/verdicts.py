@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmark.reproduce.effect import Effect, blocked
 from benchmark.reproduce.protocol import Claim, Protocol, Rows
 from hierarchy.problem import Array
 from scenarios.measure.metric import Metric
-from scenarios.measure.statistics import Effect, blocked, holm, wilson
+from scenarios.measure.statistics import holm, wilson
 
 SUPPORTED, CONTRADICTED = "supported", "contradicted"
 NEGLIGIBLE, UNDECIDED = "no effect that matters", "undecided"

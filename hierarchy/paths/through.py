@@ -116,8 +116,10 @@ class Recorded(Path):
         _check_points("recorded path", self.times, self.points)
         if len(self.times) < 2:
             raise HierarchyError("recorded path: one point is no motion; use a path of kind still")
-        set_frozen(self, _slopes=_spline_slopes(
-            np.array(self.times, dtype=float), np.array(self.points, dtype=float)))
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(self.times, np.array(self.points, dtype=float), bc_type="clamped")
+        set_frozen(self, _slopes=spline(self.times, 1))
 
     @classmethod
     def from_csv(cls, file: str | File) -> Recorded:
@@ -164,23 +166,6 @@ def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: A
         return i
     out[0], out[1:] = points[min(i, len(times) - 1)], 0.0
     return None
-
-
-def _spline_slopes(t: Array, p: Array) -> Array:
-    """Slopes (N, 3) at the points of the cubic spline that begins and ends with slope zero.
-
-    The tridiagonal equations for continuous acceleration, by elimination.
-    """
-    h, slopes = np.diff(t), np.zeros_like(p)
-    above = np.zeros(len(t))
-    for i in range(1, len(t) - 1):
-        right = 3 * ((p[i] - p[i - 1]) * h[i] / h[i - 1] + (p[i + 1] - p[i]) * h[i - 1] / h[i])
-        pivot = 2 * (h[i - 1] + h[i]) - h[i] * above[i - 1]
-        above[i] = h[i - 1] / pivot
-        slopes[i] = (right - h[i] * slopes[i - 1]) / pivot
-    for i in range(len(t) - 2, 0, -1):
-        slopes[i] -= above[i] * slopes[i + 1]
-    return slopes
 
 
 def _lines(file: str | File) -> list[str]:

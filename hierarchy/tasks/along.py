@@ -10,12 +10,12 @@ import numpy as np
 from hierarchy.errors import HierarchyError, expect
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Written
 from hierarchy.tasks.position import Position
 
 
 @dataclass(frozen=True)
-class Along(Task):
+class Along(Written):
     """The rows of a position task along `directions` (m, 3) of the world, m = 1, 2 or 3 [m].
 
     A hand that slides on a table is moved along two of them and pushes along the third. The gains
@@ -48,22 +48,6 @@ class Along(Task):
     def error(self, state: State) -> Array:
         """Distance to the path along the directions (m,) [m]."""
         return np.asarray(self._D @ self.task.error(state))
-
-    def jacobian(self, state: State) -> Array:
-        """Those rows of the position's Jacobian (m, n) [m]."""
-        return np.asarray(self._D @ self.task.jacobian(state))
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Its time derivative (m, n) [m/s]."""
-        return np.asarray(self._D @ self.task.jacobian_derivative(state))
-
-    def reference_velocity(self, state: State) -> Array:
-        """See `Task.reference_velocity`."""
-        return np.asarray(self._D @ self.task.reference_velocity(state))
-
-    def reference_acceleration(self, state: State) -> Array:
-        """See `Task.reference_acceleration`."""
-        return np.asarray(self._D @ self.task.reference_acceleration(state))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:

@@ -19,8 +19,6 @@ from hierarchy.kinematics import (
     add_row,
     drift_of_point,
     place,
-    write_point_jacobian,
-    write_point_jacobian_derivative,
 )
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -72,27 +70,16 @@ class CumulatedRepulsion(JointTask):
 
     def reference_velocity(self, state: State) -> Array:
         """The sum of the commands, and of `base` (n,) [rad/s]."""
-        base = np.zeros(self.joints) if self.base is None else self.base.reference_velocity(state)
-        return base + self._sum(state, "velocity")
+        return self._sum(state, "velocity")
 
     def reference_acceleration(self, state: State) -> Array:
         """The sum of the commands, and of `base` (n,) [rad/s^2]."""
-        base = (np.zeros(self.joints) if self.base is None
-                else self.base.reference_acceleration(state))
-        return base + self._sum(state, "acceleration")
+        return self._sum(state, "acceleration")
 
     def _sum(self, state: State, level: Level) -> Array:
-        """Sum of the commands (n,)."""
-        seen, total = self._seen(state), np.zeros(self.joints)
-        J, dJ = np.zeros((2, 3, state.n))
-        for k in np.flatnonzero(seen.distance[:-1] <= self.within):
-            r, body, offset = seen.direction[k], int(self.bodies[k]), self.offsets[k]
-            write_point_jacobian(state.J, state.placements, state.supports, body, offset, J, 0)
-            if level == "acceleration":
-                write_point_jacobian_derivative(state.kinematics, body, offset, dJ)
-            row, asked = r @ J, seen.magnitude[k] - r @ dJ @ state.v
-            total += row * asked / max(row @ row, self.lever**2)
-        return total
+        side, A = np.zeros(self.joints), np.empty((self.joints, state.n))
+        self.writer(state, level, A, side, side.copy(), 0)()
+        return side
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:

@@ -44,12 +44,12 @@ from hierarchy.limits import clipped
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Written
 from hierarchy.tasks.joint_limits import JointLimits
 
 
 @dataclass(frozen=True)
-class DangerBounds(Task):
+class DangerBounds(Written):
     """Keep every joint within `limits` and slow those that move a control point to an obstacle.
 
     n rows, those of `limits`, with a box that is at most as large and never empty; see the module
@@ -116,14 +116,6 @@ class DangerBounds(Task):
     def error(self, state: State) -> Array:
         """Distance of each joint from its range (n,) [rad or m], zero inside it."""
         return self.limits.error(state)
-
-    def jacobian(self, state: State) -> Array:
-        """The identity (n, n)."""
-        return self.limits.jacobian(state)
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Zero (n, n)."""
-        return self.limits.jacobian_derivative(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:

@@ -7,19 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.jit.sources import Kernel
-from hierarchy.kinematics import (
-    drift_of_point,
-    point_at,
-    write_point_jacobian,
-    write_point_jacobian_derivative,
-)
+from hierarchy.kinematics import drift_of_point, point_at, write_point_jacobian
 from hierarchy.measured import Measured, measured
 from hierarchy.paths import Path
-from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
 
@@ -72,9 +64,3 @@ class Position(Measured):
         """See `Measured.measure`."""
         seen = _NOTHING_SEEN if state.measurement is None else state.measurement.arrays
         return _position, (self.frame.joint, self.frame.offset, seen, self.repulsion_within)
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Its time derivative (3, n) [m/s], for plain tasks that are made of this one."""
-        dJ = np.empty((3, state.n))
-        write_point_jacobian_derivative(state.kinematics, self.frame.joint, self.frame.offset, dJ)
-        return dJ

@@ -47,17 +47,15 @@ from hierarchy.kinematics import (
     add_row,
     drift_of_point,
     place,
-    write_point_jacobian,
-    write_point_jacobian_derivative,
 )
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Task
+from hierarchy.task import Kind, Level, Written
 
 
 @dataclass(frozen=True)
-class SelfSeparation(Task):
+class SelfSeparation(Written):
     """Keep pairs of capsules of the robot at `barrier.distance` or more (m = pairs).
 
     `pairs` are indices of `capsules`; None takes every pair of the chain except neighbours. No
@@ -112,39 +110,6 @@ class SelfSeparation(Task):
         """distance - d (m,) [m], positive where two capsules are too close."""
         return self.barrier.distance - self.distances(state)
 
-    def jacobian(self, state: State) -> Array:
-        """r^T (J_a - J_b) (m, n): the derivative of the distances."""
-        def of_point(joint: int, offset: Array) -> Array:
-            J = np.empty((3, state.n))
-            write_point_jacobian(state.J, state.placements, state.supports, joint, offset, J, 0)
-            return J
-        return self._between(state, of_point)
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """r^T (dJ_a/dt - dJ_b/dt) (m, n), with directions and nearest points held constant."""
-        def of_point(joint: int, offset: Array) -> Array:
-            dJ = np.empty((3, state.n))
-            write_point_jacobian_derivative(state.kinematics, joint, offset, dJ)
-            return dJ
-        return self._between(state, of_point)
-
-    def bend(self, state: State) -> Array:
-        """d2d/dt2 less r^T (J_a - J_b) a + r^T (dJ_a/dt - dJ_b/dt) v: (m,) [m/s^2]."""
-        return np.array([
-            _motion(state.kinematics, self.joints, self.table, i, j, tuple(seen))[2]
-            for (i, j), seen in zip(self.indices, self._seen(state), strict=True)])
-
-    def reference_velocity(self, state: State) -> Array:
-        """The least r^T (J_a - J_b) v (m,) [m/s], -inf beyond `influence`."""
-        return self._near(state, [least_rate(-e, self.settings) for e in self.error(state)])
-
-    def reference_acceleration(self, state: State) -> Array:
-        """The least r^T (J_a - J_b) a + r^T (dJ_a/dt - dJ_b/dt) v (m,), -inf beyond `influence`."""
-        terms = zip(self.error(state), self.jacobian(state) @ state.v, self.bend(state),
-                    strict=True)
-        return self._near(state, [least_acceleration(-e, rate, bend, self.settings)
-                                  for e, rate, bend in terms])
-
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
@@ -152,20 +117,8 @@ class SelfSeparation(Task):
                                  level == "acceleration")
         return bind(_write, state.kinematics, parameters, A, lower, upper, row)
 
-    def _near(self, state: State, lower: Sequence[float]) -> Array:
-        return np.where(self.distances(state) <= self.barrier.influence, lower, -np.inf)
-
     def _seen(self, state: State) -> Array:
         return measure_capsules(state.placements, self.joints, self.table, self.indices)
-
-    def _between(self, state: State, of_point: Callable[[int, Array], Array]) -> Array:
-        """r^T (of a - of b) (m, n) of the nearest points of each pair."""
-        rows = np.empty((self.dimension, state.n))
-        for row, (i, j), seen in zip(rows, self.indices, self._seen(state), strict=True):
-            a, b = self.table[i], self.table[j]
-            row[:] = seen[1:4] @ (of_point(int(self.joints[i]), a[:3] + seen[4] * a[3:6])
-                                  - of_point(int(self.joints[j]), b[:3] + seen[5] * b[3:6]))
-        return rows
 
 
 class _Parameters(NamedTuple):

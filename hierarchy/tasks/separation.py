@@ -39,19 +39,17 @@ from hierarchy.kinematics import (
     add_row,
     drift_of_point,
     place,
-    write_point_jacobian,
-    write_point_jacobian_derivative,
 )
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Task
+from hierarchy.task import Kind, Level, Written
 
 _SHARPEST = 1e-3  # [m] smallest radius of turning that is used
 
 
 @dataclass(frozen=True)
-class Separation(Task):
+class Separation(Written):
     """Keep every point at `barrier.distance` or more from every obstacle (m = points x obstacles).
 
     `points` are those of the sensor in its order, the end effector last; `obstacles` is how many
@@ -96,58 +94,10 @@ class Separation(Task):
         """distance - d (m,) [m], positive where a point is too close."""
         return np.asarray(self.barrier.distance - self._pairs(state)[:, 0])
 
-    def jacobian(self, state: State) -> Array:
-        """r^T J_c (m, n): the derivative of the distances to obstacles at rest."""
-        J = np.empty((3, state.n))
-        A = np.empty((self.dimension, state.n))
-        for row, (k, pair) in enumerate(self._rows(state)):
-            write_point_jacobian(state.J, state.placements, state.supports, int(self.joints[k]),
-                                 self.offsets[k], J, 0)
-            A[row] = pair[1:4] @ J
-        return A
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """r^T dJ_c/dt (m, n), with the direction held constant."""
-        dJ = np.empty((3, state.n))
-        A_dot = np.empty((self.dimension, state.n))
-        for row, (k, pair) in enumerate(self._rows(state)):
-            write_point_jacobian_derivative(state.kinematics, int(self.joints[k]),
-                                            self.offsets[k], dJ)
-            A_dot[row] = pair[1:4] @ dJ
-        return A_dot
-
     def desired_velocity(self, state: State) -> Array:
         """r . v_o (m,) [m/s]."""
         pairs = self._pairs(state)
         return np.asarray((pairs[:, 1:4] * pairs[:, 4:7]).sum(axis=1))
-
-    def desired_acceleration(self, state: State) -> Array:
-        """r . a_o (m,) [m/s^2]."""
-        return np.array([pair[1:4] @ pair[7:10] for _, pair in self._rows(state)])
-
-    def bend(self, state: State) -> Array:
-        """What the turning of the directions adds to d2d/dt2 (m,) [m/s^2]."""
-        J = np.empty((3, state.n))
-        bend = np.empty(self.dimension)
-        for row, (k, pair) in enumerate(self._rows(state)):
-            write_point_jacobian(state.J, state.placements, state.supports, int(self.joints[k]),
-                                 self.offsets[k], J, 0)
-            w = J @ state.v - pair[4:7]
-            across = w @ w - (pair[1:4] @ w) ** 2 - (pair[10:13] @ w) ** 2
-            bend[row] = max(across, 0.0) / max(pair[13], self.barrier.distance, _SHARPEST)
-        return bend
-
-    def reference_velocity(self, state: State) -> Array:
-        """The least r^T J_c v (m,) [m/s], -inf beyond `influence`."""
-        required = [least_rate(-e, self.settings) for e in self.error(state)]
-        return self._near(state, self.desired_velocity(state) + required)
-
-    def reference_acceleration(self, state: State) -> Array:
-        """The least r^T d2p/dt2 (m,) [m/s^2], -inf beyond `influence`."""
-        rates = self.jacobian(state) @ state.v - self.desired_velocity(state)
-        required = [least_acceleration(-e, rate, bend, self.settings) for e, rate, bend
-                    in zip(self.error(state), rates, self.bend(state), strict=True)]
-        return self._near(state, self.desired_acceleration(state) + required)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
@@ -156,15 +106,6 @@ class Separation(Task):
                                  level == "acceleration")
         return bind(_write, state.kinematics, parameters, self._seen(state).table, A, lower, upper,
                     row)
-
-    def _near(self, state: State, lower: Array) -> Array:
-        distances = self.barrier.distance - self.error(state)
-        return np.where(distances <= self.barrier.influence, lower, -np.inf)
-
-    def _rows(self, state: State) -> list[tuple[int, Array]]:
-        """Point and pair (14,) of each row."""
-        per_point = 1 if self.obstacles is None else self.obstacles
-        return [(row // per_point, pair) for row, pair in enumerate(self._pairs(state))]
 
     def _pairs(self, state: State) -> Array:
         """The pair of each row (m, 14)."""

@@ -12,13 +12,13 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Written
 
 APPROACH = 0.25  # gain times period: a robot that lags a tick comes to rest without overshooting
 
 
 @dataclass(frozen=True)
-class StepLimits(Task):
+class StepLimits(Written):
     """Keep each joint within its limits of position and speed: gain (lower - q) <= v, and so on.
 
     One row per velocity, n in number, with infinite sides where the robot has no limit. A joint
@@ -56,14 +56,6 @@ class StepLimits(Task):
         """The joint of each row."""
         return tuple(self.robot.velocity_names)
 
-    def jacobian(self, state: State) -> Array:
-        """The identity (n, n)."""
-        return np.eye(state.n)
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Zero (n, n)."""
-        return np.zeros((state.n, state.n))
-
     def box(self, state: State) -> tuple[Array, Array]:
         """Least and largest velocity of each joint (n,), (n,) [rad/s or m/s]."""
         q, fastest = state.q[self.robot.coordinates], self.robot.velocity_limit
@@ -83,7 +75,7 @@ class StepLimits(Task):
         rows = slice(row, row + self.dimension)
 
         def write() -> None:
-            A[rows] = self.jacobian(state)
+            A[rows] = np.eye(state.n)
             lower[rows], upper[rows] = self.box(state)
 
         return write

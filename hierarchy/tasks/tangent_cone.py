@@ -11,11 +11,11 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Task
+from hierarchy.task import Kind, Level, Task, Written
 
 
 @dataclass(frozen=True)
-class TangentCone(Task):
+class TangentCone(Written):
     """Keep an inequality task in its set by its rate alone, at velocity level.
 
     A row of `task` whose error is negative, strictly inside, has no bounds; one on the bound or
@@ -55,14 +55,6 @@ class TangentCone(Task):
     def error(self, state: State) -> Array:
         """The error of `task` (m,)."""
         return self.task.error(state)
-
-    def jacobian(self, state: State) -> Array:
-        """The Jacobian of `task` (m, n)."""
-        return self.task.jacobian(state)
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """The derivative of the Jacobian of `task` (m, n)."""
-        return self.task.jacobian_derivative(state)
 
     def desired_velocity(self, state: State) -> Array:
         """The rate (m,) at which the bound of `task` moves."""

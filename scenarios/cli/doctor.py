@@ -79,7 +79,7 @@ def _imported(one: Requirement) -> Finding:
     if there is None:
         return Finding("versions", one.name, "missing", False, f"pip install {one.name}")
     module = import_module(_MODULES.get(one.name, one.name.replace("-", "_")))
-    loaded = getattr(module, "__version__", there)
+    loaded = vars(module).get("__version__", there)  # one that is made when asked for warns
     if isinstance(loaded, str) and loaded != there:
         return Finding("versions", one.name, f"{loaded} in {module.__file__}, not the {there} that "
                        "is installed", False, "remove it from the path")

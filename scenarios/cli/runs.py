@@ -57,8 +57,7 @@ def run(scenario: Annotated[str, typer.Argument(
             "--figures", help="Also draw the run's figures, like `hierarchy figures`.")
             ] = False, as_json: AsJson = False,
         live: Annotated[bool, typer.Option(
-            "--live", help="Show the run in the browser and change it interactively; needs the "
-                           "extra `view`.")] = False,
+            "--live", help="Show the run in the browser and change it interactively.")] = False,
         speed: Annotated[float | None, typer.Option(
             "--speed", metavar="X", min=0.01, max=100.0,
             help="With --live: real-time factor. Default: 1.")] = None,

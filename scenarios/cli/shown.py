@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import sys
 import time
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
@@ -17,8 +19,9 @@ from scenarios.cli.terminal import print_json, shown
 if TYPE_CHECKING:
     from scenarios.config import Scenario
     from scenarios.draw.viewer.live_page import LivePage
+    from scenarios.recording.recording import Recording
 
-_POLL = 0.05  # [s] between two looks for the first browser
+_POLL = 0.5  # [s] between two looks for an interruption
 
 
 @app.command()
@@ -29,25 +32,37 @@ def view(folders: Runs,
          port: Port = PORT, browser: Browser = True) -> int:
     """Show finished runs in the browser.
 
-    In 3D and as curves; needs the extra `view`.
+    In 3D and as curves, as `hierarchy replay` writes them.
     """
-    from scenarios.draw.viewer.server import announce, close, open_server
-    from scenarios.draw.viewer.view import View, labelled
+    from scenarios.draw.viewer.server import announce, served
+
+    page = _replay([run for folder in folders for run in _runs_in(folder)], beside=side_by_side)
+    with served(port, lambda: page) as address, suppress(KeyboardInterrupt):
+        announce(address, browser)
+        while True:
+            time.sleep(3600.0)
+    print()
+    return 0
+
+
+def _replay(folders: list[Path], rate: float = 30.0, beside: bool = False) -> str:
+    """Return the page that plays the runs of some folders."""
+    from scenarios.draw.replay.page import html
     from scenarios.measure.run_folder import load_run
 
-    found = [run for folder in folders for run in _runs_in(folder)]
-    runs = labelled(found, [load_run(folder) for folder in found])
-    names = dict.fromkeys(run.scenario.name for run in runs.values())
-    server = open_server(port, ", ".join(names))
-    try:
-        page = View(server, runs, side_by_side)
-        announce(server, browser)
-        page.serve()
-    except KeyboardInterrupt:
-        print()
-    finally:
-        close(server)
-    return 0
+    runs = labelled(folders, [load_run(folder) for folder in folders])
+    titles = dict.fromkeys(one.scenario.title or one.scenario.name for one in runs.values())
+    return html(runs, " · ".join(titles), rate=rate, beside=beside)
+
+
+def labelled(folders: Sequence[Path], recordings: Sequence[Recording]) -> dict[str, Recording]:
+    """Return recordings by their resolvers' labels; equal labels get the folder as well."""
+    labels = [one.facts.resolver.label for one in recordings]
+    if len({one.scenario.name for one in recordings}) > 1:
+        labels = [f"{label} {one.scenario.name}"
+                  for label, one in zip(labels, recordings, strict=True)]
+    return {label if labels.count(label) == 1 else f"{label} in {folder}": one
+            for label, folder, one in zip(labels, folders, recordings, strict=True)}
 
 
 def _runs_in(folder: Path) -> list[Path]:
@@ -68,22 +83,20 @@ def show_live(scenario: Scenario, folder: Path, port: int, speed: float, browser
     """
     from scenarios.draw.viewer.live import Live
     from scenarios.draw.viewer.live_page import LivePage
-    from scenarios.draw.viewer.server import announce, close, open_server
+    from scenarios.draw.viewer.server import announce, served
 
     live = Live(scenario)
-    server = open_server(port, f"{scenario.name}, live")
-    page = LivePage(server, live, speed)
-    try:
-        announce(server, browser)
-        while wait and not server.get_clients():
-            time.sleep(_POLL)
-        _serve(page, folder)
-    except KeyboardInterrupt:
-        print()
-        if not live.over:
-            _keep(page, folder)
-    finally:
-        close(server)
+    page = LivePage(live, speed)
+    with served(port, page.html, page.answer) as address:
+        try:
+            announce(address, browser)
+            while wait and not page.opened.wait(_POLL):
+                pass
+            _serve(page, folder)
+        except KeyboardInterrupt:
+            print()
+            if not live.over:
+                _keep(page, folder)
     return 1 if live.ending else 0
 
 
@@ -139,15 +152,10 @@ def replay(folders: Runs,
                "--rate", metavar="HZ", help="Frames per second.")] = 30.0,
            plugin: Plugins = None) -> None:
     """Write runs as one HTML file that plays without a server."""
-    from scenarios.draw.replay.page import html
-    from scenarios.draw.viewer.view import labelled
     from scenarios.files import named, write_text
-    from scenarios.measure.run_folder import load_run
 
-    recordings = labelled(folders, [load_run(folder) for folder in folders])
-    titles = dict.fromkeys(one.scenario.title or one.scenario.name for one in recordings.values())
     target = out if out is not None else folders[0] / "replay.html"
-    text = html(recordings, " · ".join(titles), rate=rate)
+    text = _replay(folders, rate)
     with named(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         write_text(target, text)

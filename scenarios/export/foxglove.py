@@ -29,7 +29,7 @@ def transforms(scene: Scene, frame: int) -> Message:
     The desired point has no rotation of its own and is given that of the world.
     """
     robot, t = scene.stage.robot, float(scene.t[frame])
-    rows, tip = scene.placements[frame], scene.stage.points[-1]
+    rows, tip = scene.placements[frame], scene.stage.robot.points[-1]
     placed = [(name, rows[i, 9:], rows[i, :9].reshape(3, 3).T)
               for i, name in enumerate(robot.joint_names, 1)]
     turned = rows[tip.joint, :9].reshape(3, 3).T @ np.array(robot.tool)
@@ -52,7 +52,7 @@ def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
         t, entities = float(scene.t[frame]), []
         if frame == 0:
             entities += [link(t, capsule, scene.stage.robot.joint_names)
-                         for capsule in scene.stage.capsules]
+                         for capsule in scene.stage.robot.capsules]
             if scene.desired is not None:
                 entities.append(line(t, "path asked for", scene.desired, _ASKED))
         moved = (scene.centres[frame] != scene.centres[max(frame - 1, 0)]).any(axis=1)

@@ -33,12 +33,6 @@ _UNITS = {"position": "m", "avoidance": "m", "separation": "m", "joint limits": 
           "posture": "rad"}  # of the errors of tasks that no section lists
 
 
-def phrase(fate: Fate, violation: float, unit: str = "") -> str:
-    """Return a fate in words, with the violation where the level is missed."""
-    by = f" by {violation:.2g} {unit}".rstrip()
-    return PHRASES[fate] + (by if fate is Fate.MISSED else "")
-
-
 def row_units(scenario: Scenario, names: Sequence[str]) -> tuple[str, ...]:
     """Return the unit of the rows of each task, "" where they differ or it is not known."""
     sections = {task.title: task for task in scenario.tasks}

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy import HierarchyError
-from hierarchy.avoidance import Capsule, Measurement, Obstacles
+from hierarchy.avoidance import Measurement, Obstacles
 from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.problem import Array
 from scenarios.cell.sensors.sensor import make_obstacles
 from scenarios.recording import listed
-from scenarios.recording.facts import Point, RobotFacts
+from scenarios.recording.facts import RobotFacts
 from scenarios.recording.fate import Fate, Levels, levels_at
 from scenarios.recording.tree import ends
 from scenarios.scene.curves import Areas, Series, marks_of, series
@@ -44,21 +44,6 @@ class Stage:
     areas: Areas
     axis: Array | None
     half_angle: float
-
-    @property
-    def capsules(self) -> tuple[Capsule, ...]:
-        """The links, in the frames of their joints."""
-        return self.robot.capsules
-
-    @property
-    def points(self) -> tuple[Point, ...]:
-        """The robot's control points, then its end effector."""
-        return self.robot.points
-
-    @property
-    def floor(self) -> float:
-        """Height of the floor [m]."""
-        return self.robot.floor
 
     @property
     def azimuth(self) -> float:
@@ -120,7 +105,7 @@ class Scene:
     @property
     def links(self) -> Array:
         """Start and end of each capsule of the arm in the world: (F, C, 2, 3) [m]."""
-        return ends(self.stage.capsules, self.placements)
+        return ends(self.stage.robot.capsules, self.placements)
 
     @property
     def linked(self) -> NDArray[np.int64]:
@@ -188,7 +173,7 @@ def _joints(recording: Recording) -> Array:
 def _moved(fixed: Stage, recording: Recording, ticks: NDArray[np.int64]) -> dict[str, Array]:
     """Return what follows from the joints at each tick."""
     placements = fixed.robot.placements(_joints(recording)[ticks])
-    tip = fixed.points[-1].joint
+    tip = fixed.robot.points[-1].joint
     z = placements[:, tip, :9].reshape(-1, 3, 3).swapaxes(1, 2) @ np.array(fixed.robot.tool)[:, 2]
     return {"placements": placements, "axis": z,
             **_distances(fixed, recording, ticks, placements)}
@@ -197,9 +182,9 @@ def _moved(fixed: Stage, recording: Recording, ticks: NDArray[np.int64]) -> dict
 def _distances(fixed: Stage, recording: Recording, ticks: NDArray[np.int64],
                placements: Array) -> dict[str, Array]:
     """Return points, distances, nearest points and the obstacles' centres, frame by frame."""
-    seen, now = Measurement(len(fixed.points) - 1), np.empty(placements.shape[1:])
-    measure = exact_measurer(seen, now, np.array([point.joint for point in fixed.points]),
-                             np.array([point.offset for point in fixed.points]),
+    seen, now = Measurement(len(fixed.robot.points) - 1), np.empty(placements.shape[1:])
+    measure = exact_measurer(seen, now, np.array([point.joint for point in fixed.robot.points]),
+                             np.array([point.offset for point in fixed.robot.points]),
                              fixed.obstacles.table, _NO_LAWS, np.zeros(2))
     frames: dict[str, list[Array]] = {name: [] for name in (
         "points", "nearest", "distance", "centres")}

@@ -7,10 +7,11 @@ import pytest
 
 from benchmark.reproduce import claims, protocol, verdicts
 from benchmark.reproduce.avoidance import acceleration, measured
+from benchmark.reproduce.effect import blocked
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
 from hierarchy import Robot, State
 from scenarios import load
-from scenarios.measure.statistics import blocked, holm
+from scenarios.measure.statistics import holm
 from scenarios.results.sampled import Workers
 
 LAYOUTS, SEEDS, STARTS = ["a", "b"], [1, 2], 25

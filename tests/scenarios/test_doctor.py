@@ -26,7 +26,7 @@ def test_every_requirement_is_looked_at(monkeypatch):
     core = [line for line in requires("task-hierarchy") if "extra" not in line]
     for line in core:
         assert re.split("[<>]", line)[0] in looked_at
-    for extra in ("qp", "sim", "sweep", "view", "jax"):
+    for extra in ("qp", "sim", "sweep", "export", "jax"):
         assert any(one.what == extra and one.part.startswith("extras") for one in doctor.examine())
 
 
@@ -46,12 +46,12 @@ def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, capsys):
 def test_a_missing_package_says_how_to_get_it(monkeypatch):
     there = doctor._version
     monkeypatch.setattr(doctor, "_version", lambda package: (
-        None if package in ("osqp", "viser") else there(package)))
+        None if package in ("osqp", "mcap") else there(package)))
     found = {one.what: one for one in [*doctor._versions(), *doctor._extras()]}
     assert found["osqp"].well is False
     assert found["osqp"].remedy == "pip install osqp"
-    assert found["view"].remedy == "pip install 'task-hierarchy[view]'"
-    assert found["view"].well is None
+    assert found["export"].remedy == "pip install 'task-hierarchy[export]'"
+    assert found["export"].well is None
 
 
 def test_a_cache_that_cannot_be_written_is_not_well(monkeypatch):

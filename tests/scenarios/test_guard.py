@@ -1,10 +1,13 @@
 """Which requests the pages in the browser answer."""
 
 from contextlib import closing
+from http.client import HTTPConnection
+from urllib.parse import urlsplit
 
 import pytest
 
-from scenarios.draw.viewer.server import is_own
+from hierarchy.errors import HierarchyError
+from scenarios.draw.viewer.server import is_own, served
 
 
 @pytest.mark.parametrize(("headers", "own"), [
@@ -19,25 +22,33 @@ def test_only_a_browser_of_this_machine_on_our_own_page_is_answered(headers, own
     assert is_own(headers) == own
 
 
-@pytest.mark.slow
-def test_the_server_of_a_page_rejects_them_and_its_page_has_a_title_and_is_as_dark_as_asked():
-    pytest.importorskip("viser")
-    import http.client
+def test_the_server_of_a_page_rejects_them():
+    asked = []
 
-    from scenarios.draw.viewer.server import close, open_server
+    def answer(one):
+        asked.append(one)
+        return "{}"
 
-    server = open_server(0, "test")
-    assert server.get_host() == "127.0.0.1"
-    try:
-        found = []
-        for host in (None, "rebound.example"):
-            with closing(http.client.HTTPConnection("127.0.0.1", server.get_port())) as connection:
-                connection.request("GET", "/", headers={"Host": host} if host else {})
-                answer = connection.getresponse()
-                found.append((answer.status, answer.read().decode()))
-        (status, page), (rejected, _) = found
-        assert (status, rejected) == (200, 403)
-        assert "<title>test</title>" in page
-        assert 'matchMedia("(prefers-color-scheme: dark)")' in page
-    finally:
-        close(server)
+    def status(method, path="/", body=None, **headers):
+        with closing(HTTPConnection(urlsplit(address).netloc)) as connection:
+            connection.request(method, path, body, headers)
+            answer = connection.getresponse()
+            answer.read()
+            return answer.status
+
+    with served(0, lambda: "<p>page</p>", answer) as address:
+        assert address.startswith("http://127.0.0.1:")
+        assert status("GET") == 200
+        assert status("POST", "/now", '{"a": 1}') == 200
+        assert status("GET", "/elsewhere") == 404
+        assert status("POST", "/now", "[") == 400
+        for others in ({"Host": "rebound.example"}, {"Origin": "http://elsewhere.example"}):
+            assert status("GET", **others) == status("POST", "/now", '{"b": 2}', **others) == 403
+        assert status("POST", "/now", "x" * 200_000) == 403
+    assert asked == [{"a": 1}]
+
+
+def test_a_port_in_use_is_named():
+    with served(0, str) as address, pytest.raises(HierarchyError, match="--port"), served(
+            urlsplit(address).port, str):
+        pass

@@ -9,7 +9,6 @@ from hierarchy import Robot
 from scenarios import load, simulate
 from scenarios.draw.replay.page import html
 from scenarios.draw.viewer.live import Live
-from scenarios.draw.viewer.moment import of_scene
 from scenarios.recording.facts import ContactPoint, facts_of
 from scenarios.scene import scene
 from scenarios.scene.pushes import pushes
@@ -81,13 +80,13 @@ def test_every_shipped_scenario_of_torques_can_be_replayed(name):
     assert "</html>" in html({"a": run}, name)
     live = Live(run.scenario)
     live.tick()
-    for (here, goal), path in zip(live.moment().moved, scene(run).paths, strict=True):
-        np.testing.assert_allclose(here, path.actual[0], atol=1e-9)
-        assert (goal is None) == (path.wanted is None)
+    for now, path in zip(live.frame().paths, scene(run).paths, strict=True):
+        np.testing.assert_allclose(now.actual[0], path.actual[0], atol=1e-9)
+        assert (now.wanted is None) == (path.wanted is None)
         if name == "wipe":
             assert (scene(run).pushes.table[..., 2] == load(name).plant.height).all()
-        if goal is not None:
-            np.testing.assert_allclose(goal, path.wanted[0], atol=1e-9)
+        if path.wanted is not None:
+            np.testing.assert_allclose(now.wanted[0], path.wanted[0], atol=1e-9)
 
 
 def test_the_viewers_show_the_same_live_and_afterwards():
@@ -95,6 +94,7 @@ def test_the_viewers_show_the_same_live_and_afterwards():
     run = simulate(STANDING.with_changes({"control.duration": 0.02}))
     live = Live(run.scenario)
     live.tick()
-    assert [one.name for one in live.curves(1.0)[1]] == [one.name for one in scene(run).series]
-    for one, other in zip(live.moment().pushes, of_scene(scene(run), 0).pushes, strict=True):
+    now, after = live.frame(), scene(run)
+    assert [one.name for one in now.series] == [one.name for one in after.series]
+    for one, other in zip(now.pushes.at(0), after.pushes.at(0), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)

@@ -153,9 +153,9 @@ def test_a_robot_without_capsules_is_drawn_as_sticks(tmp_path):
 def test_no_robot_at_rest_is_below_the_floor(name):
     scenario = load("ellipse").model_copy(update={"robot": RobotSection(model=name)})
     fixed = stage_of(scenario)
-    low = ends(fixed.capsules[1:], fixed.robot.placements(fixed.robot.rest))[..., 2].min()
-    assert low >= fixed.floor
-    assert stage_of(load("humanoid")).floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
+    low = ends(fixed.robot.capsules[1:], fixed.robot.placements(fixed.robot.rest))[..., 2].min()
+    assert low >= fixed.robot.floor
+    assert stage_of(load("humanoid")).robot.floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
 
 
 def test_listed_tasks_have_their_paths_and_errors():

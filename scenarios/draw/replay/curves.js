@@ -35,13 +35,15 @@ class Curves {
   constructor(place, runs, data, seek) {
     Object.assign(this, {place, runs, seek, joints: data.joints, fates: data.fates,
                          phrases: data.phrases});
-    this.end = Math.max(...runs.map(run => run.end)) || 1;
+    [this.begin, this.end] = [0, Math.max(...runs.map(run => run.end)) || 1];
     new ResizeObserver(() => { if (place.clientWidth !== this.width) this.lay_out(); })
       .observe(place);
     this.lay_out();
   }
 
-  x(t) { return this.left + (this.width - this.left - RIGHT) * t / this.end; }
+  x(t) {
+    return this.left + (this.width - this.left - RIGHT) * (t - this.begin) / (this.end - this.begin);
+  }
 
   lay_out() {
     this.width = this.place.clientWidth;
@@ -65,7 +67,7 @@ class Curves {
     const put = event => {
       const box = svg.getBoundingClientRect();
       const share = (event.clientX - box.left - this.left) / (box.width - this.left - RIGHT);
-      this.seek(this.end * Math.min(Math.max(share, 0), 1));
+      this.seek(this.begin + (this.end - this.begin) * Math.min(Math.max(share, 0), 1));
     };
     svg.addEventListener("pointerdown", event => {
       svg.setPointerCapture(event.pointerId);
@@ -76,7 +78,7 @@ class Curves {
   }
 
   times(height) {
-    return ticks(0, this.end, Math.max(3, Math.round(this.width / 90))).flatMap(t => [
+    return ticks(this.begin, this.end, Math.max(3, Math.round(this.width / 90))).flatMap(t => [
       element("line", {class: "grid", x1: this.x(t), x2: this.x(t), y1: TOP, y2: height - BELOW}),
       element("text", {x: this.x(t), y: height - 3, "text-anchor": "middle"}, `${t} s`)]);
   }

@@ -27,6 +27,7 @@ class Run {
     this.frames = this.t.rows;
     this.end = this.t.values[this.frames - 1];
     this.visible = true;
+    this.stretches = [{first: 0, last: Infinity, colour: this.colour}];  // of the path by colour
   }
 
   // The last frame not after time t [s], and the fraction of the time to the next.

@@ -21,6 +21,7 @@ from scenarios.scene.pushes import key
 from scenarios.templates import render, resource
 
 if TYPE_CHECKING:
+    from scenarios.config import Scenario
     from scenarios.recording.recording import Recording
 
 NOTHING = 65535  # NaN or infinite
@@ -65,11 +66,11 @@ def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
         "distance": scene.distance[frames, scene.linked], "fate": levels.fate,
         "violation": levels.violation, "saturated": levels.saturated}
     return {**about,
-            "radii": [capsule.radius for capsule in fixed.capsules],
+            "radii": [capsule.radius for capsule in fixed.robot.capsules],
             "obstacles": [{"shape": obstacle.shape, "size": list(obstacle.size),
                            "rotation": np.asarray(obstacle.rotation, float).ravel().tolist()}
                           for obstacle in fixed.obstacles.obstacles],
-            "areas": fixed.areas, "floor": fixed.floor, "azimuth": fixed.azimuth,
+            "areas": fixed.areas, "floor": fixed.robot.floor, "azimuth": fixed.azimuth,
             "halfAngle": fixed.half_angle,
             "wanted": None if fixed.axis is None else fixed.axis.tolist(),
             "orders": scene.orders, "tasks": levels.names, "units": levels.units,
@@ -109,39 +110,48 @@ _SCRIPTS = ("data.js", "space.js", "painter.js", "sketch.js", "stage.js", "curve
 
 def html(recordings: Mapping[str, Recording], title: str,
          happenings: Mapping[str, Iterable[Happening]] | None = None, *, rate: float = 30.0,
-         embedded: bool = False) -> str:
+         embedded: bool = False, beside: bool = False) -> str:
     """Return a replay of runs, by label, as a self-contained document.
 
     `happenings` are those of each run, where they are known; `rate` is in frames per second. With
     `embedded` the document has no heading, is as tall as its content, and leaves the mouse wheel to
-    the surrounding page. Raises HierarchyError if there is nothing to show.
+    the surrounding page. With `beside` several runs are side by side at first. Raises
+    HierarchyError if there is nothing to show.
     """
-    from scenarios.draw.figures.drawing import JOINTS
-
     if not recordings:
         raise HierarchyError("a replay needs at least one run")
     look = looks(recordings)
-    runs = [run_data(scene(recording, rate), {"label": label, **look[label]._asdict(),
-                                              **_about(recording, happenings[label] if happenings
-                                                       else happened(recording))})
-            for label, recording in recordings.items()]
-    data = {"runs": runs, "fates": fates(), "phrases": phrases(), "joints": JOINTS,
-            "embedded": embedded,
-            "drawn": {name: words for one in recordings.values()
-                      for name, words in key(one.facts, one.scenario).items()}}
-    document = render(
+    runs = [run_data(scene(recording, rate), {
+        "label": label, **look[label]._asdict(), **about(recording.scenario),
+        "fault": recording.fault, "goals": list(verdict(recording).said),
+        "events": [{"t": one.t, "text": f"{one.what}: {one.why}"} for one in (
+            happenings[label] if happenings else happened(recording))]})
+        for label, recording in recordings.items()]
+    drawn = {name: words for one in recordings.values()
+             for name, words in key(one.facts, one.scenario).items()}
+    return document(title, {"runs": runs, "embedded": embedded, "beside": beside, "drawn": drawn},
+                    "embedded" if embedded else "whole")
+
+
+def document(title: str, data: Mapping[str, Any], kind: str, more: str = "",
+             player: str = "Player") -> str:
+    """Return the page of a `kind` that its `player` plays; `more` is a script that it needs."""
+    from scenarios.draw.figures.drawing import JOINTS
+
+    known = {**data, "fates": fates(), "phrases": phrases(), "joints": JOINTS}
+    return str(render(  # not markup: a page that embeds it has to escape it
         f"{_FOLDER}/replay.html", title=title, style=resource(f"{_FOLDER}/replay.css"),
-        script=Markup("\n").join(resource(f"{_FOLDER}/{name}") for name in _SCRIPTS),
-        kind="embedded" if embedded else "whole",
-        data=Markup(json.dumps(data, separators=(",", ":"), allow_nan=False).replace(
-            "<", "\\u003c")))
-    return str(document)  # not markup: a page that embeds it has to escape it
+        script=Markup("\n").join([*(resource(f"{_FOLDER}/{name}") for name in _SCRIPTS),
+                                  Markup(more)]),
+        kind=kind, player=player, data=Markup(as_json(known).replace("<", "\\u003c"))))
 
 
-def _about(recording: Recording, happenings: Iterable[Happening]) -> dict[str, Any]:
-    scenario = recording.scenario
-    limits = getattr(scenario, "limits", None)
-    return {"scenario": scenario.name, "title": scenario.title, "fault": recording.fault,
-            "goals": list(verdict(recording).said), "level": scenario.control.level,
-            "limited": limits is not None,
-            "events": [{"t": one.t, "text": f"{one.what}: {one.why}"} for one in happenings]}
+def as_json(data: Any) -> str:
+    """Return plain data as compact JSON."""
+    return json.dumps(data, separators=(",", ":"), allow_nan=False)
+
+
+def about(scenario: Scenario) -> dict[str, Any]:
+    """Return what the page says of a scenario."""
+    return {"scenario": scenario.name, "title": scenario.title, "level": scenario.control.level,
+            "limited": getattr(scenario, "limits", None) is not None}

@@ -198,6 +198,14 @@ class Painter {
 
   finish() {}
 
+  // Give the memory of meshes and segments back.
+  release(...shapes) {
+    for (const {vertices, indices} of shapes) {
+      this.gl.deleteBuffer(vertices);
+      if (indices) this.gl.deleteBuffer(indices);
+    }
+  }
+
   bind(mesh, attributes, stride) {
     const gl = this.gl;
     gl.bindBuffer(gl.ARRAY_BUFFER, mesh.vertices);

@@ -2,7 +2,7 @@
 
 class Player {
   constructor(data) {
-    this.runs = data.runs.map(one => new Run(one));
+    this.runs = data.runs.map(one => this.run(one));
     this.runs.forEach((run, i) => {  // of one colour: each paler than the previous one
       run.paler = 0.3 * this.runs.slice(0, i).filter(one => one.colour === run.colour).length;
     });
@@ -11,15 +11,22 @@ class Player {
     const get = id => document.getElementById(id);
     this.parts = Object.fromEntries(["space", "scrub", "time", "play", "speed", "legend", "modes",
       "names", "notice", "drawn", "stacks", "curves", "marks"].map(id => [id, get(id)]));
-    this.stacks = this.runs.map(run => new StackList(run, data, this.runs.length > 1,
-      t => this.seek(t)));
-    this.parts.stacks.append(...this.stacks.map(stack => stack.card));
-    this.curves = new Curves(this.parts.curves, this.runs, data, t => this.seek(t));
+    this.make_lists(data);
     this.make_stage();
-    this.make_controls();
+    this.make_controls(data);
     this.make_legend();
     this.make_key(data.drawn);
+    if (data.beside) this.arrange(true);
     this.seek(+(/^#t=([\d.]+)$/.exec(location.hash) || [0, 0])[1]);
+  }
+
+  run(data) { return new Run(data); }
+
+  make_lists(data) {
+    this.stacks = this.runs.map(run => new StackList(run, data, this.runs.length > 1,
+      t => this.seek(t)));
+    this.parts.stacks.replaceChildren(...this.stacks.map(stack => stack.card));
+    this.curves = new Curves(this.parts.curves, this.runs, data, t => this.seek(t));
   }
 
   make_stage() {
@@ -96,13 +103,18 @@ class Player {
   toggle() {
     this.playing = !this.playing;
     if (this.playing && this.t >= this.end) this.seek(0);
-    this.parts.play.setAttribute("aria-label", this.playing ? "Pause" : "Play");
-    this.parts.play.querySelector("path").setAttribute("d",
-      this.playing ? "M6 4h4v16H6zM14 4h4v16h-4z" : "M7 4v16l13-8z");
+    this.show_playing(this.playing);
     if (this.playing) {
       this.last = performance.now();
       requestAnimationFrame(now => this.tick(now));
     }
+  }
+
+  show_playing(playing) {
+    this.playing = playing;
+    this.parts.play.setAttribute("aria-label", playing ? "Pause" : "Play");
+    this.parts.play.querySelector("path").setAttribute("d",
+      playing ? "M6 4h4v16H6zM14 4h4v16h-4z" : "M7 4v16l13-8z");
   }
 
   tick(now) {
@@ -207,5 +219,3 @@ class Player {
         `top: ${space.offsetTop + (space.height - y - h) / ratio + above}px`}, run.label)));
   }
 }
-
-const player = new Player(JSON.parse(document.getElementById("data").textContent));

@@ -11,6 +11,8 @@ class Sketch {
 
   segments(pairs) { return {pairs}; }
 
+  release() {}
+
   clear(colour) {
     this.pen.fillStyle = css(colour);
     this.pen.fillRect(0, 0, this.canvas.width, this.canvas.height);
@@ -118,10 +120,10 @@ class Sketch {
   }
 
   line({pairs}, [red, green, blue, alpha], width,
-       {dash = 0, depth = true, last = Infinity, under = false} = {}) {
+       {dash = 0, depth = true, first = 0, last = Infinity, under = false} = {}) {
     const style = css([red, green, blue], alpha);
     let along = 0;
-    for (const [a, b] of pairs.slice(0, Math.min(last, pairs.length))) {
+    for (const [a, b] of pairs.slice(first, Math.min(last, pairs.length))) {
       const shown = !dash || along / dash % 1 < 0.55;
       along += Math.hypot(...subtract(b, a));
       if (!shown) continue;

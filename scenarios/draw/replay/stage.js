@@ -38,7 +38,7 @@ function palette() {
   const named = name => rgb(style.getPropertyValue(`--${name}`).trim());
   const dark = named("ground")[0] < 0.5;
   return {sky: named("sky"), ink: named("ink"), alert: named("alert"), quiet: named("quiet"),
-          accent: named("accent"),
+          accent: named("accent"), met: named("met"), missed: named("missed"),
           link: dark ? [0.72, 0.75, 0.79] : [0.86, 0.88, 0.9],
           joint: dark ? [0.36, 0.4, 0.46] : [0.4, 0.44, 0.5], dark};
 }
@@ -56,13 +56,24 @@ class Stage {
     const webgl = {antialias: true, stencil: true, alpha: false};
     this.flat = !this.canvas.getContext("webgl", webgl);
     this.painter = this.flat ? new Sketch(this.canvas) : new Painter(this.canvas);
-    this.paths = new Map(this.runs.map(run => [run, {
+    this.paths = new Map(this.runs.map(run => [run, this.shapes(run)]));
+    this.grid = this.painter.segments(grid(this.camera, this.floor));
+  }
+
+  shapes(run) {
+    const wanted = run.ahead || [run.desired, ...run.paths.map(path => path.wanted)];
+    return {
       traced: [[run.points, run.points.width - 3], ...run.paths.map(path => [path.actual, 0])]
         .map(([points, first]) => this.painter.segments(joined(points, first))),
-      desired: [run.desired, ...run.paths.map(path => path.wanted)].filter(points => points)
+      desired: wanted.filter(points => points)
         .map(points => this.painter.segments(joined(points, 0))),
-      cone: run.wanted && this.painter.mesh(cone(run.halfAngle))}]));
-    this.grid = this.painter.segments(grid(this.camera, this.floor));
+      cone: run.wanted && this.painter.mesh(cone(run.halfAngle))};
+  }
+
+  forget(run) {
+    const {traced = [], desired = [], cone: own} = this.paths.get(run) || {};
+    this.painter.release(...traced, ...desired, ...(own ? [own] : []));
+    this.paths.delete(run);
   }
 
   // Draw the visible runs side by side or overlaid; return the area of each.
@@ -114,10 +125,12 @@ class Stage {
       const colour = k === active ? colours.alert : k === last ? rgb(run.colour) : colours.ink;
       moment.dots.push(ball(triple(points, k), k === active ? 1.6 * DOT : DOT, [...colour, 1]));
     }
+    for (const place of run.handles || []) moment.dots.push(ball(place, 1.4 * DOT, [...colours.accent, 1]));
     if (run.wanted) {
+      const inside = dot(unit(run.wanted), moment.axis) >= Math.cos(run.halfAngle);
+      const state = several ? rgb(run.colour) : inside ? colours.met : colours.missed;
       moment.cones.push({mesh: this.paths.get(run).cone, centre: tip, size: [0, 0, 0],
-                         axes: axes_along(run.wanted), radius: CONE_LENGTH,
-                         colour: [...rgb(run.colour), 0.3]});
+                         axes: axes_along(run.wanted), radius: CONE_LENGTH, colour: [...state, 0.3]});
     }
     return moment;
   }
@@ -139,7 +152,9 @@ class Stage {
     for (const path of desired) {
       painter.line(path, [...colours.ink, 0.75], 1.2 * ratio, {dash: 0.02});
     }
-    for (const path of traced) painter.line(path, [...own, 1], 2.6 * ratio, {last: at.frame});
+    for (const path of traced) for (const {first, last, colour} of run.stretches) {
+      painter.line(path, [...rgb(colour), 1], 2.6 * ratio, {first, last: Math.min(last, at.frame)});
+    }
     const passing = (pairs, colour, width, options) =>
       painter.line(painter.segments(pairs, false), colour, width * ratio, options);
     if (run.wanted) {
@@ -180,7 +195,8 @@ function bounds(runs) {
   });
   for (const run of runs) {
     const radius = Math.max(...run.radii, 0), wanted = run.paths.map(path => path.wanted);
-    for (const all of [run.links, run.points, run.desired, run.centres, ...wanted]) {
+    for (const all of [run.links, run.points, run.desired, run.centres, ...wanted,
+                       ...run.ahead || []]) {
       for (let k = 0; all && k < all.values.length / 3; k++) take(all.values, k, radius);
     }
   }

@@ -5,18 +5,18 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.plant import KinematicSection
-from scenarios.draw.viewer.moment import Moment, of_scene
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import rehearsed, tick
@@ -24,11 +24,10 @@ from scenarios.measure.judging import Fates, completed
 from scenarios.measure.run_folder import save
 from scenarios.measure.verdict import verdict
 from scenarios.recording.recording import Recording
-from scenarios.scene import Series, scene, series
+from scenarios.scene import Scene, scene
 
 _HAND = 1.0     # [m/s] greatest speed of a dragged obstacle
 _FARTHEST = 5.0  # [m] greatest distance of dragging
-_POINTS = 150    # of a curve
 
 
 class Live:
@@ -39,7 +38,7 @@ class Live:
     HierarchyError and has no effect. `over` is set after the last tick or after one with a `fault`.
     """
 
-    _moment: Moment
+    _frame: Scene
 
     def __init__(self, scenario: Scenario) -> None:
         if scenario.faults:
@@ -62,7 +61,6 @@ class Live:
         offset = np.zeros((0, 3)) if self.obstacles is None else self.obstacles.offset
         self._wanted, self._changed = offset.copy(), np.zeros(self.ticks, dtype=np.bool_)
         self._offsets = np.zeros((self.ticks, *offset.shape))
-        self._cosine = np.zeros(self.ticks)
         self._goals: tuple[int, tuple[str, ...]] = 0, ()
         self._seen: tuple[int, Controller | None] = -1, None
 
@@ -78,8 +76,6 @@ class Live:
         k = self.recorder.ticks
         self._drag_on()
         broken = tick(self.controller, self.recorder, self.t)
-        if (pointing := self.controller.cell.pointing) is not None:
-            self._cosine[k] = pointing.cos_alpha_d
         self._changed[k] = self.scenario != self.begun or self._offsets[k].any()
         policy = self.controller.policy
         if broken:
@@ -130,33 +126,23 @@ class Live:
         exact = self.begun.model_copy(update={"plant": KinematicSection()})
         return completed(recording, build(exact))
 
-    def moment(self) -> Moment:
-        """Return what is drawn after the last tick: the state at its start."""
+    def frame(self) -> Scene:
+        """Return what is drawn after the last tick, one frame: the state at its start."""
         k, controller = self.recorder.ticks - 1, self.controller
         if self._seen == (k, controller):
-            return self._moment
+            return self._frame
         self._seen = k, controller
-        recording = self._part(np.array([k]))
+        recording = self.recorder.part(np.array([k]), self.scenario)
+        order = recording.orders[int(recording["order"][0])]
+        recording.signals["order"][:] = 1
+        recording = replace(recording, orders=(" > ".join(controller.cell.stack.names), order))
         fates = Fates(recording.task_names, 1, controller.cell.robot.n)
         if controller.answered:
             fates.look(0, controller)
         recording.signals.update(fates.signals(recording), obstacle_offset=self._offsets[k:k + 1])
         with suppress(HierarchyError):  # a state that is not finite cannot be drawn
-            self._moment = of_scene(scene(recording), 0)
-        return self._moment
-
-    def curves(self, seconds: float) -> tuple[Array, tuple[Series, ...]]:
-        """Return times (F,) [s] and curves of the last seconds."""
-        last = self.recorder.ticks - 1
-        first = max(0, last - round(seconds / self.scenario.control.period))
-        rows = np.unique(np.linspace(first, last, _POINTS).astype(np.int64))
-        recording = self._part(rows)
-        if (pointing := self.controller.cell.pointing) is not None:  # the cone may have changed
-            recording.signals["pointing_error"] += pointing.cos_alpha_d - self._cosine[rows]
-        return recording["t"], tuple(series(recording, np.arange(len(rows))))
-
-    def _part(self, rows: NDArray[np.int64]) -> Recording:
-        return self.recorder.part(rows, self.scenario)
+            self._frame = scene(recording)
+        return self._frame
 
     def goals(self) -> tuple[str, ...]:
         """Return how far the run is, or how it ended, and its goals so far, in a line each."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections import deque
+from queue import SimpleQueue
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -12,52 +13,54 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.pose import PoseTask
-from scenarios.draw.figures.drawing import colours
+from scenarios.config import Scenario
+from scenarios.draw.figures.palette import looks
+from scenarios.draw.replay.page import about, as_json, document, packed, run_data
+from scenarios.draw.viewer.knobs import knobs
 from scenarios.draw.viewer.live import Live
-from scenarios.draw.viewer.live_panel import LivePanel, resolvers
-from scenarios.draw.viewer.model import Model, Rgb, rgb
-from scenarios.draw.viewer.moment import Moment
-from scenarios.draw.viewer.playback import Requests
-from scenarios.draw.viewer.server import lay_floor, look_at_all
-from scenarios.draw.viewer.stack_list import key_html, stack_html
-from scenarios.scene import Stage, ends, stage
 from scenarios.scene.pushes import key
+from scenarios.templates import resource
 
 FRAMES = 30.0   # frames per second
-_CURVES = 4.0   # updates of the curves per second
-_TRACE = 600    # length of the trace in frames, points of the path
 _BUSY = 0.05    # [s] of ticks between two frames, at most
 _HAND = 1.0     # [m/s] greatest speed of a dragged path
-_NEAR = 1.0     # [m] from the base: obstacles in the initial camera view
+_POINTS = 300   # of a desired path
 
 
 class LivePage:
-    """A live run drawn into a server.
+    """A live run as a page shows it.
 
-    `step` carries out requests, runs the ticks that are due, and draws; nothing else changes the
-    run. `requests` takes the page's requests; `list` is the stack's HTML; `refused` says why the
-    last invalid request was rejected.
+    `step` carries out requests, runs the ticks that are due, and makes `now`, the JSON that the
+    page gets; nothing else changes the run. `answer` and `html` are for the threads of a server;
+    `opened` is set once a page has asked. `refused` says why the last invalid request was rejected.
     """
 
-    def __init__(self, server: Any, live: Live, speed: float = 1.0) -> None:
-        self.server, self.live, self.requests = server, live, Requests()
-        self.speed, self.playing = speed, True
-        self.list, self.refused = "", ""
+    def __init__(self, live: Live, speed: float = 1.0) -> None:
+        self.live, self.speed, self.playing, self.refused = live, speed, True, ""
+        self.opened = Event()
         self.specs = resolvers(live.scenario)
-        self._colours = colours(self.specs)
-        self._due, self._curves_at = 0.0, -np.inf
-        self._stage = self._stage_now()
-        self._trace: deque[tuple[list[Array], Rgb]] = deque(maxlen=_TRACE)
-        self._middle, self._path_wanted = np.zeros(3), self._path_offset()
-        lay_floor(server, self._stage.floor)
-        paths = self._paths()
-        self._model = Model(server, "/run", self._stage, self._colour, paths)
-        self._first_tick()
-        self._place_camera(paths)
-        self.panel = LivePanel(
-            server, self.requests, live, list(self.specs), speed, self._stage,
-            key_html(key(live.recorder.facts, live.scenario), self._colour))
-        self.draw()
+        self._looks = looks(self.specs)
+        self._requests: SimpleQueue[dict[str, Any]] = SimpleQueue()
+        self._due, self._refusals, self._begun = 0.0, 0, 0
+        self.live.tick()  # before it there is nothing to show
+        self._follow()
+        self._path_wanted = self._path_offset()
+        self.now = as_json(self.data())
+
+    def answer(self, asked: dict[str, Any]) -> str:
+        """Take the requests of a page, values by what is to be changed; return `now`."""
+        self.opened.set()
+        if asked:
+            self._requests.put(asked)
+        return self.now
+
+    def html(self) -> str:
+        """Return the page."""
+        scenario = self.live.scenario
+        words = key(self.live.recorder.facts, scenario)
+        return document(f"{scenario.title or scenario.name}, live",
+                        {**self.data(), "drawn": words, "embedded": False, "beside": False},
+                        "live", resource("draw/viewer/live.js"), "LivePlayer")
 
     @property
     def label(self) -> str:
@@ -65,27 +68,39 @@ class LivePage:
         return str(self.live.scenario.make_resolver().label)
 
     def step(self, seconds: float) -> None:
-        """Carry out requests, run the ticks of so many seconds, and draw."""
-        for what, value in self.requests.take():
+        """Carry out requests and run the ticks of so many seconds."""
+        asked: dict[str, Any] = {}
+        for _ in range(self._requests.qsize()):  # of repeated ones only the last counts
+            asked |= self._requests.get()
+        for what, value in asked.items():
             self._do(what, value)
         if self.playing and not self.live.over:
             self._drag_path(seconds)
             self._make_ticks(seconds)
-        self.draw()
+        self.now = as_json(self.data())
 
-    def draw(self) -> None:
-        """Draw the present state of the run."""
-        now = self.live.moment()
-        tips, shades = zip(*self._trace, strict=True)
-        with self.server.atomic():
-            self._model.show(now, list(np.swapaxes(tips, 0, 1)), np.array(shades))
-            for h, centre in enumerate(now.centres):
-                self.panel.handles.follow(f"obstacle {h}", centre)
-            self.panel.handles.follow("path", self._middle + self._path_offset())
-        self._show_list(now)
-        if time.monotonic() - self._curves_at > 1.0 / _CURVES:
-            self._curves_at = time.monotonic()
-            self.panel.roll()
+    def data(self) -> dict[str, Any]:
+        """Return what the page shows now: a frame of the run, and the state of its controls."""
+        live, scenario, playing = self.live, self.live.scenario, self.playing and not self.live.over
+        run = run_data(live.frame(), {
+            "label": self.label, **self._looks[self.label]._asdict(), **about(scenario),
+            "fault": live.fault, "goals": [] if playing else list(live.goals()), "events": [],
+            "ahead": [packed(path) for path in self._paths]})
+        return {"runs": [run], "playing": playing, "refused": [self._refusals, self.refused],
+                "begun": self._begun, "speed": self.speed, "resolver": self.label,
+                "resolvers": list(self.specs), "handles": self._handles(),
+                "note": f"t = {live.t:.1f} of {scenario.control.duration:.1f} s"
+                        + (", ended" if live.over else ""),
+                "settings": [{**knob._asdict(), "value": value} for knob, value in knobs(scenario)]}
+
+    def _handles(self) -> dict[str, list[float]]:
+        """Return where what can be dragged is, (3,) [m] by its name."""
+        obstacles = self.live.obstacles
+        found = {} if obstacles is None else {
+            f"obstacle {h}": place for h, place in enumerate(obstacles.centres)}
+        if self.live.scenario.position is not None:
+            found["path"] = self.middle + self._path_offset()
+        return {name: place.tolist() for name, place in found.items()}
 
     def _make_ticks(self, seconds: float) -> None:
         """Run the ticks that are due as far as time allows; drop the rest."""
@@ -95,15 +110,6 @@ class LivePage:
         while self._due >= 1.0 and not live.over and time.perf_counter() < end:
             live.tick()
             self._due -= 1.0
-        self._note()
-
-    def _first_tick(self) -> None:
-        """Run one tick, before which there is nothing to show."""
-        self.live.tick()
-        self._note()
-
-    def _note(self) -> None:
-        self._trace.append((self.live.moment().tips, rgb(self._colour)))
 
     def _do(self, what: str, value: Any) -> None:
         try:
@@ -112,31 +118,25 @@ class LivePage:
             elif what in ("toggle", "restart"):
                 self._restart()
             elif what == "speed":
-                self.speed = value
-            elif what == "handles":
-                self.panel.handles.set_visible(value)
+                self.speed = min(max(float(value), 0.01), 100.0)
             elif what == "path":
-                self._path_wanted = value - self._middle
+                self._path_wanted = np.asarray(value, dtype=float).reshape(3) - self.middle
             elif what.startswith("obstacle "):
-                self._drag(int(what.removeprefix("obstacle ")), value)
+                self._drag(int(what.removeprefix("obstacle ")), np.asarray(value, dtype=float))
+            elif what == "resolver":
+                self.live.switch(self.specs.get(value, str(value)))
+                self._follow()
             else:
-                self._change(what, value)
-        except HierarchyError as error:
-            self._refuse(str(error))
-
-    def _change(self, what: str, value: Any) -> None:
-        if what == "resolver":
-            self.live.switch(self.specs[value])
-        else:
-            self.live.change({what: value})
-        self._follow()
+                self.live.change({what: value})
+                self._follow()
+        except (HierarchyError, TypeError, ValueError) as error:
+            self.refused, self._refusals = str(error), self._refusals + 1
 
     def _restart(self) -> None:
         self.live.restart()
-        self._trace.clear()
-        self._due, self.playing = 0.0, True
+        self._due, self.playing, self._begun = 0.0, True, self._begun + 1
+        self.live.tick()
         self._follow()
-        self._first_tick()
 
     def _drag(self, h: int, place: Array) -> None:
         obstacles = self.live.obstacles
@@ -154,54 +154,40 @@ class LivePage:
             if (here == self._path_offset()).all():  # the change was rejected
                 self._path_wanted = here
 
-    def _follow(self) -> None:
-        """Draw the parts that have changed with the scenario."""
-        before, self._stage = self._stage, self._stage_now()
-        if (before.areas, before.half_angle) != (self._stage.areas, self._stage.half_angle):
-            self._model.set_stage(self._stage)
-        self._model.paint(self._colour)
-        self._model.set_paths(self._paths())
-
-    def _stage_now(self) -> Stage:
-        return stage(self.live.recorder.facts.robot, self.live.scenario)
-
-    def _refuse(self, why: str) -> None:
-        """Say why a request was rejected, and reset the inputs."""
-        self.refused = why
-        for client in self.server.get_clients().values():
-            client.add_notification("Not changed", why, color="red", auto_close_seconds=6.0)
-        self.panel.set_to(self.live.scenario, self.label)
-
-    @property
-    def _colour(self) -> str:
-        return self._colours[self.label]
-
     def _path_offset(self) -> Array:
         position = self.live.scenario.position
         return np.array(position.offset) if position else np.zeros(3)
 
-    def _paths(self) -> list[Array]:
-        """Return the desired paths (N, 3) [m]; update `_middle`, that of the first one."""
+    def _follow(self) -> None:
+        """Note the desired paths (N, 3) [m] of the present scenario, and the middle of the first.
+
+        That is its middle without its offset.
+        """
         cell = self.live.controller.cell
-        times = np.linspace(0.0, self.live.scenario.control.duration, _TRACE)
-        paths = [np.array([task.path(t)[0] for t in times])
-                 for task in (cell.position, *cell.listed) if isinstance(task, Position | PoseTask)]
-        if cell.position is not None:
-            self._middle = (paths[0].min(axis=0) + paths[0].max(axis=0)) / 2 - self._path_offset()
-        return paths
+        times = np.linspace(0.0, self.live.scenario.control.duration, _POINTS)
+        self._paths = [np.array([task.path(t)[0] for t in times])
+                       for task in (cell.position, *cell.listed)
+                       if isinstance(task, Position | PoseTask)]
+        first = self._paths[0] if self._paths else np.zeros((1, 3))
+        self.middle = (first.min(axis=0) + first.max(axis=0)) / 2 - self._path_offset()
 
-    def _place_camera(self, paths: list[Array]) -> None:
-        stage, placements = self._stage, self.live.moment().placements
-        arm = ends(stage.capsules, placements).reshape(-1, 3)
-        near = [place for place in stage.obstacles.centres if np.linalg.norm(place) < _NEAR]
-        look_at_all(self.server, np.vstack([*paths, arm, *near]), stage.azimuth)
 
-    def _show_list(self, now: Moment) -> None:
-        live = self.live
-        note = f"t = {now.t:.1f} of {live.ticks * live.scenario.control.period:.1f} s"
-        if live.over:
-            note += f", {live.fault or 'ended'}"
-        playing = self.playing and not live.over
-        self.list = stack_html(self.label, self._colour, now, live.controller.cell.stack.names,
-                               note, () if playing else live.goals())
-        self.panel.show(playing, self.list)
+def resolvers(scenario: Scenario) -> dict[str, str]:
+    """Return the specs of resolvers that can resolve a scenario's stack, by label.
+
+    The scenario's own resolver is the first.
+    """
+    from scenarios.config.resolvers import default_resolvers
+    from solvers import names, variants
+
+    own = scenario.control.resolver
+    found: dict[str, str] = {}
+    for spec in (own, *default_resolvers(scenario.asks)[0], *names(), *variants()):
+        try:
+            other = scenario if spec == own else scenario.with_resolver(spec)
+            resolver = other.make_resolver()
+        except HierarchyError:
+            continue
+        if resolver.can_resolve(other.asks):
+            found.setdefault(str(resolver.label), spec)
+    return found
