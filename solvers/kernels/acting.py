@@ -197,7 +197,7 @@ def _drop_rounding(w, own, zero, rank):
 def _mu(W, at, settings, regularisation, work):
     """Return mu, combined with lambda if the soft rows are damped as one level."""
     if settings.damping > 0.0 and at.k1 > at.k0:
-        return np.hypot(regularisation, level_damping(W, at, settings, work))
+        return np.sqrt(regularisation ** 2 + level_damping(W, at, settings, work) ** 2)
     return regularisation
 
 

@@ -125,7 +125,7 @@ def orthogonalise_rows(W, U):
                     continue
                 settled = False
                 zeta = (b - a) / (2.0 * c)
-                t = 1.0 / (abs(zeta) + np.hypot(1.0, zeta))
+                t = 1.0 / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
                 t = t if zeta >= 0.0 else -t
                 cosine = 1.0 / np.sqrt(1.0 + t * t)
                 _rotate(W, i, j, cosine, t)

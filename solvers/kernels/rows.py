@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product
 from solvers.kernels.tolerances import LEAST_SQUARE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
@@ -113,13 +113,6 @@ def reflect(basis, k0, k1, W, i0, i1):
         for i in range(i0, i1):
             w = W[i, k:]
             add_multiple(w, -beta * inner_product(v, w), v)
-
-
-@inlined
-def add_multiple(w, s, v):
-    """Add s v to w."""
-    for c in range(v.size):
-        w[c] += s * v[c]
 
 
 @inlined

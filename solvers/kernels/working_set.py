@@ -19,10 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined, inner_product
-from solvers.kernels.rows import ZERO, add_multiple, factor_level, reflect, swap
+from hierarchy.jit import add_multiple, as_matrix, compiled, inlined, inner_product
+from solvers.kernels.rows import ZERO, factor_level, reflect, swap
 from solvers.kernels.space import Basis, Rows, View, carve_basis, integers, matrix, vector
-from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE
+from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE, SPARED
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
 # Rows of `number`. Per row of A: its norm, its only entry, its sides, the norm of what was cut from
@@ -37,10 +37,10 @@ NUMBERS = 16  # one more than these: `levels.py` keeps its own behind REFERENCE
 # the change that the search asks for, how often it entered,
 # the side before a search and at its last checkpoint. By place in the list: the row, the sign
 # of its multipliers. The unknown of each column, the column of each unknown. Per level: its first
-# row, its first place in the list, its first column.
+# row, its first place in the list, its first column, whether W lacks the columns above it.
 (UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, SEEN, LIST, SIGN, ORDER, PLACE, BEGIN,
- RANK) = range(13)
-INDICES = 13
+ RANK, SHORT) = range(14)
+INDICES = 14
 # In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
 # cut since the rows were those of A, whether small coefficients are cut along other rows too, the
 # number of rows that are negligible beside those of other levels alone, the number of levels that
@@ -239,7 +239,7 @@ def meet(s, last):
     s.count[PICKED], s.count[WHOLE], s.scalar[SIZE] = 0, -1, 0.0
     s.scalar[PIVOT] = s.scalar[SECOND] = 1.0
     for k in range(levels):
-        begin, index[BEGIN, k], index[RANK, k] = rows, rows, rank
+        begin, index[BEGIN, k], index[RANK, k], index[SHORT, k] = rows, rows, rank, 0
         if k >= last or s.count[WHOLE] >= 0:
             continue
         if gives_all(s, k, s.number[GRADIENT], s.number[SCRATCH]):
@@ -252,9 +252,11 @@ def meet(s, last):
                 index[LIST, rows] = i
                 rows += 1
         if rows > begin:
-            above, rank = rank, _factor(s, begin, rows, rank)
-            _solve(s, begin, rows, above, rank)
+            index[SHORT, k] = _is_short(s, begin, rows, rank)
+            above, rank = rank, _factor(s, begin, rows, rank, index[SHORT, k] == 1)
+            _solve(s, begin, rows, above, rank, index[SHORT, k] == 1)
     index[BEGIN, levels], index[RANK, levels] = rows, rank
+    _keep_goal(s, rank)
     _write_x(s, rank)
 
 
@@ -280,7 +282,15 @@ def gives_all(s, k, goal, seen):
 
 
 @inlined
-def _factor(s, begin, end, rank):
+def _is_short(s, begin, end, rank):
+    """Whether a level has so few columns left that these cost less than its rows, as 0 or 1."""
+    left = s.x.size - rank
+    few = s.count[COARSE] == 0 and rank > s.count[PICKED]
+    return ZERO + (few and 2 * left < s.x.size and left + SPARED < end - begin)
+
+
+@inlined
+def _factor(s, begin, end, rank, short):
     """Give places begin .. end - 1 of the list columns of Q from `rank` on; return the new rank."""
     listed, single = s.index[LIST], rank == s.count[PICKED]
     for q in range(begin, end):
@@ -291,13 +301,13 @@ def _factor(s, begin, end, rank):
         i = listed[q]
         least = s.scalar[TOLERANCE] * s.number[NORM, i]
         s.number[ZEROED, q] = least * least
-        if s.number[CUT, i] > 0.0:
-            for t in range(s.x.size):
-                s.W[q, t] = s.C[i, s.index[ORDER, t]]
-        else:
-            for t in range(s.x.size):
-                s.W[q, t] = s.A[i, s.index[ORDER, t]]
-    reflect(s.basis, s.count[PICKED], rank, s.W, begin, end)
+        for t in range(s.x.size):
+            s.W[q, t] = 0.0
+        add_row(s, i, 1.0, s.W[q])
+    if short:
+        _see_in_columns(s, begin, end, rank)
+    else:
+        reflect(s.basis, s.count[PICKED], rank, s.W, begin, end)
     above = rank
     rank = factor_level(Rows(s.W, listed, s.number[ZEROED], s.number[MISS]), s.basis, begin, end,
                         rank)
@@ -310,6 +320,37 @@ def _factor(s, begin, end, rank):
     for q in range(begin + (0 if s.count[COARSE] == 1 else rank - above), end):
         _cut(s, q, rank, q >= begin + rank - above)
     return rank
+
+
+@inlined
+def add_row(s, i, factor, w):
+    """Add a multiple of row i, as it is after cuts, in the order of the columns."""
+    if s.index[UNIT, i] >= 0:
+        w[s.index[PLACE, s.index[UNIT, i]]] += factor * s.number[ENTRY, i]
+    elif s.number[CUT, i] > 0.0:
+        for t in range(s.x.size):
+            w[t] += factor * s.C[i, s.index[ORDER, t]]
+    else:
+        for t in range(s.x.size):
+            w[t] += factor * s.A[i, s.index[ORDER, t]]
+
+
+@inlined
+def _see_in_columns(s, begin, end, rank):
+    """Replace rows by their products with the columns of Q from `rank` on, and zeros before."""
+    n, w = s.x.size, s.number[SCRATCH]
+    for t in range(rank, n):
+        for c in range(n):
+            s.T[t, c] = 1.0 if c == t else 0.0
+    for k in range(rank - 1, s.count[PICKED] - 1, -1):
+        reflect(s.basis, k, k + 1, s.T, rank, n)
+    for q in range(begin, end):
+        c = s.index[UNIT, s.index[LIST, q]]
+        for t in range(n):
+            w[t], s.W[q, t] = s.W[q, t], 0.0
+        for t in range(rank, n):
+            s.W[q, t] = (w[s.index[PLACE, c]] * s.T[t, s.index[PLACE, c]] if c >= 0 else
+                         inner_product(w[:n], s.T[t]))
 
 
 @inlined
@@ -369,12 +410,19 @@ def _cut(s, q, rank, dependent):
 
 
 @inlined
-def _solve(s, begin, end, above, rank):
+def _solve(s, begin, end, above, rank, short):
     """Write y of the columns above .. rank - 1, and the residuals of a level."""
     y, miss = s.number[Y], s.number[MISS]
+    if short:
+        for t in range(above, s.x.size):
+            y[t] = 0.0
+        _write_x(s, above)
     for q in range(begin, end):
-        rest, w = side_at(s, s.index[LIST, q]), s.W[q]
-        for t in range(above):
+        i, w = s.index[LIST, q], s.W[q]
+        rest = side_at(s, i)
+        if short:
+            rest -= value_at(s, i)
+        for t in range(0 if short else above):
             rest -= w[t] * y[t]
         miss[q] = rest
     tall = end - begin > rank - above
@@ -455,8 +503,8 @@ def turn(s, values, begin, end, above, rank, back):
 
 
 @inlined
-def _write_x(s, rank):
-    """Write x = Q y; the columns from `rank` on keep the goal."""
+def _keep_goal(s, rank):
+    """Give y in the columns from `rank` on the goal."""
     n, picked, order, moved, goal = s.x.size, s.count[PICKED], s.index[ORDER], False, s.number[GOAL]
     for c in range(n):
         s.number[SCRATCH, c] = goal[c]
@@ -467,9 +515,14 @@ def _write_x(s, rank):
         reflect(s.basis, picked, rank, s.number, GOAL, GOAL + 1)
     for t in range(rank, n):
         s.number[Y, t] = goal[t]
-    for t in range(n):
+
+
+@inlined
+def _write_x(s, rank):
+    """Write x = Q y, by the first reflectors."""
+    for t in range(s.x.size):
         s.number[SCRATCH, t] = s.number[Y, t]
-    for k in range(rank - 1, picked - 1, -1):
+    for k in range(rank - 1, s.count[PICKED] - 1, -1):
         reflect(s.basis, k, k + 1, s.number, SCRATCH, SCRATCH + 1)
-    for t in range(n):
-        s.x[order[t]] = s.number[SCRATCH, t]
+    for t in range(s.x.size):
+        s.x[s.index[ORDER, t]] = s.number[SCRATCH, t]
