@@ -18,7 +18,9 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
+from solvers.kernels.least_squares import turn
 from solvers.kernels.rows import length_of, reflect
+from solvers.kernels.space import matrix
 from solvers.kernels.tolerances import CANCELLED, COARSE_SIGN, EPSILON, NEGLIGIBLE, SHADOW
 from solvers.kernels.working_set import (
     BEGIN,
@@ -43,7 +45,6 @@ from solvers.kernels.working_set import (
     Y,
     add_row,
     side_at,
-    turn,
     value_at,
 )
 from solvers.kernels.working_set import (
@@ -230,16 +231,16 @@ def _share(s, begin, end, above, rank):
     force = s.number[FORCE]
     for q in range(begin, end):
         force[q] = 0.0
-    for t in range(above, rank):
-        pull, unsure = s.number[GRADIENT, t], s.number[NOISE, t]
-        for r in range(above, t):
-            part = s.T[t, begin + r - above] * force[begin + r - above]
+    T, _ = matrix(s.T, above * s.A.shape[0], rank - above, end - begin)
+    for k in range(rank - above):
+        pull, unsure = s.number[GRADIENT, above + k], s.number[NOISE, above + k]
+        for r in range(k):
+            part = T[k, r] * force[begin + r]
             pull += part
             unsure += CANCELLED * abs(part)
         if abs(pull) > unsure:
-            force[begin + t - above] = -pull / s.number[DIAGONAL, t]
-    if rank > above:
-        turn(s, force, begin, end, above, rank, True)
+            force[begin + k] = -pull / s.number[DIAGONAL, above + k]
+    turn(T, force[begin:], True)
     most = 0.0
     for q in range(begin, end):
         most = max(most, abs(force[q]) * s.number[NORM, s.index[LIST, q]])
