@@ -13,6 +13,7 @@ from numba.core.errors import TypingError
 from hierarchy.jit.inside import cgutils, intrinsic, types
 
 _LANES = 8
+_REST = (4, 2, 1)
 _NUMBER, _INDEX = ir.DoubleType(), ir.IntType(32)
 
 
@@ -20,24 +21,25 @@ def _inner_product(context: Any, left: Any, right: Any) -> Any:
     """Return the inner product of two contiguous arrays, of which the first has the size.
 
     Lane j sums entries j, j + 8, ..; then halves of the lanes are added, and before each half the
-    entries of the rest that fill it. This order is the same on every machine.
+    entries of the rest that fill it. Fewer than 8 are added one by one. This order is the same on
+    every machine.
     """
     _require_contiguous(left, right)
 
     def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         arrays, size = _opened(context, builder, signature.args, arguments)
-        total = cgutils.alloca_once_value(builder, _splat(builder, _NUMBER(0.0), _LANES))
+        sums = {width: cgutils.alloca_once_value(builder, _splat(builder, _NUMBER(0.0), width))
+                for width in (_LANES, *_REST)}
 
-        def add(at: Any, width: int, place: Any = total) -> None:
+        def add(at: Any, width: int) -> None:
             entries = [_load(builder, array, at, width) for array in arrays]
-            builder.store(_fused(builder, *entries, builder.load(place)), place)
+            builder.store(_fused(builder, *entries, builder.load(sums[width])), sums[width])
 
-        at = _whole(builder, size, add)
-        for width in (4, 2, 1):
-            half = cgutils.alloca_once_value(builder, _halved(builder, builder.load(total), width))
-            at = _rest(builder, size, at, width, lambda at, width, half=half: add(at, width, half))
-            total = half
-        return builder.load(total)
+        def halve(width: int) -> None:
+            builder.store(_halved(builder, builder.load(sums[2 * width]), width), sums[width])
+
+        _step_by_step(builder, size, add, halve)
+        return builder.load(sums[1])
 
     return types.float64(left, right), write
 
@@ -51,14 +53,11 @@ def _add_multiple(context: Any, w: Any, factor: Any, v: Any) -> Any:
         (v, w), size = _opened(context, builder, (kinds[2], kinds[0]), (of, to))
 
         def add(at: Any, width: int) -> None:
-            place = _place(builder, w, at, width)
             entries = (_splat(builder, by, width), _load(builder, v, at, width))
-            sums = _fused(builder, *entries, builder.load(place, align=8))
-            builder.store(sums, place, align=8)
+            sums = _fused(builder, *entries, _load(builder, w, at, width))
+            builder.store(sums, _place(builder, w, at, width), align=8)
 
-        at = _whole(builder, size, add)
-        for width in (4, 2, 1):
-            at = _rest(builder, size, at, width, add)
+        _step_by_step(builder, size, add, lambda width: None)
         return context.get_dummy_value()
 
     return types.void(w, types.float64, v), write
@@ -78,20 +77,23 @@ def _opened(context: Any, builder: Any, kinds: Any, values: Any) -> tuple[list[A
     return arrays, cgutils.unpack_tuple(builder, arrays[0].shape, 1)[0]
 
 
-def _whole(builder: Any, size: Any, step: Callable[[Any, int], None]) -> Any:
-    """Write the steps of all lanes; return the place of the rest."""
-    end = builder.and_(size, size.type(-_LANES))
-    with cgutils.for_range_slice(builder, size.type(0), end, size.type(_LANES)) as (at, _):
-        step(at, _LANES)
-    return end
-
-
-def _rest(builder: Any, size: Any, at: Any, width: int, step: Callable[[Any, int], None]) -> Any:
-    """Write a step of so many lanes if the rest needs it; return the place of what remains."""
-    part = builder.and_(size, size.type(width))
-    with builder.if_then(builder.icmp_signed("!=", part, size.type(0))):
-        step(at, width)
-    return builder.add(at, part)
+def _step_by_step(builder: Any, size: Any, step: Callable[[Any, int], None],
+                  halve: Callable[[int], None]) -> None:
+    """Write the steps: of all lanes, then of halves for the rest; one by one for few entries."""
+    few = builder.icmp_signed("<", size, size.type(_LANES))
+    with builder.if_else(few) as (small, large):
+        with small, cgutils.for_range_slice(builder, size.type(0), size, size.type(1)) as (at, _):
+            step(at, 1)
+        with large:
+            end = builder.and_(size, size.type(-_LANES))
+            with cgutils.for_range_slice(builder, size.type(0), end, size.type(_LANES)) as (at, _):
+                step(at, _LANES)
+            for width in _REST:
+                halve(width)
+                part = builder.and_(size, size.type(width))
+                with builder.if_then(builder.icmp_signed("!=", part, size.type(0))):
+                    step(end, width)
+                end = builder.add(end, part)
 
 
 def _place(builder: Any, array: Any, at: Any, width: int) -> Any:

@@ -114,9 +114,10 @@ def reflect(basis, k0, k1, W, i0, i1):
     They act from a whole block of lanes on, so that each finds what the last has stored.
     """
     for k in range(k0, k1):
-        v = basis[k, k & -LANES:]
+        first = k & -LANES if basis.shape[1] >= LANES else k
+        v = basis[k, first:]
         for i in range(i0, i1):
-            reflect_by(v, W[i, k & -LANES:])
+            reflect_by(v, W[i, first:])
 
 
 @inlined
