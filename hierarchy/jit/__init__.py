@@ -3,6 +3,7 @@
 from hierarchy.jit.binding import bind
 from hierarchy.jit.caching import cache_folder
 from hierarchy.jit.compiling import compiled, inlined, unlocked
+from hierarchy.jit.lanes import add_multiple as add_multiple
 from hierarchy.jit.lanes import inner_product as inner_product
 from hierarchy.jit.saying import announce_compilation
 from hierarchy.jit.sources import Kernel as Kernel

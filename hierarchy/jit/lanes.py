@@ -1,7 +1,8 @@
-"""Sums that run in lanes: numba keeps the order of a sum, so it adds one number after the other."""
+"""Loops over numbers in lanes: numba keeps the order of a sum, so it adds one after the other."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numba
@@ -12,60 +13,133 @@ from numba.core.errors import TypingError
 from hierarchy.jit.inside import cgutils, intrinsic, types
 
 _LANES = 8
+_REST = (4, 2, 1)
+_NUMBER, _INDEX = ir.DoubleType(), ir.IntType(32)
 
 
 def _inner_product(context: Any, left: Any, right: Any) -> Any:
     """Return the inner product of two contiguous arrays, of which the first has the size.
 
-    Lane j sums entries j, j + 8, ..; then halves of the lanes are added, and what is left over one
-    by one. This order is the same on every machine.
+    Lane j sums entries j, j + 8, ..; then halves of the lanes are added, and before each half the
+    entries of the rest that fill it. Fewer than 8 are added one by one. This order is the same on
+    every machine.
     """
-    from numba.np import arrayobj
-
-    if left.layout != "C" or right.layout != "C":
-        raise TypingError(f"inner_product takes contiguous arrays, not {left} and {right}")
+    _require_contiguous(left, right)
 
     def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        arrays = [arrayobj.make_array(kind)(context, builder, value)
-                  for kind, value in zip(signature.args, arguments, strict=True)]
-        size = cgutils.unpack_tuple(builder, arrays[0].shape, 1)[0]
-        whole, number = builder.and_(size, size.type(-_LANES)), ir.DoubleType()
-        total = cgutils.alloca_once_value(builder, number(0.0))
-        with builder.if_then(builder.icmp_signed(">", whole, size.type(0))):
-            lanes = _sum(builder, arrays, (size.type(0), whole, _LANES),
-                         ir.Constant(ir.VectorType(number, _LANES), [0.0] * _LANES))
-            builder.store(_added(builder, lanes), total)
-        return _sum(builder, arrays, (whole, size, 1), builder.load(total))
+        arrays, size = _opened(context, builder, signature.args, arguments)
+        sums = {width: cgutils.alloca_once_value(builder, _splat(builder, _NUMBER(0.0), width))
+                for width in (_LANES, *_REST)}
+
+        def add(at: Any, width: int) -> None:
+            entries = [_load(builder, array, at, width) for array in arrays]
+            builder.store(_fused(builder, *entries, builder.load(sums[width])), sums[width])
+
+        def halve(width: int) -> None:
+            builder.store(_halved(builder, builder.load(sums[2 * width]), width), sums[width])
+
+        _step_by_step(builder, size, add, halve)
+        return builder.load(sums[1])
 
     return types.float64(left, right), write
 
 
-def _sum(builder: Any, arrays: Any, span: tuple[Any, Any, int], begin: Any) -> Any:
-    """Add the products of entries of a span, so many at a time, to a number or a vector."""
-    first, last, step = span
-    total = cgutils.alloca_once_value(builder, begin)
-    with cgutils.for_range_slice(builder, first, last, first.type(step)) as (index, _):
-        entries = [builder.load(builder.bitcast(builder.gep(array.data, [index], inbounds=True),
-                                                begin.type.as_pointer()), align=8)
-                   for array in arrays]
-        builder.store(builder.fadd(builder.load(total), builder.fmul(*entries)), total)
-    return builder.load(total)
+def _add_multiple(context: Any, w: Any, factor: Any, v: Any) -> Any:
+    """Add a multiple of v to w, both contiguous and not the same; v has the size."""
+    _require_contiguous(w, v)
+
+    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kinds, (to, by, of) = signature.args, arguments
+        (v, w), size = _opened(context, builder, (kinds[2], kinds[0]), (of, to))
+
+        def add(at: Any, width: int) -> None:
+            entries = (_splat(builder, by, width), _load(builder, v, at, width))
+            sums = _fused(builder, *entries, _load(builder, w, at, width))
+            builder.store(sums, _place(builder, w, at, width), align=8)
+
+        _step_by_step(builder, size, add, lambda width: None)
+        return context.get_dummy_value()
+
+    return types.void(w, types.float64, v), write
 
 
-def _added(builder: Any, lanes: Any) -> Any:
-    """Return the sum of the lanes: one half to the other, until one is left."""
-    width = _LANES
-    while width > 1:
-        width //= 2
-        kind = ir.VectorType(ir.IntType(32), width)
-        halves = (ir.Constant(kind, list(range(at, at + width))) for at in (0, width))
-        lanes = builder.fadd(*(builder.shuffle_vector(lanes, lanes, half) for half in halves))
-    return builder.extract_element(lanes, ir.IntType(32)(0))
+def _require_contiguous(*arrays: Any) -> None:
+    if any(array.layout != "C" for array in arrays):
+        raise TypingError(f"contiguous arrays are needed, not {arrays}")
+
+
+def _opened(context: Any, builder: Any, kinds: Any, values: Any) -> tuple[list[Any], Any]:
+    """Return arrays as structures, and the size of the first."""
+    from numba.np import arrayobj
+
+    arrays = [arrayobj.make_array(kind)(context, builder, value)
+              for kind, value in zip(kinds, values, strict=True)]
+    return arrays, cgutils.unpack_tuple(builder, arrays[0].shape, 1)[0]
+
+
+def _step_by_step(builder: Any, size: Any, step: Callable[[Any, int], None],
+                  halve: Callable[[int], None]) -> None:
+    """Write the steps: of all lanes, then of halves for the rest; one by one for few entries."""
+    few = builder.icmp_signed("<", size, size.type(_LANES))
+    with builder.if_else(few) as (small, large):
+        with small, cgutils.for_range_slice(builder, size.type(0), size, size.type(1)) as (at, _):
+            step(at, 1)
+        with large:
+            end = builder.and_(size, size.type(-_LANES))
+            with cgutils.for_range_slice(builder, size.type(0), end, size.type(_LANES)) as (at, _):
+                step(at, _LANES)
+            for width in _REST:
+                halve(width)
+                part = builder.and_(size, size.type(width))
+                with builder.if_then(builder.icmp_signed("!=", part, size.type(0))):
+                    step(end, width)
+                end = builder.add(end, part)
+
+
+def _place(builder: Any, array: Any, at: Any, width: int) -> Any:
+    kind = _NUMBER if width == 1 else ir.VectorType(_NUMBER, width)
+    return builder.bitcast(builder.gep(array.data, [at], inbounds=True), kind.as_pointer())
+
+
+def _load(builder: Any, array: Any, at: Any, width: int) -> Any:
+    return builder.load(_place(builder, array, at, width), align=8)
+
+
+def _fused(builder: Any, left: Any, right: Any, third: Any) -> Any:
+    """Return left times right plus the third, rounded once where the processor can."""
+    kind = left.type
+    name = f"llvm.fmuladd.{'f64' if kind == _NUMBER else f'v{kind.count}f64'}"
+    function = cgutils.get_or_insert_function(
+        builder.module, ir.FunctionType(kind, [kind] * 3), name)
+    return builder.call(function, (left, right, third))
+
+
+def _splat(builder: Any, value: Any, width: int) -> Any:
+    """Return a number in all lanes."""
+    if width == 1:
+        return value
+    kind = ir.VectorType(_NUMBER, width)
+    one = builder.insert_element(ir.Constant(kind, ir.Undefined), value, _INDEX(0))
+    lanes = ir.Constant(ir.VectorType(_INDEX, width), [0] * width)
+    return builder.shuffle_vector(one, one, lanes)
+
+
+def _halved(builder: Any, lanes: Any, width: int) -> Any:
+    """Return one half of the lanes, `width`, added to the other."""
+    if width == 1:
+        return builder.fadd(*(builder.extract_element(lanes, _INDEX(at)) for at in (0, 1)))
+    kind = ir.VectorType(_INDEX, width)
+    halves = (ir.Constant(kind, list(range(at, at + width))) for at in (0, width))
+    return builder.fadd(*(builder.shuffle_vector(lanes, lanes, half) for half in halves))
 
 
 if numba.config.DISABLE_JIT:
     def inner_product(left: Any, right: Any) -> Any:
         """See `_inner_product`."""
         return np.dot(left, right[:left.size])
+
+    def add_multiple(w: Any, factor: Any, v: Any) -> None:
+        """See `_add_multiple`."""
+        w[:v.size] += factor * v
 else:
-    inner_product = intrinsic(_inner_product)
+    inner_product, add_multiple = intrinsic(_inner_product), intrinsic(_add_multiple)

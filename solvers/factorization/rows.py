@@ -129,7 +129,6 @@ class FactoredRows:
         self._W, self._width = np.zeros((room + width + EXTRA_ROWS, width)), width
         if before:
             self._W[:room + before, :before] = old[:room + before]
-            self._W[room + width, :before] = old[room + before]  # beta
         self._work = np.empty(factorization_work(room, width))
 
 

@@ -18,15 +18,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined
-from solvers.kernels.block import level_damping
-from solvers.kernels.rows import ZERO, factor_level, reflect, reflect_back
+from hierarchy.jit import compiled, inlined
+from solvers.kernels.block import level_damping, stacked
+from solvers.kernels.least_squares import least_squares
+from solvers.kernels.rows import ZERO, factor_level, length_of, reflect, reflect_back
 from solvers.kernels.space import (
-    Basis,
     Block,
     Rows,
     View,
-    carve_basis,
     carve_rows,
     matrix,
     vector,
@@ -62,15 +61,14 @@ class Acting(NamedTuple):
 class Factors(NamedTuple):
     """The factored active rows, hard rows first.
 
-    of_x (1, n), y (n,): the step, and the step in coordinates of Q. diagonal, force, size (n,):
-    intermediate results. of_block: work space.
+    of_x (1, n), y (n,): the step, and the step in coordinates of Q. force, size (n,): intermediate
+    results. of_block: work space.
     """
 
     rows: Rows
-    basis: Basis
+    basis: View
     of_x: View
     y: View
-    diagonal: View
     force: View
     size: View
     of_block: View
@@ -80,14 +78,13 @@ class Factors(NamedTuple):
 def carve_factors(work, at, m, n):
     """Return Factors for m rows of n unknowns, and where they end."""
     rows, at = carve_rows(work, at, m, n)
-    basis, at = carve_basis(work, at, n, n)
+    basis, at = matrix(work, at, n, n)
     of_x, at = matrix(work, at, 1, n)
     y, at = vector(work, at, n)
-    diagonal, at = vector(work, at, n)
     force, at = vector(work, at, n)
     size, at = vector(work, at, n)
     of_block, at = vector(work, at, (m + n) * (n + 1))
-    return Factors(rows, basis, of_x, y, diagonal, force, size, of_block), at
+    return Factors(rows, basis, of_x, y, force, size, of_block), at
 
 
 @inlined
@@ -103,7 +100,7 @@ def carve_acting(record, work, at, m):
 @compiled
 def solve_acting(problem, x, acting, factors, settings, regularisation):
     """Write x and the multipliers; return whether rows are nearly parallel."""
-    rows, basis, of_x, y, _, _, _, _ = factors
+    rows, basis, of_x, y, _, _, _ = factors
     hard = _gather(problem, acting, rows, settings.rank_tolerance, ZERO, True)
     end = _gather(problem, acting, rows, settings.rank_tolerance, hard, False)
     p = factor_level(rows, basis, ZERO, hard, ZERO)
@@ -134,15 +131,6 @@ def solve_acting(problem, x, acting, factors, settings, regularisation):
 def side_of(problem, acting, i):
     """Return the side at which a row is active."""
     return problem.lower[i] if acting.state[i] == LOWER else problem.upper[i]
-
-
-@inlined
-def length_of(x):
-    """Return the Euclidean norm."""
-    square = 0.0
-    for c in range(x.size):
-        square += x[c] * x[c]
-    return np.sqrt(square)
 
 
 @compiled
@@ -197,56 +185,22 @@ def _drop_rounding(w, own, zero, rank):
 def _mu(W, at, settings, regularisation, work):
     """Return mu, combined with lambda if the soft rows are damped as one level."""
     if settings.damping > 0.0 and at.k1 > at.k0:
-        return np.hypot(regularisation, level_damping(W, at, settings, work))
+        return np.sqrt(regularisation ** 2 + level_damping(W, at, settings, work) ** 2)
     return regularisation
 
 
-@compiled
+@inlined
 def _least_squares(factors, at, mu):
     """Write into y the minimiser of ||W y - miss||^2 + mu^2 ||y||^2, over the block `at`.
 
     miss is the remaining residual on return. It comes from the reflections, so that the small
     residual of a heavy row is as accurate as the rest.
     """
-    (W, _, _, miss), y, diagonal = factors.rows, factors.y, factors.diagonal
-    rows, q = at.i1 - at.i0, at.k1 - at.k0
-    height = rows + q
-    T = as_matrix(factors.of_block[:height * (q + 1)], q + 1, height)  # a column is stored as a row
-    b = T[q]
-    for k in range(q + 1):
-        for i in range(rows):
-            T[k, i] = miss[at.i0 + i] if k == q else W[at.i0 + i, at.k0 + k]
-        for i in range(rows, height):
-            T[k, i] = mu if i - rows == k else 0.0
-    for k in range(q):
-        v = T[k, k:]
-        norm = length_of(v)
-        diagonal[k] = -norm if v[0] > 0.0 else norm
-        v[0] -= diagonal[k]
-        for j in range(k + 1, q + 1):
-            _reflect(v, T[j, k:], diagonal[k])
-    for k in range(q - 1, -1, -1):
-        rest = b[k]
-        for j in range(k + 1, q):
-            rest -= T[j, k] * y[at.k0 + j]
-        y[at.k0 + k] = rest / diagonal[k]
-    for k in range(q):
-        b[k] = 0.0
-    for k in range(q - 1, -1, -1):
-        _reflect(T[k, k:], b[k:], diagonal[k])
+    (W, _, _, miss), rows, q = factors.rows, at.i1 - at.i0, at.k1 - at.k0
+    T, _ = stacked(W, miss, at, mu, rows + q, factors.of_block)
+    least_squares(T[:q], T[q], factors.y[at.k0:])
     for i in range(rows):
-        miss[at.i0 + i] = b[i]
-
-
-@inlined
-def _reflect(v, b, norm):
-    """Apply the reflector of v, which maps a column onto `norm` times the first unit vector."""
-    s = 0.0
-    for i in range(v.size):
-        s += v[i] * b[i]
-    s /= norm * v[0]
-    for i in range(v.size):
-        b[i] += s * v[i]
+        miss[at.i0 + i] = T[q, i]
 
 
 @compiled

@@ -7,6 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
+from solvers.kernels.least_squares import least_squares
+from solvers.kernels.rows import ZERO
+from solvers.kernels.space import matrix
 from solvers.kernels.tolerances import ORTHOGONAL, SWEEPS
 
 
@@ -125,7 +128,7 @@ def orthogonalise_rows(W, U):
                     continue
                 settled = False
                 zeta = (b - a) / (2.0 * c)
-                t = 1.0 / (abs(zeta) + np.hypot(1.0, zeta))
+                t = 1.0 / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
                 t = t if zeta >= 0.0 else -t
                 cosine = 1.0 / np.sqrt(1.0 + t * t)
                 _rotate(W, i, j, cosine, t)
@@ -155,42 +158,20 @@ def _one_unknown(M, r, y, at, damped):
 
 @compiled
 def _least_squares(M, r, y, at, damped, work):
-    """Write the minimiser into y, by Householder reflections of [M r; lambda I 0]."""
+    """Write the minimiser into y, by reflections of [M r; lambda I 0]."""
     p, rows = at.k1 - at.k0, at.i1 - at.i0
-    height = rows + p if damped > 0.0 else rows
-    T = as_matrix(work[:height * (p + 1)], height, p + 1)
-    for i in range(height):
-        for k in range(p + 1):
-            T[i, k] = 0.0
-    for i in range(rows):
-        for k in range(p):
-            T[i, k] = M[at.i0 + i, at.k0 + k]
-        T[i, p] = r[at.i0 + i]
-    for k in range(height - rows):
-        T[rows + k, k] = damped
-    for k in range(p):
-        _reflect_columns(T, k)
-    for k in range(p - 1, -1, -1):
-        rest = T[k, p]
-        for j in range(k + 1, p):
-            rest -= T[k, j] * y[at.k0 + j]
-        y[at.k0 + k] = rest / T[k, k]
+    T, _ = stacked(M, r, at, damped, rows + p if damped > 0.0 else rows, work)
+    least_squares(T[:p], T[p], y[at.k0:])
 
 
 @inlined
-def _reflect_columns(T, k):
-    """Reflect column k of T onto unit vector k, and apply it to the columns after it."""
-    height, columns = T.shape
-    square = 0.0
-    for i in range(k, height):
-        square += T[i, k] * T[i, k]
-    norm = -np.sqrt(square) if T[k, k] > 0.0 else np.sqrt(square)
-    T[k, k] -= norm
-    for j in range(k + 1, columns):
-        s = 0.0
-        for i in range(k, height):
-            s += T[i, k] * T[i, j]
-        s /= norm * T[k, k]
-        for i in range(k, height):
-            T[i, j] += s * T[i, k]
-    T[k, k] = norm
+def stacked(M, r, at, damped, height, work):
+    """Return the columns of the block and r as rows, with lambda I behind, and where they end."""
+    p, rows = at.k1 - at.k0, at.i1 - at.i0
+    T, end = matrix(work, ZERO, p + 1, height)
+    for k in range(p + 1):
+        for i in range(rows):
+            T[k, i] = M[at.i0 + i, at.k0 + k] if k < p else r[at.i0 + i]
+        for i in range(rows, height):
+            T[k, i] = damped if i - rows == k else 0.0
+    return T, end

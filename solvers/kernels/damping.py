@@ -17,13 +17,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hierarchy.jit import compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product
 from solvers.kernels.block import level_damping
 from solvers.kernels.rows import (
     NO,
     YES,
     ZERO,
-    add_multiple,
     factor_level,
     length_of,
     reflect,

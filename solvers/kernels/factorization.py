@@ -8,8 +8,8 @@ Rows of C and of the squares stay in the slot where a level was first put; a tab
 level, in order of priority, [slot, rows, rank with all above]. W has, for m <= V rows:
 
     rows 0 .. V - 1       the staircase, in order, each level in pivot order
-    the next `width`      reflectors, see `Basis`
-    four more             beta, y, x and the reference, in coordinates of Q
+    the next `width`      reflectors
+    three more            y, x and the reference, in coordinates of Q
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -20,38 +20,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product
 from solvers.kernels.block import solve_level
 from solvers.kernels.rows import (
     ZERO,
     factor_level,
     finish,
     has_outlier,
+    length_of,
     reflect,
     reflect_back,
 )
-from solvers.kernels.space import Basis, Block, Rows, View, shared
+from solvers.kernels.space import Block, Rows, View, shared
 from solvers.kernels.staircase import is_doubtful, smallest_pivot, subtract
 from solvers.kernels.tolerances import FAR_LIGHTER, OUTSIDE, UNCLEAR_PIVOT
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
 PASSES = 4       # most passes; two are enough unless the row is rounding
-EXTRA_ROWS = 4   # of W, in addition to staircase and reflectors
-
-
-@inlined
-def dot(u, v):
-    """Return the inner product, in four sums that do not wait for each other."""
-    a = b = c = d = 0.0
-    fours = u.size - u.size % 4
-    for i in range(0, fours, 4):
-        a += u[i] * v[i]
-        b += u[i + 1] * v[i + 1]
-        c += u[i + 2] * v[i + 2]
-        d += u[i + 3] * v[i + 3]
-    for i in range(fours, u.size):
-        a += u[i] * v[i]
-    return (a + b) + (c + d)
+EXTRA_ROWS = 3   # of W, in addition to staircase and reflectors
 
 
 @compiled
@@ -68,7 +54,7 @@ def project_rows(A, first, last, r, Q, C, squares):
             w[c] = A[i, c]
         for k in range(coefficients.size):
             coefficients[k] = 0.0
-        squares[i] = dot(w, w)
+        squares[i] = inner_product(w, w)
         if not np.isfinite(squares[i]):
             continue
         size = np.sqrt(squares[i])
@@ -92,11 +78,10 @@ def _orthogonalise(w, Q, r, coefficients, size):
         before = left
         for k in range(r):
             q = Q[k]
-            s = dot(q, w)
+            s = inner_product(q, w)
             coefficients[k] += s
-            for c in range(w.size):
-                w[c] -= s * q[c]
-        left = np.sqrt(dot(w, w))
+            add_multiple(w, -s, q)
+        left = length_of(w)
         if left > 0.5 * before or left <= OUTSIDE * size:
             break
     return left
@@ -110,7 +95,7 @@ class Factored(NamedTuple):
     """
 
     rows: Rows
-    basis: Basis
+    basis: View
     y: View
     of_x: View
     rest: View
@@ -121,8 +106,8 @@ def _opened(W, pivots, work):
     """Return the parts of W, with zero and miss from the work space."""
     V, width = pivots.size, W.shape[1]
     rows = Rows(W[:V], pivots, work[:V], work[V:2 * V])
-    basis = Basis(W[V:V + width], W[V + width])
-    return Factored(rows, basis, W[V + width + 1], W[V + width + 2:V + width + 4], work[2 * V:])
+    y, of_x = W[V + width], W[V + width + 1:V + width + 3]
+    return Factored(rows, W[V:V + width], y, of_x, work[2 * V:])
 
 
 @compiled
@@ -210,9 +195,7 @@ def resolve(b, x, Q, table, W, pivots, settings, work):
         _project_reference(x, Q, factored, rank)
     _lift(factored, rank)
     for k in range(Q.shape[0]):
-        s, q = u[k] - u0[k], Q[k]
-        for c in range(x.size):
-            x[c] += s * q[c]
+        add_multiple(x, u[k] - u0[k], Q[k])
     return finish(x, SOLVED)
 
 
@@ -221,7 +204,7 @@ def _project_reference(x, Q, factored, rank):
     """Write Q^T q0 (14) into u0, and its reflection into u."""
     u, u0 = factored.of_x[0], factored.of_x[1]
     for k in range(Q.shape[0]):
-        u[k] = u0[k] = dot(Q[k], x)
+        u[k] = u0[k] = inner_product(Q[k], x)
     reflect(factored.basis, ZERO, rank, factored.of_x, ZERO, ZERO + 1)
     if Q.shape[0] == x.size:  # only rounding of the reference is outside the basis
         for c in range(x.size):

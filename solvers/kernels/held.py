@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import ZERO, make_reflector, reflect, reflect_back
-from solvers.kernels.space import Basis, View, carve_basis, integers, matrix, vector
+from solvers.kernels.space import View, integers, matrix, vector
 from solvers.kernels.tolerances import BOUND_KEPT, TERMS
 
 NO_JOINT = -1
@@ -34,7 +34,7 @@ class Held(NamedTuple):
     upper, lower bound, else 0. y (n,): the step in each column of Q.
     """
 
-    basis: Basis
+    basis: View
     E: View
     joint: View
     side: View
@@ -53,7 +53,7 @@ def carve_box(work, at, n):
 @inlined
 def carve_held(work, at, n):
     """Return Held for n joints, and where it ends."""
-    basis, at = carve_basis(work, at, n, n)
+    basis, at = matrix(work, at, n, n)
     E, at = matrix(work, at, n, n)
     joint, at = integers(work, at, n)
     side, at = vector(work, at, n)

@@ -9,11 +9,8 @@ by back substitution in sum_t lambda_t a_t = -A_k^T w_k, says whether that row h
 
 from __future__ import annotations
 
-import numpy as np
-
-from hierarchy.jit import as_matrix, compiled, inlined
-from solvers.kernels.rows import reflect, reflect_back
-from solvers.kernels.space import Basis
+from hierarchy.jit import as_matrix, inlined
+from solvers.kernels.least_squares import least_squares
 from solvers.kernels.tableau import (
     COLUMN,
     FORCE,
@@ -73,40 +70,10 @@ def _least_squares_step(t, begin, rank):
         L[rank, q] = rest
         if q < rank:
             size = max(size, abs(rest / L[q, q]))
-    least_squares(L, y, t.room[L.size:])
+    least_squares(L[:rank], L[rank], y)
     for q in range(rows):
         s.number[OVER, q] = -L[rank, q]
     return size
-
-
-@compiled
-def least_squares(T, y, work):
-    """Write into y[:r] the minimiser of |T y - b|, for T (r + 1, s) by columns with b the last.
-
-    b is the residual on return. It comes from the reflections, not from a difference, so the small
-    residual of a heavy row is as accurate as the rest (Cox, Higham 1998). The rows are in pivot
-    order, the heaviest first. work (2 r,) is scratch.
-    """
-    r = T.shape[0] - 1
-    basis, diagonal, b = Basis(T, work[:r]), work[r:], T[r]
-    for k in range(r):
-        v = T[k, k:]
-        square = 0.0
-        for i in range(v.size):
-            square += v[i] * v[i]
-        norm = -np.sqrt(square) if v[0] > 0.0 else np.sqrt(square)
-        diagonal[k] = norm
-        v[0] -= norm
-        basis.beta[k] = -1.0 / (norm * v[0])
-        reflect(basis, k, k + 1, T, k + 1, r + 1)
-    for k in range(r - 1, -1, -1):
-        rest = b[k]
-        for j in range(k + 1, r):
-            rest -= T[j, k] * y[j]
-        y[k] = rest / diagonal[k]
-    for k in range(r):
-        b[k] = 0.0
-    reflect_back(basis, r, T, r, r + 1)
 
 
 @inlined

@@ -19,9 +19,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import add_multiple, compiled, inlined
 from solvers.kernels.level import balance, pull_of_rows, step_of_rows, weigh_rows
-from solvers.kernels.rows import ZERO, add_multiple, length_of
+from solvers.kernels.rows import ZERO, length_of
 from solvers.kernels.tableau import (
     BASE,
     COLUMN,

@@ -18,7 +18,9 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
+from solvers.kernels.least_squares import turn
 from solvers.kernels.rows import length_of, reflect
+from solvers.kernels.space import matrix
 from solvers.kernels.tolerances import CANCELLED, COARSE_SIGN, EPSILON, NEGLIGIBLE, SHADOW
 from solvers.kernels.working_set import (
     BEGIN,
@@ -35,13 +37,14 @@ from solvers.kernels.working_set import (
     PICKED,
     RANK,
     SCRATCH,
+    SHORT,
     SIGN,
     SIZE,
     STATE,
     WHOLE,
     Y,
+    add_row,
     side_at,
-    turn,
     value_at,
 )
 from solvers.kernels.working_set import (
@@ -114,11 +117,8 @@ def _pull(s, p, reach):
     if far == 0.0 or above == 0:
         return False
     for q in range(begin, end):
-        i = s.index[LIST, q]
-        v, norm = s.multiplier[p, i], s.number[NORM, i]
-        # The residual of a heavy row is as accurate as the lightest row of its level asks.
-        unsure = min(norm, least * least / norm) * reach + far
-        _add(s, v, EPSILON * unsure, q, above)
+        s.number[FORCE, q] = s.multiplier[p, s.index[LIST, q]]
+    _add_rows(s, p, least, reach, far)
     return True
 
 
@@ -135,11 +135,38 @@ def _pull_of_goal(s, level, weight, reach):
 
 
 @inlined
-def _add(s, f, unsure, q, end):
-    """Add a multiple of the row at place q to the gradient in the first `end` columns."""
-    w, gradient, noise = s.W[q, :end], s.number[GRADIENT], s.number[NOISE]
+def _add_rows(s, k, least, reach, far):
+    """Add the rows of level k times their forces to the gradient in the columns above it.
+
+    For violations, of which `far` is the largest: `least` is the norm of the lightest row.
+    """
+    begin, end, above = s.index[BEGIN, k], s.index[BEGIN, k + 1], s.index[RANK, k]
+    total, square, short = s.number[SCRATCH], 0.0, s.index[SHORT, k] == 1
+    for t in range(s.x.size if short else 0):
+        total[t] = 0.0
+    for q in range(begin, end):
+        i, force = s.index[LIST, q], s.number[FORCE, q]
+        norm = s.number[NORM, i]
+        # The residual of a heavy row is as accurate as the lightest row of its level asks.
+        unsure = EPSILON * (min(norm, least * least / norm) * reach + far)
+        if short:
+            add_row(s, i, force, total)
+            square += (norm * (unsure + CANCELLED * abs(force))) ** 2
+        elif force != 0.0 or unsure > 0.0:
+            _add(s, force, unsure, q, 0, above)
+    if short:
+        reflect(s.basis, s.count[PICKED], above, s.number, SCRATCH, SCRATCH + 1)
+        for t in range(above):
+            s.number[GRADIENT, t] += total[t]
+            s.number[NOISE, t] += np.sqrt(square)
+
+
+@inlined
+def _add(s, f, unsure, q, begin, end):
+    """Add a multiple of the row at place q to the gradient in these columns."""
+    w, gradient, noise = s.W[q], s.number[GRADIENT], s.number[NOISE]
     unsure += (COARSE_SIGN if s.count[COARSE] == 1 else CANCELLED) * abs(f)
-    for t in range(w.size):
+    for t in range(begin, end):
         gradient[t] += f * w[t]
         noise[t] += abs(w[t]) * unsure
 
@@ -171,6 +198,8 @@ def _write_forces(s, last):
             _share(s, begin, end, s.index[RANK, k], s.index[RANK, k + 1])
         else:
             _substitute(s, begin, end, s.index[RANK, k])
+        if s.index[RANK, k] > 0:
+            _add_rows(s, k, 0.0, 0.0, 0.0)
 
 
 @inlined
@@ -187,36 +216,34 @@ def _balance(s, p, last):
 
 @inlined
 def _substitute(s, begin, end, above):
-    """Write the forces of a level of independent rows, and add them to the gradient."""
+    """Write the forces of a level of independent rows."""
     for q in range(end - 1, begin - 1, -1):
         t = above + q - begin
         pull = s.number[GRADIENT, t]
         s.number[FORCE, q] = force = -pull / s.W[q, t] if abs(pull) > s.number[NOISE, t] else 0.0
         if force != 0.0:
-            _add(s, force, 0.0, q, t)
+            _add(s, force, 0.0, q, above, t)
 
 
 @inlined
 def _share(s, begin, end, above, rank):
-    """Write the shortest forces of a level of dependent rows, and add them to the gradient."""
+    """Write the shortest forces of a level of dependent rows."""
     force = s.number[FORCE]
     for q in range(begin, end):
         force[q] = 0.0
-    for t in range(above, rank):
-        pull, unsure = s.number[GRADIENT, t], s.number[NOISE, t]
-        for r in range(above, t):
-            part = s.T[t, begin + r - above] * force[begin + r - above]
+    T, _ = matrix(s.T, above * s.A.shape[0], rank - above, end - begin)
+    for k in range(rank - above):
+        pull, unsure = s.number[GRADIENT, above + k], s.number[NOISE, above + k]
+        for r in range(k):
+            part = T[k, r] * force[begin + r]
             pull += part
             unsure += CANCELLED * abs(part)
         if abs(pull) > unsure:
-            force[begin + t - above] = -pull / s.number[DIAGONAL, t]
-    if rank > above:
-        turn(s, force, begin, end, above, rank, True)
+            force[begin + k] = -pull / s.number[DIAGONAL, above + k]
+    turn(T, force[begin:], True)
     most = 0.0
     for q in range(begin, end):
         most = max(most, abs(force[q]) * s.number[NORM, s.index[LIST, q]])
     for q in range(begin, end):
         if abs(force[q]) * s.number[NORM, s.index[LIST, q]] <= NEGLIGIBLE * most:
             force[q] = 0.0
-        else:
-            _add(s, force[q], 0.0, q, above)

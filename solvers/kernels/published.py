@@ -17,9 +17,7 @@ from hierarchy.jit import as_matrix, compiled, inlined
 from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_square
 from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
 from solvers.kernels.space import (
-    Basis,
     View,
-    carve_basis,
     integers,
     matrix,
     shared,
@@ -37,7 +35,7 @@ class Matrices(NamedTuple):
     """
 
     R: View
-    basis: Basis
+    basis: View
     F: View
     T: View
     zero: View
@@ -49,7 +47,7 @@ def _carve(work, at, m, n):
     """Return Matrices for m rows of n unknowns, and where they end."""
     N = max(m, n)
     R, at = matrix(work, at, m, N)
-    basis, at = carve_basis(work, at, m, N)
+    basis, at = matrix(work, at, m, N)
     F, at = matrix(work, at, m, m)
     T, at = matrix(work, at, m, m)
     zero, at = vector(work, at, m)
@@ -162,10 +160,9 @@ def _factor(R, basis, zero, n):
             R[i, c] = 0.0
     for k in range(m):
         square = 0.0
-        for c in range(k, N):
-            basis.V[k, c] = 0.0
-            square += R[k, c] * R[k, c]
-        basis.beta[k] = 0.0
+        for c in range(N):
+            basis[k, c] = 0.0
+            square += R[k, c] * R[k, c] if c >= k else 0.0
         if square <= zero[k]:  # no remainder: rounding must not choose a direction
             for c in range(k, N):
                 R[k, c] = 0.0

@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product
 from solvers.kernels.tolerances import LEAST_SQUARE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
 ZERO = np.int64(0)
+LANES = 8  # numbers that the inner loops take at a time
 YES, NO = np.bool_(True), np.bool_(False)
 
 
@@ -107,19 +108,22 @@ def swap_rows(W, i, j):
 
 @inlined
 def reflect(basis, k0, k1, W, i0, i1):
-    """Apply reflectors k0 .. k1 - 1 of the basis to rows i0 .. i1 - 1 of W, in this order."""
+    """Apply reflectors k0 .. k1 - 1 of the basis to rows i0 .. i1 - 1 of W, in this order.
+
+    Q is the product of the reflectors I - v v^T, v the rows of the basis, zero before column k.
+    They act from a whole block of lanes on, so that each finds what the last has stored.
+    """
     for k in range(k0, k1):
-        v, beta = basis.V[k, k:], basis.beta[k]
+        first = k & -LANES if basis.shape[1] >= LANES else k
+        v = basis[k, first:]
         for i in range(i0, i1):
-            w = W[i, k:]
-            add_multiple(w, -beta * inner_product(v, w), v)
+            reflect_by(v, W[i, first:])
 
 
 @inlined
-def add_multiple(w, s, v):
-    """Add s v to w."""
-    for c in range(v.size):
-        w[c] += s * v[c]
+def reflect_by(v, w):
+    """Reflect w by I - v v^T; v has the size."""
+    add_multiple(w, -inner_product(v, w), v)
 
 
 @inlined
@@ -135,11 +139,12 @@ def make_reflector(basis, k, w, square):
 
     square is the squared norm of w from column k on.
     """
-    v, norm = basis.V[k], np.sqrt(square)
-    for c in range(k, w.size):
-        v[c] = w[c]
-    v[k] += norm if v[k] >= 0.0 else -norm
-    basis.beta[k] = 1.0 / (norm * abs(v[k]))
+    v, norm = basis[k], np.sqrt(square)
+    head = w[k] + (norm if w[k] >= 0.0 else -norm)
+    scale = 1.0 / np.sqrt(norm * abs(head))
+    for c in range(k & -LANES, w.size):
+        v[c] = scale * w[c] if c > k else 0.0
+    v[k] = scale * head
 
 
 @compiled

@@ -35,12 +35,10 @@ from solvers.kernels.held import (
 )
 from solvers.kernels.rows import ZERO, factor_level, finish, load_rows, reflect, reflect_back
 from solvers.kernels.space import (
-    Basis,
     Block,
     Rows,
     Settings,
     View,
-    carve_basis,
     carve_rows,
     matrix,
     shared,
@@ -98,7 +96,7 @@ class Space(NamedTuple):
     """
 
     held: Held
-    kept: Basis
+    kept: View
     rows: Rows
     seen: View
     now: View
@@ -114,7 +112,7 @@ class Space(NamedTuple):
 def _carve(work, at, m, n):
     """Return Space for m rows of n joints, and where it ends."""
     held, at = carve_held(work, at, n)
-    kept, at = carve_basis(work, at, n, n)
+    kept, at = matrix(work, at, n, n)
     rows, at = carve_rows(work, at, m, n)
     seen, at = matrix(work, at, m, n)
     now, at = vector(work, at, m)
@@ -354,9 +352,8 @@ def _write_line(task, x, space, at, options):
 def _copy_reflectors(source, target, k0, k1):
     """Copy reflectors k0 .. k1 - 1."""
     for k in range(k0, k1):
-        target.beta[k] = source.beta[k]
-        for j in range(k, source.V.shape[1]):
-            target.V[k, j] = source.V[k, j]
+        for j in range(source.shape[1]):
+            target[k, j] = source[k, j]
 
 
 @inlined

@@ -1,6 +1,6 @@
 """Named views of one array: how kernels divide their work space.
 
-    basis, at = carve_basis(work, 0, n, n)
+    V, at = matrix(work, 0, n, n)
     rows, at = carve_rows(work, at, m, n)
     if at > work.size:
         return TOO_SMALL
@@ -19,16 +19,6 @@ from typing import Any, NamedTuple
 from hierarchy.jit import as_integers, as_matrix, inlined
 
 View = Any  # an array to the reader; numba infers a type
-
-
-class Basis(NamedTuple):
-    """Reflectors I - beta[k] v v^T whose product is Q.
-
-    V (k, n): the vectors v as rows; v of reflector k is zero before column k. beta (k,).
-    """
-
-    V: View
-    beta: View
 
 
 class Rows(NamedTuple):
@@ -86,14 +76,6 @@ def matrix(work, at, rows, columns):
     """Like `vector`, as (rows, columns); no rows if they do not fit."""
     numbers, end = vector(work, at, rows * columns)
     return as_matrix(numbers, rows if end <= work.size else 0, columns), end
-
-
-@inlined
-def carve_basis(work, at, k, n):
-    """Return a Basis of up to k reflectors of n unknowns, and where it ends."""
-    V, at = matrix(work, at, k, n)
-    beta, at = vector(work, at, k)
-    return Basis(V, beta), at
 
 
 @inlined

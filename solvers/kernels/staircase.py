@@ -26,11 +26,9 @@ from solvers.kernels.rows import (
     reflect_back,
 )
 from solvers.kernels.space import (
-    Basis,
     Block,
     Rows,
     View,
-    carve_basis,
     carve_rows,
     matrix,
     shared,
@@ -47,7 +45,7 @@ class Staircase(NamedTuple):
     levels. of_x (1, n): x, for reflections. of_block: work space of `solve_level`.
     """
 
-    basis: Basis
+    basis: View
     rows: Rows
     y: View
     of_x: View
@@ -57,7 +55,7 @@ class Staircase(NamedTuple):
 @inlined
 def carve_staircase(work, at, m, n):
     """Return a Staircase for m rows of n unknowns, and where it ends."""
-    basis, at = carve_basis(work, at, n, n)
+    basis, at = matrix(work, at, n, n)
     rows, at = carve_rows(work, at, m, n)
     y, at = vector(work, at, n)
     of_x, at = matrix(work, at, 1, n)

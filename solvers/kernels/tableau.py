@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product
 from solvers.kernels.rows import ZERO, swap
 from solvers.kernels.space import View, integers, matrix, vector
 from solvers.kernels.tolerances import CLEAR_SQUARE, FLOOR, NEGLIGIBLE
@@ -168,21 +168,18 @@ def reflect_columns(M, k, end, column, first, total):
     norm = -norm if alpha > 0.0 else norm
     head = alpha - norm
     factor = -1.0 / (norm * head)
-    top, s = M[k, first:], total[first:]
+    top = M[k, first:]
+    s = total[:top.size]
     for c in range(top.size):
         s[c] = head * top[c]
     for t in range(k + 1, end):
-        v, row = M[t, column], M[t, first:]
-        for c in range(row.size):
-            s[c] += v * row[c]
+        if M[t, column] != 0.0:
+            add_multiple(s, M[t, column], M[t, first:])
     for t in range(k + 1, end):
-        v, row = factor * M[t, column], M[t, first:]
-        for c in range(row.size):
-            row[c] -= v * s[c]
-        M[t, column] = 0.0
-    head *= factor
-    for c in range(top.size):
-        top[c] -= head * s[c]
+        if M[t, column] != 0.0:
+            add_multiple(M[t, first:], -factor * M[t, column], s)
+            M[t, column] = 0.0
+    add_multiple(top, -head * factor, s)
     M[k, column] = norm
 
 
@@ -192,7 +189,7 @@ def fold(M, k, column, first):
     a, b = M[k, column], M[k + 1, column]
     if b == 0.0:
         return
-    norm = np.hypot(a, b)
+    norm = np.sqrt(a * a + b * b)
     cosine, sine = a / norm, b / norm
     upper, lower = M[k, first:], M[k + 1, first:]
     for c in range(upper.size):

@@ -50,6 +50,7 @@ LONGEST = 1e150      # x of `weighted`: squares of longer ones overflow
 # Limits. The pass and each search end after their number times rows plus unknowns.
 PASS_STEPS = 2
 SEARCH_STEPS = 2
+SPARED = 3           # rows over columns that are left to them: fewer are reflected one by one
 PATIENCE = 2         # block pivots that may not reduce the number of wrong rows
 RELEASED = 3         # times that a row may enter and leave again because nothing holds it
 RECURRENCES = 1      # of a working set in one search: after more it goes in circles

@@ -26,11 +26,10 @@ from solvers.kernels.acting import (
     Problem,
     carve_acting,
     carve_factors,
-    length_of,
     side_of,
     solve_acting,
 )
-from solvers.kernels.rows import ZERO, finish
+from solvers.kernels.rows import ZERO, finish, length_of
 from solvers.kernels.space import Settings, View, shared, vector
 from solvers.kernels.tolerances import LONGEST
 from solvers.status import (

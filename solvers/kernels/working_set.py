@@ -20,27 +20,28 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined, inner_product
-from solvers.kernels.rows import ZERO, add_multiple, factor_level, reflect, swap
-from solvers.kernels.space import Basis, Rows, View, carve_basis, integers, matrix, vector
-from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE
+from solvers.kernels.least_squares import substitute_back, triangularise, turn
+from solvers.kernels.rows import ZERO, factor_level, reflect, swap
+from solvers.kernels.space import Rows, View, integers, matrix, vector
+from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE, SPARED
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
 # Rows of `number`. Per row of A: its norm, its only entry, its sides, the norm of what was cut from
 # it. By place in the list: the square at which a row counts as dependent, its
 # residual side - a x. Per unknown or column of Q: reference, y, the goal of the free columns, a
-# gradient and what of it may be rounding, scratch; diagonal and factor of the reflections of a
-# level with more rows than rank.
+# gradient and what of it may be rounding, scratch; the diagonal of a level with more
+# rows than rank.
 (NORM, ENTRY, LOWER, UPPER, CUT, REFERENCE, ZEROED, MISS, Y, GOAL, GRADIENT, NOISE, SCRATCH,
- DIAGONAL, FACTOR) = range(15)
+ DIAGONAL) = range(14)
 NUMBERS = 16  # one more than these: `levels.py` keeps its own behind REFERENCE
 # Rows of `index`. Per row of A: its unknown (-1 for several entries), the side at which it acts,
 # the change that the search asks for, how often it entered,
 # the side before a search and at its last checkpoint. By place in the list: the row, the sign
 # of its multipliers. The unknown of each column, the column of each unknown. Per level: its first
-# row, its first place in the list, its first column.
+# row, its first place in the list, its first column, whether W lacks the columns above it.
 (UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, SEEN, LIST, SIGN, ORDER, PLACE, BEGIN,
- RANK) = range(13)
-INDICES = 13
+ RANK, SHORT) = range(14)
+INDICES = 14
 # In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
 # cut since the rows were those of A, whether small coefficients are cut along other rows too, the
 # number of rows that are negligible beside those of other levels alone, the number of levels that
@@ -64,8 +65,9 @@ class WorkingSet(NamedTuple):
 
     A (m, n), x (n,). number, index (.., w), w the largest of m, n, L + 1; count, scalar: see above.
     multiplier (L + 1, m): of each row in each level, and in its own level its violation
-    a x - side. W (m, n): the listed rows in coordinates of Q. basis: the reflectors of Q. T (n, m):
-    the reflectors of the rows of a level, by its columns. C (m, n): the rows that were cut.
+    a x - side. W (m, n): the listed rows in coordinates of Q. basis: the reflectors of Q. T (n m,):
+    the columns of each level with more rows than rank, from m times its first column on. C (m, n):
+    the rows that were cut.
     """
 
     A: View
@@ -76,7 +78,7 @@ class WorkingSet(NamedTuple):
     scalar: View
     multiplier: View
     W: View
-    basis: Basis
+    basis: View
     T: View
     C: View
 
@@ -84,7 +86,7 @@ class WorkingSet(NamedTuple):
 @inlined
 def working_set_size(n, m, levels):
     """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 12 + 3 * m * n + n * n + n
+    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 12 + 3 * m * n + n * n
 
 
 @inlined
@@ -97,8 +99,8 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
     count, at = integers(work, at, 7)
     scalar, at = vector(work, at, 5)
     W, at = matrix(work, at, m, n)
-    basis, at = carve_basis(work, at, n, n)
-    T, at = matrix(work, at, n, m)
+    basis, at = matrix(work, at, n, n)
+    T, at = vector(work, at, n * m)
     C, at = matrix(work, at, m, n)
     index = as_matrix(numbers, INDICES if numbers.size > 0 else 0, w)
     return WorkingSet(A, x, number, index, count, scalar, multiplier, W, basis, T, C), at
@@ -239,7 +241,7 @@ def meet(s, last):
     s.count[PICKED], s.count[WHOLE], s.scalar[SIZE] = 0, -1, 0.0
     s.scalar[PIVOT] = s.scalar[SECOND] = 1.0
     for k in range(levels):
-        begin, index[BEGIN, k], index[RANK, k] = rows, rows, rank
+        begin, index[BEGIN, k], index[RANK, k], index[SHORT, k] = rows, rows, rank, 0
         if k >= last or s.count[WHOLE] >= 0:
             continue
         if gives_all(s, k, s.number[GRADIENT], s.number[SCRATCH]):
@@ -252,9 +254,11 @@ def meet(s, last):
                 index[LIST, rows] = i
                 rows += 1
         if rows > begin:
-            above, rank = rank, _factor(s, begin, rows, rank)
-            _solve(s, begin, rows, above, rank)
+            index[SHORT, k] = _is_short(s, begin, rows, rank)
+            above, rank = rank, _factor(s, begin, rows, rank, index[SHORT, k] == 1)
+            _solve(s, begin, rows, above, rank, index[SHORT, k] == 1)
     index[BEGIN, levels], index[RANK, levels] = rows, rank
+    _keep_goal(s, rank)
     _write_x(s, rank)
 
 
@@ -280,7 +284,15 @@ def gives_all(s, k, goal, seen):
 
 
 @inlined
-def _factor(s, begin, end, rank):
+def _is_short(s, begin, end, rank):
+    """Whether a level has so few columns left that these cost less than its rows, as 0 or 1."""
+    left = s.x.size - rank
+    few = s.count[COARSE] == 0 and rank > s.count[PICKED]
+    return ZERO + (few and 2 * left < s.x.size and left + SPARED < end - begin)
+
+
+@inlined
+def _factor(s, begin, end, rank, short):
     """Give places begin .. end - 1 of the list columns of Q from `rank` on; return the new rank."""
     listed, single = s.index[LIST], rank == s.count[PICKED]
     for q in range(begin, end):
@@ -291,13 +303,13 @@ def _factor(s, begin, end, rank):
         i = listed[q]
         least = s.scalar[TOLERANCE] * s.number[NORM, i]
         s.number[ZEROED, q] = least * least
-        if s.number[CUT, i] > 0.0:
-            for t in range(s.x.size):
-                s.W[q, t] = s.C[i, s.index[ORDER, t]]
-        else:
-            for t in range(s.x.size):
-                s.W[q, t] = s.A[i, s.index[ORDER, t]]
-    reflect(s.basis, s.count[PICKED], rank, s.W, begin, end)
+        for t in range(s.x.size):
+            s.W[q, t] = 0.0
+        add_row(s, i, 1.0, s.W[q])
+    if short:
+        _see_in_columns(s, begin, end, rank)
+    else:
+        reflect(s.basis, s.count[PICKED], rank, s.W, begin, end)
     above = rank
     rank = factor_level(Rows(s.W, listed, s.number[ZEROED], s.number[MISS]), s.basis, begin, end,
                         rank)
@@ -310,6 +322,38 @@ def _factor(s, begin, end, rank):
     for q in range(begin + (0 if s.count[COARSE] == 1 else rank - above), end):
         _cut(s, q, rank, q >= begin + rank - above)
     return rank
+
+
+@inlined
+def add_row(s, i, factor, w):
+    """Add a multiple of row i, as it is after cuts, in the order of the columns."""
+    if s.index[UNIT, i] >= 0:
+        w[s.index[PLACE, s.index[UNIT, i]]] += factor * s.number[ENTRY, i]
+    elif s.number[CUT, i] > 0.0:
+        for t in range(s.x.size):
+            w[t] += factor * s.C[i, s.index[ORDER, t]]
+    else:
+        for t in range(s.x.size):
+            w[t] += factor * s.A[i, s.index[ORDER, t]]
+
+
+@inlined
+def _see_in_columns(s, begin, end, rank):
+    """Replace rows by their products with the columns of Q from `rank` on, and zeros before."""
+    n, w = s.x.size, s.number[SCRATCH]
+    Z, _ = matrix(s.T, rank * s.A.shape[0], n - rank, n)
+    for j in range(n - rank):
+        for c in range(n):
+            Z[j, c] = 1.0 if c == rank + j else 0.0
+    for k in range(rank - 1, s.count[PICKED] - 1, -1):
+        reflect(s.basis, k, k + 1, Z, 0, n - rank)
+    for q in range(begin, end):
+        c = s.index[UNIT, s.index[LIST, q]]
+        for t in range(n):
+            w[t], s.W[q, t] = s.W[q, t], 0.0
+        for j in range(n - rank):
+            s.W[q, rank + j] = (w[s.index[PLACE, c]] * Z[j, s.index[PLACE, c]] if c >= 0 else
+                                inner_product(Z[j], w))
 
 
 @inlined
@@ -369,38 +413,38 @@ def _cut(s, q, rank, dependent):
 
 
 @inlined
-def _solve(s, begin, end, above, rank):
+def _solve(s, begin, end, above, rank, short):
     """Write y of the columns above .. rank - 1, and the residuals of a level."""
     y, miss = s.number[Y], s.number[MISS]
+    if short:
+        for t in range(above, s.x.size):
+            y[t] = 0.0
+        _write_x(s, above)
     for q in range(begin, end):
-        rest, w = side_at(s, s.index[LIST, q]), s.W[q]
-        for t in range(above):
+        i, w = s.index[LIST, q], s.W[q]
+        rest = side_at(s, i)
+        if short:
+            rest -= value_at(s, i)
+        for t in range(0 if short else above):
             rest -= w[t] * y[t]
         miss[q] = rest
-    tall = end - begin > rank - above
-    if tall and rank > above:
-        _reduce(s, begin, end, above, rank)
-        turn(s, miss, begin, end, above, rank, False)
-    for t in range(above, rank):
-        q = begin + t - above
-        if tall:
-            s.scalar[SIZE] = max(s.scalar[SIZE], abs(miss[q] / s.number[DIAGONAL, t]))
-        else:
-            rest = miss[q]
-            for c in range(above, t):
-                rest -= s.W[q, c] * y[c]
-            y[t], miss[q] = rest / s.W[q, t], 0.0
-    if tall:
-        for t in range(rank - 1, above - 1, -1):
+    if end - begin == rank - above:
+        for t in range(above, rank):
             rest = miss[begin + t - above]
-            for c in range(t + 1, rank):
-                rest -= s.T[c, begin + t - above] * y[c]
-            y[t] = rest / s.number[DIAGONAL, t]
+            for c in range(above, t):
+                rest -= s.W[begin + t - above, c] * y[c]
+            y[t], miss[begin + t - above] = rest / s.W[begin + t - above, t], 0.0
+    elif rank > above:
+        T, _ = _triangle(s, begin, end, above, rank)
+        turn(T, miss[begin:], False)
+        for t in range(above, rank):
+            y[t] = s.number[DIAGONAL, t]
+            s.scalar[SIZE] = max(s.scalar[SIZE], abs(miss[begin + t - above] / y[t]))
+        substitute_back(T, miss[begin:], y[above:])
         for q in range(begin, begin + rank - above):
             miss[q] = 0.0
-        if rank > above:
-            turn(s, miss, begin, end, above, rank, True)
-            s.scalar[SIZE] = max(s.scalar[SIZE], _compromise(s, begin, end))
+        turn(T, miss[begin:], True)
+        s.scalar[SIZE] = max(s.scalar[SIZE], _compromise(s, begin, end))
     for t in range(above, rank):
         s.scalar[SIZE] = max(s.scalar[SIZE], abs(y[t]))
 
@@ -416,47 +460,19 @@ def _compromise(s, begin, end):
 
 
 @inlined
-def _reduce(s, begin, end, above, rank):
-    """Reflect the rows of a level to make its columns upper triangular; T keeps the reflectors.
-
-    The rows are in pivot order, the heaviest first, so each residual is accurate relative to its
-    own row (Cox, Higham 1998).
-    """
-    for t in range(above, rank):
-        for q in range(begin, end):
-            s.T[t, q] = s.W[q, t] if t - above <= q - begin else 0.0
-    for t in range(above, rank):
-        v, square = s.T[t, begin + t - above:end], 0.0
-        for q in range(v.size):
-            square += v[q] * v[q]
-        norm = -np.sqrt(square) if v[0] > 0.0 else np.sqrt(square)
-        v[0] -= norm
-        s.number[DIAGONAL, t], s.number[FACTOR, t] = norm, -1.0 / (norm * v[0])
-        for c in range(t + 1, rank):
-            _turn_by(s.T[c, begin + t - above:end], v, s.number[FACTOR, t])
+def _triangle(s, begin, end, above, rank):
+    """Make the columns of a level upper triangular; return them and where they end."""
+    T, at = matrix(s.T, above * s.A.shape[0], rank - above, end - begin)
+    for k in range(T.shape[0]):
+        for i in range(T.shape[1]):
+            T[k, i] = s.W[begin + i, above + k] if k <= i else 0.0
+    triangularise(T, s.number[DIAGONAL, above:])
+    return T, at
 
 
 @inlined
-def _turn_by(w, v, factor):
-    """Reflect w by I - factor v v^T."""
-    total = 0.0
-    for q in range(v.size):
-        total += w[q] * v[q]
-    add_multiple(w, -factor * total, v)
-
-
-@inlined
-def turn(s, values, begin, end, above, rank, back):
-    """Apply the reflections of the rows of a level to values by place in the list, or undo them."""
-    for r in range(rank - above):
-        t = rank - 1 - r if back else above + r
-        _turn_by(values[begin + t - above:end], s.T[t, begin + t - above:end],
-                 s.number[FACTOR, t])
-
-
-@inlined
-def _write_x(s, rank):
-    """Write x = Q y; the columns from `rank` on keep the goal."""
+def _keep_goal(s, rank):
+    """Give y in the columns from `rank` on the goal."""
     n, picked, order, moved, goal = s.x.size, s.count[PICKED], s.index[ORDER], False, s.number[GOAL]
     for c in range(n):
         s.number[SCRATCH, c] = goal[c]
@@ -467,9 +483,14 @@ def _write_x(s, rank):
         reflect(s.basis, picked, rank, s.number, GOAL, GOAL + 1)
     for t in range(rank, n):
         s.number[Y, t] = goal[t]
-    for t in range(n):
+
+
+@inlined
+def _write_x(s, rank):
+    """Write x = Q y, by the first reflectors."""
+    for t in range(s.x.size):
         s.number[SCRATCH, t] = s.number[Y, t]
-    for k in range(rank - 1, picked - 1, -1):
+    for k in range(rank - 1, s.count[PICKED] - 1, -1):
         reflect(s.basis, k, k + 1, s.number, SCRATCH, SCRATCH + 1)
-    for t in range(n):
-        s.x[order[t]] = s.number[SCRATCH, t]
+    for t in range(s.x.size):
+        s.x[s.index[ORDER, t]] = s.number[SCRATCH, t]
