@@ -154,9 +154,10 @@ def peers(install: Install = False,
               "--scene", metavar="NAME", help="Only `ellipse`, inverse kinematics of an arm, or "
               "`stand`, inverse dynamics of a humanoid on two feet.")] = None,
           out: Out = None) -> int:
-    """Compare with pink, mink, placo, tsid, embodiK, roboplan and frax.
+    """Compare with other packages for robots.
 
-    Run it once with --install first. Exit code 1 if a package of `--scene stand` is missing.
+    They are pink, mink, placo, tsid, embodiK, roboplan and frax. Run it once with --install first.
+    Exit code 1 if a package of `--scene stand` is missing.
     """
     _known("scene", scene, _SCENES)
     if install:
@@ -217,7 +218,7 @@ def open_(family: Family = None,
           install: Install = False,
           out: Annotated[Path, output("Folder to begin or to continue.")] = Path("runs/open")
           ) -> int:
-    """Compare solvers on public and fresh problems with proved answers.
+    """Compare solvers on problems with proved answers.
 
     Run the same command again to resume an interrupted one.
     """
@@ -260,9 +261,9 @@ def stress(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
                "--processes", min=1, metavar="N", help="Default: one for each core.")] = None,
            out: Annotated[Path, output("Where failing problems are saved.")
                           ] = Path("runs/stress")) -> int:
-    """Certify a resolver on generated problems, or prove its answers right or wrong.
+    """Certify a resolver's answers to generated problems.
 
-    Exit code 1 if an answer fails.
+    What is not certified is proved right or wrong. Exit code 1 if an answer fails.
     """
     from benchmark.stress import ALL, KINDS, report, run
     from solvers import make

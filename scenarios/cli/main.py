@@ -115,7 +115,10 @@ def library(out: Annotated[Path, output("Folder of the library: new or empty, or
                 "--check", help="Write nothing: compare the kernels of the library in the folder "
                                 "with those installed.")] = False,
             as_json: AsJson = False) -> int:
-    """Write the resolvers as a C library: the same kernels, without Python."""
+    """Write the resolvers as a C library.
+
+    The same kernels, without Python.
+    """
     from dataclasses import asdict
 
     from scenarios.files import claim, whole

@@ -168,9 +168,9 @@ def why(folder: Run,
             "--tick", metavar="N", help="The jump into this tick. Default: the three largest.")
             ] = None,
         plugin: Plugins = None, as_json: AsJson = False) -> None:
-    """Say why the command of a run jumped: torque, acceleration or speed.
+    """Say why the command of a run jumped.
 
-    Bisects between the rows of two ticks.
+    The largest steps of torque, acceleration or speed: bisects between the rows of two ticks.
     """
     from scenarios.measure.jumps import jumps
     from scenarios.measure.run_folder import load_run
