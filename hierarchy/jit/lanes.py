@@ -32,8 +32,8 @@ def _inner_product(context: Any, left: Any, right: Any) -> Any:
                 for width in (_LANES, *_REST)}
 
         def add(at: Any, width: int) -> None:
-            entries = [_load(builder, array, at, width) for array in arrays]
-            builder.store(_fused(builder, *entries, builder.load(sums[width])), sums[width])
+            one, other = (_load(builder, array, at, width) for array in arrays)
+            builder.store(_fused(builder, one, other, builder.load(sums[width])), sums[width])
 
         def halve(width: int) -> None:
             builder.store(_halved(builder, builder.load(sums[2 * width]), width), sums[width])
@@ -53,8 +53,8 @@ def _add_multiple(context: Any, w: Any, factor: Any, v: Any) -> Any:
         (v, w), size = _opened(context, builder, (kinds[2], kinds[0]), (of, to))
 
         def add(at: Any, width: int) -> None:
-            entries = (_splat(builder, by, width), _load(builder, v, at, width))
-            sums = _fused(builder, *entries, _load(builder, w, at, width))
+            sums = _fused(builder, _splat(builder, by, width), _load(builder, v, at, width),
+                          _load(builder, w, at, width))
             builder.store(sums, _place(builder, w, at, width), align=8)
 
         _step_by_step(builder, size, add, lambda width: None)

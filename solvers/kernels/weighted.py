@@ -268,7 +268,7 @@ def _first_event(space, x):
         if (state == FREE and new > near) or (state != FREE and new < -near):
             over, under = _beyond(problem, x, i)
             old = over if up else under
-            at = old / (old - new) if old * new < 0.0 else 0.0
+            at = old / (old - new) if old * new < 0.0 and abs(old) > near else 0.0
             if at < share:
                 first, share = i, at
     return first, share
