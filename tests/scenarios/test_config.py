@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
@@ -62,3 +63,25 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
                     '[control]\nresolver = "tpm"\nduration = 1.0\n')
     with pytest.raises(ScenarioError, match="scenario 'idle': the stack is empty"):
         build(load(path))
+
+
+def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():
+    def paths(seed, spread, timing):
+        change = f"avoidance.variation={{seed={seed}, spread={spread}, timing={timing}}}"
+        return [(np.array(one.path.times), np.array(one.path.points))
+                for one in load("human", [change]).avoidance.placed]
+
+    plain, away = paths(0, 0.0, 0.0), []
+    for seed in range(20):
+        for (t, p), (times, points) in zip(plain, paths(seed, 0.1, 0.9), strict=True):
+            away += np.linalg.norm(points - p, axis=1).tolist()
+            room = np.append(np.minimum(np.diff(t)[:-1], np.diff(t)[1:]), np.diff(t)[-1]) / 2.0
+            assert times[0] == t[0]
+            assert (np.abs(times - t)[1:] <= 0.9 * room + 1e-12).all()
+            rests = (p[1:] == p[:-1]).all(axis=1)
+            np.testing.assert_array_equal((points[1:] == points[:-1]).all(axis=1), rests)
+    assert max(away) <= 0.1
+    assert np.median(away) == pytest.approx(0.1 * 0.5 ** (1.0 / 3.0), rel=0.05)  # of a ball
+    (_, one), _ = paths(1, 0.1, 0.0)
+    (_, other), _ = paths(2, 0.1, 0.0)
+    assert np.abs(one - other).max() > 0.01

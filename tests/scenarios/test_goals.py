@@ -5,7 +5,7 @@ import pytest
 from hand_made import recording
 
 from scenarios import load, simulate
-from scenarios.measure.goals import goals
+from scenarios.measure.goals import goals, percent
 from scenarios.measure.runs import Run
 from scenarios.measure.verdict import Verdict, lines, table, verdict, verdicts
 
@@ -92,6 +92,12 @@ def test_a_goal_has_a_flag_and_its_worst_distance(signals, name, flag, worst, un
      "for 20 % of the time, first at 3.00 s")])
 def test_a_line_says_what_was_asked_how_far_off_and_for_how_long(signals, name, said):
     assert str(goal(name, **signals)) == said
+
+
+@pytest.mark.parametrize(("share", "said"), [
+    (0.0012, "0.12 %"), (0.9949, "99 %"), (0.995, "100 %"), (1.0, "100 %")])
+def test_a_share_is_said_in_two_digits_up_to_all(share, said):
+    assert percent(share) == said
 
 
 def run(label, **signals):

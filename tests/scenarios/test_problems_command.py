@@ -2,12 +2,13 @@
 
 import json
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from scenarios.cli.main import run_command
-from scenarios.problems import recorded
+from scenarios.problems import answers, recorded
 from scenarios.problems.answers import export, save
 from scenarios.problems.families import FAMILIES, available, family
 from solvers import make, problems
@@ -119,6 +120,15 @@ def test_check_finds_an_answer_that_is_not_proved(capsys, tmp_path):
     save(found, tmp_path)
     assert run_command(["problems", "check", str(file)]) == 1
     assert "problem 1: level 1: least violation" in capsys.readouterr().out
+
+
+def test_of_answers_without_a_whole_proof_the_one_that_is_proved_furthest_is_taken(monkeypatch):
+    proofs = [SimpleNamespace(complete=False, judged=judged) for judged in (1, 3, 2)]
+    monkeypatch.setattr(answers, "_candidates", lambda _: proofs)
+    monkeypatch.setattr(answers, "prove", lambda _, candidates: candidates[0])
+    assert answers.answer(None) is proofs[1]
+    proofs[2].complete = True
+    assert answers.answer(None) is proofs[2]
 
 
 def test_problems_as_others_make_them_are_what_their_makers_describe():

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections import Counter
 from contextlib import suppress
+from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
@@ -167,6 +168,15 @@ def test_a_run_has_every_metric_of_its_scenario_as_sampled(tmp_path):
     assert (found.key, found.ticks, found.reason) == (job.key, 20, None)
     assert {m.name: m.value for m in found.metrics if m.group != "Computing"} == {
         m.name: m.value for m in expected.values() if m.group != "Computing"}
+
+
+@pytest.mark.parametrize(("measured", "reason"), [
+    (lambda _: (SimpleNamespace(ticks=3, fault=None), ()), None),
+    (mock.Mock(side_effect=ValueError("no")), "ValueError: no")])
+def test_a_run_is_timed_whether_it_ends_well_or_not(measured, reason, monkeypatch):
+    monkeypatch.setattr("scenarios.results.run.perf_counter", iter([10.0, 12.5]).__next__)
+    found = outcome(SimpleNamespace(key="a", load=lambda: None), measured)
+    assert (found.key, found.reason, found.wall_seconds) == ("a", reason, 2.5)
 
 
 @pytest.mark.slow

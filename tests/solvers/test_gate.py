@@ -7,12 +7,14 @@ import copy
 import pickle
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import make
+from solvers.adapters.displacements import _names_of
 from solvers.adapters.displacements import packed as of_displacements
 from solvers.batch import Batch
 from solvers.factorization import Factorization
@@ -204,3 +206,11 @@ def test_rows_of_a_foreign_task_must_fit_the_unknowns():
     with pytest.raises(HierarchyError, match=r"limits: \(2, 90\) rows for \(2,\) values and 7"):
         of_displacements(None, seven_joints, 7, 0.01,
                          [("limits", np.ones((2, 90)), np.ones(2))], [], [])
+
+
+@pytest.mark.parametrize(("frame", "rows", "cost", "names"), [
+    ("tip", 3, None, ["tip x", "tip y", "tip z"]), ("tip", 2, None, ["row 0", "row 1"]),
+    ("tip", 6, [0, 0, 1.0, 2.0, 0, 0], ["tip z", "tip about x"]), ("", 3, 0.0, []),
+    ("", 3, 1.0, ["row 0", "row 1", "row 2"])])
+def test_rows_of_a_foreign_task_that_cost_something_have_names(frame, rows, cost, names):
+    assert _names_of(SimpleNamespace(frame=frame, cost=cost), None, np.ones(rows)) == names

@@ -63,6 +63,14 @@ def test_humanoids_are_solved_step_by_step(ratio):
         assert certify(as_two_levels(h, weighted, 1), res.x).optimal
 
 
+@pytest.mark.parametrize("limit", [1, 4])
+def test_at_its_iteration_limit_it_says_how_many_it_made(limit):
+    h = next(iter(family("HUM38")))[0]
+    res = make("weighted", guesses=1, max_iterations=limit).solve(h)
+    assert res.status is Status.ITERATION_LIMIT
+    assert limit <= res.iterations <= limit + 1
+
+
 @pytest.mark.parametrize("seed", [3, 4, 5])
 def test_a_row_released_by_rounding_alone_is_not_released_for_ever(seed):
     res = make("weighted", ratio=1e8, guesses=1, max_iterations=200).solve(
