@@ -174,10 +174,14 @@ class PointingTask(TaskSection):
         return Pointing(at.frame(self.frame), self.axis, radians(self.alpha_d), self.rows,
                         *self.gains, name=self.title)
 
+    def angle(self, error: Array) -> Array:
+        """Return the angle [deg] from the axis of the cone at errors of the task."""
+        cosine = np.cos(np.radians(self.alpha_d)) - error
+        return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
         """Yield the angle [deg] off the cone, or outside it."""
-        cosine = np.clip(np.cos(np.radians(self.alpha_d)) - error[:, 0], -1.0, 1.0)
-        beyond = np.degrees(np.arccos(cosine)) - self.alpha_d
+        beyond = self.angle(error[:, 0]) - self.alpha_d
         yield "deg", np.maximum(beyond, 0.0 if self.rows == "inequality" else -beyond)
 
 

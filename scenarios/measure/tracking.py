@@ -54,22 +54,16 @@ def _tracking(recording: Recording, by: Criteria) -> Iterator[Metric]:
 
 @register("pointing")
 def _pointing(recording: Recording, by: Criteria) -> Iterator[Metric]:
-    if "pointing_error" not in recording or recording.scenario.pointing is None:
+    pointing = recording.scenario.pointing
+    if "pointing_error" not in recording or pointing is None:
         return
-    half_angle = recording.scenario.pointing.alpha_d
-    beyond = pointing_angle(recording) - half_angle
+    half_angle = pointing.alpha_d
+    beyond = pointing.angle(recording["pointing_error"]) - half_angle
     yield _metric("cone_violation_max", "Beyond the cone, max",
                   finite(max(float(beyond.max()), 0.0)), "deg", note=f"a cone of {half_angle:g}°")
     yield _metric("cone_violation_share", "Time outside the cone",
                   float(np.mean(beyond > by.cone_tolerance_deg)), "share",
                   note=f"outside by more than {by.cone_tolerance_deg:g}°")
-
-
-def pointing_angle(recording: Recording) -> Array:
-    """Return the angle between the pointing axis and the cone's axis: (T,) [deg]."""
-    assert recording.scenario.pointing is not None
-    cosine = np.cos(np.radians(recording.scenario.pointing.alpha_d)) - recording["pointing_error"]
-    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
 @register("listed")

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios.measure.tracking import pointing_angle
 from scenarios.recording import listed
 
 if TYPE_CHECKING:
@@ -56,7 +55,8 @@ def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
                        logarithmic=True)
     if "pointing_error" in recording and scenario.pointing is not None:
         yield _sampled("Angle to the cone's axis", "deg", ("end effector",),
-                       pointing_angle(recording), ticks, (("α_d", scenario.pointing.alpha_d),))
+                       scenario.pointing.angle(recording["pointing_error"]), ticks,
+                       (("α_d", scenario.pointing.alpha_d),))
     for name, signal in (("Body to the nearest obstacle", "minimal_distance"),
                          ("End effector to the nearest obstacle", "ee_distance")):
         if signal in recording and scenario.avoidance is not None:

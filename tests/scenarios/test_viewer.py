@@ -167,6 +167,7 @@ def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses():
     for asked, why in (({"avoidance.near": 0.3}, "near = 0.3 m is beyond far"),
                        ({"avoidance.nearly": 0.3}, "avoidance.near"),
                        ({"obstacle 0": "up"}, "up"), ({"resolver": [1]}, "list"),
+                       ({"resolver": "hcood"}, "hcod"), ({"obstacle 7": [0, 0, 0]}, "7"),
                        ({"speed": "fast"}, "fast")):
         page.answer(asked)
         page.step(0.03)

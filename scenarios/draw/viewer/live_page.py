@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Collection
 from queue import SimpleQueue
 from threading import Event
 from typing import Any
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.pose import PoseTask
@@ -25,6 +26,7 @@ FRAMES = 30.0   # frames per second
 _BUSY = 0.05    # [s] of ticks between two frames, at most
 _HAND = 1.0     # [m/s] greatest speed of a dragged path
 _POINTS = 300   # of a desired path
+_OFFSET = "position.offset"
 
 
 class LivePage:
@@ -124,12 +126,13 @@ class LivePage:
             elif what.startswith("obstacle "):
                 self._drag(int(what.removeprefix("obstacle ")), np.asarray(value, dtype=float))
             elif what == "resolver":
-                self.live.switch(self.specs.get(value, str(value)))
+                self.live.switch(self.specs[named("resolver", value, self.specs)])
                 self._follow()
             else:
-                self.live.change({what: value})
+                keys = [_OFFSET, *(knob.key for knob, _ in knobs(self.live.scenario))]
+                self.live.change({named("setting", what, keys): value})
                 self._follow()
-        except (HierarchyError, TypeError, ValueError) as error:
+        except (HierarchyError, TypeError, ValueError, IndexError, OverflowError) as error:
             self.refused, self._refusals = str(error), self._refusals + 1
 
     def _restart(self) -> None:
@@ -150,7 +153,7 @@ class LivePage:
         length = float(np.linalg.norm(way))
         if length > 0.0:
             step = min(1.0, _HAND * seconds / length)
-            self._do("position.offset", (here + step * way).tolist())
+            self._do(_OFFSET, (here + step * way).tolist())
             if (here == self._path_offset()).all():  # the change was rejected
                 self._path_wanted = here
 
@@ -170,6 +173,13 @@ class LivePage:
                        if isinstance(task, Position | PoseTask)]
         first = self._paths[0] if self._paths else np.zeros((1, 3))
         self.middle = (first.min(axis=0) + first.max(axis=0)) / 2 - self._path_offset()
+
+
+def named(what: str, name: Any, known: Collection[str]) -> str:
+    """Return a name that is known; raises UnknownNameError for another."""
+    if name not in known:
+        raise UnknownNameError(what, name, known)
+    return str(name)
 
 
 def resolvers(scenario: Scenario) -> dict[str, str]:
