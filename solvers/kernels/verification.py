@@ -150,7 +150,7 @@ def _balances(s, p, reach, factored):
         return True
     source, allowed = (reach if last else level.source), REMAINDER * reach
     if not last:
-        allowed = REMAINDER * level.least * level.least * max(level.missed, reach)
+        allowed = REMAINDER * level.least * level.least * reach * s.scalar[PIVOT]
     outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
     if rounding > 0.0:
         allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
@@ -161,7 +161,8 @@ def _balances(s, p, reach, factored):
         rest = _beyond_rounding(s)
     holds = (not outside and rest <= allowed + turned
              and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
-    unsure = SIGN_MARGIN * (rest + rounding + turned) / s.scalar[PIVOT]
+    left = length_of(s.number[GRADIENT, :s.x.size])
+    unsure = SIGN_MARGIN * (left + rounding + turned) / s.scalar[PIVOT]
     holds = holds and _signs_hold(s, level, unsure, reach)
     if holds:
         _decide(s, level, unsure, reach)
