@@ -1,4 +1,4 @@
-"""The recursion (5), (6), (13) with the dampings of Nakamura, Chiaverini, and Buss and Kim.
+"""The inverses of `recursion`: the dampings of Nakamura, Chiaverini, and Buss and Kim.
 
 B = J_i P_{i-1} = C V as in `recursion`. The projectors stay undamped, so no level disturbs those
 above it. Each damping acts in the singular value decomposition B = sum_k s_k u_k v_k^T.
@@ -14,12 +14,10 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.block import orthogonalise_rows, smallest_square, solve_damped_level
-from solvers.kernels.recursion import add, begin, carve, decompose, see
-from solvers.kernels.rows import ZERO, finish, load_rows
-from solvers.kernels.space import Block, View, matrix, shared, vector
-from solvers.status import SOLVED, TOO_SMALL
+from solvers.kernels.rows import ZERO
+from solvers.kernels.space import View, matrix, vector
 
-NAKAMURA, CHIAVERINI, SELECTIVE = 1.0, 2.0, 3.0
+LEVEL, NAKAMURA, CHIAVERINI, SELECTIVE = 0.0, 1.0, 2.0, 3.0
 
 
 class Inverse(NamedTuple):
@@ -47,40 +45,11 @@ class Singular(NamedTuple):
 
 
 @compiled
-def damped_recursion(A, lower, upper, sizes, x, settings, work):
-    """Solve like `recursion`; settings: those, the method, `isotropic` and `largest`."""
-    m, n = A.shape
-    rows, at = carve(work, ZERO, m, n)
-    y, at = vector(work, at, n)
-    q, at = vector(work, at, n)
-    of_block, at = vector(work, at, 2 * (m + n) * (n + 1))
-    if at > work.size:
-        return ZERO + TOO_SMALL
-    inverse = Inverse(settings[3], settings[0], settings[1], settings[4], settings[5])
-    settings = shared(settings)
-    code = load_rows(rows.W, rows.zero, A, lower, upper, x, settings.rank_tolerance)
-    if code != SOLVED:
-        return finish(x, code)
-    begin(rows, q)
-    rank = first = ZERO
-    for level in range(sizes.size):
-        last, above = first + sizes[level], rank
-        see(rows, A, lower, q, first, last, above)
-        rank = decompose(rows, A, first, last, rank, settings.rank_tolerance)
-        _invert(rows, y, Block(first, last, above, rank), inverse, of_block)
-        for k in range(above, rank):
-            add(q, y[k], rows.V[k])  # (5)
-        first = last
-    for i in range(n):
-        add(q, x[i], rows.P[i])  # (14)
-    for c in range(n):
-        x[c] = q[c]
-    return finish(x, SOLVED)
+def invert(rows, y, at, inverse, work):
+    """Write the damped step of one level into y.
 
-
-@compiled
-def _invert(rows, y, at, inverse, work):
-    """Write the damped step of one level into y."""
+    work: what `recursion` has for it.
+    """
     if at.k1 == at.k0:
         return
     if inverse.method == NAKAMURA:
