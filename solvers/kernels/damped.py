@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product
 from solvers.kernels.block import orthogonalise_rows, smallest_square, solve_damped_level
 from solvers.kernels.rows import ZERO
 from solvers.kernels.space import View, matrix, vector
@@ -98,11 +98,8 @@ def _decomposed(rows, at, work):
 @inlined
 def _along(rows, at, space, k):
     """Return s_k^2, and s_k u_k^T times the residual of the level."""
-    square = part = 0.0
-    for i in range(at.i1 - at.i0):
-        square += space.S[k, i] * space.S[k, i]
-        part += space.S[k, i] * rows.miss[at.i0 + i]
-    return square, part
+    s = space.S[k]
+    return inner_product(s, s), inner_product(s, rows.miss[at.i0:])
 
 
 @inlined
@@ -126,8 +123,7 @@ def _filtered(rows, y, at, inverse, space):
         square, part = _along(rows, at, space, k)
         below = square + inverse.isotropic * inverse.isotropic
         below += extra if k == smallest and not lost else 0.0
-        for c in range(r):
-            y[at.k0 + c] += part / below * space.Y[k, c]
+        add_multiple(y[at.k0:], part / below, space.Y[k])
 
 
 @inlined
@@ -148,15 +144,14 @@ def _selective(rows, y, at, inverse, space):
         reach = 0.0  # M_k s_k
         for c in range(n):
             space.step[c] = 0.0
-            for j in range(r):
-                space.step[c] += space.Y[k, j] * rows.V[at.k0 + j, c]
+        for j in range(r):
+            add_multiple(space.step, space.Y[k, j], rows.V[at.k0 + j])
+        for c in range(n):
             reach += abs(space.step[c]) * space.sizes[c]
         own = min(1.0, np.sqrt(square) / reach) * inverse.largest
         share = _share(space.step, part / square, own)
-        for j in range(r):
-            y[at.k0 + j] += share * part / square * space.Y[k, j]
-        for c in range(n):
-            space.total[c] += share * part / square * space.step[c]
+        add_multiple(y[at.k0:], share * part / square, space.Y[k])
+        add_multiple(space.total, share * part / square, space.step)
     share = _share(space.total, 1.0, inverse.largest)
     for j in range(r):
         y[at.k0 + j] *= share
