@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.block import level_damping, stacked
 from solvers.kernels.least_squares import least_squares
 from solvers.kernels.rows import ZERO, factor_level, length_of, reflect, reflect_back
@@ -106,15 +106,11 @@ def solve_acting(problem, x, acting, factors, settings, regularisation):
     p = factor_level(rows, basis, ZERO, hard, ZERO)
     reflect(basis, ZERO, p, rows.W, hard, end)
     for k in range(p):
-        y[k] = rows.miss[k]
-        for c in range(k):
-            y[k] -= rows.W[k, c] * y[c]
-        y[k] /= rows.W[k, k]
+        y[k] = (rows.miss[k] - inner_product(y[:k], rows.W[k])) / rows.W[k, k]
     rank = factor_level(rows, basis, hard, end, p)
     close = _clean(acting, rows, hard, end, p, rank)
     for i in range(hard, end):
-        for c in range(p):
-            rows.miss[i] -= rows.W[i, c] * y[c]
+        rows.miss[i] -= inner_product(y[:p], rows.W[i])
     at = Block(hard, end, p, rank)
     _least_squares(factors, at, _mu(rows.W, at, settings, regularisation, factors.of_block))
     for c in range(x.size):

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined
+from hierarchy.jit import as_matrix, compiled, inlined, inner_product
 from solvers.kernels.least_squares import least_squares
 from solvers.kernels.rows import ZERO
 from solvers.kernels.space import matrix
@@ -44,10 +44,7 @@ def _substitute(M, r, y, at):
     """Write the solution of a square block into y."""
     for k in range(at.k0, at.k1):
         i = at.i0 + k - at.k0
-        rest = r[i]
-        for c in range(at.k0, k):
-            rest -= M[i, c] * y[c]
-        y[k] = rest / M[i, k]
+        y[k] = (r[i] - inner_product(y[at.k0:k], M[i, at.k0:])) / M[i, k]
 
 
 @compiled
@@ -101,10 +98,7 @@ def smallest_square(W):
     """Return the smallest squared norm of the rows of W."""
     smallest = np.inf
     for i in range(W.shape[0]):
-        square = 0.0
-        for j in range(W.shape[1]):
-            square += W[i, j] * W[i, j]
-        smallest = min(smallest, square)
+        smallest = min(smallest, inner_product(W[i], W[i]))
     return smallest
 
 
@@ -119,11 +113,8 @@ def orthogonalise_rows(W, U):
         settled = True
         for i in range(W.shape[0] - 1):
             for j in range(i + 1, W.shape[0]):
-                a = b = c = 0.0
-                for k in range(W.shape[1]):
-                    a += W[i, k] * W[i, k]
-                    b += W[j, k] * W[j, k]
-                    c += W[i, k] * W[j, k]
+                a, b = inner_product(W[i], W[i]), inner_product(W[j], W[j])
+                c = inner_product(W[i], W[j])
                 if c * c <= ORTHOGONAL * a * b:
                     continue
                 settled = False

@@ -1,4 +1,4 @@
-"""The recursion (5), (6), (13) with the dampings of Nakamura, Chiaverini, and Buss and Kim.
+"""The inverses of `recursion`: the dampings of Nakamura, Chiaverini, and Buss and Kim.
 
 B = J_i P_{i-1} = C V as in `recursion`. The projectors stay undamped, so no level disturbs those
 above it. Each damping acts in the singular value decomposition B = sum_k s_k u_k v_k^T.
@@ -12,14 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product
 from solvers.kernels.block import orthogonalise_rows, smallest_square, solve_damped_level
-from solvers.kernels.recursion import add, begin, carve, decompose, see
-from solvers.kernels.rows import ZERO, finish, load_rows
-from solvers.kernels.space import Block, View, matrix, shared, vector
-from solvers.status import SOLVED, TOO_SMALL
+from solvers.kernels.rows import ZERO
+from solvers.kernels.space import View, matrix, vector
 
-NAKAMURA, CHIAVERINI, SELECTIVE = 1.0, 2.0, 3.0
+LEVEL, NAKAMURA, CHIAVERINI, SELECTIVE = 0.0, 1.0, 2.0, 3.0
 
 
 class Inverse(NamedTuple):
@@ -47,40 +45,11 @@ class Singular(NamedTuple):
 
 
 @compiled
-def damped_recursion(A, lower, upper, sizes, x, settings, work):
-    """Solve like `recursion`; settings: those, the method, `isotropic` and `largest`."""
-    m, n = A.shape
-    rows, at = carve(work, ZERO, m, n)
-    y, at = vector(work, at, n)
-    q, at = vector(work, at, n)
-    of_block, at = vector(work, at, 2 * (m + n) * (n + 1))
-    if at > work.size:
-        return ZERO + TOO_SMALL
-    inverse = Inverse(settings[3], settings[0], settings[1], settings[4], settings[5])
-    settings = shared(settings)
-    code = load_rows(rows.W, rows.zero, A, lower, upper, x, settings.rank_tolerance)
-    if code != SOLVED:
-        return finish(x, code)
-    begin(rows, q)
-    rank = first = ZERO
-    for level in range(sizes.size):
-        last, above = first + sizes[level], rank
-        see(rows, A, lower, q, first, last, above)
-        rank = decompose(rows, A, first, last, rank, settings.rank_tolerance)
-        _invert(rows, y, Block(first, last, above, rank), inverse, of_block)
-        for k in range(above, rank):
-            add(q, y[k], rows.V[k])  # (5)
-        first = last
-    for i in range(n):
-        add(q, x[i], rows.P[i])  # (14)
-    for c in range(n):
-        x[c] = q[c]
-    return finish(x, SOLVED)
+def invert(rows, y, at, inverse, work):
+    """Write the damped step of one level into y.
 
-
-@compiled
-def _invert(rows, y, at, inverse, work):
-    """Write the damped step of one level into y."""
+    work: what `recursion` has for it.
+    """
     if at.k1 == at.k0:
         return
     if inverse.method == NAKAMURA:
@@ -129,11 +98,8 @@ def _decomposed(rows, at, work):
 @inlined
 def _along(rows, at, space, k):
     """Return s_k^2, and s_k u_k^T times the residual of the level."""
-    square = part = 0.0
-    for i in range(at.i1 - at.i0):
-        square += space.S[k, i] * space.S[k, i]
-        part += space.S[k, i] * rows.miss[at.i0 + i]
-    return square, part
+    s = space.S[k]
+    return inner_product(s, s), inner_product(s, rows.miss[at.i0:])
 
 
 @inlined
@@ -157,8 +123,7 @@ def _filtered(rows, y, at, inverse, space):
         square, part = _along(rows, at, space, k)
         below = square + inverse.isotropic * inverse.isotropic
         below += extra if k == smallest and not lost else 0.0
-        for c in range(r):
-            y[at.k0 + c] += part / below * space.Y[k, c]
+        add_multiple(y[at.k0:], part / below, space.Y[k])
 
 
 @inlined
@@ -179,15 +144,14 @@ def _selective(rows, y, at, inverse, space):
         reach = 0.0  # M_k s_k
         for c in range(n):
             space.step[c] = 0.0
-            for j in range(r):
-                space.step[c] += space.Y[k, j] * rows.V[at.k0 + j, c]
+        for j in range(r):
+            add_multiple(space.step, space.Y[k, j], rows.V[at.k0 + j])
+        for c in range(n):
             reach += abs(space.step[c]) * space.sizes[c]
         own = min(1.0, np.sqrt(square) / reach) * inverse.largest
         share = _share(space.step, part / square, own)
-        for j in range(r):
-            y[at.k0 + j] += share * part / square * space.Y[k, j]
-        for c in range(n):
-            space.total[c] += share * part / square * space.step[c]
+        add_multiple(y[at.k0:], share * part / square, space.Y[k])
+        add_multiple(space.total, share * part / square, space.step)
     share = _share(space.total, 1.0, inverse.largest)
     for j in range(r):
         y[at.k0 + j] *= share

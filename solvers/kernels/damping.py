@@ -1,9 +1,10 @@
 """Damping beside inequalities: each damped level is one convex problem.
 
 The staircase of the equalities alone gives an x. Where inequalities hold it, that is the answer, as
-in `tpm`. Where a row is exceeded, what lies along it is taken out of the equalities, in proportion
-up to all of it, and the staircase of the rest gives each level its lambda: an arm that would be
-singular with a joint at its limit is damped as one that is singular. Then level by level
+in `tpm`, unless a bound fixes an unknown, for bounds are not damped. Where a row is exceeded, what
+lies along it is taken out of the equalities, in proportion up to all of it, and the staircase of
+the rest gives each level its lambda: an arm that would be singular with a joint at its limit is
+damped as one that is singular. Then level by level
 
     min |A_k x - b_k|^2 + lambda_k^2 |x|^2, levels above at what they have reached,
 
@@ -85,7 +86,7 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
 
     The second number is the code of the staircase. x: the reference.
     """
-    first, count = ZERO, ZERO
+    first, count, fixed = ZERO, ZERO, False
     for k in range(sizes.size):
         d.sizes[k], begin = sizes[k], count
         for i in range(first, first + sizes[k]):
@@ -96,11 +97,12 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
                 d.b[count] = lower[i]
                 count += 1
         d.ends[k], first = count - begin, first + sizes[k]
+        fixed = fixed or (count > begin and _are_bounds(d, A, first, k))
     for c in range(x.size):
         d.free[c] = x[c]
     E, b = d.E[:count], d.b[:count]
     code = solve_by_staircase(E, b, b, d.ends, d.free, settings, work)
-    if code == NUMERICAL_FAILURE or _is_met(d, A, lower, upper):
+    if code == NUMERICAL_FAILURE or (not fixed and _is_met(d, A, lower, upper)):
         return True, code
     _factor_equalities(d, A, sizes, settings, work, YES)
     _take_out_exceeded(d, E, A, lower, upper, x)
@@ -114,6 +116,18 @@ def _copy_row(d, A, lower, upper, i):
     for c in range(A.shape[1]):
         d.A[i, c] = A[i, c]
     d.lower[i], d.upper[i] = lower[i], upper[i]
+
+
+@inlined
+def _are_bounds(d, A, last, k):
+    """Whether level k, which ends at row `last`, has bounds alone: they are not damped."""
+    bounds = d.ends[k] < d.sizes[k]
+    for i in range(last - d.sizes[k], last):
+        entries = 0
+        for c in range(A.shape[1]):
+            entries += A[i, c] != 0.0
+        bounds = bounds and entries <= 1
+    return bounds
 
 
 @inlined
@@ -140,20 +154,12 @@ def _take_out_exceeded(d, E, A, lower, upper, reference):
 
 @inlined
 def _factor_equalities(d, A, sizes, settings, work, whole):
-    """Write what each level adds to the staircase, if `whole`, else its lambda.
-
-    Bounds on single unknowns are not damped.
-    """
+    """Write what each level adds to the staircase, if `whole`, else its lambda."""
     m, n = d.E.shape
     (basis, rows, _, _, of_block), _ = carve_staircase(work, ZERO, m, n)
     settings, rank, first, begin = shared(settings), ZERO, ZERO, ZERO
     for k in range(sizes.size):
-        end, last, bounds = begin + d.ends[k], first + sizes[k], True
-        for i in range(first, last):
-            entries = 0
-            for c in range(n):
-                entries += A[i, c] != 0.0
-            bounds = bounds and entries <= 1
+        end, last = begin + d.ends[k], first + sizes[k]
         for e in range(begin, end):
             for c in range(n):
                 rows.W[e, c] = d.E[e, c]
@@ -166,7 +172,7 @@ def _factor_equalities(d, A, sizes, settings, work, whole):
                 for c in range(n):
                     d.Q[begin + t - above, c] = 1.0 if c == t else 0.0
             reflect_back(basis, rank, d.Q, begin, begin + rank - above)
-        elif begin < end and not (bounds and end - begin < sizes[k]):
+        elif begin < end and not _are_bounds(d, A, last, k):
             d.factor[k] = level_damping(rows.W, Block(begin, end, above, rank), settings, of_block)
         else:
             d.factor[k] = 0.0

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.rows import ZERO, make_reflector, reflect, reflect_back
 from solvers.kernels.space import View, integers, matrix, vector
 from solvers.kernels.tolerances import BOUND_KEPT, TERMS
@@ -80,18 +80,14 @@ def hold(held, seen, j, way, above, count, least):
         e[i] = 0.0
     e[j] = 1.0
     reflect(basis, ZERO, k, held.E, count, count + 1)
-    square = 0.0
-    for i in range(k, e.size):
-        square += e[i] * e[i]
+    square = inner_product(e[k:], e[k:])
     if not square > least * least:
         held.side[j] = 0.0
         return count
     make_reflector(basis, k, e, square)
     reflect(basis, k, k + 1, held.E, count, count + 1)
     reflect(basis, k, k + 1, seen, ZERO, seen.shape[0])
-    for i in range(above, k):
-        way -= e[i] * held.y[i]
-    held.y[k] = way / e[k]
+    held.y[k] = (way - inner_product(e[above:k], held.y[above:])) / e[k]
     held.joint[count] = j
     return count + 1
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined
+from hierarchy.jit import as_matrix, compiled, inlined, inner_product
 from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_square
 from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
 from solvers.kernels.space import (
@@ -71,9 +71,7 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
         return finish(x, code)
     tolerance, square = _tolerance(A, settings.rank_tolerance), 0.0
     for i in range(m):
-        u[i] = 0.0
-        for k in range(n):
-            u[i] -= A[i, k] * x[k]
+        u[i] = -inner_product(A[i], x)
         for k in range(i, m):
             square += matrices.T[i, k] * matrices.T[i, k]
     for k in range(m):
@@ -92,9 +90,7 @@ def _add_inverse(matrices, u, of_x, x):
     for c in range(of_x.shape[1]):
         of_x[0, c] = 0.0
     for i in range(m):
-        for k in range(i):
-            u[i] -= matrices.R[i, k] * u[k]
-        u[i] /= matrices.R[i, i]
+        u[i] = (u[i] - inner_product(u[:i], matrices.R[i])) / matrices.R[i, i]
         of_x[0, i] = u[i]
     reflect_back(matrices.basis, m, of_x, ZERO, ZERO + 1)
     for c in range(x.size):
@@ -195,10 +191,7 @@ def _tolerance(A, rank_tolerance):
     """Return the absolute tolerance of singular values: rank_tolerance times the largest norm."""
     largest = 0.0
     for i in range(A.shape[0]):
-        square = 0.0
-        for c in range(A.shape[1]):
-            square += A[i, c] * A[i, c]
-        largest = max(largest, square)
+        largest = max(largest, inner_product(A[i], A[i]))
     return rank_tolerance * np.sqrt(largest)
 
 
@@ -227,9 +220,7 @@ def _invert_pivot(F, T, first, settings, tolerance, D, work):
     ratio = smallest_square(S) / (threshold * threshold)
     damped = damping * damping * max(0.0, 1.0 - ratio)  # lambda^2
     for k in range(p):
-        square = 0.0
-        for j in range(p):
-            square += S[k, j] * S[k, j]
+        square = inner_product(S[k], S[k])
         if damped > 0.0 or square > tolerance * tolerance:
             for i in range(p):
                 for j in range(p):

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product
 from solvers.kernels.block import solve_level
-from solvers.kernels.rows import ZERO, finish, largest_row, load_rows, swap, swap_rows
+from solvers.kernels.damped import LEVEL, Inverse, invert
+from solvers.kernels.rows import ZERO, finish, largest_row, length_of, load_rows, swap, swap_rows
 from solvers.kernels.space import Block, View, matrix, shared, vector
 from solvers.status import SOLVED, TOO_SMALL
 
@@ -36,7 +35,7 @@ class Projected(NamedTuple):
 
 
 @inlined
-def carve(work, at, m, n):
+def _carve(work, at, m, n):
     """Return Projected for m rows of n unknowns, and where it ends."""
     W, at = matrix(work, at, m, n)
     C, at = matrix(work, at, m, n)
@@ -51,39 +50,44 @@ def carve(work, at, m, n):
 def recursion(A, lower, upper, sizes, x, settings, work):
     """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
-    Arguments and return codes are those of `solve_by_staircase`.
+    settings: those of `Recursive`. Other arguments and the codes are those of `solve_by_staircase`.
     """
     m, n = A.shape
-    rows, at = carve(work, 0, m, n)
+    rows, at = _carve(work, ZERO, m, n)
     y, at = vector(work, at, n)
     q, at = vector(work, at, n)
-    of_block, at = vector(work, at, (m + n) * (n + 1))
+    of_block, at = vector(work, at, 2 * (m + n) * (n + 1))
     if at > work.size:
-        return TOO_SMALL
+        return ZERO + TOO_SMALL
+    inverse = Inverse(settings[3], settings[0], settings[1], settings[4], settings[5])
     settings = shared(settings)
     code = load_rows(rows.W, rows.zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
         return finish(x, code)
-    begin(rows, q)
+    _begin(rows, q)
 
     rank = first = ZERO
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
-        see(rows, A, lower, q, first, last, above)
-        rank = decompose(rows, A, first, last, rank, settings.rank_tolerance)
-        solve_level(rows.C, rows.miss, y, Block(first, last, above, rank), settings, of_block)
+        _see(rows, A, lower, q, first, last, above)
+        rank = _decompose(rows, A, first, last, rank, settings.rank_tolerance)
+        block = Block(first, last, above, rank)
+        if inverse.method == LEVEL:
+            solve_level(rows.C, rows.miss, y, block, settings, of_block)
+        else:
+            invert(rows, y, block, inverse, of_block)
         for k in range(above, rank):
-            add(q, y[k], rows.V[k])  # (5)
+            add_multiple(q, y[k], rows.V[k])  # (5)
         first = last
     for i in range(n):
-        add(q, x[i], rows.P[i])  # (14): I - J^# J = P_l
+        add_multiple(q, x[i], rows.P[i])  # (14): I - J^# J = P_l
     for c in range(n):
         x[c] = q[c]
     return finish(x, SOLVED)
 
 
 @inlined
-def begin(rows, q):
+def _begin(rows, q):
     """Set C and q to zero, and P_0 to I."""
     n = q.size
     for i in range(rows.C.shape[0]):
@@ -96,26 +100,16 @@ def begin(rows, q):
 
 
 @inlined
-def add(q, s, v):
-    """Add s v to q."""
-    for c in range(q.size):
-        q[c] += v[c] * s
-
-
-@inlined
-def see(rows, A, b, q, first, last, above):
+def _see(rows, A, b, q, first, last, above):
     """Write the residual of a level, p_i - J_i x_{i-1} in (13), and its rows J_i P_{i-1}."""
     for i in range(first, last):
-        miss = b[i]
-        for c in range(q.size):
-            miss -= A[i, c] * q[c]
-        rows.miss[i] = miss
+        rows.miss[i] = b[i] - inner_product(A[i], q)
         if above > 0:
             _project(rows.W[i], A[i], rows.P)
 
 
 @inlined
-def decompose(rows, A, first, last, rank, rank_tolerance):
+def _decompose(rows, A, first, last, rank, rank_tolerance):
     """Decompose the rows of a level into unit vectors, largest first; return the rank."""
     for i in range(first, last):
         pivot, square = largest_row(rows.W, rows.zero, i, last, ZERO)
@@ -138,9 +132,7 @@ def _project(w, a, P):
     for c in range(w.size):
         w[c] = 0.0
     for k in range(w.size):
-        factor, p = a[k], P[k]
-        for c in range(w.size):
-            w[c] += factor * p[c]
+        add_multiple(w, a[k], P[k])
 
 
 @compiled
@@ -152,22 +144,14 @@ def _take_direction(rows, i, last, k, again):
     v = rows.V[k]
     if again:
         _project(v, rows.W[i], rows.P)
-    square = 0.0
-    for c in range(v.size):
-        v[c] = v[c] if again else rows.W[i, c]
-        square += v[c] * v[c]
-    norm = np.sqrt(square)
+    else:
+        for c in range(v.size):
+            v[c] = rows.W[i, c]
+    norm = length_of(v)
     for c in range(v.size):
         v[c] /= norm
     for j in range(i, last):
-        w = rows.W[j]
-        s = 0.0
-        for c in range(v.size):
-            s += w[c] * v[c]
-        rows.C[j, k] = s
-        for c in range(v.size):
-            w[c] -= s * v[c]
+        rows.C[j, k] = inner_product(v, rows.W[j])
+        add_multiple(rows.W[j], -rows.C[j, k], v)
     for j in range(v.size):
-        s, p = v[j], rows.P[j]
-        for c in range(v.size):
-            p[c] -= s * v[c]  # (6)
+        add_multiple(rows.P[j], -v[j], v)  # (6)

@@ -13,7 +13,7 @@ staircase finds it at any rank, and no pseudoinverse is formed.
 
 from __future__ import annotations
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.rows import finish
 from solvers.kernels.space import integers, vector
 from solvers.kernels.staircase import carve_staircase, climb
@@ -46,7 +46,8 @@ def reverse(A, lower, upper, sizes, x, settings, work):
         last, first = first, first - sizes[k]
         for c in range(n):
             d[c] = 0.0 if k > 0 else reference[c]  # in the null space of all levels
-        _ask(A, lower, x, asked, first, last)
+        for i in range(first, last):
+            asked[i] = lower[i] - inner_product(A[i], x)  # b_k - J_k x_{k+1}
         two = parts[k:_end_of_parts(sizes, parts, k, m - last, settings[3] > 0.0)]
         code, _ = climb(A[first:], asked[first:], asked[first:], two, d, settings, work[at:])
         if code != SOLVED:
@@ -59,15 +60,6 @@ def reverse(A, lower, upper, sizes, x, settings, work):
         for c in range(n):
             x[c] = reference[c]
     return finish(x, SOLVED)
-
-
-@inlined
-def _ask(A, b, x, asked, first, last):
-    """Write the residual of a level, b_k - J_k x_{k+1}, as its target."""
-    for i in range(first, last):
-        asked[i] = b[i]
-        for c in range(x.size):
-            asked[i] -= A[i, c] * x[c]
 
 
 @inlined

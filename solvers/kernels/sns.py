@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.block import solve_level
 from solvers.kernels.held import (
     NO_JOINT,
@@ -289,9 +289,7 @@ def _begin(task, x, space):
     for j in range(x.size):
         space.held.side[j] = 0.0
     for i in range(task.b.size):
-        space.now[i] = 0.0
-        for j in range(x.size):
-            space.now[i] += task.J[i, j] * x[j]
+        space.now[i] = inner_product(task.J[i], x)
 
 
 @compiled

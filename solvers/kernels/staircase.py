@@ -14,13 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.block import solve_level
 from solvers.kernels.rows import (
     ZERO,
     factor_level,
     finish,
     has_outlier,
+    length_of,
     load_rows,
     reflect,
     reflect_back,
@@ -96,7 +97,8 @@ def climb(A, lower, upper, sizes, x, settings, work):
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
         reflect(basis, ZERO, above, rows.W, first, last)  # J_i Q: the level as seen from above
-        _ask(rows, lower, first, last)
+        for i in range(first, last):
+            rows.miss[i] = lower[i]
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
         least = smallest_pivot(rows, block, least)
@@ -124,10 +126,7 @@ def is_borderline(rows, begin, end, rank, share):
     """Whether more than this share of the tolerance is left of a row that counts as dependent."""
     borderline = False
     for i in range(begin, end):
-        square, w = 0.0, rows.W[i, rank:]
-        for c in range(w.size):
-            square += w[c] * w[c]
-        borderline |= square > share * share * rows.zero[i]
+        borderline |= length_of(rows.W[i, rank:]) ** 2 > share * share * rows.zero[i]
     return borderline
 
 
@@ -142,20 +141,10 @@ def smallest_pivot(rows, block, least):
 
 
 @inlined
-def _ask(rows, b, first, last):
-    """Write the targets of a level as its residual."""
-    for i in range(first, last):
-        rows.miss[i] = b[i]
-
-
-@inlined
 def subtract(rows, y, first, last, above):
     """Subtract the part that y reaches in columns 0 .. above - 1 from the residual of a level."""
     for i in range(first, last):
-        miss = rows.miss[i]
-        for c in range(above):
-            miss -= rows.W[i, c] * y[c]
-        rows.miss[i] = miss
+        rows.miss[i] -= inner_product(y[:above], rows.W[i])
 
 
 @inlined

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.acting import (
     Acting,
     Factors,
@@ -216,9 +216,7 @@ def _turn(space, row):
 @inlined
 def _beyond(problem, x, i):
     """Return the amounts by which row i is above its upper side and below its lower side."""
-    value = 0.0
-    for c in range(x.size):
-        value += problem.A[i, c] * x[c]
+    value = inner_product(problem.A[i], x)
     return value - problem.upper[i], problem.lower[i] - value
 
 

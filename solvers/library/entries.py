@@ -12,7 +12,6 @@ import numpy as np
 from hierarchy.jit import compiled, inlined
 from hierarchy.jit.exporting import INTEGER, STATUS, Entry, numbers_at
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
-from solvers.kernels.damped import damped_recursion
 from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy, verify_answer
 from solvers.kernels.merged import OWN, merged, write_levels
 from solvers.kernels.merged import record_size as merged_record
@@ -76,13 +75,8 @@ def solve_recursive(problem, settings, record, x, work, size):
     _write_shared(call.settings, s)
     call.settings[3], call.settings[4], call.settings[5] = s.method, s.isotropic, s.largest
     begun(call, ZERO)
-    if s.method == 0:
-        code = recursion(call.A, call.lower, call.upper, call.sizes, call.x, call.settings,
-                         call.work)
-    else:
-        code = damped_recursion(call.A, call.lower, call.upper, call.sizes, call.x, call.settings,
-                                call.work)
-    return closed(call, code)
+    return closed(call, recursion(call.A, call.lower, call.upper, call.sizes, call.x, call.settings,
+                                  call.work))
 
 
 def solve_sns(problem, settings, record, x, work, size):

@@ -39,7 +39,7 @@ def work_size(n, m, levels):
 
 @inlined
 def recursive(n, m):
-    """Return what the kernels of `recursive` need, see `kernels.damped.damped_recursion`."""
+    """Return what the kernel of `recursive` needs."""
     return 2 * m * n + 2 * n * n + 2 * m + 2 * n + 2 * block(n, m)
 
 

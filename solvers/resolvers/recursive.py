@@ -12,12 +12,13 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
-from solvers.kernels.damped import CHIAVERINI, NAKAMURA, SELECTIVE, damped_recursion
+from solvers.kernels.damped import CHIAVERINI, LEVEL, NAKAMURA, SELECTIVE
 from solvers.kernels.recursion import recursion
 from solvers.resolver import Resolution, Resolver, register
 from solvers.workspace import WORKSPACE, entry
 
-_METHODS = {"level": 0.0, "nakamura": NAKAMURA, "chiaverini": CHIAVERINI, "selective": SELECTIVE}
+_METHODS = {"level": LEVEL, "nakamura": NAKAMURA, "chiaverini": CHIAVERINI,
+            "selective": SELECTIVE}
 _DAMPS = {"nakamura": "each level by its manipulability",
           "chiaverini": "the smallest singular direction of each level",
           "selective": "each singular direction of each level"}
@@ -71,6 +72,5 @@ class Recursive(Resolver):
         """Resolve h; a direct method that ignores `memory`."""
         x = h.start()
         A, lower, upper, sizes = h.rows
-        kernel = recursion if self.method == "level" else damped_recursion
-        code = entry(kernel)(A, lower, upper, sizes, x, self._settings, WORKSPACE.array)
+        code = entry(recursion)(A, lower, upper, sizes, x, self._settings, WORKSPACE.array)
         return self._otherwise(h, x, code, memory) if code else Resolution(x)

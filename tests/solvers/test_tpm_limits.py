@@ -138,6 +138,15 @@ def test_damping_keeps_the_bounds_and_ends(damping):
         assert np.array_equal(damped.solve(h, res.memory).x, res.x)
 
 
+@pytest.mark.parametrize("name", ["tpm", "hcod"])
+def test_a_joint_that_a_light_row_fixes_among_bounds_is_not_damped(name):
+    """x_1 was 0.02: the light equality counted as a task near a singularity."""
+    bounds = ([[2.0, 0.0], [-0.01, 0.0], [0.0, 1.0]], [-1.0, -0.005, -1.0], [1.0, -0.005, 1.0])
+    h = Hierarchy.from_levels([bounds, (np.ones((1, 2)), [0.8])])
+    x = make(name, damping=0.05, threshold=0.1).solve(h).x
+    np.testing.assert_allclose(x, [0.5, 0.3], rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("damping", [0.0, 0.1])
 @pytest.mark.parametrize("lower", [-np.inf, -0.5])
 def test_a_bound_beyond_the_largest_number_is_a_failure_with_a_finite_x(damping, lower):
