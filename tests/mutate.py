@@ -9,10 +9,10 @@ value. Its module is replaced as it is imported, in the tests and in every progr
 the checkout is not touched, so kernels come from the cache. The tests are those that run the
 changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
 once, and again when tests have changed), or --tests: first those not marked slow, then, where these
-pass, the slow ones. A line that tests run only in other processes, or while importing, has the
-tests of its module. Of many tests, MOST are taken. Prints every survivor with its line, and the
-share of survivors. A mutant that takes over three times the CPU time of the unchanged tests, and
-LEAST, counts as killed.
+pass, the slow ones. A line that tests run only in other processes, or that runs as its module is
+imported, has the tests of its module. Of many tests MOST are taken: a case of each function first,
+those first that run few lines. Prints every survivor with its line, and the share of survivors. A
+mutant that takes over three times the CPU time of the unchanged tests, and LEAST, counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
 `strict=` of zip (a check that does not fire where shapes have been checked), what only a type
@@ -205,6 +205,14 @@ class Contexts:
         self.coverage.switch_context("")
         return result
 
+    @pytest.hookimpl(wrapper=True)
+    def pytest_make_collect_report(self, collector: pytest.Collector) -> Iterator[None]:
+        """What a file of tests runs as it is imported, all of its tests depend on."""
+        self.coverage.switch_context(collector.nodeid if isinstance(collector, pytest.File) else "")
+        result = yield
+        self.coverage.switch_context("")
+        return result
+
 
 def write_map(tests: list[str]) -> None:
     """Run tests, and keep which of them run which line."""
@@ -213,6 +221,9 @@ def write_map(tests: list[str]) -> None:
     MAP.parent.mkdir(exist_ok=True)
     coverage = Coverage(str(MAP), source=[str(ROOT / name) for name in SAMPLED])
     coverage.start()
+    for module in modules():  # what these run as they are imported, is of no test
+        with contextlib.suppress(ImportError):
+            import_module(module.removesuffix(".py").removesuffix("/__init__").replace("/", "."))
     code = pytest.main(["-q", "-p", "no:cacheprovider", "-n", "0", *tests], [Contexts(coverage)])
     coverage.stop()
     coverage.save()
@@ -246,7 +257,7 @@ def lines_of(module: str) -> dict[int, tuple[str, ...]]:
 
 
 def tests_of(mutant: Mutant) -> tuple[str, ...]:
-    """Return the tests that run the line of a mutant, of many MOST: see the module's text."""
+    """Return the tests that run the line of a mutant, of many MOST of them."""
     line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
     records = ("tests/project/test_records.py",)
     if "frozen=" in line:
