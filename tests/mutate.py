@@ -143,8 +143,12 @@ def untested(node: ast.AST) -> bool:
 
 
 def is_kernel(node: ast.AST) -> bool:
-    return isinstance(node, ast.FunctionDef) and any(
-        isinstance(mark, ast.Name) and mark.id in COMPILED for mark in node.decorator_list)
+    """Whether a function is compiled: it says so, or has no types, as those that others compile."""
+    if not isinstance(node, ast.FunctionDef):
+        return False
+    typed = node.returns or any(one.annotation for one in node.args.args)
+    return not typed or any(isinstance(mark, ast.Name) and mark.id in COMPILED
+                            for mark in node.decorator_list)
 
 
 @cache
