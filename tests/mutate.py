@@ -263,11 +263,12 @@ def lines_of(module: str) -> dict[int, tuple[str, ...]]:
 def tests_of(mutant: Mutant) -> tuple[str, ...]:
     """Return the tests that run the line of a mutant, of many MOST of them."""
     line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
-    records = ("tests/project/test_records.py",)
+    records, keys = ("tests/project/test_records.py",), ("tests/scenarios/test_reference.py",)
     if "frozen=" in line:
         return records
     known = lines_of(mutant.module)
     tests = [*(known.get(mutant.line) or known[0])]
+    default = mutant.module.startswith("scenarios/config/") and not known.get(mutant.line)
     random.Random(mutant.line).shuffle(tests)
     seen, order = Counter[str](), dict[str, tuple[int, int]]()
     for test in tests:
@@ -275,7 +276,7 @@ def tests_of(mutant: Mutant) -> tuple[str, ...]:
         order[test] = seen[function], footprints()[test]
         seen[function] += 1
     chosen = sorted(tests, key=order.__getitem__)[:MOST]
-    return ("field(" in line) * records + tuple(sorted(chosen))
+    return ("field(" in line) * records + default * keys + tuple(sorted(chosen))
 
 
 class Runner:
