@@ -120,6 +120,10 @@ def modules() -> list[str]:
     return [name for name in names if not name.startswith(left_out)]
 
 
+def name_of(module: str) -> str:
+    return module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
 def mutants(module: str) -> Iterator[Mutant]:
     """Yield every mutant of a module."""
     tree = parsed(module)
@@ -227,7 +231,8 @@ def write_map(tests: list[str]) -> None:
     coverage.start()
     for module in modules():  # what these run as they are imported, is of no test
         with contextlib.suppress(ImportError):
-            import_module(module.removesuffix(".py").removesuffix("/__init__").replace("/", "."))
+            if not module.endswith("__main__.py"):
+                import_module(name_of(module))
     code = pytest.main(["-q", "-p", "no:cacheprovider", "-n", "0", *tests], [Contexts(coverage)])
     coverage.stop()
     coverage.save()
@@ -309,8 +314,7 @@ class Runner:
     def survives(self, module: str, code: CodeType, tests: tuple[str, ...]) -> bool:
         """Whether the tests pass with this code of a module."""
         (self.folder / "mutant").write_bytes(marshal.dumps(code))
-        name = module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-        environment = {"MUTANT_NAME": name, "MUTANT_FILE": str(ROOT / module),
+        environment = {"MUTANT_NAME": name_of(module), "MUTANT_FILE": str(ROOT / module),
                        "MUTANT_CODE": str(self.folder / "mutant")}
         for mark in MARKS:
             passed, used = self._run([*tests], mark, environment, LEAST)
