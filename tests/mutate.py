@@ -9,10 +9,10 @@ value. Its module is replaced as it is imported, in the tests and in every progr
 the checkout is not touched, so kernels come from the cache. The tests are those that run the
 changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
 once, and again when tests have changed), or --tests: first those not marked slow, then, where these
-pass, the slow ones. A line that tests run only in other processes, or while importing, has the
-tests of its module. Of many tests, MOST are taken. Prints every survivor with its line, and the
-share of survivors. A mutant that takes over three times the CPU time of the unchanged tests, and
-LEAST, counts as killed.
+pass, the slow ones. A line that tests run only in other processes, or that runs as its module is
+imported, has the tests of its module. Of many tests MOST are taken: a case of each function first,
+those first that run few lines. Prints every survivor with its line, and the share of survivors. A
+mutant that takes over three times the CPU time of the unchanged tests, and LEAST, counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
 `strict=` of zip (a check that does not fire where shapes have been checked), what only a type
@@ -120,6 +120,10 @@ def modules() -> list[str]:
     return [name for name in names if not name.startswith(left_out)]
 
 
+def name_of(module: str) -> str:
+    return module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
 def mutants(module: str) -> Iterator[Mutant]:
     """Yield every mutant of a module."""
     tree = parsed(module)
@@ -143,8 +147,12 @@ def untested(node: ast.AST) -> bool:
 
 
 def is_kernel(node: ast.AST) -> bool:
-    return isinstance(node, ast.FunctionDef) and any(
-        isinstance(mark, ast.Name) and mark.id in COMPILED for mark in node.decorator_list)
+    """Whether a function is compiled: it says so, or has no types, as those that others compile."""
+    if not isinstance(node, ast.FunctionDef):
+        return False
+    typed = node.returns or any(one.annotation for one in node.args.args)
+    return not typed or any(isinstance(mark, ast.Name) and mark.id in COMPILED
+                            for mark in node.decorator_list)
 
 
 @cache
@@ -205,6 +213,14 @@ class Contexts:
         self.coverage.switch_context("")
         return result
 
+    @pytest.hookimpl(wrapper=True)
+    def pytest_make_collect_report(self, collector: pytest.Collector) -> Iterator[None]:
+        """What a file of tests runs as it is imported, all of its tests depend on."""
+        self.coverage.switch_context(collector.nodeid if isinstance(collector, pytest.File) else "")
+        result = yield
+        self.coverage.switch_context("")
+        return result
+
 
 def write_map(tests: list[str]) -> None:
     """Run tests, and keep which of them run which line."""
@@ -213,6 +229,10 @@ def write_map(tests: list[str]) -> None:
     MAP.parent.mkdir(exist_ok=True)
     coverage = Coverage(str(MAP), source=[str(ROOT / name) for name in SAMPLED])
     coverage.start()
+    for module in modules():  # what these run as they are imported, is of no test
+        with contextlib.suppress(ImportError):
+            if not module.endswith("__main__.py"):
+                import_module(name_of(module))
     code = pytest.main(["-q", "-p", "no:cacheprovider", "-n", "0", *tests], [Contexts(coverage)])
     coverage.stop()
     coverage.save()
@@ -246,13 +266,14 @@ def lines_of(module: str) -> dict[int, tuple[str, ...]]:
 
 
 def tests_of(mutant: Mutant) -> tuple[str, ...]:
-    """Return the tests that run the line of a mutant, of many MOST: see the module's text."""
+    """Return the tests that run the line of a mutant, of many MOST of them."""
     line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
-    records = ("tests/project/test_records.py",)
+    records, keys = ("tests/project/test_records.py",), ("tests/scenarios/test_reference.py",)
     if "frozen=" in line:
         return records
     known = lines_of(mutant.module)
     tests = [*(known.get(mutant.line) or known[0])]
+    default = mutant.module.startswith("scenarios/config/") and not known.get(mutant.line)
     random.Random(mutant.line).shuffle(tests)
     seen, order = Counter[str](), dict[str, tuple[int, int]]()
     for test in tests:
@@ -260,7 +281,7 @@ def tests_of(mutant: Mutant) -> tuple[str, ...]:
         order[test] = seen[function], footprints()[test]
         seen[function] += 1
     chosen = sorted(tests, key=order.__getitem__)[:MOST]
-    return ("field(" in line) * records + tuple(sorted(chosen))
+    return ("field(" in line) * records + default * keys + tuple(sorted(chosen))
 
 
 class Runner:
@@ -293,8 +314,7 @@ class Runner:
     def survives(self, module: str, code: CodeType, tests: tuple[str, ...]) -> bool:
         """Whether the tests pass with this code of a module."""
         (self.folder / "mutant").write_bytes(marshal.dumps(code))
-        name = module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-        environment = {"MUTANT_NAME": name, "MUTANT_FILE": str(ROOT / module),
+        environment = {"MUTANT_NAME": name_of(module), "MUTANT_FILE": str(ROOT / module),
                        "MUTANT_CODE": str(self.folder / "mutant")}
         for mark in MARKS:
             passed, used = self._run([*tests], mark, environment, LEAST)

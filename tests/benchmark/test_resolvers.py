@@ -23,7 +23,7 @@ def few(monkeypatch):
     monkeypatch.setattr(resolvers.reference, "family", lambda name: family(name)[:1])
 
 
-def test_a_row_for_everybody_and_every_family(few, tmp_path, capsys, monkeypatch):
+def test_a_row_for_everybody_in_every_family_asked(few, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     found = resolvers.run(seconds=0.001, families=FEW)
     rows = found.rows["resolvers"]

@@ -227,4 +227,5 @@ def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event(
     (ax,) = timeline(run).axes
     assert [text.get_text() for text in ax.get_yticklabels()] == ["1", "2", "overrun: use"]
     assert ax.get_title(loc="left") == "Place in the stack, 2 changes"
+    assert ax.get_ylim() == (2.5, -0.5)  # half a row around the three
     assert "fault" in [text.get_text() for text in ax.texts]

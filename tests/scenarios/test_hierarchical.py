@@ -47,7 +47,7 @@ def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row
 
 
 @pytest.mark.parametrize(("changes", "says"), [
-    (["avoidance.influence=0.01"], "is not below influence"),
+    (["avoidance.influence=0.05"], "0.05 m is not below influence"),
     (["control.level=velocity", "limits.torque=0.5"], "needs control.level"),
     (["limits.acceleration=0"], "limits.acceleration"),
     (["limits.acceleration=[1.0, 2.0]"], "expected a number or"),

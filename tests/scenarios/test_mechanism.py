@@ -190,6 +190,12 @@ def test_the_torque_plant_has_the_armature_of_the_robots_file(added, tmp_path):
     np.testing.assert_allclose(plant.accelerations(np.array([3.0, -2.0])), expected, rtol=1e-6)
 
 
+def test_chains_of_the_torque_plant_are_as_stiff_as_its_time_step_allows(tmp_path):
+    _, robot = ankle_at(tmp_path, CROSS)
+    model = TorqueRobot(robot, Contacts(robot, []), robot.rest).model
+    np.testing.assert_allclose(model.eq_solref, [[2.0 * model.opt.timestep, 1.0]] * 2)
+
+
 FALLING = """<mujoco><default><joint armature=".2"/></default><worldbody><body name="trunk">
 <joint type="free"/><geom type="box" size=".1 .2 .1" mass="3"/><body pos=".1 0 0"><joint name="arm"
 axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".03"/><body pos=".3 0 0"><joint

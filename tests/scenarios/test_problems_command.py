@@ -110,6 +110,8 @@ def test_export_show_and_check(capsys, tmp_path):
     assert "3 completely" in capsys.readouterr().out
     assert run_command(["problems", "show", "integers", *out, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["sha256"] == read(file).digest
+    assert run_command(["problems", "show", "EQ7", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["equalities"] == "100 % of the rows"
     assert run_command(["problems", "check", str(file)]) == 0
 
 

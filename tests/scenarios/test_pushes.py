@@ -65,6 +65,8 @@ def test_an_arrow_goes_to_the_middle_of_a_pushed_body_while_it_is_pushed():
     shaft, *head = found.at(1).push
     np.testing.assert_allclose(shaft[1] - shaft[0], [0.0, 0.2, 0.0], atol=1e-12)
     assert all((barb[1] == shaft[1]).all() and barb[0, 1] < shaft[1, 1] for barb in head)
+    sideways = np.linalg.norm(np.subtract(*np.swapaxes(head, 0, 1))[:, ::2], axis=1)
+    np.testing.assert_allclose(sideways, 0.4 * (shaft[1, 1] - np.array(head)[:, 0, 1]))
     assert abs(shaft[1, 1]) < 1e-9
     assert shaft[1, 2] > rest[:, 11].mean()  # in the trunk
 

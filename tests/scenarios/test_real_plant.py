@@ -93,5 +93,5 @@ def test_a_robot_stands_only_at_rest_upright_and_within_its_limits_until_the_end
     fallen.fault = "the robot has fallen"
     assert not standing(fallen)
     short = recorded()
-    short.scenario.plant.pushes = (SimpleNamespace(at=3.5, duration=0.1),)
+    short.scenario.plant.pushes = (SimpleNamespace(at=2.9, duration=0.2),)
     assert standing(short) is None

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -31,7 +32,7 @@ def test_pairs_are_counted_by_their_direction():
     second = np.array([1.0, 1.0, 5.0, 4.0 * (1 + 1e-4), 5.0, np.inf])
     found = paired(first, second)
     assert (found.count, found.same, found.lower, found.higher) == (4, 2, 1, 1)
-    assert not found.distinguishable
+    assert [replace(found, p=p).distinguishable for p in (0.0499, 0.05)] == [True, False]
     assert str(found) == "not distinguishable"
 
 

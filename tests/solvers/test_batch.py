@@ -90,7 +90,8 @@ def test_an_answer_that_is_inaccurate_alone_is_so_in_a_batch():
 
 @pytest.mark.parametrize("resolver", [
     *(make(name, damping=damping) for name in ("tpm", "hcod") for damping in (0.0, 0.1)),
-    make("merged", scales={"level 3": 3.0})], ids=str)
+    pytest.param(make("merged", scales={"level 3": 3.0}), marks=pytest.mark.slow)],  # to compile
+    ids=str)
 @pytest.mark.parametrize("half", [0.05, 0.3, 3.0])
 def test_bounds_and_their_memory_are_those_of_each_alone(resolver, half):
     hs = [bounded(seed, half) for seed in range(20)]
