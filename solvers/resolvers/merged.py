@@ -68,7 +68,7 @@ class Merged(Resolver):
     handles: ClassVar[Handles] = "inequalities"
     damps: ClassVar[str] = "the merged level as a whole"
     damps_with_bounds: ClassVar[str] = damps
-    ratio: float = 3.0
+    ratio: float = 4.0
     scales: Mapping[str, float] | tuple[tuple[str, float], ...] = ()
     cap: float = 1.0
     step: float = 0.1

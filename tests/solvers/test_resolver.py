@@ -40,7 +40,7 @@ STEPS = {"tolerance": 1e-10, "max_iterations": 1000}
 DEFAULTS = {
     "augmented": {}, "hcod": STEPS,
     "hqp": {"backend": "proxqp", "form": "null-space", "slack": 1e-7},
-    "merged": {**STEPS, "ratio": 3.0, "scales": (), "cap": 1.0, "step": 0.1, "strict_levels": None,
+    "merged": {**STEPS, "ratio": 4.0, "scales": (), "cap": 1.0, "step": 0.1, "strict_levels": None,
                "regularisation": 1e-3},
     "recursive": {"method": "level", "isotropic": 0.0, "largest": None},
     "reverse": {"form": "published"}, "sns": {"form": "basic", "scales": "target"},
