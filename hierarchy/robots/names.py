@@ -9,11 +9,12 @@ from importlib.metadata import PackageNotFoundError, PackagePath, distribution
 from pathlib import Path
 
 from hierarchy import plugins
-from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.errors import RobotError, UnknownNameError, nearest
 
 PACKAGES = ("example_robot_data", "robot_descriptions")
 _SUFFIXES = (".urdf", ".xml", ".mjcf",  # and those that are refused with what to give instead
              ".xacro", ".sdf", ".world", ".toml", ".dae", ".stl", ".obj", ".mjb", ".usd", ".usda")
+_NEAR = 0.7  # similarity of two names, 0 to 1, from which one is meant
 _REMEDY = "pip install 'task-hierarchy[descriptions]'"
 
 
@@ -31,8 +32,8 @@ def is_file_name(model: str) -> bool:
 
 def elsewhere(name: str) -> str:
     """Return where a robot that the package does not ship may be found, as a sentence."""
-    found = [f"{package}:{known}" for package, names in _installed().items() for known in names
-             if name.lower() in known.lower()]
+    found = [f"{package}:{known}" for package, names in _installed().items()
+             for known in nearest(name, names, 3, _NEAR)]
     if found:
         return f"The installed packages have {', '.join(sorted(found, key=len)[:3])}."
     return ("Others: a URDF or MJCF file, or with the extra `descriptions` "

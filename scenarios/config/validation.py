@@ -61,6 +61,8 @@ def _said(root: type[Section], data: Any, error: Any) -> str:
         return f"{where}: expected one table, as below [{where}], got {brief(found)}"
     if isinstance(found, dict) and error["type"] in ("tuple_type", "list_type"):
         return f"{where}: expected a list: for tables write [[{where}]] above each, not [{where}]"
+    if error["type"] == "dict_type":
+        return f"{where}: expected a table, {{name = value}}, got {found!r}"
     if error["type"] in ("tuple_type", "list_type"):
         return f"{where}: expected a list, got {found!r}"
     if isinstance(found, dict) or error["type"] in ("kind", "literal_error"):

@@ -77,7 +77,14 @@ def verdicts(runs: Sequence[Run]) -> tuple[Verdict, ...]:
 
 
 def lines(found: Sequence[Verdict]) -> tuple[str, ...]:
-    """Return three sentences about one run or several: ends, promises, targets."""
+    """Return three sentences about one run or several: ends, promises, targets.
+
+    A run is called by the first word of its label, where that is enough.
+    """
+    words = [one.label.partition(" ")[0] for one in found]
+    if len(set(words)) == len(words):
+        found = [dataclasses.replace(one, label=word)
+                 for one, word in zip(found, words, strict=True)]
     return tuple(line for line in (_ends(found), _promises(found), _targets(found)) if line)
 
 

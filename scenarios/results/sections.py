@@ -16,6 +16,7 @@ from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
 from scenarios.measure.partings import BOUND, partings
 from scenarios.measure.runs import table
+from scenarios.recording.listed import errors
 from scenarios.results import curves
 from scenarios.results.columns import flags
 from scenarios.templates import render
@@ -156,11 +157,11 @@ def _key(panel: str, recordings: Mapping[str, Recording]) -> dict[str, str]:
     count = max(int(recording["v"].shape[1]) for recording in recordings.values())
     if panel == "joint-velocities" and count <= len(drawing.JOINTS):
         return {f"joint {j + 1}": drawing.joint_colour(j) for j in range(count)}
-    if panel in ("task-errors", "task-angles"):
-        first = next(iter(recordings.values()))
-        return {section.title: drawing.joint_colour(i)
-                for i, section in enumerate(first.scenario.tasks) if section.unit == "m"}
-    return {}
+    first = next(iter(recordings.values()))
+    titles = [section.title for section in first.scenario.tasks]
+    return {section.title: drawing.joint_colour(titles.index(section.title))
+            for section, unit, _ in errors(first)
+            if unit == {"task-errors": "m", "task-angles": "deg"}.get(panel)}
 
 
 def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],

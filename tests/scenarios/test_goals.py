@@ -61,7 +61,7 @@ def test_a_cone_is_kept_in_degrees():
 
 
 def test_three_sentences_say_the_end_the_promises_and_the_targets():
-    found = [verdict(recording(**at([2, 2, 2, 2, 2])), "a"),
+    found = [verdict(recording(**at([2, 2, 2, 2, 2])), "a 1/10/100 below 3 strict"),
              verdict(recording(fault="the robot has fallen by 1 m", **joint([0, 0, 0, 0, 2.5])),
                      "b")]
     end, promises, targets = lines(found)

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from hierarchy import Hierarchy, HierarchyError
+from hierarchy import Hierarchy, HierarchyError, Robot
 from hierarchy.gate import check_rotation
 from scenarios import load
 from scenarios.cli.main import run_command
@@ -68,6 +68,13 @@ def test_a_wrong_frame_is_told_with_file_and_key(tmp_path, capsys):
     assert run_command(["check", str(file)]) == 2
     assert "mine.toml: robot: unknown end_effector frame 'left_fot'; did you mean 'left_foot'?" in (
         capsys.readouterr().err)
+
+
+def test_a_robot_of_an_installed_package_is_found_by_a_name_that_is_nearly_its_own(monkeypatch):
+    monkeypatch.setattr("hierarchy.robots.names._installed",
+                        lambda: {"example_robot_data": ["panda", "talos"]})
+    with pytest.raises(HierarchyError, match=r"packages have example_robot_data:panda\.$"):
+        Robot.load("pandda")
 
 
 def test_a_sweep_is_not_run_and_a_scenario_is_no_sweep(tmp_path, capsys):

@@ -27,8 +27,8 @@ class Panel:
     """One quantity of a run over time: its title, the signal it needs, how it is drawn.
 
     A `signal` that ends in "_" stands for all signals with that prefix. `typeset` is the unit as
-    matplotlib sets it, where that differs from plain text. With `zero_is_empty` there is nothing to
-    see while the signal is zero. A plugin adds one with `register("figures", NAME)(Panel(...))`.
+    matplotlib sets it, where that differs from plain text. `shows` says whether there is something
+    to see of a recording that fits. A plugin adds one with `register("figures", NAME)(Panel(...))`.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Panel:
     draw: Draw
     explains: str = ""
     typeset: str = ""
-    zero_is_empty: bool = False
+    shows: Callable[[Recording], bool] = lambda recording: True
 
     @property
     def heading(self) -> str:
@@ -50,10 +50,6 @@ class Panel:
         known = (any(name.startswith(self.signal) for name in recording.signals)
                  if self.signal.endswith("_") else self.signal in recording)
         return known and recording.ticks > 1
-
-    def shows(self, recording: Recording) -> bool:
-        """Whether there is something to see of a recording that fits."""
-        return not self.zero_is_empty or bool(recording[self.signal].any())
 
 
 def joint_velocities(ax: Axes, recording: Recording, colour: str) -> None:
@@ -138,6 +134,10 @@ def task_errors(ax: Axes, recording: Recording, colour: str, unit: str = "m",
     drawing.make_logarithmic(ax, "y")
 
 
+def _has_errors(unit: str, recording: Recording) -> bool:
+    return any(of == unit for _, of, _ in errors(recording))
+
+
 PANELS = (
     Panel("joint-velocities", "Joint velocities", "rad/s", "v", joint_velocities,
           "Continuous at acceleration level, with jumps at velocity level."),
@@ -151,7 +151,7 @@ PANELS = (
           "kept."),
     Panel("active-point", "Control point being pushed away", "number", "active_control_point",
           active_point, "The control point nearest to an obstacle, while within ε₂.",
-          zero_is_empty=True),
+          shows=lambda recording: bool(recording["active_control_point"].any())),
     Panel("ee-distance", "End effector to the nearest obstacle", "m", "ee_distance", ee_distance,
           "Dashed: below ε_ee, in red, the position task is pushed off its path; d_min is kept."),
     Panel("pointing-error", "Pointing error", "cos α_d − cos α", "pointing_error", pointing_error,
@@ -160,9 +160,10 @@ PANELS = (
 )
 TASK_PANELS = (
     Panel("task-errors", "Errors of the tasks, lengths", "mm, logarithmic", "task_error_",
-          task_errors, "Each task's own error, whatever its place in the stack."),
+          task_errors, "Each task's own error, whatever its place in the stack.",
+          shows=partial(_has_errors, "m")),
     Panel("task-angles", "Errors of the tasks, angles", "°, logarithmic", "task_error_",
-          partial(task_errors, unit="deg", scale=1.0)),
+          partial(task_errors, unit="deg", scale=1.0), shows=partial(_has_errors, "deg")),
 )
 for _panel in (*PANELS, *TASK_PANELS):
     plugins.register("figures", _panel.name, shipped=True)(_panel)
