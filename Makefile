@@ -18,7 +18,12 @@ BIN        := .venv/bin
 # Small matrices: threads of the linear algebra library only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
+# The kernels are compiled while what tests and documents need is installed.
+MAKEFLAGS  += --jobs=2
+SMALL      := .venv/scenarios
 INSTALLED  := .venv/installed
+PIP        := $(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off \
+              --no-compile --constraint constraints.txt --editable
 
 .DELETE_ON_ERROR:
 .PHONY: demo test quick bench stress reproduce docs dist clean set-up kernels
@@ -27,26 +32,26 @@ demo: kernels
 	@rm -rf runs/demo
 	@$(BIN)/hierarchy compare ellipse --out runs/demo
 
-test: kernels
+test: set-up
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 	$(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
 
-quick: kernels
+quick: set-up
 	$(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal -m "not slow"
 
-bench: kernels
+bench: set-up
 	@$(BIN)/hierarchy bench
 	@$(BIN)/hierarchy bench peers
 
 COUNT    ?= 1000000
 RESOLVER ?= hcod
 
-stress: kernels
+stress: set-up
 	@$(BIN)/hierarchy bench stress --count $(COUNT) --resolver $(RESOLVER)
 
-reproduce: kernels
+reproduce: set-up
 	@$(BIN)/hierarchy reproduce
 
 docs: $(INSTALLED)
@@ -57,24 +62,34 @@ docs: $(INSTALLED)
 # system library but libm.
 PLATFORM := --config-setting=--build-option=--plat-name=manylinux_2_17_x86_64
 
-dist: kernels
+# The time in all archives, so that the same sources make the same files.
+dist: export SOURCE_DATE_EPOCH ?= $(shell git log -1 --format=%ct 2>/dev/null || echo 1577836800)
+dist: set-up
 	@rm -rf dist build
 	@$(BIN)/python -m build --no-isolation --outdir dist
 	@if [ -e hierarchy/jit/objects/solvers.o ]; then \
 	  $(BIN)/python -m build --no-isolation --wheel --outdir dist $(PLATFORM); fi
+	@cd dist && tar xzf *.tar.gz && rm *.tar.gz && for archive in */; do \
+	  tar --sort=name --mtime=@$$SOURCE_DATE_EPOCH --owner=0 --group=0 --numeric-owner -c $$archive \
+	  | gzip -n9 > $${archive%/}.tar.gz && rm -r $$archive; done
 
 clean:
 	rm -rf .venv build dist runs hierarchy/jit/objects *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
-set-up: kernels
+set-up: kernels $(INSTALLED)
 
 # Kernels are compiled again when their sources have changed; without them each process compiles what
 # it calls, so that a failure stops nothing.
-kernels: $(INSTALLED)
+kernels: $(SMALL)
 	-@$(BIN)/python -m scenarios.ahead
 
 # One set-up for all targets, repeated only when what is to be installed has changed.
-$(INSTALLED): pyproject.toml constraints.txt
+$(INSTALLED): $(SMALL)
+	@$(PIP) '.[dev]'
+	@echo "Installed $$($(BIN)/python -m pip list --disable-pip-version-check --format freeze | wc -l) packages into .venv."
+	@touch $@
+
+$(SMALL): pyproject.toml constraints.txt
 	@python=; \
 	for candidate in $(CANDIDATES); do \
 	  if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; \
@@ -93,7 +108,5 @@ $(INSTALLED): pyproject.toml constraints.txt
 	fi; \
 	echo "Setting up .venv with $$("$$python" --version) (once; downloads about 250 MB) ..."; \
 	"$$python" -m venv --clear .venv
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off --no-compile \
-	  --constraint constraints.txt --editable '.[dev]'
-	@echo "Installed $$($(BIN)/python -m pip list --disable-pip-version-check --format freeze | wc -l) packages into .venv."
+	@$(PIP) '.[scenarios]'
 	@touch $@

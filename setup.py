@@ -31,7 +31,9 @@ NAMES = find_namespace_packages(include=["task_hierarchy", *(f"{name}*" for name
 INSIDE = {f"task_hierarchy.inside.{name}": name.replace(".", "/") for name in NAMES
           if name != "task_hierarchy"}
 MOVED = os.environ.get("TASK_HIERARCHY_INSIDE") == "1"
-setup(long_description=page(os.environ.get("TASK_HIERARCHY_URL", "")),
+URL = os.environ.get("TASK_HIERARCHY_URL", "")
+setup(long_description=page(URL),
+      project_urls={"Source": URL.partition("/blob/")[0]} if URL else {},
       long_description_content_type="text/markdown", include_package_data=True,
       packages=["task_hierarchy", *INSIDE] if MOVED else NAMES,
       package_dir=INSIDE if MOVED else {},

@@ -14,11 +14,13 @@ from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
+from zipfile import ZipFile
 
 from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import Column, Table, digits
 
+_ROOT = Path(__file__).parents[1]
 _REPEATED = 5        # repetitions of short processes; the minimum counts
 _KERNELS = 12        # slowest to compile, listed
 _MB = 1024.0 if sys.platform == "linux" else 1024.0**2  # units of ru_maxrss per MB
@@ -120,7 +122,7 @@ def run() -> Report:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         compiled, kernels = first_compilation(folder / "cache")
-        costs = [*beginnings(), *compiled, *memory(folder)]
+        costs = [*beginnings(folder), *compiled, *memory(folder)]
     rows = [cost.row() for cost in costs]
     slowest = ", ".join(f"{name.removeprefix('solvers.kernels.')} {s:.1f}"
                         for name, s in list(kernels.items())[:_KERNELS])
@@ -132,8 +134,8 @@ def run() -> Report:
                                         for name, s in kernels.items()]})
 
 
-def beginnings() -> Iterator[Cost]:
-    """Time whole processes from start to end, with compiled kernels in the cache.
+def beginnings(folder: Path) -> Iterator[Cost]:
+    """Time whole processes from start to end, with compiled kernels; also of a wheel in dist/.
 
     The minimum of several repetitions counts, since other load can only add to it.
     """
@@ -150,11 +152,19 @@ def beginnings() -> Iterator[Cost]:
         (f"hierarchy {' '.join(_SHORT)}", 1.5, ["-c", _COMMAND, *_SHORT]),
         ("the same with --figures", None, ["-c", _COMMAND, *_SHORT, "--figures"])]
     for what, most, arguments in cases:
-        _say(what)
-        _run(arguments)  # fills the caches of files, bytecode and kernels
-        done = [_run(arguments) for _ in range(_REPEATED)]
-        yield Cost(what, min(one.seconds for one in done), "s", most,
-                   min(one.processor for one in done))
+        yield _least(what, most, arguments)
+    for wheel in sorted(_ROOT.glob("dist/*linux*.whl"))[-1:]:
+        ZipFile(wheel).extractall(folder / "wheel")
+        yield _least("first answer of hcod, verified, from a wheel", 0.5,
+                     ["-P", "-c", _SOLVE, "hcod"], PYTHONPATH=str(folder / "wheel"))
+
+
+def _least(what: str, most: float | None, arguments: list[str], **environment: str) -> Cost:
+    _say(what)
+    _run(arguments, **environment)  # fills the caches of files, bytecode and kernels
+    done = [_run(arguments, **environment) for _ in range(_REPEATED)]
+    return Cost(what, min(one.seconds for one in done), "s", most,
+                min(one.processor for one in done))
 
 
 def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
@@ -232,8 +242,8 @@ def _run(arguments: list[str], **environment: str) -> _Done:
     that it imports, which takes longer than all else.
     """
     kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-    kept["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parents[1]),
-                                          kept.get("PYTHONPATH", "")]).rstrip(os.pathsep)
+    kept["PYTHONPATH"] = os.pathsep.join(
+        filter(None, [str(_ROOT), kept.get("PYTHONPATH")]))
     with tempfile.TemporaryDirectory() as temporary:
         measured = Path(temporary) / "measured.json"
         done = subprocess.run([sys.executable, "-S", "-c", _LAUNCH, str(measured), sys.executable,

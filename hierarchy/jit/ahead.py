@@ -32,8 +32,12 @@ _FEATURES = ("avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movb
 @final
 @dataclass(frozen=True)
 class Entry:
-    """Code for one list of types: names in the object file, and what its environment holds."""
+    """Code for one list of types: names in the object file, and what its environment holds.
 
+    digest : of the sources that the code was made of.
+    """
+
+    digest: str
     wrapper: str
     environment: str
     constants: tuple[str, ...]
@@ -44,33 +48,33 @@ class Entry:
 class Part:
     """An object file and its index.
 
-    kernels : by name, the digest of its sources and its entries by types of arguments.
+    calls : digest of the list of calls that it was made for.
+    entries : by name of the kernel and types of arguments, as `name(types)`.
     externals : the names that the object file expects to find.
-    jobs : digest of what said which kernels are in it.
     """
 
     file: Path
-    jobs: str
-    kernels: dict[str, tuple[str, dict[str, Entry]]]
+    calls: str
+    entries: dict[str, Entry]
     externals: tuple[str, ...]
 
     @staticmethod
-    def read(file: Path) -> Part:
-        """Read the index beside an object file."""
-        index = json.loads(file.with_suffix(".json").read_text())
-        kernels = {name: (digest, {kinds: Entry(wrapper, environment, tuple(constants))
-                                   for kinds, wrapper, environment, constants in entries})
-                   for name, (digest, entries) in index["kernels"].items()}
-        return Part(file, index["jobs"], kernels, tuple(index["externals"]))
+    def read(file: Path) -> Part | None:
+        """Read the index beside an object file; None if it is missing or damaged."""
+        try:
+            index = json.loads(file.with_suffix(".json").read_text())
+            return Part(file, index["calls"],
+                        {call: Entry(**entry) for call, entry in index["entries"].items()},
+                        tuple(index["externals"]))
+        except (OSError, ValueError, LookupError, TypeError, AttributeError):
+            return None
 
     def write(self, code: bytes) -> None:
         """Write both files, the object first."""
         self.file.parent.mkdir(parents=True, exist_ok=True)
         self.file.write_bytes(code)
-        index = {"jobs": self.jobs, "externals": self.externals,
-                 "kernels": {name: (digest, [(kinds, *vars(entry).values())
-                                             for kinds, entry in entries.items()])
-                             for name, (digest, entries) in self.kernels.items()}}
+        index = {"calls": self.calls, "externals": self.externals,
+                 "entries": {call: vars(entry) for call, entry in self.entries.items()}}
         self.file.with_suffix(".json").write_text(json.dumps(index, indent=1))
 
     @cached_property
@@ -102,10 +106,10 @@ class Part:
 
 def find(kernel: Any, kinds: tuple[Any, ...]) -> Any:
     """Return what Python calls for a kernel and the types of arguments; None if there is none."""
+    call = f"{kernel.__module__}.{kernel.__qualname__}({described(kinds)})"
     for part in parts():
-        known, entries = part.kernels.get(f"{kernel.__module__}.{kernel.__qualname__}", ("", {}))
-        entry = entries.get(described(kinds))
-        if entry is not None and known == source_digest(kernel):
+        entry = part.entries.get(call)
+        if entry is not None and entry.digest == source_digest(kernel):
             return part.function(entry, kernel)
     return None
 
@@ -116,7 +120,7 @@ def parts() -> tuple[Part, ...]:
     files = sorted(FOLDER.glob("*.o"))
     if not files or os.environ.get(NATIVE) or not _suits():
         return ()
-    return tuple(map(Part.read, files))
+    return tuple(filter(None, map(Part.read, files)))
 
 
 def _suits() -> bool:

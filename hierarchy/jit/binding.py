@@ -9,7 +9,6 @@ from typing import Any
 import numba
 import numpy as np
 
-from hierarchy.jit.recording import note
 from hierarchy.jit.sources import Kernel
 
 
@@ -22,8 +21,7 @@ def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callabl
     """
     dispatcher: Any = kernel
     if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT
-        note(kernel, (*arguments, *then))
-        return partial(getattr(kernel, "unnoted", kernel), *arguments)
+        return partial(kernel, *arguments)
     types = tuple(_type_of(value) for value in (*arguments, *then))
     entry = dispatcher.entry(types)
     return partial(entry, *arguments) if arguments else entry

@@ -15,51 +15,53 @@ import numpy as np
 from hierarchy.jit.ahead import PROCESSOR, Entry, Part
 from hierarchy.jit.dispatching import Cached
 from hierarchy.jit.exporting import machine, object_code
-from hierarchy.jit.inside import global_compiler_lock, registry
-from hierarchy.jit.linking import Call, found, linked
-from hierarchy.jit.sources import described, source_digest
+from hierarchy.jit.inside import global_compiler_lock
+from hierarchy.jit.linking import Library, found, linked
+from hierarchy.jit.sources import kinds_in, source_digest
 
 ENVIRONMENT = {"NUMBA_CPU_NAME": PROCESSOR, "NUMBA_CPU_FEATURES": "",
                "NUMBA_DISABLE_INTEL_SVML": "1"}  # of a process that builds
 
 
 @global_compiler_lock  # type: ignore[untyped-decorator]
-def build(file: Path, jobs: str, calls: Sequence[Call], say: Callable[[int], None]) -> None:
-    """Write an object file with these calls, and its index; `say` takes the number compiled."""
-    _without_machine_code()
+def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None]) -> None:
+    """Write an object file with these calls, whose list has the digest `of`.
+
+    calls : each `name(types)`, as `described` writes types. say : takes the number compiled.
+    """
+    Library.running = Cached.kept = False
     libraries: list[Any] = []
-    kernels: dict[str, tuple[str, dict[str, Entry]]] = {}
-    for count, (name, kinds) in enumerate(calls):
+    entries: dict[str, Entry] = {}
+    for count, call in enumerate(calls):
         say(count)
-        kernel = found(name)
+        name, _, text = call.removesuffix(")").partition("(")
+        kernel, kinds = found(name), kinds_in(text)
         kernel.compile(kinds)
         made = kernel.overloads[kinds]
-        if (entry := _entry(made)) is not None:
+        if (entry := _entry(made, source_digest(kernel))) is not None:
             libraries.append(made.library)
-            kernels.setdefault(name, (source_digest(kernel), {}))[1][described(kinds)] = entry
-    entries = [entry for _, those in kernels.values() for entry in those.values()]
-    whole = linked(libraries, {name for one in entries for name in (one.wrapper, one.environment)})
+            entries[call] = entry
+    whole = linked(libraries, {name for entry in entries.values()
+                               for name in (entry.wrapper, entry.environment)})
     here = machine()
     code = object_code(whole, here.triple, here.processor, here.features)
-    Part(file, jobs, kernels, _externals(whole)).write(code)
+    Part(file, of, entries, _externals(whole)).write(code)
 
 
-def is_current(file: Path, jobs: str) -> bool:
-    """Whether an object file was made by these jobs from the sources as they are."""
-    try:
-        part = Part.read(file)
-        return part.jobs == jobs and all(digest == source_digest(found(name))
-                                         for name, (digest, _) in part.kernels.items())
-    except (OSError, ValueError, LookupError, ImportError, AttributeError):
-        return False
+def is_current(file: Path, of: str) -> bool:
+    """Whether an object file was made of this list of calls from the sources as they are."""
+    part = Part.read(file)
+    return part is not None and part.calls == of and all(
+        entry.digest == source_digest(found(call.partition("(")[0]))
+        for call, entry in part.entries.items())
 
 
-def _entry(made: Any) -> Entry | None:
+def _entry(made: Any, digest: str) -> Entry | None:
     """Return how to find a compiled call; None if its environment holds other than number types."""
     constants = made.environment.consts
     if not all(isinstance(one, np.dtype) and one.fields is None for one in constants):
         return None
-    return Entry(made.fndesc.llvm_cpython_wrapper_name, made.fndesc.env_name,
+    return Entry(digest, made.fndesc.llvm_cpython_wrapper_name, made.fndesc.env_name,
                  tuple(one.str for one in constants))
 
 
@@ -68,10 +70,3 @@ def _externals(module: Any) -> tuple[str, ...]:
                         if one.is_declaration and not one.name.startswith("llvm.")))
 
 
-def _without_machine_code() -> None:
-    """Let numba stop at optimised LLVM code, and keep none of it in the cache."""
-    context = registry.cpu_target.target_context
-    context.refresh()
-    context.codegen()._add_module = lambda module: None
-    context.get_executable = lambda library, about, environment: [].append  # any builtin, unlike
-    Cached.kept = False

@@ -7,7 +7,6 @@ from typing import Any
 import numba
 
 from hierarchy.jit.dispatching import Cached, OnlyInlined
-from hierarchy.jit.recording import observed
 from hierarchy.jit.sources import Kernel, constants_behind, files_behind
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
@@ -39,7 +38,7 @@ def inlined(function: Kernel) -> Kernel:
 
 def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:
     if numba.config.DISABLE_JIT:
-        return observed(function)
+        return function
     allocates = _allocates(function)
     kernel: Any = numba.njit(error_model="numpy", forceinline=inline, nogil=nogil, _nrt=allocates,
                              no_cpython_wrapper=inline, no_cfunc_wrapper=True)(function)

@@ -12,11 +12,14 @@ from hierarchy.jit.ahead import find
 from hierarchy.jit.caching import KernelCache
 from hierarchy.jit.inside import CPUDispatcher, NumbaError, global_compiler_lock
 from hierarchy.jit.linking import name_of, naming
+from hierarchy.jit.sources import described
 
 if hasattr(os, "register_at_fork"):  # a child of a thread that waits would wait for ever
     os.register_at_fork(before=global_compiler_lock.acquire,
                         after_in_parent=global_compiler_lock.release,
                         after_in_child=global_compiler_lock.release)
+
+asked: set[str] = set()  # what Python has called, or bound, in this process: `name(types)`
 
 
 class Cached(CPUDispatcher):  # type: ignore[misc]
@@ -33,6 +36,8 @@ class Cached(CPUDispatcher):  # type: ignore[misc]
             return self._ready(kinds) or self.compile(kinds)
 
     def _ready(self, kinds: tuple[Any, ...]) -> Any:
+        if name := name_of(self):
+            asked.add(f"{name}({described(kinds)})")
         if kinds not in self.ready and kinds not in self.overloads:
             found = find(self, kinds)
             if found is not None:
@@ -61,14 +66,14 @@ class Cached(CPUDispatcher):  # type: ignore[misc]
         with global_compiler_lock:
             if self.kept and not isinstance(self._cache, KernelCache):
                 self._cache = KernelCache(self.py_func)
-            with naming():
+            with naming("" if self.is_named else self.py_func.__qualname__):
                 return super().compile(signature)
 
 
 class OnlyInlined(Cached):
     """A kernel without an entry for Python, where a call would end the process."""
 
-    is_named = False
+    is_named = kept = False
 
     def __call__(self, *arguments: Any) -> Any:
         """Raise a TypeError."""

@@ -15,6 +15,7 @@ try:
     from numba.core.codegen import JITCPUCodegen as Codegen
     from numba.core.compiler import CompileResult
     from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.cpu import CPUContext
     from numba.core.environment import Environment
     from numba.core.errors import NumbaError
     from numba.core.registry import CPUDispatcher
@@ -29,7 +30,7 @@ except (ImportError, AttributeError) as error:
     raise ImportError(f"task-hierarchy works inside numba {_KNOWN}, not {numba.__version__}: "
                       f"{error}") from error
 
-__all__ = ["BaseTuple", "CPUDispatcher", "CodeLibrary", "Codegen", "CompileResult",
+__all__ = ["BaseTuple", "CPUContext", "CPUDispatcher", "CodeLibrary", "Codegen", "CompileResult",
            "Environment", "NullCache", "NumbaError", "cgutils", "compiler", "dumps", "event",
            "global_compiler_lock", "intrinsic", "llvm", "load_helpers", "make_function",
            "nrt_helpers", "registry", "types"]

@@ -5,12 +5,13 @@ numba links the code of all callees into a caller and optimises the whole again,
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
-from hierarchy.jit.inside import Codegen, CodeLibrary, llvm, registry
+from hierarchy.jit.inside import Codegen, CodeLibrary, CPUContext, llvm, registry
 
 Call = tuple[str, tuple[Any, ...]]  # the name of a kernel with its module, types of arguments
 
@@ -22,14 +23,18 @@ class Library(CodeLibrary):  # type: ignore[misc]
 
     kernel : what `found` finds it by; None if it is linked into callers.
     calls : the libraries that the code names.
+    runs : whether there is machine code of it, not only LLVM code for whom it is linked into.
     """
 
     naming = False  # while a kernel compiles; numba's own cache knows no names
+    linked_only = ""  # the name of a library that does not run
+    running = True  # whether others do
 
     def __init__(self, *about: Any) -> None:
         super().__init__(*about)
         self.kernel: Call | None = None
         self.calls: dict[Any, None] = {}
+        self.runs = Library.running and self.name != Library.linked_only
 
     def add_linking_library(self, library: Any) -> None:
         """Link a library when this one is finished, or note that its names are needed."""
@@ -44,18 +49,44 @@ class Library(CodeLibrary):  # type: ignore[misc]
         else:
             self.calls[library] = None
 
+    def finalize(self) -> None:
+        """Optimise the code with all that is linked in and add it to the process, if it runs."""
+        if self.runs:
+            super().finalize()
+            return
+        for library in dict.fromkeys(self._linking_libraries):
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalized = True
+
+
+def _executable(context: Any, library: Any, about: Any, environment: Any) -> Any:
+    """Return what Python calls; of what does not run any builtin, unlike all others."""
+    library.environment = about.env_name, environment
+    if not library.runs:
+        return [].append
+    made = _made(context, library, about, environment)
+    for one in _all_behind([library]):
+        if not getattr(one, "runs", True):  # numba's own, made before this was imported, do
+            library.codegen.set_env(*one.environment)  # for what it prints
+    return made
+
 
 Codegen._library_class = Library
+_made, CPUContext.get_executable = CPUContext.get_executable, _executable
 
 
 @contextmanager
-def naming() -> Iterator[None]:
+def naming(linked_only: str = "") -> Iterator[None]:
     """Let code that is compiled now name the kernels that it calls."""
-    before, Library.naming = Library.naming, True
+    before, collecting = (Library.naming, Library.linked_only), gc.isenabled()
+    Library.naming, Library.linked_only = True, linked_only
+    gc.disable()  # looking through what numba keeps takes a seventh of the time
     try:
         yield
     finally:
-        Library.naming = before
+        Library.naming, Library.linked_only = before
+        if collecting:
+            gc.enable()
 
 
 def name_of(kernel: Any) -> str:

@@ -6,6 +6,7 @@ What a file imports counts for all its kernels: a helper further down may use it
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -13,11 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy.jit.inside import BaseTuple
+from hierarchy.jit.inside import BaseTuple, types
+from hierarchy.jit.linking import found
 
 Kernel = Callable[..., Any]  # without annotations: its types are those of the first call
 _OWN = tuple(str(Path(__file__).with_name(f"{name}.py")) for name in (
     "compiling", "lanes", "views"))  # these write code of their own
+_KIND = re.compile(r"(readonly )?array\((\w+), (\d)d, (\w)\)|([\w.]+)(\()?|\)")
 
 
 def files_behind(function: Kernel) -> frozenset[str]:
@@ -58,6 +61,26 @@ def digest_of(file: str) -> str:
 def described(kinds: tuple[Any, ...]) -> str:
     """Return types of arguments as text; classes of named tuples with their modules."""
     return ", ".join(map(_described, kinds))
+
+
+def kinds_in(text: str) -> tuple[Any, ...]:
+    """Return the types of arguments that `described` wrote; raises ValueError for others."""
+    stack: list[list[Any]] = [[]]
+    for fixed, of, dimension, layout, name, opened in _KIND.findall(text):
+        if of:
+            kind = types.Array(getattr(types, of), int(dimension), layout, readonly=bool(fixed))
+        elif opened:
+            stack.append([name])
+            continue
+        elif name:
+            kind = getattr(types, name)
+        else:
+            named, *parts = stack.pop()
+            kind = BaseTuple.from_types(parts, found(named))
+        stack[-1].append(kind)
+    if described(tuple(stack[0])) != text:
+        raise ValueError(f"no types of arguments: {text}")
+    return tuple(stack[0])
 
 
 def _described(kind: Any) -> str:

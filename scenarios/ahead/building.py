@@ -1,6 +1,7 @@
 """Compile kernels ahead: `python -m scenarios.ahead` writes the object files of the package.
 
-Jobs run as plain Python, which says what Python calls; processes side by side compile it.
+`calls.txt` says what Python calls. `python -m scenarios.ahead record` writes it anew, of what the
+jobs of `jobs.py` call.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from time import monotonic
-from typing import Any
 
 from scenarios.ahead import jobs
 from scenarios.results.pool import ended
 
+CALLS = Path(__file__).with_name("calls.txt")
 # The first part of a name of a kernel decides which object file it is in.
 PARTS = {"solvers": ("solvers",), "robots": ("hierarchy", "scenarios")}
 
@@ -27,11 +28,13 @@ def main() -> None:
     from hierarchy.jit.ahead import FOLDER
     from hierarchy.jit.building import ENVIRONMENT
 
+    if sys.argv[1:] == ["record"]:
+        CALLS.write_text("".join(f"{call}\n" for call in _recorded()))
     if is_current():
         return
-    begun, calls = monotonic(), _recorded()
+    begun, calls = monotonic(), CALLS.read_text().splitlines()
     _say(f"compiling {len(calls)} entries of kernels, once ...")
-    parts = [(FOLDER / f"{part}.o", [call for call in calls if call[0].startswith(packages)])
+    parts = [(FOLDER / f"{part}.o", [call for call in calls if call.startswith(packages)])
              for part, packages in PARTS.items()]
     with _environment(**ENVIRONMENT):
         for (file, _), size in ended(compile_part, parts):
@@ -39,51 +42,47 @@ def main() -> None:
 
 
 def is_current() -> bool:
-    """Whether the object files were made of the jobs and sources as they are."""
+    """Whether the object files were made of the calls and sources as they are."""
     from hierarchy.jit import building
     from hierarchy.jit.ahead import FOLDER
 
-    return all(building.is_current(FOLDER / f"{part}.o", _jobs()) for part in PARTS)
+    return all(building.is_current(FOLDER / f"{part}.o", _listed()) for part in PARTS)
 
 
-def record(job: str) -> list[Any]:
-    """Return the calls of kernels that a job makes, in a process without compilation."""
-    from hierarchy.jit import recording
+def record(job: str) -> list[str]:
+    """Return the calls of kernels that a job makes, and those of this process before it."""
+    from hierarchy.jit.dispatching import asked
 
-    recording.begin()
     with (redirect_stdout(StringIO()), redirect_stderr(StringIO()),
           tempfile.TemporaryDirectory() as folder):
         jobs.JOBS[job](Path(folder))
-    return recording.calls()
+    return sorted(asked)
 
 
-def compile_part(part: tuple[Path, Sequence[Any]]) -> int:
+def compile_part(part: tuple[Path, Sequence[str]]) -> int:
     """Write one object file and return its size [B]."""
     from hierarchy.jit.building import build
 
     file, calls = part
-    build(file, _jobs(), calls, lambda count: None if count % 20 else _say(
+    build(file, _listed(), calls, lambda count: None if count % 20 else _say(
         f"{file.stem}: {count} of {len(calls)}"))
     return file.stat().st_size
 
 
-def _recorded() -> list[Any]:
+def _recorded() -> list[str]:
     """Return all calls of all jobs in one order."""
-    from hierarchy.jit.sources import described
-
-    calls = set[Any]()
-    with _environment(NUMBA_DISABLE_JIT="1"):
-        for job, found in ended(record, list(jobs.JOBS)):
-            if found is None:
-                raise SystemExit(f"task-hierarchy: the job {job} ended its process")
-            calls.update(found)
-    return sorted(calls, key=lambda call: (call[0], described(call[1])))
+    calls = set[str]()
+    for job, found in ended(record, list(jobs.JOBS)):
+        if found is None:
+            raise SystemExit(f"task-hierarchy: the job {job} ended its process")
+        calls.update(found)
+    return sorted(calls)
 
 
-def _jobs() -> str:
+def _listed() -> str:
     from hierarchy.jit.sources import digest_of
 
-    return digest_of(str(jobs.__file__))
+    return digest_of(str(CALLS))
 
 
 @contextmanager

@@ -28,6 +28,17 @@ def test_continuous_integration_runs_what_a_developer_runs():
     assert (ROOT / ".ci" / "run").stat().st_mode & 0o100
 
 
+def test_what_is_compiled_ahead_are_kernels_with_types_of_arguments():
+    from hierarchy.jit.linking import found
+    from hierarchy.jit.sources import kinds_in
+    from scenarios.ahead.building import CALLS
+
+    for call in CALLS.read_text().splitlines():
+        name, _, kinds = call.removesuffix(")").partition("(")
+        assert callable(found(name)), call
+        assert kinds_in(kinds), call
+
+
 def test_every_dependency_has_a_pinned_version_and_nothing_but_versions_is_pinned():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     lines = [line for line in (ROOT / "constraints.txt").read_text().splitlines()
