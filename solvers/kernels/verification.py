@@ -150,9 +150,9 @@ def _balances(s, p, reach, factored):
         return True
     source, allowed = (reach if last else level.source), REMAINDER * reach
     if not last:
-        allowed = REMAINDER * level.least * level.least * reach * s.scalar[PIVOT]
+        allowed = REMAINDER * level.least * level.least * max(level.missed, reach)
     outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
-    if rounding > 0.0:
+    if rounding > 0.0 or not last:  # rows with small pivots can make good what is left
         allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
     rest = _beyond_rounding(s)
     if factored and not rest <= allowed + turned:
