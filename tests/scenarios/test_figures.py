@@ -221,6 +221,15 @@ def test_a_resolver_has_its_colour_in_every_figure(label):
         assert wanted in colours
 
 
+def test_tick_times_are_drawn_in_microseconds_beside_the_period():
+    (ax,) = letter.tick_times(recording(time_tick=[4e-6, 4e-6, 4e-6, 4e-6, 2e-3])).axes
+    bars = [bar for bar in ax.patches if bar.get_height() > 0.0]
+    assert [bar.get_height() for bar in bars] == [4.0, 1.0]
+    assert [bar.get_x() <= time * (1.0 + 1e-9) <= bar.get_x() + bar.get_width()
+            for bar, time in zip(bars, (4.0, 2000.0), strict=True)] == [True, True]
+    assert ax.lines[0].get_xdata()[0] == pytest.approx(1000.0)
+
+
 def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event():
     run = dataclasses.replace(recording(orders=("a > b", "b"), order=[0, 0, 1, 1, 0]),
                               fault="stopped", events=(Event(2, "overrun", "use"),))

@@ -77,6 +77,8 @@ def test_three_sentences_say_the_end_the_promises_and_the_targets():
     (joint([0.0] * 5), "joint limits", "kept", 0.0, "rad"),
     ({"v": np.diag([0, 0, 4.0, 0, 0, 0, 0])[:5], "velocity_limit": np.full(7, 3.0)},
      "speed limits", "broken", 1.0, "rad/s"),
+    ({"v": np.diag([0, 0, 3.0005, 0, 0, 0, 0])[:5], "velocity_limit": np.full(7, 3.0)},
+     "speed limits", "kept", 5e-4, "rad/s"),
     ({"contact_depth": [0, 2e-3, 0, 0, 0], "contacts": np.zeros(5)},
      "no contact with obstacles", "broken", 2e-3, "m")])
 def test_a_goal_has_a_flag_and_its_worst_distance(signals, name, flag, worst, unit):
