@@ -242,9 +242,9 @@ _Read = tuple[Task, Array, Array]  # a task, J (k, n), e (k,)
 
 
 def _read(task: Task, configuration: object, damped: bool) -> _Read:
-    if not hasattr(task, "compute_error") and hasattr(task, "compute_qp_residual"):
-        return _rows_of_cost(task, configuration)
     if not (hasattr(task, "compute_error") and hasattr(task, "compute_jacobian")):
+        if hasattr(task, "compute_qp_residual"):
+            return _rows_of_cost(task, configuration)
         raise HierarchyError(f"{label(task)}: not a task with an error and a Jacobian, so it "
                              "cannot be a level")
     if not damped and (lm := getattr(task, "lm_damping", 0.0)):

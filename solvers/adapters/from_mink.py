@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy.problem import Hierarchy
 from solvers.adapters import displacements
-from solvers.adapters.displacements import Pull, Solve, Task
+from solvers.adapters.displacements import Packed, Pull, Solve, Task
 
 if TYPE_CHECKING:
     from mink import Configuration, Limit
@@ -35,6 +35,13 @@ def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task
         is further outside its range than its velocity limit makes good in dt; lm_damping without
         `damping`, or a task that has neither rows nor a cost that is positive definite.
     """
+    return packed(configuration, tasks, dt, limits, constraints, damping, solve).hierarchy()
+
+
+def packed(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]], dt: float,
+           limits: Iterable[Limit] | None, constraints: Iterable[Task] | None,
+           damping: float | None, solve: Solve | None) -> Packed:
+    """Return the levels of `hierarchy`, which takes the same arguments, as they were packed."""
     if limits is None:
         from mink import ConfigurationLimit
 
@@ -45,7 +52,7 @@ def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task
     n = configuration.model.nv
     pull = None if damping is None else Pull(damping, np.zeros(n))
     return displacements.packed(configuration, partial(_joints, configuration.model), n, dt, given,
-                                list(constraints or ()), tasks, pull, solve=solve).hierarchy()
+                                list(constraints or ()), tasks, pull, solve=solve)
 
 
 def _joints(model: MjModel) -> list[str]:

@@ -214,9 +214,9 @@ def test_pinks_arguments_are_taken_in_pinks_order(configuration):
 
 
 def test_a_solver_of_qpsolvers_is_answered_by_hcod_with_a_note(configuration):
-    from solvers.adapters import for_pink
+    from solvers.adapters import drop_in
 
-    for_pink._noted.clear()
+    drop_in._noted.clear()
     hand = [frame_task(configuration)]
     expected = solve_ik(configuration, hand, DT)
     with pytest.warns(UserWarning, match="solver 'proxqp' minimises one cost; the tasks are "

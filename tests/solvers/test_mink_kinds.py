@@ -6,6 +6,7 @@ import pytest
 from benchmark.studies.pink_examples import exact, least_squares
 from solvers import make
 from solvers.adapters import from_mink
+from solvers.adapters.for_mink import solve_ik
 
 mink, mujoco = pytest.importorskip("mink"), pytest.importorskip("mujoco")
 
@@ -72,8 +73,7 @@ def test_one_level_is_the_minimum_of_minks_cost(configuration, kinds, held, damp
               mink.FreeJointVelocityLimit(model, 0.5, 0.9),
               mink.CollisionAvoidanceLimit(model, [(["left_h"], ["right_h"])])]
     frozen = [mink.DofFreezingTask(model, dof_indices=[0, 5])] if held else []
-    h = from_mink.hierarchy(configuration, [tasks], DT, limits, frozen, damping=damping)
-    ours = make("hcod").solve(h).x
+    ours = solve_ik(configuration, [tasks], DT, "hcod", damping, False, limits, frozen)
     problem = mink.build_ik(configuration, tasks, DT, damping, limits, frozen)
     A, b = least_squares(tasks, (), configuration, damping)
     np.testing.assert_allclose(A.T @ A, problem.P, rtol=1e-9, atol=1e-12)
@@ -94,3 +94,12 @@ def test_kinetic_energy_below_a_hand_is_the_least_motion_that_moves_it(configura
     x = by_hand @ np.linalg.solve(J @ by_hand, -hand.gain * hand.compute_error(configuration) / DT)
     np.testing.assert_allclose(make("hcod").solve(h).x, x, atol=1e-9)
     assert h.names == ("FrameTask of left_tip", "KineticEnergyRegularizationTask")
+
+
+def test_a_joint_that_cannot_come_back_in_time_is_no_solution_and_named(configuration):
+    model = configuration.model
+    outside = mink.Configuration(model, q=np.r_[configuration.q[:7], 2.5, configuration.q[8:]])
+    limits = [mink.ConfigurationLimit(model), mink.VelocityLimit(model, {"left_a": 0.8})]
+    with pytest.raises(mink.NoSolutionFound, match=r"joint left_a must move by at least .* "
+                       r"\(VelocityLimit\) and at most .* \(ConfigurationLimit\)"):
+        solve_ik(outside, tasks_of(outside), DT, damping=1e-9, limits=limits)

@@ -1,0 +1,106 @@
+"""What the `solve_ik` of both packages share: the levels are packed, resolved and looked at."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from functools import cache, partial
+from pkgutil import iter_modules
+from typing import Any
+
+import numpy as np
+
+from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array, Hierarchy
+from hierarchy.words import listed
+from solvers.adapters.displacements import ContradictionError, Packed, Solve
+from solvers.adapters.packing import largest_violation
+from solvers.resolver import Resolution, Resolver, make
+from solvers.resolvers.hcod import Hcod, solve_exactly
+from solvers.status import SOLVED, Status
+
+Failed = Callable[[Hierarchy | None, Resolution | None, str], Exception]  # what is raised then
+
+_ALWAYS = ("limits", "constraints")
+_noted: set[tuple[str, ...]] = set()
+
+
+def answer(solver: str | Resolver, settings: dict[str, Any], damping: float, tolerance: float,
+           pack: Callable[[Solve], Packed], failed: Failed) -> Array:
+    """Return the x (n,) of the levels that `pack` makes, given what solves those to be held.
+
+    solver, settings, damping, tolerance : as `for_pink.solve_ik` takes them.
+    """
+    resolver = _resolver(solver, settings) if isinstance(solver, str) else solver
+    if not 0.0 <= damping < np.inf:
+        raise HierarchyError(f"damping {damping} must not be negative")
+    solve = partial(_solved, resolver, tolerance, failed)
+    try:
+        levels = pack(solve)
+        x = _at_once(resolver, levels, tolerance) if type(resolver) is Hcod else None
+        return solve(levels.hierarchy()) if x is None else x
+    except ContradictionError as error:
+        raise failed(None, None, str(error)) from error
+
+
+def _at_once(resolver: Hcod, levels: Any, tolerance: float) -> Array | None:
+    """Return what `_solved` does without making a Hierarchy, or None where that has more to say."""
+    x = np.zeros(levels.n)
+    solved = solve_exactly(levels, x, np.zeros(3 * levels.count + 3), resolver._settings) == SOLVED
+    always = sum([size for name, size in zip(levels.names, levels.sizes, strict=True)
+                  if name in _ALWAYS])
+    held = largest_violation(levels.A, *levels.sides, x, 0, always) <= tolerance
+    return x if solved and held else None
+
+
+def _solved(resolver: Resolver, tolerance: float, failed: Failed, h: Hierarchy) -> Array:
+    """Return x; raises what `failed` makes unless limits and constraints hold."""
+    resolution = resolver.solve(h)
+    if resolution.status is not Status.SOLVED:
+        raise failed(h, resolution, f"{resolver.name}: {resolution.status}")
+    if conflict := _conflict(h, resolution.x, tolerance):
+        raise failed(h, resolution, conflict)
+    return np.asarray(resolution.x)
+
+
+def _resolver(solver: str, settings: dict[str, Any]) -> Resolver:
+    """Return the resolver for a name, which may be that of a solver of qpsolvers."""
+    if solver not in _qp_solvers():
+        return make(solver, **settings) if settings else _made(solver)
+    note = (solver, *sorted(settings))
+    if note not in _noted:
+        _noted.add(note)
+        unused = f"; without effect: {', '.join(note[1:])}" if settings else ""
+        warnings.warn(f"solver {solver!r} minimises one cost; the tasks are resolved in strict "
+                      f"order by 'hcod'{unused}", stacklevel=4)
+    return _made("hcod")
+
+
+@cache
+def _made(name: str) -> Resolver:
+    return make(name)
+
+
+@cache
+def _qp_solvers() -> frozenset[str]:
+    """Return the names that qpsolvers knows, installed or not: one module each."""
+    from qpsolvers import solvers
+
+    return frozenset(module.name.rstrip("_") for module in iter_modules(solvers.__path__))
+
+
+def _conflict(h: Hierarchy, x: Array, tolerance: float) -> str:
+    """Return which limits or constraints contradict each other, those that miss; "" if none."""
+    A, lower, upper, sizes = h.rows
+    first = 0
+    for name, size in zip(h.names, sizes.tolist(), strict=True):
+        if name not in _ALWAYS:
+            break
+        last = first + size
+        if largest_violation(A, lower, upper, x, first, last) > tolerance:
+            misses, names = np.abs(h.slacks(x)), h.named() if h.named else ()
+            rows = [f"{names[i]} by {misses[i]:.3g}" for i in range(first, last)
+                    if misses[i] > tolerance]
+            return (f"the {name} cannot all hold; at best these are violated: {listed(rows)}")
+        first = last
+    return ""
