@@ -21,15 +21,18 @@ try:
     from numba.core.registry import CPUDispatcher
     from numba.core.runtime._nrt_python import c_helpers as nrt_helpers
     from numba.core.serialize import dumps
+    from numba.core.types.containers import BaseTuple
     from numba.extending import intrinsic
 
     _ = (CPUDispatcher._insert, CPUDispatcher._compile_for_args, CPUDispatcher.add_overload,
-         CompileResult._reduce, CompileResult._rebuild)
+         CompileResult._reduce, CompileResult._rebuild, CPUContext.get_executable,
+         Codegen._library_class, Codegen._module_pass_manager, Codegen.set_env,
+         CodeLibrary.finalize, CodeLibrary._get_module_for_linking)
 except (ImportError, AttributeError) as error:
     raise ImportError(f"task-hierarchy works inside numba {_KNOWN}, not {numba.__version__}: "
                       f"{error}") from error
 
-__all__ = ["CPUContext", "CPUDispatcher", "CodeLibrary", "Codegen", "CompileResult",
+__all__ = ["BaseTuple", "CPUContext", "CPUDispatcher", "CodeLibrary", "Codegen", "CompileResult",
            "Environment", "NullCache", "NumbaError", "cgutils", "compiler", "dumps", "event",
            "global_compiler_lock", "intrinsic", "llvm", "load_helpers", "make_function",
            "nrt_helpers", "registry", "types"]

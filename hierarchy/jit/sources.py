@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy.jit.inside import types
+from hierarchy.jit.inside import BaseTuple, types
 from hierarchy.jit.linking import found
 
 Kernel = Callable[..., Any]  # without annotations: its types are those of the first call
@@ -76,7 +76,7 @@ def kinds_in(text: str) -> tuple[Any, ...]:
             kind = getattr(types, name)
         else:
             named, *parts = stack.pop()
-            kind = types.BaseTuple.from_types(parts, found(named))
+            kind = BaseTuple.from_types(parts, found(named))
         stack[-1].append(kind)
     if described(tuple(stack[0])) != text:
         raise ValueError(f"no types of arguments: {text}")
@@ -84,7 +84,7 @@ def kinds_in(text: str) -> tuple[Any, ...]:
 
 
 def _described(kind: Any) -> str:
-    if not isinstance(kind, types.BaseTuple):
+    if not isinstance(kind, BaseTuple):
         return str(kind)
     of = getattr(kind, "instance_class", tuple)
     return f"{of.__module__}.{of.__qualname__}({described(tuple(kind))})"
