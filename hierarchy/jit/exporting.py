@@ -70,8 +70,8 @@ def compiles() -> bool:
 @global_compiler_lock  # type: ignore[untyped-decorator]
 def lowered(entries: Mapping[str, Entry]) -> Any:
     """Return one optimised LLVM module in which only the entries are visible, under their names."""
-    library = registry.cpu_target.target_context.codegen().create_library("entries")
-    with naming():
+    with naming(linked_only="entries"):
+        library = registry.cpu_target.target_context.codegen().create_library("entries")
         for name, entry in entries.items():
             _add(library, name, entry)
     return linked([library], set(entries))

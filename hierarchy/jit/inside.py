@@ -25,7 +25,9 @@ try:
     from numba.extending import intrinsic
 
     _ = (CPUDispatcher._insert, CPUDispatcher._compile_for_args, CPUDispatcher.add_overload,
-         CompileResult._reduce, CompileResult._rebuild)
+         CompileResult._reduce, CompileResult._rebuild, CPUContext.get_executable,
+         Codegen._library_class, Codegen._module_pass_manager, Codegen.set_env,
+         CodeLibrary.finalize, CodeLibrary._get_module_for_linking)
 except (ImportError, AttributeError) as error:
     raise ImportError(f"task-hierarchy works inside numba {_KNOWN}, not {numba.__version__}: "
                       f"{error}") from error

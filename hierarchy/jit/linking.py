@@ -107,19 +107,23 @@ def found(name: str) -> Any:
 
 def linked(libraries: Iterable[Any], visible: set[str]) -> Any:
     """Return one optimised module of these and all behind them; only these names are visible."""
-    whole = llvm.parse_assembly("")
-    for library in _all_behind(libraries):
-        module = (library._shared_module or library._final_module).clone()  # the first if cached
-        for one in (*module.functions, *module.global_variables):
-            if not one.is_declaration and one.linkage in _SHARED:
-                one.linkage = "weak_odr"  # or the linker drops what nothing refers to yet
-        whole.link_in(module)
-    codegen = registry.cpu_target.target_context.codegen()
-    whole.data_layout = str(codegen.target_data)
-    hide(whole, visible)
-    manager, builder = codegen._module_pass_manager()
-    manager.run(whole, builder)
+    whole, behind = llvm.parse_assembly(""), _all_behind(libraries)
+    for is_optimised in (False, True):
+        for library in behind:
+            if (library._finalized and getattr(library, "runs", True)) is is_optimised:
+                _link(whole, library._get_module_for_linking().clone())
+        hide(whole, visible)
+        if not is_optimised:
+            manager, builder = _passes()
+            manager.run(whole, builder)
     return whole
+
+
+def _link(whole: Any, module: Any) -> None:
+    for one in (*module.functions, *module.global_variables):
+        if not one.is_declaration and one.linkage in _SHARED:
+            one.linkage = "weak_odr"  # or the linker drops what nothing refers to yet
+    whole.link_in(module)
 
 
 def hide(module: Any, visible: set[str]) -> None:
@@ -130,9 +134,12 @@ def hide(module: Any, visible: set[str]) -> None:
     manager = llvm.create_new_module_pass_manager()
     manager.add_global_dead_code_eliminate_pass()
     manager.add_strip_dead_prototype_pass()
-    codegen = registry.cpu_target.target_context.codegen()
-    manager.run(module, llvm.create_pass_builder(
-        codegen._tm, llvm.create_pipeline_tuning_options()))
+    manager.run(module, _passes()[1])
+
+
+def _passes() -> Any:
+    """Return numba's passes over a module, and what runs them."""
+    return registry.cpu_target.target_context.codegen()._module_pass_manager()
 
 
 def _all_behind(libraries: Iterable[Any]) -> list[Any]:

@@ -43,7 +43,7 @@ def test_the_memory_of_a_process_is_its_own_at_its_peak():
 
 
 def test_everything_measured_is_told(monkeypatch):
-    monkeypatch.setattr(start, "beginnings", lambda: [Cost("help", 0.1, "s", 0.5, 0.09)])
+    monkeypatch.setattr(start, "beginnings", lambda folder: [Cost("help", 0.1, "s", 0.5, 0.09)])
     monkeypatch.setattr(start, "first_compilation", lambda cache: (
         [Cost("first", 20.0, "s", None, 19.0)], {"solvers.kernels.a.b": 2.0}))
     monkeypatch.setattr(start, "memory", lambda folder: [Cost("a run", 301.0, "MB", 300.0)])
