@@ -98,7 +98,7 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
                 d.b[count] = lower[i]
                 count += 1
         d.ends[k], first = count - begin, first + sizes[k]
-        fixed = fixed or (count > begin and _are_bounds(d, A, first, k))
+        fixed = fixed or bool(count > begin and _are_bounds(d, A, first, k))
     for c in range(x.size):
         d.free[c] = x[c]
     E, b = d.E[:count], d.b[:count]
