@@ -9,7 +9,8 @@ damped as one that is singular. Then level by level
     min |A_k x - b_k|^2 + lambda_k^2 |x|^2, levels above at what they have reached,
 
 and last the distance to the reference. No lambda depends on which inequalities act, so each of
-these is one strictly convex problem, and its answer varies continuously with the data.
+these is one strictly convex problem, and its answer varies continuously with the data. From the
+staircase to these x jumps where a level alone would pass a bound that the answer keeps.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -97,8 +98,7 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
                 d.b[count] = lower[i]
                 count += 1
         d.ends[k], first = count - begin, first + sizes[k]
-        if count > begin and _are_bounds(d, A, first, k):
-            fixed = True
+        fixed = fixed or bool(count > begin and _are_bounds(d, A, first, k))
     for c in range(x.size):
         d.free[c] = x[c]
     E, b = d.E[:count], d.b[:count]

@@ -66,20 +66,12 @@ class Found(NamedTuple):
     most: View
 
 
-@inlined
-def try_working_set(s, last, newest):
-    """Write the x and multipliers of a working set, and return what is wrong in the first levels.
+@compiled
+def judge(s, last, newest):
+    """Write the changes that a working set asks for in the first `last` levels; see `Found`.
 
     newest: a row that entered because it was violated, so that it pushes; -1 for none.
     """
-    meet(s, last)
-    write_multipliers(s, MET)
-    return judge(s, last, newest)
-
-
-@compiled
-def judge(s, last, newest):
-    """Write the changes that a working set asks for in the first `last` levels; see `Found`."""
     wrong, leaving, most, worst = ZERO, ZERO, ZERO - 1, 0.0
     reach = length_of(s.x) + SHADOW * s.scalar[SIZE]
     for i in range(s.A.shape[0]):
@@ -165,7 +157,9 @@ def pivot_one_by_one(s, current, saved, limit, level):
         recurred = _count_recurrences(s, last, tries, recurred)
         if recurred > RECURRENCES:
             break
-        found = try_working_set(s, last, newest)
+        meet(s, last)
+        write_multipliers(s, MET)
+        found = judge(s, last, newest)
         if not np.isfinite(length_of(s.x)):
             return ZERO + NUMERICAL_FAILURE, tries, last - 1
         if found.leaving > 0 and fresh:
