@@ -19,7 +19,8 @@ class StackList {
     this.near = element("p");
     this.goals = element("div", {class: "goals"}, ...run.goals.map(goal => {
       const [short, ...rest] = goal.split(";");
-      return rest.length ? element("div", {}, element("b", {}, short),
+      const missed = rest.length && (!short.includes(" met") || short.includes("never"));
+      return missed ? element("div", {}, element("b", {}, short),
                                    element("span", {}, `;${rest.join(";")}`)) : element("div", {}, goal);
     }));
     this.note = element("p");
