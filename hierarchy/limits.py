@@ -60,7 +60,7 @@ from hierarchy.task import Level
 ROUNDING = 1e-12  # of a position, relative to 1 + its limit: closer to a limit counts as on it
 _FAR = 1e100      # [rad] stands for an infinite distance
 _CLEARANCE = 1e-3  # [rad or m] at which a horizon brings joints to rest before a position limit,
-#                    so that a disturbance of 0.05 rad/s does not reach the steep side of one tick
+#                    so that a disturbance of 0.02 rad/s does not shorten it
 
 
 @dataclass(frozen=True)
@@ -159,10 +159,36 @@ def box(q, v, limits, i, acceleration):
     # A joint beyond its speed limit returns in H, not in a tick.
     low, up = widest(q, v, (L, U, max(V, abs(v) - (abs(v) - V) * T / H), A, T), acceleration)
     c = min(_CLEARANCE, 0.25 * (U - L))
-    least, most = next_velocities(q + v * H if acceleration else q, L + c, U - c, V, A, H)  # (c)
-    if acceleration:
-        least, most = (least - v) / H, (most - v) / H
+    if not acceleration:
+        least, most = next_velocities(q, L + c, U - c, V, A, H)                        # (c)
+        return clipped(least, low, up), clipped(most, low, up)
+    least, most = approach(q, v, (L, U, V, A), c, H)
+    h = T + time_left(U - q if v > 0.0 else q - L, abs(v), A)
+    if h < H:                                                                          # (d)
+        soon, late = approach(q, v, (L, U, V, A), c * (h / H) ** 2, h)
+        if v > 0.0:
+            most = min(most, late)
+            least = min(least, most)
+        elif v < 0.0:
+            least = max(least, soon)
+            most = max(most, least)
     return clipped(least, low, up), clipped(most, low, up)
+
+
+@inlined
+def approach(q, v, limits, c, h):
+    """Return the least and the greatest acceleration with a horizon h and a clearance c."""
+    L, U, V, A = limits
+    least, most = next_velocities(q + v * h, L + c, U - c, V, A, h)
+    return (least - v) / h, (most - v) / h
+
+
+@inlined
+def time_left(s, v, A):
+    """Return the longest horizon that brings a joint of speed v to rest within s."""
+    if v * v <= A * s:
+        return s / max(v, 1.0 / _FAR)
+    return sqrt(max(2 * s / A - v * v / (A * A), 0.0))
 
 
 @inlined
