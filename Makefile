@@ -18,7 +18,7 @@ BIN        := .venv/bin
 # Small matrices: threads of the linear algebra library only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
-# The kernels are compiled while what tests and documents need is installed.
+# What kernels and demo need is installed first; then the rest, while kernels are compiled.
 MAKEFLAGS  += --jobs=2
 SMALL      := .venv/scenarios
 INSTALLED  := .venv/installed
@@ -108,5 +108,5 @@ $(SMALL): pyproject.toml constraints.txt
 	fi; \
 	echo "Setting up .venv with $$("$$python" --version) (once; downloads about 250 MB) ..."; \
 	"$$python" -m venv --clear .venv
-	@$(PIP) '.[scenarios]'
+	@$(PIP) '.[scenarios,qp]'
 	@touch $@

@@ -66,7 +66,7 @@ class Cached(CPUDispatcher):  # type: ignore[misc]
         with global_compiler_lock:
             if self.kept and not isinstance(self._cache, KernelCache):
                 self._cache = KernelCache(self.py_func)
-            with naming("" if self.is_named else self.py_func.__qualname__):
+            with naming(None if self.is_named else self.py_func):
                 return super().compile(signature)
 
 

@@ -27,14 +27,14 @@ class Library(CodeLibrary):  # type: ignore[misc]
     """
 
     naming = False  # while a kernel compiles; numba's own cache knows no names
-    linked_only = ""  # the name of a library that does not run
+    linked_only: Any = None  # the function that compiles now, if it does not run
     running = True  # whether others do
 
     def __init__(self, *about: Any) -> None:
         super().__init__(*about)
         self.kernel: Call | None = None
         self.calls: dict[Any, None] = {}
-        self.runs = Library.running and self.name != Library.linked_only
+        self.runs = True
 
     def add_linking_library(self, library: Any) -> None:
         """Link a library when this one is finished, or note that its names are needed."""
@@ -62,6 +62,9 @@ class Library(CodeLibrary):  # type: ignore[misc]
 def _executable(context: Any, library: Any, about: Any, environment: Any) -> Any:
     """Return what Python calls; of what does not run any builtin, unlike all others."""
     library.environment = about.env_name, environment
+    only = Library.linked_only
+    library.runs = Library.running and (only is None or (about.modname, about.qualname) != (
+        only.__module__, only.__qualname__))
     if not library.runs:
         return [].append
     made = _made(context, library, about, environment)
@@ -76,8 +79,11 @@ _made, CPUContext.get_executable = CPUContext.get_executable, _executable
 
 
 @contextmanager
-def naming(linked_only: str = "") -> Iterator[None]:
-    """Let code that is compiled now name the kernels that it calls."""
+def naming(linked_only: Any = None) -> Iterator[None]:
+    """Let code that is compiled now name the kernels that it calls.
+
+    linked_only : the function that is compiled, if its code is only linked into callers.
+    """
     before, collecting = (Library.naming, Library.linked_only), gc.isenabled()
     Library.naming, Library.linked_only = True, linked_only
     gc.disable()  # looking through what numba keeps takes a seventh of the time
