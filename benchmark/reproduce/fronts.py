@@ -60,7 +60,7 @@ class Point:
     """Settings of a method on the front of its training, and what came of them.
 
     training, test : median of each metric over scenes, infinite where half of them fail; kept :
-    test scenes that did not fail.
+    test scenes that did not fail, of so many `scenes`.
     """
 
     front: str
@@ -69,6 +69,7 @@ class Point:
     training: list[float]
     test: list[float]
     kept: int
+    scenes: int
     units: list[str]
 
 
@@ -91,7 +92,7 @@ def run(names: Sequence[str], out: Path, workers: Workers, progress: Progress | 
             tested = _scores(front, method, chosen, (GIVEN["seed"] + 1, GIVEN["test"]),
                              (out / name, workers, progress))
             found += [Point(name, label, trials[k], training[0][k].tolist(),
-                            tested[0][i].tolist(), tested[1][i], tested[2])
+                            tested[0][i].tolist(), tested[1][i], GIVEN["test"], tested[2])
                       for i, k in enumerate(best)]
         yield found
 
@@ -165,12 +166,12 @@ def table(points: Sequence[Point], name: str) -> list[str]:
             settings = ", ".join(f"{'.'.join(key.split('.')[-2:])} = {x:g}"
                                  for key, x in one.settings.items())
             cells = [shown(x, unit) for x, unit in zip(one.test, one.units, strict=True)]
-            lines.append(f"| {method} | {settings or '–'} | {one.kept} of {GIVEN['test']} | "
+            lines.append(f"| {method} | {settings or '–'} | {one.kept} of {one.scenes} | "
                          f"{' | '.join(cells)} |")
         if failed:
             several = f"{len(failed)} others" if len(failed) < len(tried) else f"all {len(tried)}"
             several = several if len(tried) > 1 else "–"
-            lines.append(f"| {method} | {several} | at most {max(failed)} of {GIVEN['test']} |"
+            lines.append(f"| {method} | {several} | at most {max(failed)} of {tried[0].scenes} |"
                          + " failed |" * len(front.minimised))
     return lines
 
