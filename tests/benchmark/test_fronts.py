@@ -33,13 +33,13 @@ def test_every_method_can_take_its_settings():
 
 
 def test_points_are_kept_and_shown(tmp_path):
-    points = [Point("ellipse-hqp", "strict", {}, [1e-3, 1.0, 10.0], [2e-3, 1.0, 10.0], 4,
+    points = [Point("ellipse-hqp", "strict", {}, [1e-3, 1.0, 10.0], [2e-3, 1.0, 10.0], 4, 4,
                     ["m", "deg", "rad/s^2"]),
               Point("ellipse-hqp", "weighted", {"control.options.ratio": 7.0},
-                    [1e-3, 1.0, 10.0], [np.inf] * 3, 1, ["m", "deg", "rad/s^2"])]
+                    [1e-3, 1.0, 10.0], [np.inf] * 3, 1, 4, ["m", "deg", "rad/s^2"])]
     fronts.write(points, tmp_path / "fronts.json")
     assert fronts.read(tmp_path / "fronts.json") == points
     table = fronts.table(points, "ellipse-hqp")
     assert table[2] == "| strict | – | 4 of 4 | 2 mm | 1° | 10 rad/s² |"
-    assert table[3].endswith("| options.ratio = 7 | 1 of 4 | failed | failed | failed |")
+    assert table[3] == "| weighted | – | at most 1 of 4 | failed | failed | failed |"
     assert len(fronts.figure(points).axes) == 1
