@@ -86,7 +86,7 @@ def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
     for claim in PROTOCOL.claims:
         assert {claim.of, claim.rival} - {""} <= set(PROTOCOL.columns)
         assert bool(claim.quotation) == (claim.family == "letter")
-    assert len(claims.asked(PROTOCOL, "own")) > 5
+    assert len(claims.asked(PROTOCOL)) > 5
 
 
 def test_the_acceleration_of_a_point_is_its_second_difference(chance):

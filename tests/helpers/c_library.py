@@ -38,7 +38,7 @@ class Settings(ctypes.Structure):
 def settings_of(**given):
     """Settings with the defaults of the header but for those given."""
     return Settings(**{"threshold": 0.1, "rank_tolerance": 1e-8, "tolerance": 1e-10,
-                       "largest": np.inf, "ratio": 5.0, "cap": 1.0, "step": 0.1,
+                       "largest": np.inf, "ratio": 4.0, "cap": 1.0, "step": 0.1,
                        "regularisation": 1e-3, "max_iterations": 1000, "strict_levels": -1,
                        **given})
 

