@@ -72,6 +72,7 @@ def packed(configuration: object, joints: Names, n: int, period: float,
     levels = Packed(n, joints, period, limits, read, pull)
     levels.keep("limits", levels.limit())
     levels.keep("constraints", levels.write(read[0], weighted=False))
+    levels.always = levels.count
     for level in read[1:]:
         if levels.weight and any(np.any(_costs(task, len(e))) for task, _, e in level):
             levels.hold(solve)
@@ -86,7 +87,7 @@ class ContradictionError(HierarchyError):
 def _row_names(packed: Packed) -> tuple[str, ...]:
     """Name each row: by its joint if it is about a single one, else by its limit or task."""
     known = list(packed.joints())
-    above, free = (packed.sizes[0] if packed.names[:1] == ["limits"] else 0), packed.count
+    above, free = (packed.sizes[0] if packed.kept[:1] == ["limits"] else 0), packed.count
     free -= packed.sizes[-1] if packed.weight else 0
     of_tasks = [name for level in packed.read for one in level
                 for name in _names_of(*one)][:free - above]
@@ -113,8 +114,9 @@ def _names_of(task: Task, J: Array, e: Array) -> list[str]:
 class Packed:
     """The levels written so far, and a table of what limits and tasks give, see `packing`.
 
-    names, sizes : of the levels, without the empty ones. A (m, n), sides (2, m): their rows, m =
-    `count`, and room for more.
+    kept, sizes : what is in each level, without the empty ones, and its rows. A (m, n), sides (2,
+    m): the rows of all, m = `count`, and room for more; the first `always` are limits and
+    constraints.
     """
 
     def __init__(self, n: int, joints: Names, period: float, limits: Sequence[Limit],
@@ -123,21 +125,28 @@ class Packed:
         self.limits, self.read = limits, read
         given = sum([len(h) for _, _, h in limits])
         most = given + sum([len(e) for level in read for _, _, e in level])
-        self.table = np.empty((most, n + GIVEN))
+        self.table = np.zeros((most, n + GIVEN))
         self.A, self.sides = np.empty((most + 2 * n, n)), np.empty((2, most + 2 * n))
-        self.count, self.filled = 0, 0
+        self.count, self.filled, self.always = 0, 0, 0
         self.weight = 0.0  # of the step in the last level, whose rows in the table are `last`
         self.last = (0, 0)
-        self.names: list[str] = []
+        self.kept: list[str | Sequence[_Read]] = []
         self.sizes: list[int] = []
 
-    def keep(self, name: str, last: int) -> None:
+    def keep(self, what: str | Sequence[_Read], last: int) -> None:
         """Make the rows written up to `last` a level, unless there are none."""
         if last > self.count:
-            again = self.names.count(name)
-            self.names.append(f"{name} ({again + 1})" if again else name)
+            self.kept.append(what)
             self.sizes.append(last - self.count)
             self.count = last
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the levels: of the classes and frames of their tasks, each once."""
+        plain = [one if isinstance(one, str) else " + ".join([label(task) for task, _, _ in one])
+                 for one in self.kept]
+        again = [plain[:k].count(name) for k, name in enumerate(plain)]
+        return [f"{name} ({k + 1})" if k else name for name, k in zip(plain, again, strict=True)]
 
     def limit(self) -> int:
         """Write the rows G x <= h / period from row 0 on: one for a joint, after all others.
@@ -161,11 +170,10 @@ class Packed:
             return self.count
         first = self.filled
         for task, J, e in level:
-            row, n = self.filled, self.n
-            self._give(task, J, e)
-            own = self.table[row:self.filled]
-            own[:, n + 1] = _costs(task, len(e)) if weighted else 1.0
-            own[:, n + 2], own[:, n + 3] = task.gain, getattr(task, "lm_damping", 0.0) or 0.0
+            own, n = self._give(task, J, e), self.n
+            own[:, n + 1], own[:, n + 2] = _costs(task, len(e)) if weighted else 1.0, task.gain
+            if damping := getattr(task, "lm_damping", 0.0):
+                own[:, n + 3] = damping
         self.last = first, self.filled
         row = int(write_tasks(self.table, *self.last, self.period, self.A, self.sides, self.count))
         if row == ODD:
@@ -175,15 +183,17 @@ class Packed:
                                  "gain are not finite")
         return row
 
-    def _give(self, what: str | Task, rows: Array, sides: Array) -> None:
-        """Put rows (k, n) and sides (k,) into the table."""
+    def _give(self, what: str | Task, rows: Array, sides: Array) -> Array:
+        """Put rows (k, n) and sides (k,) into the table; return what it has of them."""
         n, first = self.n, self.filled
         self.filled = last = first + len(sides)
         if rows.shape != (last - first, n):
             name = what if isinstance(what, str) else label(what)
             raise HierarchyError(f"{name}: {rows.shape} rows for {sides.shape} values and {n} "
                                  "unknowns")
-        self.table[first:last, :n], self.table[first:last, n] = rows, sides
+        own = self.table[first:last]
+        own[:, :n], own[:, n] = rows, sides
+        return own
 
     def level(self, level: Sequence[_Read]) -> None:
         """Write tasks as a level; if its step is weighed, n rows then stand for all of it."""
@@ -193,7 +203,7 @@ class Packed:
                                last)
             if self.weight > 0.0:
                 last = self.count + self.n
-        self.keep(" + ".join([label(one[0]) for one in level]), last)
+        self.keep(level, last)
 
     def hold(self, solve: Solve | None) -> None:
         """Make the last level, which weighs its step, ask for what it then reaches."""
@@ -208,7 +218,7 @@ class Packed:
         self.weight = 0.0
         if x is not None:
             self.sides[:, first:last] = self.A[first:last] @ x
-        self.keep(self.names.pop(), last)
+        self.keep(self.kept.pop(), last)
 
     @property
     def rows(self) -> tuple[Array, Array, Array, Sizes]:

@@ -47,9 +47,7 @@ def _at_once(resolver: Hcod, levels: Any, tolerance: float) -> Array | None:
     """Return what `_solved` does without making a Hierarchy, or None where that has more to say."""
     x = np.zeros(levels.n)
     solved = solve_exactly(levels, x, np.zeros(3 * levels.count + 3), resolver._settings) == SOLVED
-    always = sum([size for name, size in zip(levels.names, levels.sizes, strict=True)
-                  if name in _ALWAYS])
-    held = largest_violation(levels.A, *levels.sides, x, 0, always) <= tolerance
+    held = largest_violation(levels.A, *levels.sides, x, 0, levels.always) <= tolerance
     return x if solved and held else None
 
 
