@@ -88,7 +88,6 @@ def run(scenario: Annotated[str, typer.Argument(
 def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json: bool) -> int:
     from scenarios.cli.progress import bar
     from scenarios.config.validation import doubtful_units
-    from scenarios.draw.figures.letter import redraw
     from scenarios.loop.first_tick import contact_warnings
     from scenarios.loop.simulation import simulate
     from scenarios.measure.metrics import as_plain_data
@@ -103,6 +102,8 @@ def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json
     if lost := kept(recording, folder):
         return exit_code(lost)
     if figures:
+        from scenarios.draw.figures.letter import redraw
+
         redraw([folder])
     if as_json:
         print_json({"scenario": scenario.name, "resolver": scenario.control.resolver,

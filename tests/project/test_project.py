@@ -84,10 +84,13 @@ def make_set_up(folder, interpreter):
     ("import solvers", {"pinocchio"}),
     ("import scenarios.cli.main", {"numpy", "numba", "pinocchio", "scipy", "matplotlib"}),
     ("from scenarios.cli.main import run_command; run_command(['--help'])",
-     {"numpy", "numba", "pinocchio", "pydantic", "matplotlib"})])
-def test_a_program_loads_no_heavy_package_that_it_does_not_need(statement, heavy):
+     {"numpy", "numba", "pinocchio", "pydantic", "matplotlib"}),
+    ("from scenarios.cli.main import run_command; "
+     "run_command('run ellipse --duration 0.01'.split())", {"matplotlib"})])
+def test_a_program_loads_no_heavy_package_that_it_does_not_need(statement, heavy, tmp_path):
     code = f"import sys; {statement}; print({heavy} & set(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                          cwd=tmp_path)
     assert done.stdout.endswith("set()\n")
 
 
