@@ -60,7 +60,8 @@ def acceleration(state: State, joint: int, p: Array, a: Array) -> Array:
     moves = state.supports[joint]
     v, w = (state.J[:, moves] @ state.v[moves]).reshape(2, 3)
     dv, dw = (state.J[:, moves] @ a[moves] + state.dJ[:, moves] @ state.v[moves]).reshape(2, 3)
-    return np.asarray(dv + cross(dw) @ p + cross(w) @ (v + cross(w) @ p))
+    turned = cross(w)
+    return np.asarray(dv + cross(dw) @ p + turned @ (v + turned @ p))
 
 
 def measured(scenario: Scenario) -> tuple[Recording, tuple[Metric, ...]]:

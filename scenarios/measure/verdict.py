@@ -53,6 +53,11 @@ class Verdict:
         """How it ended, and a line for each goal."""
         return _sentence(self.end).removesuffix("."), *map(str, self.goals)
 
+    def on_page(self) -> dict[str, list[Any]]:
+        """Return the lines, and the indices of those about goals that were not met."""
+        missed = [k for k, goal in enumerate(self.goals, 1) if not goal.met]
+        return {"goals": list(self.said), "missed": missed}
+
     def as_plain_data(self) -> dict[str, Any]:
         """Return the verdict for a JSON file."""
         return {"end": self.end, "goals": [

@@ -123,7 +123,7 @@ def html(recordings: Mapping[str, Recording], title: str,
     look = looks(recordings)
     runs = [run_data(scene(recording, rate), {
         "label": label, **look[label]._asdict(), **about(recording.scenario),
-        "fault": recording.fault, "goals": list(verdict(recording).said),
+        "fault": recording.fault, **verdict(recording).on_page(),
         "events": [{"t": one.t, "text": f"{one.what}: {one.why}"} for one in (
             happenings[label] if happenings else happened(recording))]})
         for label, recording in recordings.items()]

@@ -17,11 +17,10 @@ class StackList {
     this.list = element("ol", {class: "order", style: `height: ${ROW * run.tasks.length}px`},
                         ...this.rows.map(parts => parts.row));
     this.near = element("p");
-    this.goals = element("div", {class: "goals"}, ...run.goals.map(goal => {
+    this.goals = element("div", {class: "goals"}, ...run.goals.map((goal, k) => {
+      if (!run.missed.includes(k)) return element("div", {}, goal);
       const [short, ...rest] = goal.split(";");
-      const missed = rest.length && (!short.includes(" met") || short.includes("never"));
-      return missed ? element("div", {}, element("b", {}, short),
-                                   element("span", {}, `;${rest.join(";")}`)) : element("div", {}, goal);
+      return element("div", {}, element("b", {}, short), element("span", {}, `;${rest.join(";")}`));
     }));
     this.note = element("p");
     const head = element("h2", {}, ...(several ? [sample(run)] : []), run.label, element("small", {}, run.scenario));

@@ -38,7 +38,7 @@ class LiveRun extends Run {
     this.order.values[this.frames - 1] = index;
     this.end = this.t.values[this.frames - 1];
     this.stretch(over, next.colour);
-    for (const name of ["label", "colour", "dash", "fault", "goals", "areas", "halfAngle", "wanted",
+    for (const name of ["label", "colour", "dash", "fault", "goals", "missed", "areas", "halfAngle", "wanted",
                         "ahead", "handles"]) this[name] = next[name];
   }
 
@@ -135,7 +135,7 @@ class LivePlayer extends Player {
       this.runs.splice(0, 1, next);
       this.make_lists(data);
     } else if (next.end > run.end) run.append(next);
-    else for (const name of ["goals", "fault", "handles"]) run[name] = next[name];
+    else for (const name of ["goals", "missed", "fault", "handles"]) run[name] = next[name];
     this.handles = data.handles;
     if (lists !== [run.label, run.fault, run.goals].join() && this.runs[0] === run) this.make_lists(data);
     this.roll();

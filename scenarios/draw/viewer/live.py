@@ -61,7 +61,7 @@ class Live:
         offset = np.zeros((0, 3)) if self.obstacles is None else self.obstacles.offset
         self._wanted, self._changed = offset.copy(), np.zeros(self.ticks, dtype=np.bool_)
         self._offsets = np.zeros((self.ticks, *offset.shape))
-        self._goals: tuple[int, tuple[str, ...]] = 0, ()
+        self._goals: tuple[int, dict[str, list[Any]]] = 0, {}
         self._seen: tuple[int, Controller | None] = -1, None
 
     @property
@@ -144,12 +144,12 @@ class Live:
             self._frame = scene(recording)
         return self._frame
 
-    def goals(self) -> tuple[str, ...]:
-        """Return how far the run is, or how it ended, and its goals so far, in a line each."""
+    def goals(self) -> dict[str, list[Any]]:
+        """Return how far the run is, or how it ended, and its goals so far: `Verdict.on_page`."""
         ticks = self.recorder.ticks
         if ticks != self._goals[0]:
             so_far = self.recorder.finish(self.begun, self.fault if self.over else None)
-            self._goals = ticks, verdict(so_far).said
+            self._goals = ticks, verdict(so_far).on_page()
         return self._goals[1]
 
     def save(self, folder: Path) -> Recording:

@@ -86,7 +86,8 @@ class LivePage:
         live, scenario, playing = self.live, self.live.scenario, self.playing and not self.live.over
         run = run_data(live.frame(), {
             "label": self.label, **self._looks[self.label]._asdict(), **about(scenario),
-            "fault": live.fault, "goals": [] if playing else list(live.goals()), "events": [],
+            "fault": live.fault, "events": [], "goals": [], "missed": [],
+            **({} if playing else live.goals()),
             "ahead": [packed(path) for path in self._paths]})
         return {"runs": [run], "playing": playing, "refused": [self._refusals, self.refused],
                 "begun": self._begun, "speed": self.speed, "resolver": self.label,
