@@ -86,8 +86,7 @@ class LivePage:
         live, scenario, playing = self.live, self.live.scenario, self.playing and not self.live.over
         run = run_data(live.frame(), {
             "label": self.label, **self._looks[self.label]._asdict(), **about(scenario),
-            "fault": live.fault, "events": [], "goals": [], "missed": [],
-            **({} if playing else live.goals()),
+            "fault": live.fault, "events": [], **live.goals(1.0 if playing else 0.0),
             "ahead": [packed(path) for path in self._paths]})
         return {"runs": [run], "playing": playing, "refused": [self._refusals, self.refused],
                 "begun": self._begun, "speed": self.speed, "resolver": self.label,
