@@ -84,36 +84,6 @@ def write_point_jacobian(J, placements, supports, joint, offset, A, row):
             A[row + 2, c] = 0.0
 
 
-@compiled
-def write_point_jacobian_derivative(kinematics, joint, offset, out):
-    """Write d/dt dp/dq of a point into out (3, n), exact or as a backward difference."""
-    v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
-    if period > 0.0:
-        before = np.empty((3, out.shape[1]))
-        write_point_jacobian(J, placements, supports, joint, offset, out, 0)
-        write_point_jacobian(previous_J, previous_placements, supports, joint, offset, before, 0)
-        subtract_over_period(out, before, period)
-        return
-    x = point_at(placements, joint, offset, 0)
-    y = point_at(placements, joint, offset, 1)
-    z = point_at(placements, joint, offset, 2)
-    dx, dy, dz = 0.0, 0.0, 0.0
-    for c in range(out.shape[1]):
-        if supports[joint, c]:
-            dx += (J[0, c] + J[4, c] * z - J[5, c] * y) * v[c]
-            dy += (J[1, c] + J[5, c] * x - J[3, c] * z) * v[c]
-            dz += (J[2, c] + J[3, c] * y - J[4, c] * x) * v[c]
-    for c in range(out.shape[1]):
-        if supports[joint, c]:
-            out[0, c] = dJ[0, c] + dJ[4, c] * z - dJ[5, c] * y + J[4, c] * dz - J[5, c] * dy
-            out[1, c] = dJ[1, c] + dJ[5, c] * x - dJ[3, c] * z + J[5, c] * dx - J[3, c] * dz
-            out[2, c] = dJ[2, c] + dJ[3, c] * y - dJ[4, c] * x + J[3, c] * dy - J[4, c] * dx
-        else:
-            out[0, c] = 0.0
-            out[1, c] = 0.0
-            out[2, c] = 0.0
-
-
 @inlined
 def velocity_of_point(J, supports, joint, v, x, y, z):
     """Velocity of the material point at x, y, z, and the angular velocity of its body."""
@@ -176,14 +146,6 @@ def write_identity(A, row, count):
         for j in range(A.shape[1]):
             A[row + i, j] = 0.0
         A[row + i, base + i] = 1.0
-
-
-@compiled
-def subtract_over_period(now, before, period):
-    """Replace `now` by the backward difference (now - before) / period."""
-    for i in range(now.shape[0]):
-        for c in range(now.shape[1]):
-            now[i, c] = (now[i, c] - before[i, c]) / period
 
 
 @inlined

@@ -171,6 +171,11 @@ class State:
         self._from_now_on(partial(pin.dccrba, model, data, self.q, self.v))
         return Momentum(_columns(data.Ag, 6), _columns(data.dAg, 6))
 
+    @cached_property
+    def beside(self) -> State:
+        """Another state of the robot, to move for differences."""
+        return State(self.robot)
+
     def _from_now_on(self, *computations: Callable[[], object]) -> None:
         self._further += computations
         for compute in computations:
@@ -182,11 +187,6 @@ class State:
     def mass_matrix(self) -> Array:
         """Joint-space inertia matrix M(q) (n, n) [kg m^2]."""
         return np.ascontiguousarray(pin.crba(self._model, self._data, self.q))
-
-    def mass_matrix_derivative(self) -> Array:
-        """Time derivative of M(q) (n, n) [kg m^2/s]."""
-        C = pin.computeCoriolisMatrix(self._model, self._data, self.q, self.v)
-        return np.ascontiguousarray(C + C.T)
 
     def bias_effort(self) -> Array:
         """Joint efforts h(q, v) (n,) [N m or N] of gravity, Coriolis and centrifugal forces."""

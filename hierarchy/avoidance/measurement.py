@@ -84,13 +84,6 @@ class Measurement:
         return float(self.distance.item(-1))
 
 
-def measure_exactly(measurement: Measurement, placements: Array, joints: NDArray[np.int64],
-                    offsets: Array, obstacles: Array, laws: Array,
-                    mean_within: Array) -> None:
-    """Fill a Measurement from known geometry; see `exact_measurer`."""
-    exact_measurer(measurement, placements, joints, offsets, obstacles, laws, mean_within)()
-
-
 def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[np.int64],
                    offsets: Array, obstacles: Array, laws: Array,
                    mean_within: Array) -> Callable[[], object]:

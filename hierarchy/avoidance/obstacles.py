@@ -18,6 +18,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 
 # One obstacle is one row of the packed table: shape, size, centre, rotation.
+# The number of a shape is also how many sizes it has.
 SHAPES = {"point": 0, "sphere": 1, "capsule": 2, "box": 3}
 _WIDTH = 1 + 3 + 3 + 9
 _CENTRE = slice(4, 7)
@@ -43,7 +44,7 @@ class Obstacle:
     def __post_init__(self) -> None:
         if self.shape not in SHAPES:
             raise UnknownNameError("obstacle shape", self.shape, SHAPES)
-        expected = {"point": 0, "sphere": 1, "capsule": 2, "box": 3}[self.shape]
+        expected = SHAPES[self.shape]
         if len(self.size) != expected or any(not 0.0 < s < inf for s in self.size):
             raise HierarchyError(f"{self.name}: a {self.shape} takes {expected} positive "
                                  f"size(s), got {list(self.size)}")

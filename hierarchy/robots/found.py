@@ -12,6 +12,7 @@ from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.self_collision import Capsule
 from hierarchy.problem import Array
 from hierarchy.robots.frames import ambiguous
+from hierarchy.robots.table import Table
 from hierarchy.words import some
 
 _HUGE = 1e300  # a limit of pinocchio beyond this is none
@@ -53,6 +54,7 @@ class Found:
     `missing` are sentences. `control_points` is None if they are to be proposed. `coupled` joints
     follow others, `loops` are closed chains; `starts` are configurations (nq,) that the file names,
     and `apart` pairs of bodies, by the joints that move them, whose distance it does not watch.
+    `table` is the table that the model was made from, or None.
     """
 
     model: Any
@@ -65,6 +67,7 @@ class Found:
     loops: tuple[Loop, ...] = ()
     starts: Mapping[str, Array] = field(default_factory=dict)
     apart: tuple[tuple[str, str], ...] = ()
+    table: Table | None = None
 
 
 def is_floating(model: Any) -> bool:

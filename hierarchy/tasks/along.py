@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,7 +26,6 @@ class Along(Written):
     task: Position
     directions: Sequence[Sequence[float]]
     name: str = "along"
-    _D: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -38,27 +37,26 @@ class Along(Written):
         if D.ndim != 2 or D.shape[1:] != (3,) or not np.allclose(D @ D.T, np.eye(len(D))):
             raise HierarchyError(f"task {self.name!r}: directions {self.directions!r} are not of "
                                  "length one and orthogonal, (m, 3)")
-        object.__setattr__(self, "_D", D)
 
     @property
     def dimension(self) -> int:
         """One row per direction."""
-        return len(self._D)
+        return len(self.directions)
 
     def error(self, state: State) -> Array:
         """Distance to the path along the directions (m,) [m]."""
-        return np.asarray(self._D @ self.task.error(state))
+        return np.asarray(self.directions) @ self.task.error(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
         rows, b, above = np.zeros((3, A.shape[1])), np.zeros(3), np.zeros(3)
         write_rows = self.task.writer(state, level, rows, b, above, 0)
-        own = slice(row, row + self.dimension)
+        own, D = slice(row, row + self.dimension), np.array(self.directions, dtype=float)
 
         def write() -> None:
             write_rows()
-            A[own] = self._D @ rows
-            lower[own] = upper[own] = self._D @ b
+            A[own] = D @ rows
+            lower[own] = upper[own] = D @ b
 
         return write

@@ -5,20 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.errors import HierarchyError
 from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import add_row, drift_of_point, place, write_point_jacobian
 from hierarchy.measured import Measured, measured
-from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.state import State
+from hierarchy.task import seen_by
 
 
 @measured
@@ -61,17 +57,11 @@ class Avoidance(Measured):
     rows: Literal[1, 3] = 1
     name: str = "avoidance"
     stiffness = gain = 1.0  # the error is the command at both levels
-    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    offsets: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.rows not in (1, 3):
             raise HierarchyError(f"task {self.name!r}: rows must be 1 or 3, got {self.rows}")
-        if not self.points:
-            raise HierarchyError(f"task {self.name!r}: needs at least one control point")
-        joints, offsets = pack_points(self.points)
-        set_frozen(self, joints=joints, offsets=offsets)
 
     @property
     def dimension(self) -> int:
@@ -80,6 +70,4 @@ class Avoidance(Measured):
 
     def measure(self, state: State) -> tuple[Kernel, Any]:
         """See `Measured.measure`; the error is the repulsion [m/s^2 or m/s]."""
-        if state.measurement is None:
-            raise HierarchyError(f"task {self.name!r}: the state carries no measurement")
-        return _avoidance, (self.joints, self.offsets, state.measurement.arrays)
+        return _avoidance, (*pack_points(self.points), seen_by(self, state).arrays)

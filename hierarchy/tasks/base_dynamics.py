@@ -1,19 +1,19 @@
 """The equations of motion of a floating base, which no motor moves."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hierarchy.contacts import Contacts, write_dynamics, zero_while_open
-from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import write_equality
+import numpy as np
+
+from hierarchy.contacts import Contacts, zero_while_open
+from hierarchy.jit import bind
 from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level
 from hierarchy.tasks.forces import ForceTask
+from hierarchy.tasks.torque_limits import write_torques
 
 
 @dataclass(frozen=True)
@@ -46,16 +46,8 @@ class BaseDynamics(ForceTask):
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
         M, h = state.dynamics
-        parameters = M, h, state.kinematics, self.contacts.points
-        write_rows = bind(_write, parameters, A, lower, upper, row, self.dimension)
+        parameters = M, h, state.kinematics, self.contacts.points, 0
+        write_rows = bind(write_torques, parameters, np.zeros(self.dimension), A, lower, upper, row)
         forces = [(A[row:row + self.dimension, self.contacts.blocks[contact.name]],)
                   for contact in self.contacts.contacts]
         return zero_while_open(write_rows, state, self.contacts, forces)
-
-
-@compiled
-def _write(parameters, A, lower, upper, row, count):
-    M, h, kinematics, points = parameters
-    write_dynamics(M, kinematics, points, A, row, 0, count)
-    for i in range(count):
-        write_equality(lower, upper, row + i, -h[i])

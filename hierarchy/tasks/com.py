@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,6 @@ from hierarchy.kinematics import drift_of_point, place, row_times
 from hierarchy.measured import Measured, measured
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
 
@@ -38,7 +37,6 @@ class CentreOfMass(Measured):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "centre of mass"
-    shares: Array = field(init=False, repr=False, compare=False)  # of the mass, one per body
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -47,15 +45,18 @@ class CentreOfMass(Measured):
                 set(axes)):
             raise HierarchyError(f"task {self.name!r}: axes {list(axes)} must be some of 0, 1, 2, "
                                  "in this order")
-        mass = float(self.robot.masses.sum())
-        if not mass > 0.0:
+        if not self.robot.masses.sum() > 0.0:
             raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has no masses")
-        set_frozen(self, shares=self.robot.masses / mass)
 
     @property
     def dimension(self) -> int:
         """One row per axis."""
         return len(self.axes)
+
+    @property
+    def shares(self) -> Array:
+        """The share of the mass that each body has."""
+        return self.robot.masses / float(self.robot.masses.sum())
 
     def position(self, state: State) -> Array:
         """World position of the centre of mass (3,) [m]."""

@@ -55,13 +55,6 @@ class _Coupling(Measured):
         """See `Measured.measure`; the error is to the nearest full turn of a continuous joint."""
         return _coupling, (state.q, self.terms)
 
-    def jacobian_derivative(self, state: State) -> Array:
-        """Their second derivatives, times the velocities of the joints (m, n)."""
-        found = np.zeros((self.dimension, state.n))
-        for row, at, of, continuous, c in zip(*self.terms[:5], strict=True):
-            found[row, of] = _polynomial(c, _position(state.q, at, continuous))[2] * state.v[of]
-        return found
-
 
 @dataclass(frozen=True)
 class JointCoupling(_Coupling):

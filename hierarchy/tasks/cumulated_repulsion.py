@@ -5,25 +5,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
-from hierarchy.avoidance.measurement import Measurement
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import (
-    add_row,
-    drift_of_point,
-    place,
-)
+from hierarchy.kinematics import add_row, drift_of_point, place, write_identity
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Task, seen_by
 from hierarchy.tasks.posture import JointTask
 
 
@@ -49,61 +43,34 @@ class CumulatedRepulsion(JointTask):
     base: Task | None = None
     lever: float = 0.05
     name: str = "cumulated repulsion"
-    bodies: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    offsets: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.points:
-            raise HierarchyError(f"task {self.name!r}: needs at least one control point")
         if not self.lever > 0.0:
             raise HierarchyError(f"task {self.name!r}: lever {self.lever} m must be positive")
         if self.base is not None and self.base.dimension != self.joints:
             raise HierarchyError(f"task {self.name!r}: {self.base.name!r} has "
                                  f"{self.base.dimension} rows, expected {self.joints}")
-        bodies, offsets = pack_points(self.points)
-        set_frozen(self, bodies=bodies, offsets=offsets)
-
-    def error(self, state: State) -> Array:
-        """Zero (n,): there is no target position."""
-        return np.zeros(self.joints)
-
-    def reference_velocity(self, state: State) -> Array:
-        """The sum of the commands, and of `base` (n,) [rad/s]."""
-        return self._sum(state, "velocity")
-
-    def reference_acceleration(self, state: State) -> Array:
-        """The sum of the commands, and of `base` (n,) [rad/s^2]."""
-        return self._sum(state, "acceleration")
-
-    def _sum(self, state: State, level: Level) -> Array:
-        side, A = np.zeros(self.joints), np.empty((self.joints, state.n))
-        self.writer(state, level, A, side, side.copy(), 0)()
-        return side
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        seen = self._seen(state)
-        below = (lambda: lower[row:row + self.joints].fill(0.0)) if self.base is None else (
+        self.check_size(state)
+        below = bind(write_identity, A, row, self.joints) if self.base is None else (
             self.base.writer(state, level, A, lower, upper, row))
-        parameters = _Parameters(self.bodies, self.offsets, self.within, self.lever,
+        sides = lower[row:row + self.joints]
+        parameters = _Parameters(*pack_points(self.points), self.within, self.lever,
                                  level == "acceleration", np.empty((1, state.n)))
-        add = bind(_add, state.kinematics, parameters, seen.arrays, lower, upper, row)
+        add = bind(_add, state.kinematics, parameters, seen_by(self, state).arrays, lower, upper,
+                   row)
 
         def write() -> None:
+            if self.base is None:
+                sides.fill(0.0)
             below()
             add()
 
         return write
-
-    def _seen(self, state: State) -> Measurement:
-        if state.measurement is None:
-            raise HierarchyError(f"task {self.name!r}: the state carries no measurement")
-        if self.joints != state.n:
-            raise HierarchyError(f"task {self.name!r}: {self.joints} joints, the robot has "
-                                 f"{state.n} velocities")
-        return state.measurement
 
 
 class _Parameters(NamedTuple):

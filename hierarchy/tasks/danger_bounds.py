@@ -28,7 +28,7 @@ velocity at contact.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -42,9 +42,8 @@ from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import point_at
 from hierarchy.limits import clipped
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Level, Written
+from hierarchy.task import Level, Written, seen_by
 from hierarchy.tasks.joint_limits import JointLimits
 
 
@@ -72,16 +71,11 @@ class DangerBounds(Written):
     shape: float = 6.0
     lever: float = 1e-9
     name: str = "danger bounds"
-    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    offsets: Array = field(init=False, repr=False, compare=False)
-    danger: Repulsion = field(init=False, repr=False, compare=False)
     kind = "inequality"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         expect(f"task {self.name!r}: limits", self.limits, JointLimits, "give a JointLimits task")
-        if not self.points:
-            raise HierarchyError(f"task {self.name!r}: needs at least one control point")
         if self.limits.robot.base == "floating":
             raise HierarchyError(f"task {self.name!r}: robot {self.limits.robot.name!r} has a "
                                  "floating base, whose speed no joint bounds")
@@ -91,11 +85,9 @@ class DangerBounds(Written):
             raise HierarchyError(f"task {self.name!r}: joint {self.limits.robot.velocity_names[i]} "
                                  "has no velocity limit to scale")
         try:
-            danger = Repulsion(1.0, self.reach, self.shape)
+            Repulsion(1.0, self.reach, self.shape)
         except HierarchyError as error:
             raise HierarchyError(f"task {self.name!r}: {error}") from error
-        joints, offsets = pack_points(self.points)
-        set_frozen(self, danger=danger, joints=joints, offsets=offsets)
 
     @property
     def dimension(self) -> int:
@@ -131,7 +123,7 @@ class DangerBounds(Written):
 
     def _tighten(self, state: State, level: Level, lower: Array, upper: Array,
                  row: int) -> Callable[[], object]:
-        parameters = _Parameters(self.joints, self.offsets, self.reach, self.shape, self.lever,
+        parameters = _Parameters(*pack_points(self.points), self.reach, self.shape, self.lever,
                                  self.limits.limits.packed[2],
                                  max(self.limits.period, self.limits.horizon),
                                  level == "acceleration")
@@ -139,9 +131,7 @@ class DangerBounds(Written):
                     row)
 
     def _seen(self, state: State) -> Measurement:
-        seen = state.measurement
-        if seen is None:
-            raise HierarchyError(f"task {self.name!r}: the state carries no measurement")
+        seen = seen_by(self, state)
         if len(self.points) > len(seen.distance):
             raise HierarchyError(f"task {self.name!r}: {len(self.points)} control points, and "
                                  f"distances of {len(seen.distance)}")

@@ -15,10 +15,10 @@ from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Written
 
 
-class ForceTask(Task):
+class ForceTask(Written):
     """m rows over x = (a, f), the unknowns of `contacts`, at level "torque". Abstract.
 
     Such rows have no task variable and no gains: they say what x must satisfy. A new one needs
@@ -29,30 +29,10 @@ class ForceTask(Task):
     scale = 3.0  # N
     contacts: Contacts
 
-    @abstractmethod
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`."""
-
-    def rows(self, state: State) -> tuple[Array, Array, Array]:
-        """The rows at a state: A (m, n + 3 p), lower and upper (m,)."""
-        A = np.zeros((self.dimension, self.contacts.unknowns))
-        lower, upper = np.empty(self.dimension), np.empty(self.dimension)
-        self.writer(state, "torque", A, lower, upper, 0)()
-        return A, lower, upper
-
     def error(self, state: State) -> Array:
         """The residual at x = 0 (m,), in the unit of the rows."""
         _, lower, upper = self.rows(state)
         return np.asarray(np.clip(0.0, lower, upper))
-
-    def jacobian(self, state: State) -> Array:
-        """The rows A (m, n + 3 p)."""
-        return self.rows(state)[0]
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Zero (m, n + 3 p); no row uses it."""
-        return np.zeros((self.dimension, self.contacts.unknowns))
 
 
 class FixedRows(ForceTask):

@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy.jit.sources import Kernel
+from hierarchy.kinematics import Kinematics
+from hierarchy.measured import Measured, Motion, plain
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.tasks.geometric import View, cross, rates_of, view_of
+from hierarchy.tasks.geometric import Placed, cross
 from hierarchy.tasks.pose import PoseTask, rotation_vector
 
 _SERIES = 0.01   # [rad^2] squared angle below which coefficients are taken from their series
@@ -18,78 +21,64 @@ _STEP = 1e-30    # of a complex step: no difference is formed, so it may be this
 
 
 @dataclass(frozen=True)
-class FrameLog(PoseTask):
+class FrameLog(PoseTask, Measured):
     """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
 
     The error is e = log(T^-1 T_d), with the poses T of the frame and T_d of its target: the twist
     in the axes of the frame, linear part first, that takes it to the target in unit time. The frame
     moves on a screw, where with `Pose` its origin moves on a straight line. It is what `FrameTask`
-    of pink and of placo are. Beyond half a turn the error jumps.
+    of pink and of placo are. Beyond half a turn the error jumps. The derivative is always exact.
 
     Source: F. Bullo, R. Murray, "Proportional derivative (PD) control on the Euclidean group",
     European Control Conference (1995).
     """
 
     name: str = "frame"
-    row_names = ("x", "y", "z", "about x", "about y", "about z")
+    columns = np.arange(6)
+    exact = True
 
-    def error(self, state: State) -> Array:
-        """The twist e (6,) [m, rad]."""
-        return self._error(view_of(state), state.t)
+    def measure(self, state: State) -> tuple[Kernel, Any]:
+        """See `Measured.measure`."""
+        return _frame_log, (self, state)
 
-    def jacobian(self, state: State) -> Array:
-        """J = D(e) J_b (6, n), with the Jacobian J_b of the frame in its own axes."""
-        return self._jacobian(view_of(state), state.t)
+    def goal(self, state: State) -> Array:
+        """The part of de/dt that comes from the path, and its derivative, in rows 1 and 2."""
+        return np.zeros((3, 6))
 
-    def jacobian_derivative(self, state: State) -> Array:
-        """D(e) dJ_b + D'(e) J_b, with the motion of the target in de/dt: (6, n)."""
-        if state.period > 0.0:
-            return self._difference(state)
-        placed = view_of(state).frame(self.frame)
-        rates = rates_of(state, self.frame, placed)
-        turning = cross(rates.w)
-        J_b = np.vstack([placed.R.T @ placed.J, placed.R.T @ placed.W])
-        dJ_b = np.vstack([placed.R.T @ (rates.dJ - turning @ placed.J),
-                          placed.R.T @ (rates.dW - turning @ placed.W)])
-        e = self.error(state)
-        return np.asarray(_left(e) @ dJ_b + _along(_left, e, self._rate(state)) @ J_b)
+    def follow(self, state: State, goal: Array) -> None:
+        """The measure writes the goal, which depends on the error."""
 
-    def desired_velocity(self, state: State) -> Array:
-        """The part of de/dt that comes from the path: D(-e) V_d (6,), V_d in the target's axes."""
-        return np.asarray(_left(-self.error(state)) @ self._twist(state.t, 1))
 
-    def desired_acceleration(self, state: State) -> Array:
-        """Its time derivative (6,)."""
-        e, rate = self.error(state), self._rate(state)
-        return np.asarray(_left(-e) @ self._twist(state.t, 2)
-                          + _along(_left, -e, -rate) @ self._twist(state.t, 1))
+@plain
+def _frame_log(kinematics: Kinematics, reads: tuple[FrameLog, State], goal: Array, J: Array,
+               motion: Motion) -> None:
+    """J = D(e) J_b, with the Jacobian J_b of the frame in its own axes; de/dt = D(-e) V_d - J v."""
+    task, state = reads
+    v, placed, R_d = state.v, Placed.of(kinematics, task.frame), np.array(task.rotation, float)
+    p_d, velocity, acceleration = task.path(state.t)
+    R = placed.R
+    turn, away = rotation_vector(R.T @ R_d), R.T @ (p_d - placed.p)
+    K = cross(turn)
+    e = np.concatenate([away - K @ away / 2 + _of_angle(turn @ turn)[0] * (K @ K @ away), turn])
+    J_b = _own_axes(R, placed.J)
+    dJ_b = _own_axes(R, placed.dJ) - _own_axes(R, _both(cross(placed.J[3:] @ v)) @ placed.J)
+    J[:] = _left(e) @ J_b
+    goal[1] = _left(-e) @ np.append(R_d.T @ velocity, np.zeros(3))
+    rate = goal[1] - J @ v
+    goal[2] = (_left(-e) @ np.append(R_d.T @ acceleration, np.zeros(3))
+               + _along(-e, -rate) @ np.append(R_d.T @ velocity, np.zeros(3)))
+    motion.error[:], motion.rate[:] = e, J @ v
+    motion.drift[:] = _left(e) @ (dJ_b @ v) + _along(e, rate) @ (J_b @ v)
 
-    def _error(self, view: View, t: float) -> Array:
-        placed = view.frame(self.frame)
-        away = placed.R.T @ (self.path(t)[0] - placed.p)
-        turn = rotation_vector(placed.R.T @ np.asarray(self.rotation, dtype=float))
-        K = cross(turn)
-        return np.concatenate([away - K @ away / 2 + _of_angle(turn @ turn)[0] * (K @ K @ away),
-                               turn])
 
-    def _jacobian(self, view: View, t: float) -> Array:
-        placed = view.frame(self.frame)
-        J_b = np.vstack([placed.R.T @ placed.J, placed.R.T @ placed.W])
-        return np.asarray(_left(self._error(view, t)) @ J_b)
+def _both(A: NDArray[Any]) -> NDArray[Any]:
+    """Return the matrix (6, 6) that does to both parts of a twist what A (3, 3) does to one."""
+    return np.kron(np.eye(2), A)
 
-    def _difference(self, state: State) -> Array:
-        before = View(state.previous_J, state.previous_placements, state.supports)
-        return (self.jacobian(state)
-                - self._jacobian(before, state.t - state.period)) / state.period
 
-    def _rate(self, state: State) -> Array:
-        """de/dt (6,)."""
-        return self.desired_velocity(state) - self.jacobian(state) @ state.v
-
-    def _twist(self, t: float, order: int) -> Array:
-        """Velocity or acceleration of the target in its own axes (6,)."""
-        R = np.asarray(self.rotation, dtype=float)
-        return np.concatenate([R.T @ self.path(t)[order], np.zeros(3)])
+def _own_axes(R: Array, J: Array) -> Array:
+    """Return a Jacobian (6, n) in the axes of its frame."""
+    return _both(R.T) @ J
 
 
 def _left(e: NDArray[Any]) -> NDArray[Any]:
@@ -116,6 +105,6 @@ def _of_angle(square: Any) -> tuple[Any, Any, Any]:
             (1 - alpha + (alpha - beta) / 2) / square**2)
 
 
-def _along(function: Any, e: Array, rate: Array) -> Array:
-    """The derivative of a function of e along `rate`, by a complex step: exact to rounding."""
-    return np.asarray(function(e + 1j * _STEP * rate).imag / _STEP)
+def _along(e: Array, rate: Array) -> Array:
+    """The derivative of D at e along `rate`, by a complex step: exact to rounding."""
+    return np.asarray(_left(e + 1j * _STEP * rate).imag / _STEP)

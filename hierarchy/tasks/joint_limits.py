@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, brief, finite_numbers, number
+from hierarchy.errors import HierarchyError, finite_numbers, number
+from hierarchy.gate import array_of
 from hierarchy.jit import bind
 from hierarchy.kinematics import write_identity
 from hierarchy.limits import Limits, write_box
@@ -51,7 +52,8 @@ class JointLimits(JointRows):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        robot, acceleration = self.robot, _numbers(self.name, self.acceleration)
+        robot = self.robot
+        acceleration = array_of(f"task {self.name!r}: acceleration", self.acceleration)
         n = robot.n - robot.actuated
         if acceleration.shape not in ((), (n,)):
             raise HierarchyError(f"task {self.name!r}: acceleration has shape "
@@ -140,11 +142,3 @@ class JointLimits(JointRows):
         commanded = state.commanded if level == "velocity" else None
         rates: Array = state.v if commanded is None else commanded
         return rates[self.first:] if self.first else rates
-
-
-def _numbers(name: str, value: ArrayLike) -> Array:
-    try:
-        return np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise HierarchyError(f"task {name!r}: acceleration: expected numbers, got {brief(value)}"
-                             ) from None

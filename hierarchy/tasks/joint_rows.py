@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from hierarchy.problem import Array
 from hierarchy.robot import Robot
-from hierarchy.state import State
-from hierarchy.task import Task
+from hierarchy.task import Written
 
 
-class JointRows(Task):
+class JointRows(Written):
     """A task with one row per actuated joint of `robot`, or per velocity from `first` on."""
 
     robot: Robot
@@ -30,11 +26,3 @@ class JointRows(Task):
     def row_names(self) -> tuple[str, ...]:
         """The joint of each row."""
         return tuple(self.robot.velocity_names[self.first:])
-
-    def jacobian(self, state: State) -> Array:
-        """The identity (m, n), right of zeros for a floating base."""
-        return np.eye(state.n)[self.first:]
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Zero (m, n)."""
-        return np.zeros((self.dimension, state.n))

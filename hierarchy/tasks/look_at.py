@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,11 @@ from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import row_times
 from hierarchy.measured import Measured, measured
 from hierarchy.paths.path import check_point
-from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.tasks.geometric import (
     Spot,
+    column,
     crossed,
     jacobians_of,
     less,
@@ -50,26 +49,16 @@ class LookAt(Measured):
     damping: float = 10.0
     gain: float = 5.0
     name: str = "look-at"
-    point: Array = field(init=False, repr=False, compare=False)
+    dimension = 2
+    row_names = ("x", "y")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_point(f"task {self.name!r}: target", self.target)
-        set_frozen(self, point=np.array(self.target, dtype=float))
-
-    @property
-    def dimension(self) -> int:
-        """Two rows."""
-        return 2
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """Axes of the frame."""
-        return ("x", "y")
 
     def measure(self, state: State) -> tuple[Kernel, Any]:
         """See `Measured.measure`: the error is -2 (u_x, u_y) / (1 + u_z)."""
-        return _look_at, (Spot.of(self.frame), self.point)
+        return _look_at, (Spot.of(self.frame), np.array(self.target, dtype=float))
 
 
 @compiled
@@ -126,8 +115,7 @@ def _look_at(kinematics, reads, goal, J, motion):
     sight = u, r, d, R = _sight(kinematics.placements, frame, point)
     linear, angular = jacobians_of(kinematics.J, kinematics.placements, kinematics.supports, frame)
     for c in range(J.shape[1]):
-        s = less(crossed(d, (angular[0, c], angular[1, c], angular[2, c])),
-                 (linear[0, c], linear[1, c], linear[2, c]))
+        s = less(crossed(d, column(angular, c)), column(linear, c))
         J[0, c], J[1, c], _ = _seen_from(u, r, turned_back(R, s))
     for i in range(2):
         motion.error[i] = -2.0 * u[i] / (1.0 + u[2])

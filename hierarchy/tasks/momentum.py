@@ -64,10 +64,6 @@ class Momentum(Measured):
         """See `Measured.measure`; a momentum has no position, so there is no error."""
         return _momentum, (*state.momentum, self.columns)
 
-    def jacobian_derivative(self, state: State) -> Array:
-        """Its time derivative (m, n)."""
-        return np.ascontiguousarray(state.momentum.dA[self.columns])
-
     @property
     def columns(self) -> NDArray[np.int64]:
         """The components."""

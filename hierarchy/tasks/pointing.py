@@ -68,6 +68,7 @@ class Pointing(Measured):
     damping: float = 2.0
     gain: float = 5.0
     name: str = "pointing"
+    dimension = 1
     z_d: Array = field(init=False, repr=False, compare=False)
     z_e: Array = field(init=False, repr=False, compare=False)
     cos_alpha_d: float = field(init=False, repr=False, compare=False)
@@ -81,11 +82,6 @@ class Pointing(Measured):
         number(f"task {self.name!r}: half_angle [rad]", self.half_angle, 0.0, np.pi)
         set_frozen(self, z_d=axis / length, cos_alpha_d=cos(self.half_angle),
                    z_e=np.ascontiguousarray(self.frame.rotation[:, 2]))
-
-    @property
-    def dimension(self) -> int:
-        """One row."""
-        return 1
 
     def cone_error(self, state: State) -> float:
         """The error cos(alpha_d) - cos(alpha), positive outside the cone."""

@@ -26,6 +26,7 @@ from hierarchy.paths import Path
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Task
+from hierarchy.tasks.geometric import rotation_of, times_transposed
 
 
 @compiled
@@ -49,21 +50,6 @@ def rotation_vector(R):
     return axis * (angle / sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2))
 
 
-@compiled
-def _turn(T, rotation, desired):
-    """R_d R^T (3, 3) of a frame with `rotation` on the body whose placement is T (12,)."""
-    R, turn = np.zeros((3, 3)), np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                R[i, j] += T[3 * k + i] * rotation[k, j]
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                turn[i, j] += desired[i, k] * R[j, k]
-    return turn
-
-
 @measured
 def _pose(kinematics, reads, goal, J, motion):
     joint, offset, rotation, desired = reads
@@ -73,7 +59,8 @@ def _pose(kinematics, reads, goal, J, motion):
     write_rotation_jacobian(kinematics.J, supports, joint, J, 3)
     for i in range(3):
         motion.error[i] = goal[0, i] - point_at(placements, joint, offset, i)
-    motion.error[3:] = rotation_vector(_turn(placements[joint], rotation, desired))
+    motion.error[3:] = rotation_vector(times_transposed(
+        desired, rotation_of(placements, joint, rotation)))
     rate[0], rate[1], rate[2], drift[0], drift[1], drift[2], rate[3], rate[4], rate[5] = (
         drift_of_point(kinematics, joint, offset[0], offset[1], offset[2]))
     _, _, _, drift[3], drift[4], drift[5] = velocity_of_point(dJ, supports, joint, v, 0.0, 0.0, 0.0)
@@ -93,20 +80,12 @@ class PoseTask(Task):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "pose"
+    dimension = 6
+    row_names = ("x", "y", "z", "about x", "about y", "about z")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_rotation(f"task {self.name!r}: rotation", self.rotation)
-
-    @property
-    def dimension(self) -> int:
-        """Six rows."""
-        return 6
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """The axes of the world."""
-        return ("x", "y", "z", "about x", "about y", "about z")
 
 
 @dataclass(frozen=True)

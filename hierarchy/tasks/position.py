@@ -49,16 +49,8 @@ class Position(Measured):
     gain: float = 10.0
     repulsion_within: float = -1.0
     name: str = "position"
-
-    @property
-    def dimension(self) -> int:
-        """Three rows."""
-        return 3
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """The axes of the world."""
-        return ("x", "y", "z")
+    dimension = 3
+    row_names = ("x", "y", "z")
 
     def measure(self, state: State) -> tuple[Kernel, Any]:
         """See `Measured.measure`."""

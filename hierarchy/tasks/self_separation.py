@@ -41,7 +41,7 @@ from hierarchy.avoidance.self_collision import (
     pairs_of_chain,
     turned,
 )
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect_each
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
@@ -70,13 +70,11 @@ class SelfSeparation(Written):
     pairs: Sequence[tuple[int, int]] | None = None
     name: str = "self-separation"
     kind: Kind = "inequality"
-    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    table: Array = field(init=False, repr=False, compare=False)
     indices: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    settings: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        expect_each("capsules", self.capsules, Capsule, "see robot.capsules")
         pairs = pairs_of_chain(self.capsules) if self.pairs is None else self.pairs
         count = len(self.capsules)
         if not pairs:
@@ -85,11 +83,7 @@ class SelfSeparation(Written):
             if not (0 <= i < count and 0 <= j < count and i != j):
                 raise HierarchyError(f"task {self.name!r}: pair ({i}, {j}) is no pair among "
                                      f"{count} capsules")
-        if self.kind != "inequality":
-            raise HierarchyError(f"task {self.name!r}: its rows are inequalities")
-        joints, table = pack_capsules(self.capsules)
-        set_frozen(self, joints=joints, table=table, indices=np.array(pairs, dtype=np.int64),
-                   settings=self.barrier.packed())
+        set_frozen(self, indices=np.array(pairs, dtype=np.int64))
 
     @property
     def dimension(self) -> int:
@@ -104,7 +98,7 @@ class SelfSeparation(Written):
 
     def distances(self, state: State) -> Array:
         """Distances d (m,) [m], negative where capsules overlap."""
-        return self._seen(state)[:, 0]
+        return measure_capsules(state.placements, *pack_capsules(self.capsules), self.indices)[:, 0]
 
     def error(self, state: State) -> Array:
         """distance - d (m,) [m], positive where two capsules are too close."""
@@ -113,12 +107,9 @@ class SelfSeparation(Written):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        parameters = _Parameters(self.joints, self.table, self.indices, self.settings,
+        parameters = _Parameters(*pack_capsules(self.capsules), self.indices, self.barrier.packed(),
                                  level == "acceleration")
         return bind(_write, state.kinematics, parameters, A, lower, upper, row)
-
-    def _seen(self, state: State) -> Array:
-        return measure_capsules(state.placements, self.joints, self.table, self.indices)
 
 
 class _Parameters(NamedTuple):

@@ -19,7 +19,7 @@ difference, as in the state.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +41,6 @@ from hierarchy.kinematics import (
     place,
 )
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Kind, Level, Written
 
@@ -64,23 +63,11 @@ class Separation(Written):
     obstacles: int | None = None
     name: str = "separation"
     kind: Kind = "inequality"
-    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    offsets: Array = field(init=False, repr=False, compare=False)
-    settings: Array = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.points:
-            raise HierarchyError(f"task {self.name!r}: needs at least one point")
-        if self.kind != "inequality":
-            raise HierarchyError(f"task {self.name!r}: its rows are inequalities")
-        joints, offsets = pack_points(self.points)
-        set_frozen(self, joints=joints, offsets=offsets, settings=self.barrier.packed())
 
     @property
     def dimension(self) -> int:
         """One row per pair, or per point."""
-        return len(self.joints) * (1 if self.obstacles is None else self.obstacles)
+        return len(self.points) * (1 if self.obstacles is None else self.obstacles)
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -102,8 +89,8 @@ class Separation(Written):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        parameters = _Parameters(self.joints, self.offsets, self.settings, self.obstacles is None,
-                                 level == "acceleration")
+        parameters = _Parameters(*pack_points(self.points), self.barrier.packed(),
+                                 self.obstacles is None, level == "acceleration")
         return bind(_write, state.kinematics, parameters, self._seen(state).table, A, lower, upper,
                     row)
 
@@ -119,14 +106,11 @@ class Separation(Written):
         if seen is None:
             raise HierarchyError(f"task {self.name!r}: the state carries no measurement of pairs")
         points, obstacles, _ = seen.table.shape
-        if self.obstacles is None:
-            fits = points == len(self.joints) and obstacles > 0
-        else:
-            fits = points == len(self.joints) and obstacles == self.obstacles
-        if not fits:
+        fits = obstacles > 0 if self.obstacles is None else obstacles == self.obstacles
+        if points != len(self.points) or not fits:
             raise HierarchyError(
                 f"task {self.name!r}: {points} points are measured against {obstacles} obstacles, "
-                f"expected {len(self.joints)} against {self.obstacles or 'one at least'}")
+                f"expected {len(self.points)} against {self.obstacles or 'one at least'}")
         return seen
 
 

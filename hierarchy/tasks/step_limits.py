@@ -12,13 +12,14 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Written
+from hierarchy.task import Level
+from hierarchy.tasks.joint_rows import JointRows
 
 APPROACH = 0.25  # gain times period: a robot that lags a tick comes to rest without overshooting
 
 
 @dataclass(frozen=True)
-class StepLimits(Written):
+class StepLimits(JointRows):
     """Keep each joint within its limits of position and speed: gain (lower - q) <= v, and so on.
 
     One row per velocity, n in number, with infinite sides where the robot has no limit. A joint
@@ -36,7 +37,7 @@ class StepLimits(Written):
     gain: float | None = None  # type: ignore[assignment]
     name: str = "limits"
     kind = "inequality"
-    straight = True
+    first = 0
 
     def __post_init__(self) -> None:
         if not number(f"task {self.name!r}: period [s]", self.period) > 0.0:
@@ -45,16 +46,6 @@ class StepLimits(Written):
         number(f"task {self.name!r}: gain [1/s]", gain, 0.0, 1.0 / self.period)
         set_frozen(self, gain=gain)
         super().__post_init__()
-
-    @property
-    def dimension(self) -> int:
-        """One row per velocity."""
-        return self.robot.n
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """The joint of each row."""
-        return tuple(self.robot.velocity_names)
 
     def box(self, state: State) -> tuple[Array, Array]:
         """Least and largest velocity of each joint (n,), (n,) [rad/s or m/s]."""

@@ -12,11 +12,11 @@ from hierarchy.errors import HierarchyError, expect_each
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task, writer_in_stack
+from hierarchy.task import Level, Task, Written, writer_in_stack
 
 
 @dataclass(frozen=True)
-class Together(Task):
+class Together(Written):
     """The rows of several tasks as one level: m is the sum of theirs.
 
     What cannot all be met is missed by the smallest sum of squares over all rows, so the rows
@@ -70,14 +70,6 @@ class Together(Task):
         """The errors of the tasks (m,)."""
         return np.concatenate([task.error(state) for task in self.tasks])
 
-    def jacobian(self, state: State) -> Array:
-        """The rows of the tasks (m, n), or (m, n + 3 p) with contact forces."""
-        return self._stacked([task.jacobian(state) for task in self.tasks])
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Their time derivatives, of the same shape."""
-        return self._stacked([task.jacobian_derivative(state) for task in self.tasks])
-
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
@@ -91,7 +83,3 @@ class Together(Task):
                 write_rows()
 
         return write
-
-    def _stacked(self, rows: list[Array]) -> Array:
-        columns = max(part.shape[1] for part in rows)
-        return np.vstack([np.pad(part, ((0, 0), (0, columns - part.shape[1]))) for part in rows])

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
@@ -15,7 +15,6 @@ from hierarchy.contacts import Contacts, write_dynamics
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level
@@ -42,7 +41,6 @@ class TorqueLimits(JointRows):
     name: str = "torque limits"
     contacts: Contacts | None = None
     step: float = inf
-    limit: Array = field(init=False, repr=False, compare=False)  # (n,) [N m or N]
     kind = "inequality"
     of_forces: ClassVar[bool] = True
     straight = False
@@ -57,25 +55,16 @@ class TorqueLimits(JointRows):
         if self.robot.base == "floating" and self.contacts is None:
             raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has a floating "
                                  "base; its torques depend on contact forces, so give the contacts")
-        limit = self.robot.effort_limit[self.robot.actuated:]
-        set_frozen(self, limit=self.fraction * limit)
+
+    @property
+    def limit(self) -> Array:
+        """The largest torque of each row (n,) [N m or N]."""
+        return self.fraction * self.robot.effort_limit[self.robot.actuated:]
 
     def error(self, state: State) -> Array:
         """Distance of the torque with x = 0 from the limits (n,) [N m or N]."""
         h = state.bias_effort()[self.robot.actuated:]
         return np.asarray(np.clip(h, -self.limit, self.limit) - h)
-
-    def jacobian(self, state: State) -> Array:
-        """Rows of the mass matrix M(q) [kg m^2], to the left of -J_c^T [m] with contacts."""
-        M = state.mass_matrix()
-        J = np.empty((0, state.n)) if self.contacts is None else self.contacts.jacobian(state)
-        return np.hstack([M, -J.T])[self.robot.actuated:]
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Time derivative of M(q) [kg m^2/s] without contacts, else zero; no row uses it."""
-        if self.contacts is None:
-            return state.mass_matrix_derivative()
-        return np.zeros((self.dimension, self.contacts.unknowns))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
@@ -86,7 +75,7 @@ class TorqueLimits(JointRows):
         M, h = state.dynamics
         contacts = Contacts(self.robot) if self.contacts is None else self.contacts
         parameters = M, h, state.kinematics, contacts.points, self.robot.actuated
-        write_rows = bind(_write, parameters, self.limit, A, lower, upper, row)
+        write_rows = bind(write_torques, parameters, self.limit, A, lower, upper, row)
         if level != "torque" or self.step == inf:
             return write_rows
         rows, efforts = slice(row, row + self.dimension), h[self.robot.actuated:]
@@ -103,7 +92,8 @@ class TorqueLimits(JointRows):
 
 
 @compiled
-def _write(parameters, limit, A, lower, upper, row):
+def write_torques(parameters, limit, A, lower, upper, row):
+    """Write rows of M a + h - J_c^T f from -limit to limit, of the velocities from `first` on."""
     M, h, kinematics, points, first = parameters
     write_dynamics(M, kinematics, points, A, row, first, len(limit))
     for i in range(len(limit)):
