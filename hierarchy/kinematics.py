@@ -120,6 +120,13 @@ def drift_of_point(kinematics, joint, ox, oy, oz):
 
 
 @inlined
+def moving_point(kinematics, joint, o):
+    """Velocity and drift of the point at offset o, and the angular velocity of its body."""
+    vx, vy, vz, ax, ay, az, wx, wy, wz = drift_of_point(kinematics, joint, o[0], o[1], o[2])
+    return (vx, vy, vz), (ax, ay, az), (wx, wy, wz)
+
+
+@inlined
 def add_row(J, supports, joint, point, r, A, row):
     """Add r^T J_c (n,) of the material point at `point` of a body to A[row]."""
     (x, y, z), (rx, ry, rz) = point, r
@@ -162,3 +169,39 @@ def write_equality(lower, upper, row, value):
     """Make a row an equality."""
     lower[row] = value
     upper[row] = value
+
+
+@inlined
+def triple(a, i):
+    """Three entries of an array, from i on, as a tuple."""
+    return a[i], a[i + 1], a[i + 2]
+
+
+@inlined
+def dot(a, b):
+    """a . b of tuples."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def crossed(a, b):
+    """a x b of tuples."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined
+def less(a, b):
+    """a - b of tuples."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inlined
+def plus(a, b):
+    """a + b of tuples."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined
+def times(factor, a):
+    """A multiple of a tuple."""
+    return factor * a[0], factor * a[1], factor * a[2]

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.errors import HierarchyError
 from hierarchy.jit.sources import Kernel
-from hierarchy.kinematics import add_row, drift_of_point, place, write_point_jacobian
+from hierarchy.kinematics import add_row, dot, moving_point, place, triple, write_point_jacobian
 from hierarchy.measured import Measured, measured
 from hierarchy.state import State
 from hierarchy.task import seen_by
@@ -23,20 +23,17 @@ def _avoidance(kinematics, reads, goal, J, motion):
     k = max(seen.active[0], 0)
     joint, offset, r, magnitude = joints[k], offsets[k], seen.direction[k], seen.magnitude[k]
     columns, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(kinematics, joint, offset[0], offset[1],
-                                                     offset[2])
+    velocity, drift, _ = moving_point(kinematics, joint, offset)
     if len(motion.error) == 3:  # (28)
         write_point_jacobian(columns, placements, supports, joint, offset, J, 0)
-        motion.rate[0], motion.rate[1], motion.rate[2] = vx, vy, vz
-        motion.drift[0], motion.drift[1], motion.drift[2] = ax, ay, az
         for i in range(3):
             motion.error[i] = magnitude * r[i]
+            motion.rate[i], motion.drift[i] = velocity[i], drift[i]
         return
     point = place(placements[joint], offset[0], offset[1], offset[2])
-    add_row(columns, supports, joint, point, (r[0], r[1], r[2]), J, 0)
-    motion.error[0] = magnitude
-    motion.rate[0] = r[0] * vx + r[1] * vy + r[2] * vz
-    motion.drift[0] = r[0] * ax + r[1] * ay + r[2] * az  # (29)
+    add_row(columns, supports, joint, point, triple(r, 0), J, 0)
+    motion.error[0], motion.rate[0] = magnitude, dot(r, velocity)
+    motion.drift[0] = dot(r, drift)  # (29)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import compiled, inlined
 from hierarchy.jit.sources import Kernel
-from hierarchy.kinematics import drift_of_point, place, row_times
+from hierarchy.kinematics import moving_point, place, row_times
 from hierarchy.measured import Measured, measured
 from hierarchy.paths import Path
 from hierarchy.problem import Array
@@ -110,15 +110,12 @@ def _centre_of_mass(kinematics, reads, goal, J, motion):
     p, drift = np.zeros(3), np.zeros(3)
     for joint in range(1, len(shares)):
         if shares[joint] > 0.0:
-            cx, cy, cz = centres[joint, 0], centres[joint, 1], centres[joint, 2]
-            x, y, z = place(kinematics.placements[joint], cx, cy, cz)
-            p[0] += shares[joint] * x
-            p[1] += shares[joint] * y
-            p[2] += shares[joint] * z
-            _, _, _, ax, ay, az, _, _, _ = drift_of_point(kinematics, joint, cx, cy, cz)
-            drift[0] += shares[joint] * ax
-            drift[1] += shares[joint] * ay
-            drift[2] += shares[joint] * az
+            o = centres[joint]
+            at = place(kinematics.placements[joint], o[0], o[1], o[2])
+            _, bend, _ = moving_point(kinematics, joint, o)
+            for i in range(3):
+                p[i] += shares[joint] * at[i]
+                drift[i] += shares[joint] * bend[i]
     for i in range(len(axes)):
         motion.error[i] = goal[0, axes[i]] - p[axes[i]]
         motion.rate[i] = row_times(J, i, kinematics.v)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import add_row, drift_of_point, place, write_identity
+from hierarchy.kinematics import add_row, dot, moving_point, place, triple, write_identity
 from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level, Task, seen_by
@@ -92,12 +92,11 @@ def _add(kinematics, parameters, seen, lower, upper, row):
             continue
         body, offset, r, asked = bodies[k], offsets[k], seen.direction[k], seen.magnitude[k]
         if acceleration:
-            _, _, _, ax, ay, az, _, _, _ = drift_of_point(kinematics, body, offset[0], offset[1],
-                                                          offset[2])
-            asked -= r[0] * ax + r[1] * ay + r[2] * az
+            _, drift, _ = moving_point(kinematics, body, offset)
+            asked -= dot(r, drift)
         point = place(kinematics.placements[body], offset[0], offset[1], offset[2])
         scratch[0, :] = 0.0
-        add_row(kinematics.J, kinematics.supports, body, point, (r[0], r[1], r[2]), scratch, 0)
+        add_row(kinematics.J, kinematics.supports, body, point, triple(r, 0), scratch, 0)
         square = 0.0
         for c in range(n):
             square += scratch[0, c] * scratch[0, c]

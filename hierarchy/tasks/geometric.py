@@ -13,7 +13,7 @@ from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import (
     Kinematics,
     axis_at,
-    drift_of_point,
+    moving_point,
     point_at,
     velocity_of_point,
     write_point_jacobian,
@@ -65,24 +65,6 @@ class Spot(NamedTuple):
 
 
 @inlined
-def crossed(a, b):
-    """a x b of tuples."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@inlined
-def less(a, b):
-    """a - b of tuples."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@inlined
-def plus(a, b):
-    """a + b of tuples."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@inlined
 def column(A, c):
     """Column c of three rows, as a tuple."""
     return A[0, c], A[1, c], A[2, c]
@@ -128,11 +110,10 @@ def rotation_of(placements, joint, rotation):
 @inlined
 def motion_of(kinematics, spot):
     """Velocity, angular velocity, and their drifts dJ/dt v and dW/dt v, of a spot; exact ones."""
-    vx, vy, vz, ax, ay, az, wx, wy, wz = drift_of_point(
-        kinematics, spot.joint, spot.offset[0], spot.offset[1], spot.offset[2])
+    v, a, w = moving_point(kinematics, spot.joint, spot.offset)
     _, _, _, bx, by, bz = velocity_of_point(kinematics.dJ, kinematics.supports, spot.joint,
                                             kinematics.v, 0.0, 0.0, 0.0)
-    return (vx, vy, vz), (wx, wy, wz), (ax, ay, az), (bx, by, bz)
+    return v, w, a, (bx, by, bz)
 
 
 @inlined

@@ -82,7 +82,7 @@ class ClosedChains(Written):
 
     A chain in a plane closes out of it by itself, but for the rounding of its file. So of all rows,
     each kind of them at a common scale, only singular directions count whose singular value is more
-    than 1e-3 of the largest; the other rows are zero. The error is that of `whole`.
+    than 1e-3 of the largest; the other rows are zero. Error and Jacobian are those of `whole`.
     """
 
     whole: Together
@@ -101,6 +101,10 @@ class ClosedChains(Written):
     def error(self, state: State) -> Array:
         """How far the mechanism is from closed (m,) [m or rad]."""
         return self.whole.error(state)
+
+    def jacobian(self, state: State) -> Array:
+        """The derivatives of what is to be closed (m, n)."""
+        return self.whole.jacobian(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:

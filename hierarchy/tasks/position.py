@@ -9,7 +9,7 @@ from typing import Any
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.jit.sources import Kernel
-from hierarchy.kinematics import drift_of_point, point_at, write_point_jacobian
+from hierarchy.kinematics import moving_point, point_at, write_point_jacobian
 from hierarchy.measured import Measured, measured
 from hierarchy.paths import Path
 from hierarchy.robot import Frame
@@ -23,11 +23,10 @@ def _position(kinematics, reads, goal, J, motion):
     joint, offset, seen, repulsion_within = reads
     placements = kinematics.placements
     write_point_jacobian(kinematics.J, placements, kinematics.supports, joint, offset, J, 0)
-    motion.rate[0], motion.rate[1], motion.rate[2], ax, ay, az, _, _, _ = drift_of_point(
-        kinematics, joint, offset[0], offset[1], offset[2])
-    motion.drift[0], motion.drift[1], motion.drift[2] = ax, ay, az
+    velocity, drift, _ = moving_point(kinematics, joint, offset)
     last = len(seen.distance) - 1
     for i in range(3):
+        motion.rate[i], motion.drift[i] = velocity[i], drift[i]
         motion.error[i] = goal[0, i] - point_at(placements, joint, offset, i)
         if seen.distance[last] <= repulsion_within:
             motion.push[i] = seen.magnitude[last] * seen.direction[last, i]  # (30)

@@ -14,18 +14,15 @@ from hierarchy.errors import finite_numbers
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
 from hierarchy.jit.sources import Kernel
-from hierarchy.kinematics import row_times
+from hierarchy.kinematics import crossed, less, plus, row_times
 from hierarchy.measured import Measured, measured
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.tasks.geometric import (
     Spot,
     column,
-    crossed,
     jacobians_of,
-    less,
     motion_of,
-    plus,
     position_of,
     rotation_of,
     times_transposed,

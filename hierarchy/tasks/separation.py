@@ -35,11 +35,7 @@ from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.pairs import Pairs
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import (
-    add_row,
-    drift_of_point,
-    place,
-)
+from hierarchy.kinematics import add_row, dot, less, moving_point, place, triple
 from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Kind, Level, Written
@@ -130,8 +126,7 @@ def _write(kinematics, parameters, pairs, A, lower, upper, row):
     for k in range(joints.size):
         joint = joints[k]
         point = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
-        vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(
-            kinematics, joint, offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        velocity, drift, _ = moving_point(kinematics, joint, offsets[k])
         first, end = 0, pairs.shape[1]
         if nearest:
             for j in range(1, end):
@@ -140,23 +135,20 @@ def _write(kinematics, parameters, pairs, A, lower, upper, row):
             end = first + 1
         for j in range(first, end):
             pair = pairs[k, j]
-            rx, ry, rz = pair[1], pair[2], pair[3]
+            r = triple(pair, 1)
             for c in range(A.shape[1]):
                 A[row, c] = 0.0
-            add_row(J, supports, joint, point, (rx, ry, rz), A, row)
+            add_row(J, supports, joint, point, r, A, row)
             drop_rounding(A, row)
             lower[row], upper[row] = -np.inf, np.inf
-            if pair[0] <= influence:
-                h = pair[0] - distance
-                if acceleration:
-                    wx, wy, wz = vx - pair[4], vy - pair[5], vz - pair[6]
-                    rate = rx * wx + ry * wy + rz * wz
-                    straight = pair[10] * wx + pair[11] * wy + pair[12] * wz
-                    across = wx * wx + wy * wy + wz * wz - rate * rate - straight * straight
-                    bend = max(across, 0.0) / max(pair[13], distance, _SHARPEST)
-                    lower[row] = (least_acceleration(h, rate, bend, settings)
-                                  + rx * (pair[7] - ax) + ry * (pair[8] - ay) + rz * (pair[9] - az))
-                else:
-                    lower[row] = (least_rate(h, settings)
-                                  + rx * pair[4] + ry * pair[5] + rz * pair[6])
+            h = pair[0] - distance
+            if pair[0] <= influence and acceleration:
+                w = less(velocity, triple(pair, 4))
+                rate, straight = dot(r, w), dot(triple(pair, 10), w)
+                across = dot(w, w) - rate * rate - straight * straight
+                bend = max(across, 0.0) / max(pair[13], distance, _SHARPEST)
+                lower[row] = (least_acceleration(h, rate, bend, settings)
+                              + dot(r, less(triple(pair, 7), drift)))
+            elif pair[0] <= influence:
+                lower[row] = least_rate(h, settings) + dot(r, triple(pair, 4))
             row += 1
