@@ -23,8 +23,7 @@ from hierarchy.errors import RobotError, UnknownNameError, expect, file_path, fi
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
-from hierarchy.robots.found import Found, is_floating
-from hierarchy.robots.frames import ambiguous, frames_called, in_words
+from hierarchy.robots.found import Found, ambiguous, frames_called, in_words, is_floating
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.joints import coordinates_of, normalise, parts_of, set_joint, values_of
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name

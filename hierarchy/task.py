@@ -242,6 +242,15 @@ def seen_by(task: Task, state: State) -> Measurement:
     return state.measurement
 
 
+def in_turn(*functions: Callable[[], object]) -> Callable[[], object]:
+    """Return a function that calls some, or the only one."""
+    def call() -> None:
+        for function in functions:
+            function()
+
+    return call if len(functions) > 1 else functions[0]
+
+
 def writer_in_stack(task: Task, state: State, level: Level, A: Array, lower: Array, upper: Array,
                     row: int) -> Callable[[], object]:
     """Return the writer of a task; at level "torque" one of the joints writes their columns."""

@@ -2,9 +2,8 @@
 
 from hierarchy.avoidance.barrier import Barrier
 from hierarchy.avoidance.control_points import ControlPoint
-from hierarchy.avoidance.measurement import Measurement, SurveillanceAreas
+from hierarchy.avoidance.measurement import Measurement, Pairs, SurveillanceAreas, measure_pairs
 from hierarchy.avoidance.obstacles import Obstacle, Obstacles
-from hierarchy.avoidance.pairs import Pairs, measure_pairs
 from hierarchy.avoidance.repulsion import Repulsion
 from hierarchy.avoidance.self_collision import Capsule, pairs_of_chain
 

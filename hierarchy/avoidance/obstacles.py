@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, UnknownNameError, expect_each
 from hierarchy.gate import check_rotation
-from hierarchy.jit import compiled
+from hierarchy.jit import compiled, inlined
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 
@@ -99,6 +99,15 @@ class Obstacles:
         return self.table[:, _CENTRE]
 
 
+@inlined
+def _in_axes(obstacle, x, y, z):
+    """A point in the axes of an obstacle, as a tuple."""
+    ox, oy, oz = x - obstacle[4], y - obstacle[5], z - obstacle[6]
+    return (obstacle[7] * ox + obstacle[10] * oy + obstacle[13] * oz,
+            obstacle[8] * ox + obstacle[11] * oy + obstacle[14] * oz,
+            obstacle[9] * ox + obstacle[12] * oy + obstacle[15] * oz)
+
+
 @compiled
 def distance_to_obstacle(obstacle, x, y, z, away):
     """Signed distance of a point to one obstacle; writes the unit vector away from it to `away`.
@@ -106,11 +115,7 @@ def distance_to_obstacle(obstacle, x, y, z, away):
     The distance is negative inside. Where the direction is undefined (on a point, at a centre or
     on an axis), `away` (3,) is the obstacle's z axis.
     """
-    # Point in the obstacle's axes.
-    ox, oy, oz = x - obstacle[4], y - obstacle[5], z - obstacle[6]
-    px = obstacle[7] * ox + obstacle[10] * oy + obstacle[13] * oz
-    py = obstacle[8] * ox + obstacle[11] * oy + obstacle[14] * oz
-    pz = obstacle[9] * ox + obstacle[12] * oy + obstacle[15] * oz
+    px, py, pz = _in_axes(obstacle, x, y, z)
     shape = int(obstacle[0])
     if shape == 3:
         D, ux, uy, uz = _off_box(obstacle[1], obstacle[2], obstacle[3], px, py, pz)
@@ -140,15 +145,13 @@ def turning_off_obstacle(obstacle, x, y, z, D, straight):
     shape = int(obstacle[0])
     if shape < 2:
         return D + obstacle[1]
-    ox, oy, oz = x - obstacle[4], y - obstacle[5], z - obstacle[6]
+    p = _in_axes(obstacle, x, y, z)
     if shape == 2:
-        along = obstacle[9] * ox + obstacle[12] * oy + obstacle[15] * oz
-        _copy_axis(obstacle, 2 if abs(along) < obstacle[2] else -1, straight)
+        _copy_axis(obstacle, 2 if abs(p[2]) < obstacle[2] else -1, straight)
         return D + obstacle[1]
     beyond, axis = 0, -1
     for i in range(3):  # outside one pair of faces: flat; two: an edge; three: a corner
-        along = obstacle[7 + i] * ox + obstacle[10 + i] * oy + obstacle[13 + i] * oz
-        if abs(along) > obstacle[1 + i]:
+        if abs(p[i]) > obstacle[1 + i]:
             beyond += 1
         else:
             axis = i

@@ -12,7 +12,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, expect_each, number
+from hierarchy.errors import expect_each, finite_numbers, number
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import dot, less, place, plus, times, triple
 from hierarchy.problem import Array
@@ -39,10 +39,7 @@ class Capsule:
     def __post_init__(self) -> None:
         number(f"capsule {self.name!r}: radius [m]", self.radius, 0.0)
         for name in ("start", "end"):
-            point = np.asarray(getattr(self, name), dtype=float)
-            if point.shape != (3,) or not np.isfinite(point).all():
-                raise HierarchyError(f"capsule {self.name!r}: {name} {getattr(self, name)} must be "
-                                     "three finite numbers [m]")
+            finite_numbers(f"capsule {self.name!r}: {name} [m]", getattr(self, name), 3)
 
 
 def pairs_of_chain(capsules: Sequence[Capsule]) -> tuple[tuple[int, int], ...]:

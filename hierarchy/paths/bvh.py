@@ -90,7 +90,8 @@ def _positions(joints: list[_Joint], values: Array) -> dict[str, Array]:
             if channel.endswith("position"):
                 place[:, axis] += value
             else:
-                turn = turn @ Rotation.from_euler(channel[0], value, degrees=True).as_matrix()
+                about = Rotation.from_euler(channel[0], value[:, None], degrees=True)
+                turn = turn @ about.as_matrix()
             first += 1
         if joint.parent >= 0:
             place = places[joint.parent] + np.einsum("fij,fj->fi", turns[joint.parent], place)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,9 +12,8 @@ import numpy as np
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.self_collision import Capsule
 from hierarchy.problem import Array
-from hierarchy.robots.frames import ambiguous
 from hierarchy.robots.table import Table
-from hierarchy.words import some
+from hierarchy.words import listed, some
 
 _HUGE = 1e300  # a limit of pinocchio beyond this is none
 
@@ -103,3 +103,32 @@ def neutral_within_limits(model: Any, neutral: Array) -> Array:
                 q[i] = (lower + upper) / 2 if np.isfinite([lower, upper]).all() else (
                     min(max(q[i], lower), upper))
     return q
+
+
+_SAME_PLACE = 1e-9
+_KINDS = {"BODY": "link", "JOINT": "joint", "FIXED_JOINT": "fixed joint"}
+
+
+def frames_called(model: Any, name: str) -> list[Any]:
+    """Return the frames with a name that stand at different places, one for each place."""
+    found: list[Any] = []
+    for frame in model.frames:
+        if frame.name == name and not any(
+                one.parentJoint == frame.parentJoint
+                and one.placement.isApprox(frame.placement, _SAME_PLACE) for one in found):
+            found.append(frame)
+    return found
+
+
+def ambiguous(model: Any) -> list[str]:
+    """Return the names that frames at different places share, such as a joint and a link."""
+    counts = Counter(str(frame.name) for frame in model.frames)
+    return [name for name, count in counts.items()
+            if count > 1 and len(frames_called(model, name)) > 1]
+
+
+def in_words(model: Any, frames: list[Any]) -> str:
+    """Say what frames are and where: "a link on the body of joint 'wrist' and ..."."""
+    return listed([f"a {_KINDS.get(frame.type.name, 'frame')} "
+                   + (f"on the body of joint {model.names[frame.parentJoint]!r}"
+                      if frame.parentJoint > 0 else "fixed to the world") for frame in frames])

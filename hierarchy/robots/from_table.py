@@ -10,8 +10,8 @@ import pinocchio as pin
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.self_collision import Vector
 from hierarchy.problem import Array
-from hierarchy.robots.capsules import link_capsules
 from hierarchy.robots.found import Found
+from hierarchy.robots.shapes import link_capsules
 from hierarchy.robots.table import Base, DHTable, Link, Table, TreeTable
 
 END_EFFECTOR = "end_effector"

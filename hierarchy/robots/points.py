@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.problem import Array
-from hierarchy.robots.frames import ambiguous
+from hierarchy.robots.found import ambiguous
 
 COUNT = 8            # number of proposed control points
 FIRST_MOVED_BY = 3   # they start at the origin of this joint of the chain, counted from 1

@@ -15,9 +15,8 @@ from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Level, Task, Written
-from hierarchy.tasks.along import Along
 from hierarchy.tasks.pose import Pose
-from hierarchy.tasks.position import Position
+from hierarchy.tasks.position import Along, Position
 from hierarchy.tasks.together import Together
 
 

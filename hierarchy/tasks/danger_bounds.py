@@ -29,10 +29,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.measurement import Measurement
@@ -43,7 +41,7 @@ from hierarchy.kinematics import add_row, place, triple
 from hierarchy.limits import clipped
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Written, seen_by
+from hierarchy.task import Level, Written, in_turn, seen_by
 from hierarchy.tasks.joint_limits import JointLimits
 
 
@@ -112,21 +110,14 @@ class DangerBounds(Written):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`; the rows have two sides."""
-        write_limits = self.limits.writer(state, level, A, lower, upper, row)
-        tighten = self._tighten(state, level, lower, upper, row)
-
-        def write() -> None:
-            write_limits()
-            tighten()
-
-        return write
+        return in_turn(self.limits.writer(state, level, A, lower, upper, row),
+                       self._tighten(state, level, lower, upper, row))
 
     def _tighten(self, state: State, level: Level, lower: Array, upper: Array,
                  row: int) -> Callable[[], object]:
-        parameters = _Parameters(*pack_points(self.points), self.reach, self.shape, self.lever,
-                                 self.limits.limits.packed[2],
-                                 max(self.limits.period, self.limits.horizon),
-                                 level == "acceleration")
+        parameters = (*pack_points(self.points), self.reach, self.shape, self.lever,
+                      self.limits.limits.packed[2], max(self.limits.period, self.limits.horizon),
+                      level == "acceleration")
         return bind(_tighten, state.kinematics, parameters, self._seen(state).arrays, lower, upper,
                     row)
 
@@ -138,21 +129,11 @@ class DangerBounds(Written):
         return seen
 
 
-class _Parameters(NamedTuple):
-    joints: NDArray[np.int64]
-    offsets: Array
-    reach: float
-    shape: float
-    lever: float
-    V: Array  # velocity limits
-    T: float  # period, or horizon
-    acceleration: bool
-
-
 @compiled
 def _tighten(kinematics, parameters, seen, lower, upper, row):
     """Tighten the bounds of a box of n joints that starts at `row`."""
     v, J, _, placements, supports, _, _, _ = kinematics
+    # V are the velocity limits, T the period, or the horizon.
     joints, offsets, reach, shape, lever, V, T, acceleration = parameters
     n = len(v)
     danger, J_n = np.zeros((2, n)), np.zeros((1, n))  # of moving backward, and forward; r^T J_c

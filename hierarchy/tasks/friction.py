@@ -12,10 +12,9 @@ import numpy as np
 
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import HierarchyError
-from hierarchy.kinematics import write_point_jacobian
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level
+from hierarchy.task import Level, in_turn
 from hierarchy.tasks.forces import FixedRows, required
 
 _SLOW = 0.01      # [m/s] below which the friction of a sliding point falls to zero
@@ -107,12 +106,7 @@ class Friction(FixedRows):
                 changing.append(partial(self._slide, k, state, A[rows, n + point:n + point + 3],
                                         (low, up)))
 
-        def write() -> None:
-            write_rows()
-            for change in changing:
-                change()
-
-        return write if changing else write_rows
+        return in_turn(write_rows, *changing)
 
     def _ramp(self, number: int, state: State, low: Array, up: Array) -> None:
         """Write the sides (r,) of a contact that opens: its last row has all its normal force."""
@@ -141,12 +135,8 @@ class Friction(FixedRows):
 
     def _velocity(self, contact: Contact, state: State) -> Array:
         """Velocity (3,) [m/s] of the first point of a contact."""
-        block = self.contacts.blocks[contact.name]
-        joints, offsets = self.contacts.points
-        k = (block.start - state.n) // 3
-        J = np.empty((3, state.n))
-        write_point_jacobian(state.J, state.placements, state.supports, joints[k], offsets[k], J, 0)
-        velocity: Array = J @ state.v
+        first = self.contacts.blocks[contact.name].start - state.n
+        velocity: Array = self.contacts.jacobian(state)[first:first + 3] @ state.v
         return velocity
 
     @property

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,17 +102,9 @@ class SelfSeparation(Written):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        parameters = _Parameters(*pack_capsules(self.capsules), self.indices, self.barrier.packed(),
-                                 level == "acceleration")
+        parameters = (*pack_capsules(self.capsules), self.indices, self.barrier.packed(),
+                      level == "acceleration")
         return bind(_write, state.kinematics, parameters, A, lower, upper, row)
-
-
-class _Parameters(NamedTuple):
-    joints: NDArray[np.int64]
-    capsules: Array
-    pairs: NDArray[np.int64]
-    settings: Array
-    acceleration: bool
 
 
 @compiled

@@ -20,10 +20,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.avoidance.barrier import (
     Barrier,
@@ -32,7 +30,7 @@ from hierarchy.avoidance.barrier import (
     least_rate,
 )
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
-from hierarchy.avoidance.pairs import Pairs
+from hierarchy.avoidance.measurement import Pairs
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import add_row, dot, less, moving_point, place, triple
@@ -85,8 +83,8 @@ class Separation(Written):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        parameters = _Parameters(*pack_points(self.points), self.barrier.packed(),
-                                 self.obstacles is None, level == "acceleration")
+        parameters = (*pack_points(self.points), self.barrier.packed(), self.obstacles is None,
+                      level == "acceleration")
         return bind(_write, state.kinematics, parameters, self._seen(state).table, A, lower, upper,
                     row)
 
@@ -108,14 +106,6 @@ class Separation(Written):
                 f"task {self.name!r}: {points} points are measured against {obstacles} obstacles, "
                 f"expected {len(self.points)} against {self.obstacles or 'one at least'}")
         return seen
-
-
-class _Parameters(NamedTuple):
-    joints: NDArray[np.int64]
-    offsets: Array
-    settings: Array
-    nearest: bool  # one row per point
-    acceleration: bool
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Joint torque limits as rows over the accelerations, and the contact forces if there are any."""
+"""Rows of the equations of motion: those of a floating base, and limits of joint torques."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -11,14 +11,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from hierarchy.contacts import Contacts, write_dynamics
+from hierarchy.contacts import Contacts, write_dynamics, zero_while_open
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level
-from hierarchy.tasks.joint_rows import JointRows
+from hierarchy.tasks.forces import WRENCH, ForceTask
+from hierarchy.tasks.joint_limits import JointRows
 
 
 @dataclass(frozen=True)
@@ -99,3 +100,39 @@ def write_torques(parameters, limit, A, lower, upper, row):
     for i in range(len(limit)):
         lower[row + i] = -limit[i] - h[first + i]
         upper[row + i] = limit[i] - h[first + i]
+
+
+@dataclass(frozen=True)
+class BaseDynamics(ForceTask):
+    """Let the contact forces move the base: M_b(q) a + h_b(q, v) = J_cb^T f [N, N m].
+
+    Six rows, those of the floating base; none for a fixed one. It belongs at the top of a stack: an
+    x that violates it cannot happen. A contact without load moves nothing; without contacts the
+    rows say that the robot falls.
+
+    Source: A. Herzog et al., "Momentum control with hierarchical inverse dynamics on a
+    torque-controlled humanoid", Autonomous Robots (2016), eq. (7).
+    """
+
+    contacts: Contacts
+    name: str = "base dynamics"
+
+    @property
+    def dimension(self) -> int:
+        """Six rows, or none for a fixed base."""
+        return self.contacts.robot.actuated
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Force and moment along the axes of the base."""
+        return WRENCH[:self.dimension]
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        M, h = state.dynamics
+        parameters = M, h, state.kinematics, self.contacts.points, 0
+        write_rows = bind(write_torques, parameters, np.zeros(self.dimension), A, lower, upper, row)
+        forces = [(A[row:row + self.dimension, self.contacts.blocks[contact.name]],)
+                  for contact in self.contacts.contacts]
+        return zero_while_open(write_rows, state, self.contacts, forces)
