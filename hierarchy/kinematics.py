@@ -5,8 +5,6 @@ on body j has the columns J_v + J_w x p of the joints that support j. Its time d
 dJ_v + dJ_w x p + J_w x dp/dt. `placements` rows are rotation (by columns) and translation.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple

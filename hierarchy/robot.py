@@ -23,11 +23,17 @@ from hierarchy.errors import RobotError, UnknownNameError, expect, file_path, fi
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
-from hierarchy.robots.found import Found, ambiguous, frames_called, in_words, is_floating
+from hierarchy.robots.found import (
+    Found,
+    ambiguous,
+    frames_called,
+    in_words,
+    is_floating,
+    points_along_chain,
+)
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.joints import coordinates_of, normalise, parts_of, set_joint, values_of
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
-from hierarchy.robots.points import points_along_chain
 from hierarchy.robots.table import Base, Table
 
 ROBOTS = TABLES
@@ -157,7 +163,7 @@ class Robot:
                   root: str | Sequence[str] = ()) -> Robot:
         """Read a URDF or MJCF file (its root element says which); RobotError if it cannot.
 
-        `end_effector` names a frame; without it one is proposed, see `hierarchy.robots.points`.
+        `end_effector` names a frame; without it one is proposed, see `hierarchy.robots.found`.
         `base` None is that of the file: floating if its first joint is free, else fixed. Capsules
         are proposed from the collision geometry, unless `shapes` is False, and control points along
         the chain to the end effector. `locked` joints are fixed at a value [rad or m], see

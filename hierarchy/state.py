@@ -1,7 +1,5 @@
 """State of a robot at one time: everything that a task may read."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Measurements of one tick: distances, directions and magnitudes of repulsion; and of all pairs."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable

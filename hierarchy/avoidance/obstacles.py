@@ -1,7 +1,5 @@
 """Obstacles: points, spheres, capsules and boxes, at rest or moving on a path."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Sequence

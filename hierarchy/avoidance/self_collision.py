@@ -1,7 +1,5 @@
 """Capsules fixed to the links of a robot, and the distances between them."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -21,10 +21,16 @@ from numpy.typing import ArrayLike
 
 from hierarchy.errors import RobotError
 from hierarchy.robots import mjcf, urdf, urdf_remarks
-from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits, remarks
+from hierarchy.robots.found import (
+    Coupled,
+    Found,
+    is_floating,
+    neutral_within_limits,
+    proposed_end_effector,
+    remarks,
+)
 from hierarchy.robots.from_table import ROOT
 from hierarchy.robots.joints import without
-from hierarchy.robots.points import proposed_end_effector
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
 from hierarchy.words import some

@@ -2,14 +2,13 @@
 
 from hierarchy.task import Task
 from hierarchy.tasks.avoidance import Avoidance, CumulatedRepulsion
-from hierarchy.tasks.centre_of_pressure import CentreOfPressure
 from hierarchy.tasks.com import CentreOfMass, Momentum
 from hierarchy.tasks.contact_motion import ContactMotion
 from hierarchy.tasks.coupling import JointCoupling
 from hierarchy.tasks.danger_bounds import DangerBounds
 from hierarchy.tasks.dynamics import BaseDynamics, TorqueLimits
 from hierarchy.tasks.forces import ContactForce, LeastForce
-from hierarchy.tasks.friction import Friction
+from hierarchy.tasks.friction import CentreOfPressure, Friction
 from hierarchy.tasks.joint_limits import JointLimits
 from hierarchy.tasks.manipulability import Manipulability
 from hierarchy.tasks.mechanism import Mechanism, model_rows

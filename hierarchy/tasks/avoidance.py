@@ -1,7 +1,5 @@
 """Obstacle avoidance: of the nearest control point, 3-D (28) or one row (29), or of all at once."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

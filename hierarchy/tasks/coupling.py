@@ -1,7 +1,5 @@
 """Couplings of joints: gears, mimic joints, fingers that close together."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping

@@ -23,8 +23,6 @@ avoidance", ICRA 2012, reference [10] of the letter; there f is g, which leaves 
 velocity at contact.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

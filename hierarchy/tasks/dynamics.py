@@ -1,7 +1,5 @@
 """Rows of the equations of motion: those of a floating base, and limits of joint torques."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable

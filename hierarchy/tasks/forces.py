@@ -1,7 +1,5 @@
 """Rows over contact forces: what they have in common, a force that is given, the least ones."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from abc import abstractmethod

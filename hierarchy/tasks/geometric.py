@@ -1,7 +1,5 @@
 """Common parts of tasks of several frames: their Jacobians and motion, in numpy and in kernels."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Pose of a frame (m = 6): by a rotation vector and a line, or by the logarithm of SE(3)."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Tasks of the joints themselves: a target posture, and damping of the motion (eq. 15)."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping

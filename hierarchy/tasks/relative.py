@@ -1,7 +1,5 @@
 """Pose of a frame in another frame: two hands that hold one thing, a loop that is closed."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from dataclasses import dataclass

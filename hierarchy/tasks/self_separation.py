@@ -13,8 +13,6 @@ kink, and bend falls without bound; `barrier.limit` then limits the row, and d m
 `limit` at acceleration level.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -117,8 +115,7 @@ def _write(kinematics, parameters, A, lower, upper, row):
         T_a, T_b = placements[joints[i]], placements[joints[j]]
         seen = nearest_of_capsules(T_a, a, T_b, b)
         D, r, s, t = seen
-        for c in range(A.shape[1]):
-            A[row, c] = 0.0
+        A[row, :] = 0.0
         x, y, z = on_axis(a, s)
         add_row(J, supports, joints[i], place(T_a, x, y, z), r, A, row)
         x, y, z = on_axis(b, t)

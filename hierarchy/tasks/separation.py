@@ -14,8 +14,6 @@ can satisfy. The radius is taken as at least d_min. The derivative of J_c is exa
 difference, as in the state.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -126,8 +124,7 @@ def _write(kinematics, parameters, pairs, A, lower, upper, row):
         for j in range(first, end):
             pair = pairs[k, j]
             r = triple(pair, 1)
-            for c in range(A.shape[1]):
-                A[row, c] = 0.0
+            A[row, :] = 0.0
             add_row(J, supports, joint, point, r, A, row)
             drop_rounding(A, row)
             lower[row], upper[row] = -np.inf, np.inf
