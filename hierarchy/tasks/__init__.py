@@ -1,4 +1,4 @@
-"""The tasks that are shipped, one per file; `TASKS` lists them by name."""
+"""The tasks that are shipped; `TASKS` lists them by name."""
 
 from hierarchy.task import Task
 from hierarchy.tasks.avoidance import Avoidance, CumulatedRepulsion
