@@ -35,7 +35,7 @@ from hierarchy.avoidance.measurement import Measurement
 from hierarchy.avoidance.repulsion import Repulsion, repulsion
 from hierarchy.errors import HierarchyError, expect
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import add_row, place, triple
+from hierarchy.kinematics import place
 from hierarchy.limits import clipped
 from hierarchy.problem import Array
 from hierarchy.state import State
@@ -134,21 +134,21 @@ def _tighten(kinematics, parameters, seen, lower, upper, row):
     # V are the velocity limits, T the period, or the horizon.
     joints, offsets, reach, shape, lever, V, T, acceleration = parameters
     n = len(v)
-    danger, J_n = np.zeros((2, n)), np.zeros((1, n))  # of moving backward, and forward; r^T J_c
+    danger = np.zeros((2, n))  # of moving backward, and forward
     contact = repulsion(0.0, 1.0, reach, shape, 2.0)
     for k in range(len(joints)):
         joint, r = joints[k], seen.direction[k]
         f = min(repulsion(max(seen.distance[k], 0.0), 1.0, reach, shape, 2.0) / contact, 1.0)
-        o = offsets[k]
-        J_n[0, :] = 0.0
-        point = place(placements[joint], o[0], o[1], o[2])
-        add_row(J, supports, joint, point, triple(r, 0), J_n, 0)
+        x, y, z = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
         for c in range(n):
-            away = J_n[0, c]
-            if away > lever:
-                danger[0, c] = max(danger[0, c], f)
-            elif away < -lever:
-                danger[1, c] = max(danger[1, c], f)
+            if supports[joint, c]:
+                away = (r[0] * (J[0, c] + J[4, c] * z - J[5, c] * y)
+                        + r[1] * (J[1, c] + J[5, c] * x - J[3, c] * z)
+                        + r[2] * (J[2, c] + J[3, c] * y - J[4, c] * x))  # column c of r^T J_c
+                if away > lever:
+                    danger[0, c] = max(danger[0, c], f)
+                elif away < -lever:
+                    danger[1, c] = max(danger[1, c], f)
     for c in range(n):
         low, up = -V[c] * (1.0 - danger[0, c]), V[c] * (1.0 - danger[1, c])
         if acceleration:

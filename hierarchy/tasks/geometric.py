@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import (
     Kinematics,
-    axis_at,
     moving_point,
     point_at,
     velocity_of_point,
@@ -98,10 +97,11 @@ def position_of(placements, spot):
 @compiled
 def rotation_of(placements, joint, rotation):
     """World rotation (3, 3) of a spot."""
-    R = np.empty((3, 3))
-    for k in range(3):
-        for i in range(3):
-            R[i, k] = axis_at(placements, joint, rotation[:, k], i)
+    R, T = np.empty((3, 3)), placements[joint]
+    for i in range(3):
+        for k in range(3):
+            R[i, k] = (T[i] * rotation[0, k] + T[3 + i] * rotation[1, k]
+                       + T[6 + i] * rotation[2, k])
     return R
 
 
