@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from operator import attrgetter
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,20 +33,14 @@ from hierarchy.records import set_frozen
 _ROUNDING = 1e-10  # of a violation, relative to 1 + |a| |x|
 _ARRAYS = ("A", "lower", "upper", "reference", "metric", "give")  # what can be set
 
-_Kind = TypeVar("_Kind")
 
+def _handed_out(kept: Callable[[Hierarchy], Any]) -> Any:
+    """Return an array that is handed out as a view: numpy lets its holder change its shape."""
+    def view(h: Hierarchy) -> Any:
+        array = kept(h)
+        return None if array is None else array.view()
 
-class _HandedOut(Generic[_Kind]):
-    """An array that a hierarchy hands out as a view: numpy lets its holder change its shape."""
-
-    def __init__(self, kept: Callable[[Any], Any]) -> None:
-        self._kept = kept
-
-    def __get__(self, h: Hierarchy | None, owner: type) -> _Kind:
-        if h is None:
-            return self  # type: ignore[return-value]
-        array: Any = self._kept(h)
-        return None if array is None else array.view()  # type: ignore[return-value]
+    return property(view)
 
 
 @lru_cache(maxsize=256)
@@ -78,13 +72,14 @@ class Hierarchy:
     __slots__ = ("_give", "_metric", "_reference", "m", "n", "named", "names", "plain", "rows",
                  "start")
 
-    A = _HandedOut[Array](lambda h: h.rows[0])
-    lower = _HandedOut[Array](lambda h: h.rows[1])
-    upper = _HandedOut[Array](lambda h: h.rows[2])
-    sizes = _HandedOut[Sizes](lambda h: _layout(h.rows[3].tobytes())[0])
-    offsets = _HandedOut[Sizes](lambda h: _layout(h.rows[3].tobytes())[1])
-    reference = _HandedOut[Array](attrgetter("_reference"))
-    metric, give = (_HandedOut[Array | None](attrgetter(name)) for name in ("_metric", "_give"))
+    A: Array = _handed_out(lambda h: h.rows[0])
+    lower: Array = _handed_out(lambda h: h.rows[1])
+    upper: Array = _handed_out(lambda h: h.rows[2])
+    sizes: Sizes = _handed_out(lambda h: _layout(h.rows[3].tobytes())[0])
+    offsets: Sizes = _handed_out(lambda h: _layout(h.rows[3].tobytes())[1])
+    reference: Array = _handed_out(attrgetter("_reference"))
+    metric: Array | None = _handed_out(attrgetter("_metric"))
+    give: Array | None = _handed_out(attrgetter("_give"))
 
     n: int
     m: int

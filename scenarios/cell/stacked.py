@@ -16,7 +16,7 @@ from hierarchy.avoidance import Measurement, SurveillanceAreas
 from hierarchy.contacts import Contacts
 from hierarchy.tasks import Pointing, Separation
 from hierarchy.tasks.self_separation import SelfSeparation
-from hierarchy.tasks.tangent_cone import TangentCone
+from hierarchy.tasks.together import TangentCone
 from scenarios.cell.tasks import Tasks
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection

@@ -5,7 +5,7 @@ import pytest
 
 from hierarchy import HierarchyError
 from hierarchy.tasks import Pointing
-from hierarchy.tasks.tangent_cone import TangentCone
+from hierarchy.tasks.together import TangentCone
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller

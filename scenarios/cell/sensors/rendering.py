@@ -14,9 +14,9 @@ from math import ceil, floor, sqrt
 
 import numpy as np
 
-from hierarchy.avoidance.self_collision import dot, turned
+from hierarchy.avoidance.self_collision import turned
 from hierarchy.jit import compiled, inlined
-from hierarchy.kinematics import place
+from hierarchy.kinematics import dot, place
 
 _ALONG = 1e-12  # squared sine between ray and axis below which the side of a capsule is not met
 
@@ -67,10 +67,10 @@ def _draw_capsule(depth, eye, start, along, radius):
     height, width = depth.shape
     u0, u1 = _pixels_of_capsule(eye[0], eye[2], width, x, z, ax, az, radius)
     v0, v1 = _pixels_of_capsule(eye[1], eye[3], height, y, z, ay, az, radius)
-    aa, am = dot(ax, ay, az, ax, ay, az), dot(ax, ay, az, x, y, z)
-    mm = dot(x, y, z, x, y, z) - radius * radius
+    aa, am = dot((ax, ay, az), (ax, ay, az)), dot((ax, ay, az), (x, y, z))
+    mm = dot((x, y, z), (x, y, z)) - radius * radius
     bx, by, bz = x + ax, y + ay, z + az
-    nn = dot(bx, by, bz, bx, by, bz) - radius * radius
+    nn = dot((bx, by, bz), (bx, by, bz)) - radius * radius
     for v in range(v0, v1):
         ry = (v - eye[3]) / eye[1]
         for u in range(u0, u1):
@@ -119,7 +119,8 @@ def _draw_box(depth, eye, row):
     ax, ay, az = turned_into_camera(eye, row[7], row[10], row[13])
     bx, by, bz = turned_into_camera(eye, row[8], row[11], row[14])
     dx, dy, dz = turned_into_camera(eye, row[9], row[12], row[15])
-    a, b, d = dot(ax, ay, az, cx, cy, cz), dot(bx, by, bz, cx, cy, cz), dot(dx, dy, dz, cx, cy, cz)
+    c = cx, cy, cz
+    a, b, d = dot((ax, ay, az), c), dot((bx, by, bz), c), dot((dx, dy, dz), c)
     ha, hb, hd = row[1], row[2], row[3]
     for v in range(v0, v1):
         ry = (v - eye[3]) / eye[1]
