@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,20 +28,21 @@ class Resolution:
         None.
     """
 
-    __slots__ = ("iterations", "memory", "status", "witnesses", "x")
+    __slots__ = ("_states", "iterations", "memory", "status", "witnesses", "x")
 
     def __init__(self, x: Array, status: Status = Status.SOLVED, iterations: int = 1,
-                 memory: Array | None = None) -> None:
+                 memory: Array | None = None, active: NDArray[Any] | None = None) -> None:
         self.x = x
         self.status = status
         self.iterations = iterations
         self.memory = memory
         self.witnesses: Array | None = None
+        self._states = active
 
     @property
     def active(self) -> NDArray[np.int8] | None:
         """State of each row (m,), values of `solvers.status.Row`; None if it is not reported."""
-        return None
+        return None if self._states is None else self._states.astype(np.int8)
 
     def verified(self, h: Hierarchy, rank_tolerance: float = 1e-8) -> bool:
         """Whether x and the active rows prove each other on the data of h; `th_verify` in C.

@@ -22,14 +22,34 @@ from solvers.metric import in_metric
 from solvers.resolution import Resolution as Resolution
 from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
-from solvers.workspace import WORKSPACE
+from solvers.workspace import WORKSPACE, entry
 
 Handles = Literal["equalities", "bounds", "inequalities", "activations"]
 _KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities", "activations")
+_CHECK, _CHOICES = "check", "choices"  # what a field says of a setting
 _RESOLVED: dict[str, str] = {
     "equalities": "equalities only",
     "bounds": "equalities, and bounds on single unknowns in a first level of their own",
     "activations": "equalities, and rows that come with an activation"}
+
+
+def number(default: Any = dataclasses.MISSING, low: float = 0.0, high: float = math.inf, *,
+           open_below: bool = False) -> Any:
+    """Return a field: a setting >= low, or > low if it is open below, and < high; None may stay."""
+    return dataclasses.field(default=default, metadata={
+        _CHECK: lambda resolver, name: resolver._number(name, low, high, open_below)})
+
+
+def whole_number(default: int | None, least: int) -> Any:
+    """Return a field: a setting that is a whole number >= least; None may stay."""
+    return dataclasses.field(default=default, metadata={
+        _CHECK: lambda resolver, name: resolver._whole_number(name, least)})
+
+
+def one_of(*allowed: str) -> Any:
+    """Return a field: a setting that is one of these, the first by default."""
+    return dataclasses.field(default=allowed[0], metadata={
+        _CHOICES: allowed, _CHECK: lambda resolver, name: resolver._one_of(name, allowed)})
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -51,9 +71,9 @@ class Resolver(ABC):
     HierarchyError : a setting is not a number or is out of range.
     """
 
-    damping: float = 0.0
-    threshold: float = 0.1
-    rank_tolerance: float = 1e-8
+    damping: float = number(0.0)
+    threshold: float = number(0.1, open_below=True)
+    rank_tolerance: float = number(1e-8, high=1.0)
 
     name: ClassVar[str]
     handles: ClassVar[Handles] = "equalities"
@@ -73,9 +93,10 @@ class Resolver(ABC):
             cls.solve = _with_checks(solve)  # type: ignore[assignment,method-assign]
 
     def __post_init__(self) -> None:
-        self._number("damping", 0.0, math.inf)
-        self._number("threshold", 0.0, math.inf, open_below=True)
-        self._number("rank_tolerance", 0.0, 1.0)
+        for field in dataclasses.fields(self):
+            if _CHECK in field.metadata and (
+                    field.default is not None or getattr(self, field.name) is not None):
+                field.metadata[_CHECK](self, field.name)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but what is worked out again when it is needed, such as compiled code."""
@@ -89,8 +110,10 @@ class Resolver(ABC):
 
     @property
     def label(self) -> str:
-        """Name for tables and figures, with the settings that change the method."""
-        return self.name
+        """Name for tables and figures, with the choices that are not the default."""
+        return " ".join([self.name, *(
+            value for field in dataclasses.fields(self) if _CHOICES in field.metadata
+            and (value := getattr(self, field.name)) != field.default)])
 
     @property
     def strict(self) -> bool:
@@ -104,8 +127,14 @@ class Resolver(ABC):
 
     @cached_property
     def _settings(self) -> Array:
-        """The settings in one array, in the order of the kernels' `Settings`."""
-        return np.array([self.damping, self.threshold, self.rank_tolerance])
+        """All settings in one array, as declared: that is their order in the kernels.
+
+        A choice is the number of what is chosen, and None stands for infinity.
+        """
+        values = [(field.metadata.get(_CHOICES), getattr(self, field.name))
+                  for field in dataclasses.fields(self)]
+        return np.array([math.inf if value is None else allowed.index(value) if allowed else value
+                         for allowed, value in values], dtype=float)
 
     @abstractmethod
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
@@ -194,6 +223,42 @@ def _with_checks(solve: Solve) -> Solve:
             raise
 
     return checked
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Direct(Resolver):
+    """A resolver of equalities by one kernel, which needs no memory."""
+
+    kernel: ClassVar[Callable[..., int]]
+
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        """Resolve h; a direct method that ignores `memory`."""
+        x = h.start()
+        A, lower, upper, sizes = h.rows
+        code = entry(self.kernel)(A, lower, upper, sizes, x, self._settings, WORKSPACE.array)
+        return self._otherwise(h, x, code) if code else Resolution(x)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Around(Resolver):
+    """A resolver that answers through another, `inner`, and is called and judged as that one."""
+
+    inner: Resolver
+
+    @property
+    def label(self) -> str:
+        """The label of the inner resolver."""
+        return self.inner.label
+
+    @property
+    def strict(self) -> bool:
+        """Whether the inner resolver is."""
+        return self.inner.strict
+
+    @property
+    def accuracy(self) -> float:
+        """The accuracy of the inner resolver."""
+        return self.inner.accuracy
 
 
 def refuse_inequality(resolver: Resolver, h: Hierarchy, row: int) -> None:

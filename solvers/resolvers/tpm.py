@@ -19,6 +19,7 @@ from solvers.resolver import (
     Handles,
     Resolution,
     Resolver,
+    one_of,
     refuse_inequality,
     register,
     register_variant,
@@ -54,11 +55,10 @@ class Tpm(Resolver):
     name: ClassVar[str] = "tpm"
     handles: ClassVar[Handles] = "bounds"
     damps_with_bounds: ClassVar[str] = Hcod.damps_with_bounds
-    form: str = "staircase"
+    form: str = one_of(*FORMS)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._one_of("form", FORMS)
         if self.form == "published":
             set_frozen(self, handles="equalities", damps="each pivot", damps_with_bounds="")
 

@@ -17,7 +17,7 @@ from solvers.kernels.weighted import weighted, weighted_steps
 from solvers.qp.backends import BACKENDS, backend_of
 from solvers.qp.programs import slack_program
 from solvers.qp.refinement import Rows
-from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.resolver import Handles, Resolution, Resolver, number, one_of, register, whole_number
 from solvers.resolvers.hcod import Hcod, warm_record
 from solvers.resolvers.merged import Merged
 from solvers.status import SOLVED, TOO_SMALL, UNPROVED, Status
@@ -27,20 +27,6 @@ OWN = "own"
 Mask = NDArray[np.bool_]
 _OUTSIDE = 1e-9  # of |a| |x| + |side|: a larger miss means contradictory constraints
 _NEAR = 1e-6  # distance, relative to 1 + |x|, at which a backend's x counts as on a side
-
-
-@final
-class WeightedResolution(Resolution):
-    """A resolution that reports the state of each row, the first m entries of its memory."""
-
-    __slots__ = ()
-
-    memory: Array
-
-    @property
-    def active(self) -> NDArray[np.int8]:
-        """State of each row: (m,)."""
-        return self.memory[:len(self.memory) // 2].astype(np.int8)
 
 
 @final
@@ -66,26 +52,18 @@ class Weighted(Resolver):
     handles: ClassVar[Handles] = "inequalities"
     damps: ClassVar[str] = "all active soft rows as one level"
     damps_with_bounds: ClassVar[str] = damps
-    ratio: float = 100.0
+    ratio: float = number(100.0, 1.0)
     weights: Sequence[float] | None = None
-    strict_levels: int = 0
-    regularisation: float = 1e-6
-    hard_levels: int = 1
-    backend: str = OWN
-    tolerance: float = 1e-10
-    guesses: int = 10
-    max_iterations: int = 1000
+    strict_levels: int = whole_number(0, 0)
+    regularisation: float = number(1e-6, open_below=True)
+    hard_levels: int = whole_number(1, 0)
+    backend: str = one_of(OWN, *BACKENDS)
+    tolerance: float = number(1e-10, high=1e-3, open_below=True)
+    guesses: int = whole_number(10, 1)
+    max_iterations: int = whole_number(1000, 1)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._number("ratio", 1.0, np.inf)
-        self._number("regularisation", 0.0, np.inf, open_below=True)
-        self._number("tolerance", 0.0, 1e-3, open_below=True)
-        self._whole_number("strict_levels", 0)
-        self._whole_number("hard_levels", 0)
-        self._whole_number("guesses", 1)
-        self._whole_number("max_iterations", 1)
-        self._one_of("backend", (OWN, *BACKENDS))
         if self.backend != OWN:
             backend_of(self.backend)
         if self.weights is not None:
@@ -128,12 +106,12 @@ class Weighted(Resolver):
         settings = self._settings_for(len(h.names))
         code = weighted(*h.rows, x, record, settings, WORKSPACE.array)
         if code == SOLVED:
-            return WeightedResolution(x, Status.SOLVED, int(record[-1]), record)
+            return _reported(x, Status.SOLVED, record)
         if code == TOO_SMALL:
             return self._otherwise(h, x, code, memory)
         if code == UNPROVED:
             return self._continued(h, settings, record)
-        return WeightedResolution(x, Status(code), int(record[-1]), record)
+        return _reported(x, Status(code), record)
 
     def _below(self, names: tuple[str, ...]) -> Merged:
         """Return what resolves levels of these names below `strict_levels`: without a memory."""
@@ -169,7 +147,7 @@ class Weighted(Resolver):
             return self._by_backend(h, settings, record, hard, x)
         answer = np.array([x, h.reference])
         code = run(weighted_steps, *h.rows, answer, record, settings)
-        return WeightedResolution(answer[0].copy(), Status(code), int(record[-1]), record)
+        return _reported(answer[0].copy(), Status(code), record)
 
     def _within(self, h: Hierarchy, hard: Mask) -> Resolution:
         """Return the feasible x nearest to the reference; INACCURATE if there is none."""
@@ -191,7 +169,7 @@ class Weighted(Resolver):
         code = run(weighted, *h.rows, x, record, settings)
         record[-1] += before
         if code != UNPROVED:
-            return WeightedResolution(x, Status(code), int(record[-1]), record)
+            return _reported(x, Status(code), record)
         if vouched:
             return Resolution(found, Status.INACCURATE, int(record[-1]))
         return Resolution(inside, Status.BACKEND_FAILURE, int(record[-1]))
@@ -240,6 +218,10 @@ def lexicographic_weights(violations: ArrayLike, tolerance: float, regularised: 
         weights.append(max(1.0, float(below / tolerance)))
         below = np.hypot(below, weights[-1] * v)
     return tuple(reversed(weights))
+
+
+def _reported(x: Array, status: Status, record: Array) -> Resolution:
+    return Resolution(x, status, int(record[-1]), record, record[:len(record) // 2])
 
 
 def _checked(weights: Sequence[float]) -> tuple[float, ...]:
