@@ -26,7 +26,7 @@ from solvers.workspace import WORKSPACE, entry
 
 Handles = Literal["equalities", "bounds", "inequalities", "activations"]
 _KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities", "activations")
-_CHECK, _CHOICES = "check", "choices"  # what a field says of a setting
+_CHECK, _KIND, _CHOICES = "check", "kind", "choices"  # what a field says of a setting
 _RESOLVED: dict[str, str] = {
     "equalities": "equalities only",
     "bounds": "equalities, and bounds on single unknowns in a first level of their own",
@@ -35,21 +35,27 @@ _RESOLVED: dict[str, str] = {
 
 def number(default: Any = dataclasses.MISSING, low: float = 0.0, high: float = math.inf, *,
            open_below: bool = False) -> Any:
-    """Return a field: a setting >= low, or > low if it is open below, and < high; None may stay."""
-    return dataclasses.field(default=default, metadata={
-        _CHECK: lambda resolver, name: resolver._number(name, low, high, open_below)})
+    """Return a field: a setting >= low, or > low if it is open below, and < high."""
+    def check(value: Any) -> str:
+        known = isinstance(value, (int, float)) and not isinstance(value, bool)
+        good = known and low <= value < high and not (open_below and value == low)
+        return "" if good else f"a number {'>' if open_below else '>='} {low:g} and < {high:g}"
+
+    return dataclasses.field(default=default, metadata={_CHECK: check, _KIND: float})
 
 
 def whole_number(default: int | None, least: int) -> Any:
-    """Return a field: a setting that is a whole number >= least; None may stay."""
-    return dataclasses.field(default=default, metadata={
-        _CHECK: lambda resolver, name: resolver._whole_number(name, least)})
+    """Return a field: a setting that is a whole number >= least."""
+    def check(value: Any) -> str:
+        good = isinstance(value, int) and not isinstance(value, bool) and least <= value < 2**31
+        return "" if good else f"a whole number >= {least}"
+
+    return dataclasses.field(default=default, metadata={_CHECK: check, _KIND: int})
 
 
 def one_of(*allowed: str) -> Any:
     """Return a field: a setting that is one of these, the first by default."""
-    return dataclasses.field(default=allowed[0], metadata={
-        _CHOICES: allowed, _CHECK: lambda resolver, name: resolver._one_of(name, allowed)})
+    return dataclasses.field(default=allowed[0], metadata={_CHOICES: allowed})
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -94,9 +100,14 @@ class Resolver(ABC):
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
-            if _CHECK in field.metadata and (
-                    field.default is not None or getattr(self, field.name) is not None):
-                field.metadata[_CHECK](self, field.name)
+            value, said = getattr(self, field.name), field.metadata
+            if _CHOICES in said and value not in said[_CHOICES]:
+                raise UnknownNameError(f"{field.name} of {self.name}", value, said[_CHOICES])
+            if _CHECK in said and (value is not None or field.default is not None):
+                if expected := said[_CHECK](value):
+                    raise HierarchyError(f"{self.name}: {field.name} = {value!r}, expected "
+                                         f"{expected}")
+                set_frozen(self, **{field.name: said[_KIND](value)})
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but what is worked out again when it is needed, such as compiled code."""
@@ -147,24 +158,6 @@ class Resolver(ABC):
         ------
         HierarchyError : the resolver cannot handle a row. A numerical outcome is a status.
         """
-
-    def _number(self, setting: str, low: float, high: float, open_below: bool = False) -> None:
-        value = getattr(self, setting)
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not low <= value < high or (open_below and value == low):
-            raise HierarchyError(f"{self.name}: {setting} = {value!r}, expected a number "
-                                 f"{'>' if open_below else '>='} {low:g} and < {high:g}")
-        set_frozen(self, **{setting: float(value)})
-
-    def _whole_number(self, setting: str, least: int) -> None:
-        value = getattr(self, setting)
-        if not isinstance(value, int) or isinstance(value, bool) or not least <= value < 2**31:
-            raise HierarchyError(f"{self.name}: {setting} = {value!r}, expected a whole number >= "
-                                 f"{least}")
-
-    def _one_of(self, setting: str, allowed: tuple[str, ...]) -> None:
-        if getattr(self, setting) not in allowed:
-            raise UnknownNameError(f"{setting} of {self.name}", getattr(self, setting), allowed)
 
     def _otherwise(self, h: Hierarchy, x: Array, code: int,
                    memory: Array | None = None) -> Resolution:
