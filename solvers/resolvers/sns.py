@@ -10,8 +10,8 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.sns import sns
+from solvers.resolution import SaturatedResolution
 from solvers.resolver import Handles, Resolution, Resolver, one_of, register
-from solvers.resolvers.saturation import SaturatedResolution
 from solvers.status import CONTRADICTION, TOO_SMALL, Status
 from solvers.workspace import WORKSPACE
 

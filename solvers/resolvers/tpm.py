@@ -15,6 +15,7 @@ from hierarchy.records import set_frozen
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.published import matrix_as_published, solve_as_published
 from solvers.kernels.staircase import solve_by_staircase
+from solvers.resolution import SaturatedResolution
 from solvers.resolver import (
     Handles,
     Resolution,
@@ -25,7 +26,6 @@ from solvers.resolver import (
     register_variant,
 )
 from solvers.resolvers.hcod import Hcod, solve_exactly, warm_record
-from solvers.resolvers.saturation import SaturatedResolution
 from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import WORKSPACE, entry, run
 
