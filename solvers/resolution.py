@@ -89,7 +89,8 @@ class SaturatedResolution(Resolution):
 
     def __init__(self, x: Array, status: Status, iterations: int, record: Array, levels: int,
                  memory: Array | None = None) -> None:
-        super().__init__(x, status, iterations, memory)
+        self.x, self.status, self.iterations, self.memory = x, status, iterations, memory
+        self.witnesses = self._states = None
         self._record, self._levels = record, levels
 
     @property

@@ -25,6 +25,7 @@ from solvers.workspace import WORKSPACE, run
 
 OWN = "own"
 Mask = NDArray[np.bool_]
+_SOLVED = Status.SOLVED
 _OUTSIDE = 1e-9  # of |a| |x| + |side|: a larger miss means contradictory constraints
 _NEAR = 1e-6  # distance, relative to 1 + |x|, at which a backend's x counts as on a side
 
@@ -114,6 +115,10 @@ class Weighted(Resolver):
             strict_levels=max(0, min(self.strict_levels, len(names) - 1)),
             damping=self.damping, threshold=self.threshold))
 
+    @cached_property
+    def _inside(self) -> Hcod:
+        return Hcod(rank_tolerance=self.rank_tolerance)
+
     def _weights(self, levels: int) -> Array:
         """Return weights (L,), 1 for the lowest; where they overflow, the status reports it."""
         if self.weights is None:
@@ -130,7 +135,7 @@ class Weighted(Resolver):
         if hard.any():
             x, status = self._within(h, hard)
             if status is not Status.SOLVED:
-                return Resolution(x, status, int(record[-1]))
+                return Resolution(x, status, int(record.item(-1)))
         if self.backend != OWN:
             return self._by_backend(h, settings, record, hard, x)
         answer = np.array([x, h.reference])
@@ -141,7 +146,7 @@ class Weighted(Resolver):
         """Return the feasible x nearest to the reference; INACCURATE if there is none."""
         limits = h.changed(A=h.A[hard], lower=h.lower[hard], upper=h.upper[hard],
                            sizes=[hard.sum()], names=("constraints",), give=None)
-        found = Hcod(rank_tolerance=self.rank_tolerance).solve(limits)
+        found = self._inside.solve(limits)
         x, status = found.x, found.status
         value, slack = limits.A @ x, limits.slacks(x)
         size = np.linalg.norm(limits.A, axis=1) * np.linalg.norm(x) + abs(value - slack)
@@ -160,8 +165,8 @@ class Weighted(Resolver):
         if code != UNPROVED:
             return _reported(x, code, record)
         if vouched:
-            return Resolution(found, Status.INACCURATE, int(record[-1]))
-        return Resolution(inside, Status.BACKEND_FAILURE, int(record[-1]))
+            return Resolution(found, Status.INACCURATE, int(record.item(-1)))
+        return Resolution(inside, Status.BACKEND_FAILURE, int(record.item(-1)))
 
     def _backend_x(self, h: Hierarchy, hard: Mask, weight: Array) -> tuple[Array, bool]:
         """Return the backend's x (n,), and whether the backend vouches for it."""
@@ -210,8 +215,8 @@ def lexicographic_weights(violations: ArrayLike, tolerance: float, regularised: 
 
 
 def _reported(x: Array, code: int, record: Array) -> Resolution:
-    status = Status(code) if code else Status.SOLVED  # half the time of a look-up
-    return Resolution(x, status, int(record[-1]), record, record[:len(record) // 2])
+    status = Status(code) if code else _SOLVED  # a look-up takes twice the time
+    return Resolution(x, status, int(record.item(-1)), record, record[:len(record) // 2])
 
 
 def _checked(weights: Sequence[float]) -> tuple[float, ...]:
