@@ -135,6 +135,20 @@ def print_list(what: str, entries: dict[str, str]) -> None:
         print(*(f"{'':{width + 4}}{line}\n" for line in lines[1:]), sep="", end="")
 
 
+def print_lists(lists: dict[str, dict[str, str]], as_json: bool) -> None:
+    """Print lists by heading, or all as JSON."""
+    if as_json:
+        return print_json(lists)
+    for what, entries in lists.items():
+        print_list(what, entries)
+
+
+def print_files(files: list[Path], as_json: bool) -> None:
+    """Print the files that a command has written."""
+    names = [shown(file) for file in files]
+    print_json({"files": names}) if as_json else print(*names, sep="\n")
+
+
 def first_line(thing: Any) -> str:
     """Return the first line of the docstring of a class or an instance."""
     return (thing.__doc__ or "").strip().partition("\n")[0]

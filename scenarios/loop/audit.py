@@ -16,7 +16,7 @@ from scenarios.config import Scenario
 from scenarios.loop.controller import Controller
 from scenarios.recording.recording import Recording
 from solvers import Resolution, Resolver, Status, certify
-from solvers.resolvers.saturation import SaturatedResolution
+from solvers.resolution import SaturatedResolution
 from solvers.resolvers.settled import Settled
 from solvers.status import EQUAL, FREE
 
