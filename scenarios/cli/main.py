@@ -9,6 +9,7 @@ SIGTERM or SIGHUP.
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
@@ -16,8 +17,7 @@ from typing import Annotated
 import typer
 
 import scenarios.cli.runs
-import scenarios.cli.shown  # noqa: F401, both add their commands
-from scenarios.cli import benchmarks
+import scenarios.cli.shown  # both add their commands
 from scenarios.cli.options import (
     INTERRUPTED,
     AsJson,
@@ -30,9 +30,10 @@ from scenarios.cli.options import (
     output,
 )
 from scenarios.cli.problems import problems
-from scenarios.cli.terminal import exit_code, first_line, print_json, print_list, shown
+from scenarios.cli.terminal import exit_code, first_line, print_json, print_list, print_lists, shown
 
 app.add_typer(problems, name="problems")
+_ROOT = Path(scenarios.__file__).parents[1]  # of a checkout, if `benchmark/` is beside this package
 
 
 def run_command(arguments: list[str]) -> int:
@@ -96,10 +97,7 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
         if own := plugins.own(group):
             entries.setdefault(group, {}).update({
                 name: f"{first_line(thing)} (plugin)" for name, thing in own.items()})
-    if as_json:
-        return print_json(entries)
-    for what, named in entries.items():
-        print_list(what, named)
+    print_lists(entries, as_json)
 
 
 @app.command()
@@ -159,12 +157,13 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
     robot_check.check_known(file)
     if robot_check.is_robot(file):
         robot = robot_check.look_at(file, changes or [])
-        return print_json(robot_check.as_plain_data(*robot)) if as_json else print(
-            robot_check.say(*robot))
-    scenario = loaded(file, changes)
-    found = first_tick(scenario)
-    return print_json(scenario_check.as_plain_data(scenario, found)) if as_json else print(
-        scenario_check.say(scenario, found))
+        data, text = robot_check.as_plain_data(*robot), robot_check.say(*robot)
+    else:
+        scenario = loaded(file, changes)
+        found = first_tick(scenario)
+        data, text = scenario_check.as_plain_data(scenario, found), scenario_check.say(
+            scenario, found)
+    print_json(data) if as_json else print(text)
 
 
 @app.command("help")
@@ -229,4 +228,26 @@ def _wrong(text: str) -> int:
     return 2
 
 
-benchmarks.register(app)
+def _add_benchmarks() -> None:
+    """Add `bench` and `reproduce`; without a checkout they say what they need."""
+    if (_ROOT / "benchmark" / "commands.py").is_file():
+        if str(_ROOT) not in sys.path:
+            sys.path.insert(0, str(_ROOT))  # before another's package of the same name
+        commands = import_module("benchmark.commands")
+        app.add_typer(commands.bench, name="bench")
+        app.command()(commands.reproduce)
+        return
+    for name, what in (("bench", "Measure speed, accuracy and strictness (in a checkout)."),
+                       ("reproduce", "Regenerate the numbers in the documents (in a checkout).")):
+        app.command(name, help=what, context_settings={
+            "allow_extra_args": True, "ignore_unknown_options": True})(_absent)
+
+
+def _absent(context: typer.Context) -> None:
+    from hierarchy.errors import HierarchyError
+
+    raise HierarchyError(f"`hierarchy {context.info_name}` is not part of the installed package; "
+                         "it runs where a checkout of the project is installed: `pip install -e .`")
+
+
+_add_benchmarks()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from scenarios.cli.options import AsJson, output
-from scenarios.cli.terminal import print_json, print_list, shown
+from scenarios.cli.terminal import print_files, print_json, print_lists, shown
 
 if TYPE_CHECKING:
     from solvers.problems.files import Collection
@@ -39,10 +39,7 @@ def list_(as_json: AsJson = False) -> None:
     groups: dict[str, dict[str, str]] = {}
     for one in FAMILIES.values():
         groups.setdefault(one.group, {})[one.name] = one.what
-    if as_json:
-        return print_json(groups)
-    for group, entries in groups.items():
-        print_list(group, entries)
+    print_lists(groups, as_json)
 
 
 @problems.command()
@@ -80,9 +77,7 @@ def export(family: Annotated[list[str], typer.Argument(
     for one in chosen:
         with bar("problems") as told:
             files.append(write(one, seed, count, answers, out, partial(told, one.name)))
-    if as_json:
-        return print_json({"files": [shown(file) for file in files]})
-    print(*map(shown, files), sep="\n")
+    print_files(files, as_json)
 
 
 @problems.command()

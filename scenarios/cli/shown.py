@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scenarios.cli.options import PORT, AsJson, Browser, Plugins, Port, Run, Runs, app, output
-from scenarios.cli.terminal import print_json, shown
+from scenarios.cli.terminal import print_files, print_json
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
@@ -141,7 +141,7 @@ def export(folder: Run,
     from scenarios import load_run
     from scenarios.export import export as write
 
-    _print_files(write(load_run(folder), out or folder / f"run.{format}"), as_json)
+    print_files(write(load_run(folder), out or folder / f"run.{format}"), as_json)
 
 
 @app.command()
@@ -199,11 +199,4 @@ def figures(folders: Runs,
     """
     from scenarios.draw.figures.letter import redraw
 
-    _print_files(redraw(folders, style, out), as_json)
-
-
-def _print_files(files: list[Path], as_json: bool) -> None:
-    names = [shown(file) for file in files]
-    if as_json:
-        return print_json({"files": names})
-    print(*names, sep="\n")
+    print_files(redraw(folders, style, out), as_json)

@@ -67,7 +67,7 @@ def _finite(data: Any) -> Any:
 
 def print_table(runs: list[Run]) -> None:
     """Print the metrics of runs, where strict resolvers diverge, and the verdict by goal."""
-    from scenarios.measure.partings import partings
+    from scenarios.measure.motions import partings
     from scenarios.measure.runs import flags, table
     from scenarios.measure.verdict import lines, verdicts
 
@@ -133,6 +133,20 @@ def print_list(what: str, entries: dict[str, str]) -> None:
         lines = wrap(text, _WIDTH - width - 4) or [""]
         print(f"  {name:{width}}  {lines[0]}".rstrip())
         print(*(f"{'':{width + 4}}{line}\n" for line in lines[1:]), sep="", end="")
+
+
+def print_lists(lists: dict[str, dict[str, str]], as_json: bool) -> None:
+    """Print lists by heading, or all as JSON."""
+    if as_json:
+        return print_json(lists)
+    for what, entries in lists.items():
+        print_list(what, entries)
+
+
+def print_files(files: list[Path], as_json: bool) -> None:
+    """Print the files that a command has written."""
+    names = [shown(file) for file in files]
+    print_json({"files": names}) if as_json else print(*names, sep="\n")
 
 
 def first_line(thing: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from scenarios.export import foxglove, new_file
 from scenarios.export.layout import layout
 from scenarios.export.schemas import FOXGLOVE, INTEGER, NUMBER, TEXT, TRUTH, a_list, an_object
+from scenarios.recording.recording import Recording
 from scenarios.recording.signals import OTHER, known
 from scenarios.scene import scene
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
 
 FRAMES_A_SECOND = 30.0  # of the 3D scene; signals have every tick
 _WARNING = 3            # Foxglove's level of a log message

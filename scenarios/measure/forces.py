@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +19,7 @@ from scenarios.measure.metric import (
     true,
 )
 from scenarios.measure.safety import steps
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 _LOAD = 1.0        # [N] from which a contact counts as loaded
 _AT_LIMIT = 0.999  # share of a torque limit that counts as being at it

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,11 +16,9 @@ from scenarios.cell.stacked import stack_resolver
 from scenarios.measure.causes import Cause, Solve, Tick, causes
 from scenarios.measure.judging import Rows
 from scenarios.measure.safety import STEPS
+from scenarios.recording.recording import Recording
 from solvers import Resolver, Status
 from solvers.resolvers.merged import Merged
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
 
 _LARGEST = 3
 _UNITS = {"torque": "N m", "acceleration": "rad/s^2", "velocity": "rad/s"}

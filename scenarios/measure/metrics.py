@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hierarchy import plugins
 from scenarios.measure import computing, forces, safety, tracking  # noqa: F401, register metrics
 from scenarios.measure.metric import Criteria
 from scenarios.measure.metric import Metric as Metric
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 _GROUPS = ("Tracking", "Safety", "Contacts", "Torques", "Levels", "Singularities", "Switching",
            "Computing")  # as tables show them

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from scenarios.config import Scenario
 from scenarios.config.scenario import OWN
 from scenarios.files import slug
 from scenarios.measure import metrics
+from scenarios.measure.jumps import Happening
 from scenarios.measure.metrics import Metric
-
-if TYPE_CHECKING:
-    from scenarios.config import Scenario
-    from scenarios.measure.jumps import Happening
-    from scenarios.recording.facts import ResolverFacts
-    from scenarios.recording.recording import Recording
+from scenarios.recording.facts import ResolverFacts
+from scenarios.recording.recording import Recording
 
 # How a resolver that is not strict departs from strict priorities, by its name.
 _DEPARTS = {

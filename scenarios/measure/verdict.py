@@ -5,14 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from scenarios.measure.goals import Goal, goals, percent
 from scenarios.measure.metric import shown
-
-if TYPE_CHECKING:
-    from scenarios.measure.runs import Run
-    from scenarios.recording.recording import Recording
+from scenarios.measure.runs import Run
+from scenarios.recording.recording import Recording
 
 _NAMED = 3  # things that a sentence names
 

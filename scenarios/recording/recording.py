@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from hierarchy.errors import UnknownNameError
 from hierarchy.notebook import html_table
 from hierarchy.problem import Array
+from scenarios.config import Scenario
 from scenarios.recording.facts import Facts
 from scenarios.recording.notebook import Column, curves, data_frame
 from scenarios.recording.signals import check, known
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from scenarios.config import Scenario
 
 
 class DepthView(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,10 +14,8 @@ from scenarios.draw.figures.drawing import ALERT, INK, Array
 from scenarios.draw.figures.palette import Look
 from scenarios.draw.figures.panels import Draw, Panel
 from scenarios.measure.metrics import Metric
+from scenarios.recording.recording import Recording
 from scenarios.results.columns import Results
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
 
 
 def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,11 +12,9 @@ from matplotlib.patches import Polygon
 
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import INK, Array
+from scenarios.recording.facts import RobotFacts
+from scenarios.recording.recording import Recording
 from scenarios.scene import ends
-
-if TYPE_CHECKING:
-    from scenarios.recording.facts import RobotFacts
-    from scenarios.recording.recording import Recording
 
 _POSES = 4
 _APART = 1.1    # distance between bodies, in widths of the widest

@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,9 +14,7 @@ from hierarchy import plugins
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK, MEASURED, Array
 from scenarios.recording.listed import errors
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 Draw = Callable[[Axes, "Recording", str], None]
 

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from hierarchy.avoidance import Obstacle, Obstacles
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK, Array
-
-if TYPE_CHECKING:
-    from hierarchy.avoidance import Obstacle, Obstacles
-    from scenarios.recording.facts import RobotFacts
-    from scenarios.recording.recording import Recording
+from scenarios.recording.facts import RobotFacts
+from scenarios.recording.recording import Recording
 
 _VERTICES = 1200
 _OTHER_POSES = 5

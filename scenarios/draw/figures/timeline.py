@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,9 +14,7 @@ from hierarchy.words import counted
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.draw.figures.palette import task_colours
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 _ON_BAND = "#101214"   # text on a band, in any theme: bands are light
 _LETTER = 0.016        # width of a character, relative to the time axis, in a band's name

@@ -5,24 +5,22 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
+from scenarios.config import Scenario
 from scenarios.draw.figures.palette import looks
 from scenarios.measure.jumps import Happening, happened
 from scenarios.measure.verdict import verdict
 from scenarios.recording.fate import PHRASES, Fate
+from scenarios.recording.recording import Recording
 from scenarios.scene import Scene, Series, scene
 from scenarios.scene.pushes import key
 from scenarios.templates import render, resource
-
-if TYPE_CHECKING:
-    from scenarios.config import Scenario
-    from scenarios.recording.recording import Recording
 
 NOTHING = 65535  # NaN or infinite
 _STEPS = 65534
