@@ -115,7 +115,9 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 def _facts(path: Path) -> Facts:
     try:
-        return TypeAdapter(Facts).validate_python(json.loads(path.read_text(encoding="utf-8")))
+        found = TypeAdapter(Facts).validate_python(json.loads(path.read_text(encoding="utf-8")))
+        found.robot.placements(np.array(found.robot.rest))  # the model can be read
+        return found
     except (OSError, ValueError, RecursionError) as error:
         raise HierarchyError(f"{path} cannot be read: {error}") from error
 
