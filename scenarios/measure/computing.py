@@ -9,6 +9,7 @@ import numpy as np
 
 from scenarios.measure.metric import Criteria, Metric, finite, register
 from scenarios.recording.recording import Recording
+from solvers import Status
 
 _DONE = {"brake": "Ticks braked", "hold": "Ticks with the last command held",
          "use": "Ticks with trouble, answer sent", "stop": "Ticks that stopped the run",
@@ -25,19 +26,15 @@ def _switching(recording: Recording, by: Criteria) -> Iterator[Metric]:
     metric = partial(Metric, unit="", group="Switching")
     yield metric("stack_changes", "Changes of the stack", float(recording.switches().size))
     if "active_set" in recording or recording.facts.asks != "equalities":
-        yield metric("active_set_changes", "Changes of the active set", _set_changes(recording),
+        known = recording.get("active_set", np.zeros(0))
+        changes = (float(np.count_nonzero(np.diff(known[known >= 0])))
+                   if "active_set" in recording else None)
+        yield metric("active_set_changes", "Changes of the active set", changes,
                      lower_is_better=None,
                      note="of the inequality rows that act, where the resolver reports them")
     if "active_control_point" in recording:
         changes = np.count_nonzero(np.diff(recording["active_control_point"].astype(int)))
         yield metric("active_point_changes", "Changes of the active point", float(changes))
-
-
-def _set_changes(recording: Recording) -> float | None:
-    if "active_set" not in recording:
-        return None
-    known = recording["active_set"][recording["active_set"] >= 0]
-    return float(np.count_nonzero(np.diff(known)))
 
 
 @register("troubles")
@@ -50,7 +47,6 @@ def _troubles(recording: Recording, by: Criteria) -> Iterator[Metric]:
 @register("time")
 def _time(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "status" in recording:
-        from solvers import Status
         failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
         yield _metric("ticks_not_solved", "Ticks not solved", float(failed), "")
     if "time_tick" in recording:

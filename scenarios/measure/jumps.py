@@ -17,7 +17,7 @@ from scenarios.measure.causes import Cause, Solve, Tick, causes
 from scenarios.measure.judging import Rows
 from scenarios.measure.safety import STEPS
 from scenarios.recording.recording import Recording
-from solvers import Resolver, Status
+from solvers import Status
 from solvers.resolvers.merged import Merged
 
 _LARGEST = 3
@@ -66,15 +66,15 @@ def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
     resolver = stack_resolver(recording.scenario, cell.stack, cell.activation)
     carried: dict[int, Any] = {}
     memory = None
+
+    def answer(memory: Any, h: Hierarchy) -> Array:
+        return resolver.solve(h, memory).x
+
     for k in range(max(ticks) + 1 if isinstance(resolver, Merged) else 0):
         carried[k] = memory
         if (h := _hierarchy(recording, rows, k)) is not None:
             memory = resolver.solve(h, memory).memory
-    return {k: partial(_answer, resolver, carried.get(k)) for k in ticks}
-
-
-def _answer(resolver: Resolver, memory: Any, h: Hierarchy) -> Array:
-    return resolver.solve(h, memory).x
+    return {k: partial(answer, carried.get(k)) for k in ticks}
 
 
 def _jump(recording: Recording, cell: Cell, rows: Rows, k: int, solve: Solve) -> Jump:

@@ -37,21 +37,16 @@ def _distances(recording: Recording, by: Criteria) -> Iterator[Metric]:
         seen = not apart and recording.scenario.sensor.kind != "exact"
         yield _metric(f"{who}_distance_min", f"{label} distance, min", least(kept), "m", False,
                       note="as measured: the true one is not known" if seen else "")
-        yield from _below(recording, who, f"Time {label.lower()} is below its distance", kept)
+        avoidance = recording.scenario.avoidance
+        if avoidance is not None and who in avoidance.promised:
+            promised, sure = avoidance.promised[who], kept[~np.isnan(kept)]
+            yield _metric(f"{who}_below_share", f"Time {label.lower()} is below its distance",
+                          float(np.mean(sure < promised - _ON_IT)) if sure.size else None, "share",
+                          note=f"nearer than {promised:g} m")
         if apart:
             yield _metric(f"{who}_distance_min_measured", f"{label} distance measured, min",
                           least(recording[signal]), "m", None, detail=True,
                           note="with the errors of the sensor")
-
-
-def _below(recording: Recording, who: str, label: str, distance: Array) -> Iterator[Metric]:
-    """Share of ticks below the distance that the scenario asks to keep, if it asks for one."""
-    avoidance = recording.scenario.avoidance
-    if avoidance is not None and who in avoidance.promised:
-        promised, sure = avoidance.promised[who], distance[~np.isnan(distance)]
-        yield _metric(f"{who}_below_share", label,
-                      float(np.mean(sure < promised - _ON_IT)) if sure.size else None, "share",
-                      note=f"nearer than {promised:g} m")
 
 
 @register("contacts")
@@ -74,9 +69,12 @@ def _motion(recording: Recording, by: Criteria) -> Iterator[Metric]:
         yield _metric("velocity_step_max_measured", "Joint speed step measured, max",
                       largest(np.diff(recording["v"], axis=0)), "rad/s", None, detail=True,
                       note="with the errors of the sensor")
-    if recording.scenario.control.level != "torque":
-        yield _metric("command_step_max", "Commanded speed step, max", _command_step(recording),
-                      "rad/s", note="of the command, not of the joints")
+    control, command = recording.scenario.control, recording["command"]
+    if control.level != "torque":
+        yield _metric("command_step_max", "Commanded speed step, max",
+                      largest(np.diff(command, axis=0) if control.level == "velocity" else
+                              command * control.period), "rad/s",
+                      note="of the command, not of the joints")
     yield _metric("acceleration_max", "Joint acceleration, max", largest(recording["a"]),
                   "rad/s^2")
     yield from steps("acceleration", "Joint acceleration", recording["a"], "rad/s^2")
@@ -91,13 +89,6 @@ def steps(key: str, label: str, values: Array, unit: str, note: str = "", group:
     large = float(np.count_nonzero((step > bound).any(axis=1)))
     yield Metric(f"{key}_step_ticks", f"{label} steps above {bound:g} {unit.replace('^2', '²')}",
                  large, "", group=group, note="ticks")
-
-
-def _command_step(recording: Recording) -> float | None:
-    """Return the largest change of a joint's commanded speed in one tick [rad/s]."""
-    control, command = recording.scenario.control, recording["command"]
-    return largest(np.diff(command, axis=0) if control.level == "velocity"
-                   else command * control.period)
 
 
 def _joint_limit_excess(recording: Recording) -> Metric:

@@ -66,9 +66,8 @@ def _marks(runs: Sequence[Run]) -> str:
 def _stopped(run: Run) -> str:
     if run.fault is None:
         return ""
-    if run.recording is None or not run.recording.ticks:
-        return "did not start"
-    return f"stopped at {run.recording['t'][-1]:.2f} s"
+    t = run.recording["t"] if run.recording else ()
+    return f"stopped at {t[-1]:.2f} s" if len(t) else "did not start"
 
 
 def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
@@ -81,9 +80,9 @@ def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
     for run in runs:
         rows = [(what, why, str(ticks), f"{t:.3f} s") for what, why, ticks, t in run.happened]
         if run.fault:
-            began = run.recording is not None and run.recording.ticks
+            t = run.recording["t"] if run.recording else ()
             rows.append((f"fault: {run.fault}", "run stopped", "–",
-                         f"{run.recording['t'][-1]:.3f} s" if began else "the start"))
+                         f"{t[-1]:.3f} s" if len(t) else "the start"))
         found += [(run.label if i == 0 else "", row) for i, row in enumerate(rows)]
     return found
 
