@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.notebook import html_table
 from hierarchy.problem import Array
 from scenarios.config import Scenario
 from scenarios.recording.facts import Facts
-from scenarios.recording.notebook import Column, curves, data_frame
 from scenarios.recording.signals import check, known
 
 if TYPE_CHECKING:
@@ -39,7 +40,17 @@ class DepthView(NamedTuple):
     active: int
 
 
+_LIBRARIES = ("pandas", "polars")
+_LABELLED = 10  # curves of a panel that a legend can name
 _USUAL = ("q", "v", "position_error", "minimal_distance")  # what `plot` draws unless told
+
+
+class Column(NamedTuple):
+    """One number or text per tick: name such as `q[0]`, unit or "", values (T,)."""
+
+    name: str
+    unit: str
+    values: NDArray[Any]
 
 
 class Event(NamedTuple):
@@ -108,7 +119,7 @@ class Recording:
             if name not in drawn:
                 raise UnknownNameError("signal", name, drawn)
         asked = names or [name for name in _USUAL if name in drawn]
-        return curves(self["t"], {name: drawn[name] for name in asked}, self.units())
+        return _curves(self["t"], {name: drawn[name] for name in asked}, self.units())
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """Return all signals as a data frame, one row per tick and one column per number.
@@ -116,7 +127,7 @@ class Recording:
         `library` is "pandas", which has the units in `attrs`, or "polars"; None takes the first
         that is installed. Raises HierarchyError, saying what to install, where none is.
         """
-        return data_frame(list(self.columns()), library)
+        return _data_frame(list(self.columns()), library)
 
     def columns(self) -> Iterator[Column]:
         """Yield every per-tick signal number by number, then the stack and the events as text."""
@@ -187,3 +198,45 @@ class Recording:
         for tick, kind, action in self.events:
             found.setdefault((kind, action), []).append(tick)
         return found
+
+
+def _data_frame(columns: Sequence[Column], library: str | None) -> Any:
+    """Return a data frame; see `Recording.to_dataframe`."""
+    if library is not None and library not in _LIBRARIES:
+        raise UnknownNameError("library", library, _LIBRARIES)
+    for name in _LIBRARIES if library is None else (library,):
+        try:
+            package = import_module(name)
+        except ImportError:
+            continue
+        frame = package.DataFrame({column.name: column.values for column in columns})
+        if hasattr(frame, "attrs"):  # pandas has a place for them
+            frame.attrs["units"] = {column.name: column.unit for column in columns if column.unit}
+        return frame
+    raise HierarchyError(f"to_dataframe needs {library or ' or '.join(_LIBRARIES)}: pip install "
+                         f"{library or _LIBRARIES[0]}")
+
+
+def _curves(t: NDArray[Any], signals: Mapping[str, NDArray[Any]],
+           units: Mapping[str, Sequence[str]]) -> Figure:
+    """Return a figure with one panel per signal, a curve for each of its numbers."""
+    from matplotlib.figure import Figure
+
+    class Shown(Figure):
+        def _repr_png_(self) -> bytes:  # a notebook asks for it; without pyplot it shows no figure
+            png = BytesIO()
+            self.savefig(png, format="png")
+            return png.getvalue()
+
+    figure = Shown(figsize=(8.0, 1.0 + 1.8 * len(signals)), layout="constrained")
+    axes = figure.subplots(len(signals), 1, sharex=True, squeeze=False)[:, 0]
+    for ax, (name, signal) in zip(axes, signals.items(), strict=True):
+        lines = ax.plot(t, signal.reshape(len(t), -1), linewidth=0.9)
+        if 1 < len(lines) <= _LABELLED:
+            labels = [f"{name}{''.join(f'[{k}]' for k in place)}"
+                      for place in np.ndindex(signal.shape[1:])]
+            ax.legend(lines, labels, fontsize="x-small", ncols=2, loc="upper right")
+        shown = ", ".join(dict.fromkeys(units.get(name, ())))
+        ax.set_ylabel(f"{name} [{shown}]" if shown else name)
+    axes[-1].set_xlabel("t [s]")
+    return figure
