@@ -80,8 +80,10 @@ def link(t: float, capsule: Capsule, joints: Sequence[str]) -> Message:
     """Return a capsule fixed to the frame of its joint: a cylinder and two balls."""
     start, end = np.array(capsule.start), np.array(capsule.end)
     length, wide = float(np.linalg.norm(end - start)), 2.0 * capsule.radius
-    cylinders = [] if length == 0.0 else [_cylinder((start + end) / 2, _z_to(end - start), wide,
-                                                    length, _ARM)]
+    cylinders = []
+    if length:
+        turned = Rotation.align_vectors([end - start], [[0.0, 0.0, 1.0]])[0].as_matrix()
+        cylinders = [_cylinder((start + end) / 2, turned, wide, length, _ARM)]
     return entity(t, f"body {capsule.name}", joints[capsule.joint - 1] if capsule.joint else WORLD,
                   cylinders=cylinders, spheres=[_body(place, wide, _ARM) for place in (start, end)])
 
@@ -148,14 +150,6 @@ def xyzw(q: Array) -> Message:
 def quaternion(R: Array) -> Array:
     """Return the unit quaternion (4,) x, y, z, w >= 0 of a rotation (3, 3)."""
     return np.asarray(Rotation.from_matrix(R).as_quat(canonical=True))
-
-
-def _z_to(direction: Array) -> Array:
-    """Return a rotation (3, 3) that takes the z axis to a direction (3,)."""
-    z = direction / np.linalg.norm(direction)
-    x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
 
 
 def _cylinder(centre: Array, rotation: Array, wide: float, long: float,

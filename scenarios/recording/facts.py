@@ -21,7 +21,7 @@ from scenarios.cell.contacts import contacts_of
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario
 from scenarios.config.kinds.torque import TorqueSection
-from solvers.resolver import Handles, Resolver
+from solvers.resolver import Handles
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
@@ -134,19 +134,13 @@ def facts_of(scenario: Scenario, robot: Robot) -> Facts:
     facts, plant = robot_facts(robot, scenario.sensor.foot), scenario.plant
     if isinstance(plant, TorqueSection) and facts.base == "floating":
         facts = replace(facts, floor=plant.height)
-    return Facts(facts, resolver_facts(scenario), scenario.asks, scenario.limits_in_stack,
-                 contact_points(scenario, robot))
-
-
-def contact_points(scenario: Scenario, robot: Robot) -> tuple[ContactPoint, ...]:
-    """Return the contact points of a scenario on its robot, none but at level "torque"."""
     contacts = contacts_of(scenario, robot)
-    if contacts is None:
-        return ()
-    of = [contact for contact in contacts.contacts for _ in contact.points]
-    return tuple(ContactPoint(contact.name, int(joint), _vector(offset), _vector(contact.axes[2]),
-                              contact.friction)
-                 for contact, joint, offset in zip(of, *contacts.points, strict=True))
+    of = [contact for contact in contacts.contacts for _ in contact.points] if contacts else []
+    points = tuple(ContactPoint(contact.name, int(joint), _vector(offset),
+                                _vector(contact.axes[2]), contact.friction)
+                   for contact, joint, offset in zip(
+                       of, *(contacts.points if contacts else ((), ())), strict=True))
+    return Facts(facts, resolver_facts(scenario), scenario.asks, scenario.limits_in_stack, points)
 
 
 def robot_facts(robot: Robot, foot: float = 0.0) -> RobotFacts:
@@ -174,13 +168,8 @@ def resolver_facts(scenario: Scenario) -> ResolverFacts:
                 for field in dataclasses.fields(resolver)}
     return ResolverFacts(resolver.name, str(resolver.label), resolver.strict,
                          float(resolver.accuracy), resolver.handles, settings,
-                         _damped(resolver, scenario.asks))
-
-
-def _damped(resolver: Resolver, asked: Handles) -> str:
-    if not resolver.damping:
-        return ""
-    return resolver.damps if asked == "equalities" else resolver.damps_with_bounds
+                         "" if not resolver.damping else resolver.damps
+                         if scenario.asks == "equalities" else resolver.damps_with_bounds)
 
 
 def _plain(value: Any) -> Setting:
