@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection
+from contextlib import suppress
 from functools import reduce
 from queue import SimpleQueue
 from threading import Event
@@ -216,18 +217,13 @@ def named(what: str, name: Any, known: Collection[str]) -> str:
 
 
 def resolvers(scenario: Scenario) -> dict[str, str]:
-    """Return the specs of resolvers that can resolve a scenario's stack, by label.
-
-    The scenario's own resolver is the first.
-    """
+    """Return the specs of resolvers that can resolve a scenario, by label, its own first."""
     own = scenario.control.resolver
     found: dict[str, str] = {}
     for spec in (own, *default_resolvers(scenario.asks)[0], *names(), *variants()):
-        try:
+        with suppress(HierarchyError):
             other = scenario if spec == own else scenario.with_resolver(spec)
             resolver = other.make_resolver()
-        except HierarchyError:
-            continue
-        if resolver.can_resolve(other.asks):
-            found.setdefault(str(resolver.label), spec)
+            if resolver.can_resolve(other.asks):
+                found.setdefault(str(resolver.label), spec)
     return found
