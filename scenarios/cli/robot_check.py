@@ -102,14 +102,16 @@ def say(section: RobotSection, robot: Robot) -> str:
     end = "as given" if section.end_effector else listed
     source = (f"{section.model} ({file_of(section.model)})" if in_package(section.model) else
               "a table of this package" if section.model in TABLES else section.model)
+    moving, joint = 0, robot.frame(robot.end_effector).joint
+    while joint > (robot.base == "floating"):
+        moving, joint = moving + 1, robot.parents[joint]
     lines = [f"{robot.name}: {source}",
              f"  base            {robot.base}, {robot.n} velocities, {robot.nq} positions",
              f"  mass            {found['mass_kg']:.3g} kg of moving links",
              f"  joints          {len(found['joints'])} actuated",
              *_joint_table(found["joints"]),
              f"  frames          {some(found['frames'])}",
-             f"  end effector    {robot.end_effector}, {end}; "
-             f"{_moved_by(robot)} joints move it",
+             f"  end effector    {robot.end_effector}, {end}; {moving} joints move it",
              *([f"  lowest frames   {some(feet)}; [[contacts]] may be there"]
                if (feet := found["lowest_frames"]) else []),
              f"  capsules        {capsules}",
@@ -205,16 +207,9 @@ def _lowest(robot: Robot) -> list[str]:
     return [name for height, name in lowest.values() if height < floor + _LEVEL]
 
 
-def _moved_by(robot: Robot) -> int:
-    joint, count = robot.frame(robot.end_effector).joint, 0
-    while joint > (1 if robot.base == "floating" else 0):
-        joint, count = robot.parents[joint], count + 1
-    return count
-
-
 def _carrier(robot: Robot, joint: int) -> str | None:
     """Return the joint's name as in a section; None for the base."""
-    return robot.joint_names[joint - 1] if joint > (1 if robot.base == "floating" else 0) else None
+    return robot.joint_names[joint - 1] if joint > (robot.base == "floating") else None
 
 
 def _rounded(place: Any) -> list[float]:

@@ -60,7 +60,8 @@ def _write(writer: Any, recording: Recording, groups: dict[str, dict[str, NDArra
     writer.start(library="task-hierarchy")
     units = recording.units()
     schemas = {topic: (f"hierarchy.{topic[1:]}", an_object(
-        **{name: {**_schema(signal), "description": " ".join(units.get(name, ()))}
+        **{name: {**(a_list(_KINDS[signal.dtype.kind]) if signal.ndim > 1 else
+                     _KINDS[signal.dtype.kind]), "description": " ".join(units.get(name, ()))}
            for name, signal in group.items()})) for topic, group in groups.items()}
     for topic, name in (("/tf", "foxglove.FrameTransforms"), ("/scene", "foxglove.SceneUpdate"),
                         ("/events", "foxglove.Log")):
@@ -92,11 +93,6 @@ def _entries(recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -
         yield times[tick], "/events", {
             "timestamp": foxglove.time(t), "level": _WARNING, "message": f"{kind}: {action}",
             "name": "policy", "file": "", "line": tick}
-
-
-def _schema(signal: NDArray[Any]) -> dict[str, Any]:
-    schema = _KINDS[signal.dtype.kind]
-    return a_list(schema) if signal.ndim > 1 else schema
 
 
 def _plain(values: NDArray[Any]) -> Any:

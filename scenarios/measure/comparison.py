@@ -10,7 +10,7 @@ from typing import Any
 
 from hierarchy.notebook import html_table
 from scenarios.measure import metrics
-from scenarios.measure.motions import Parting, partings
+from scenarios.measure.motions import partings
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import lines, verdicts
 
@@ -67,8 +67,11 @@ class Comparison:
                 "verdicts": {name: list(lines(verdicts(runs)))
                              for name, runs in self.groups().items()},
                 "runs": [_plain(run) for run in self.runs], "refused": list(self.refused),
-                "partings": {name: [_plain_parting(one) for one in partings(runs)]
-                             for name, runs in self.groups().items()}}
+                "partings": {name: [
+                    {"label": one.label, "from": one.other, "bound_rad": one.bound,
+                     "tick": one.tick, "why": one.why,
+                     "largest_rad": one.largest if math.isfinite(one.largest) else None}
+                    for one in partings(runs)] for name, runs in self.groups().items()}}
 
 
 def _html(name: str, runs: Sequence[Run]) -> str:
@@ -89,8 +92,3 @@ def _plain(run: Run) -> dict[str, Any]:
             "ticks": run.recording.ticks if run.recording else 0,
             "metrics": {name: metrics.plain(metric) for name, metric in run.metrics.items()},
             **verdicts([run])[0].as_plain_data()}
-
-
-def _plain_parting(one: Parting) -> dict[str, Any]:
-    return {"label": one.label, "from": one.other, "bound_rad": one.bound, "tick": one.tick,
-            "largest_rad": one.largest if math.isfinite(one.largest) else None, "why": one.why}

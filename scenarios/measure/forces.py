@@ -36,7 +36,11 @@ def _forces(recording: Recording, by: Criteria) -> Iterator[Metric]:
             yield from _contacts(recording)
     if recording.scenario.control.level == "torque":
         yield from _torques(recording)
-        yield from _levels(recording)
+        names = recording.task_names if "level_violation" in recording else ()
+        for column, name in enumerate(names):
+            missed = known(recording["level_violation"][:, column])
+            yield Metric(f"miss_{name.replace(' ', '_')}", f"Missed by {name}, mean",
+                         float(missed.mean()) if missed.size else None, "rows", group="Levels")
 
 
 def _contacts(recording: Recording) -> Iterator[Metric]:
@@ -125,12 +129,3 @@ def standing(recording: Recording) -> bool | None:
     return recording.fault is None and bool(
         np.abs(true(recording, "v")[last]).max() < CALM and beyond.max() < _BEYOND
         and height[0] - height[last].min() < SUNK and (recording["support_margin"][last] > 0).all())
-
-
-def _levels(recording: Recording) -> Iterator[Metric]:
-    """Yield by how much each level is missed, on average over the ticks in which it is known."""
-    if "level_violation" in recording:
-        for name, column in zip(recording.task_names, recording["level_violation"].T, strict=True):
-            missed = known(column)
-            yield Metric(f"miss_{name.replace(' ', '_')}", f"Missed by {name}, mean",
-                         float(missed.mean()) if missed.size else None, "rows", group="Levels")

@@ -57,7 +57,14 @@ def jumps(recording: Recording, tick: int | None = None,
     cell = build(recording.scenario)
     rows = Rows(recording, cell)
     solves = _solves(recording, cell, rows, list(map(int, ticks)) if tick is None else [tick])
-    return [_jump(recording, cell, rows, k, solve) for k, solve in solves.items()]
+    level, found = recording.scenario.control.level, []
+    for k, solve in solves.items():
+        change = np.nan_to_num(np.abs(recording["command"][k] - recording["command"][k - 1]))
+        i = int(change.argmax())
+        joint = cell.robot.velocity_names[cell.robot.n - len(change) + i]
+        found.append(Jump(k, float(recording["t"][k]), f"{level} of {joint}", float(change[i]),
+                          _UNITS[level], tuple(_causes(recording, cell, rows, k, solve))))
+    return found
 
 
 def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
@@ -75,14 +82,6 @@ def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
         if (h := _hierarchy(recording, rows, k)) is not None:
             memory = resolver.solve(h, memory).memory
     return {k: partial(answer, carried.get(k)) for k in ticks}
-
-
-def _jump(recording: Recording, cell: Cell, rows: Rows, k: int, solve: Solve) -> Jump:
-    change = np.nan_to_num(np.abs(recording["command"][k] - recording["command"][k - 1]))
-    i, level = int(change.argmax()), recording.scenario.control.level
-    joint = cell.robot.velocity_names[cell.robot.n - len(change) + i]
-    return Jump(k, float(recording["t"][k]), f"{level} of {joint}", float(change[i]),
-                _UNITS[level], tuple(_causes(recording, cell, rows, k, solve)))
 
 
 def _causes(recording: Recording, cell: Cell, rows: Rows, k: int, solve: Solve) -> Iterator[Cause]:

@@ -126,16 +126,15 @@ def versions() -> dict[str, str]:
     """Return the versions and the processor of this installation."""
     packages = ("task-hierarchy", "numpy", "numba", "pin", "qpsolvers", "proxsuite", "osqp",
                 "mujoco")
-    return {"python": platform.python_version(), **{name: _version(name) for name in packages},
+    found = {}
+    for name in packages:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return {"python": platform.python_version(), **found,
             "system": f"{platform.system()} {platform.machine()}",
             "processor": f"{_processor()}, {os.cpu_count()} cores"}
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"
 
 
 def _processor() -> str:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from hierarchy.words import counted, in_words, listed
-from scenarios.config.distributions import Distribution
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import looks
@@ -39,11 +38,15 @@ def sampled_page(plan: Plan, found: Mapping[str, Results], folder: Path, command
     labels = listed(list(dict.fromkeys(run.label for run in plan.runs)))
     count = (f"{counted(len(plan.runs), 'run')}: {counted(sweep.samples, 'sample')}, each under "
              f"{labels}")
+    each = {one.name: (one.variation if sweep.variation else {}) | sweep.parameters
+            for one in plan.scenarios}
+    first, *others = each.values()
     with drawing.styled(drawing.SCREEN):
         shown = [_shown(name, one, plan, folder) for name, one in found.items()]
     return str(render(
         "results/sampled_page.html", title=f"{sweep.name}: {made_by}", sweep=sweep,
-        variations=_variations(plan), refused=plan.refused, made_by=made_by, unfinished="",
+        variations={"": first} if all(one == first for one in others) else each,
+        refused=plan.refused, made_by=made_by, unfinished="",
         style=resource("results/style.css"), script=resource("results/page.js"), counted=count,
         scenarios=shown, about_rows=_ABOUT_ROWS, command=command, file=file, versions=versions()))
 
@@ -59,15 +62,6 @@ def worst_runs(found: Mapping[str, Results]) -> list[Job]:
 def name_of(run: Job) -> str:
     """Return the name of the file that has the scenario of a run."""
     return f"{slug(f'{run.scenario}-{run.resolver}-{run.sample}')}-{run.key[:6]}.toml"
-
-
-def _variations(plan: Plan) -> dict[str, dict[str, Distribution]]:
-    """Return what is sampled by scenario; "" where all share it."""
-    sweep = plan.sweep
-    each = {one.name: (one.variation if sweep.variation else {}) | sweep.parameters
-            for one in plan.scenarios}
-    first, *others = each.values()
-    return {"": first} if all(one == first for one in others) else each
 
 
 def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, Any]:
