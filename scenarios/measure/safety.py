@@ -7,18 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from scenarios.measure.metric import (
-    Array,
-    Criteria,
-    Metric,
-    finite,
-    known,
-    largest,
-    least,
-    passed,
-    register,
-    true,
-)
+from hierarchy.problem import Array
+from scenarios.measure.metric import Criteria, Metric, known, largest, least, passed, register, true
 from scenarios.recording.recording import Recording
 
 _ON_IT = 1e-4  # [m] below a distance that still counts as keeping it
@@ -99,6 +89,6 @@ def _joint_limit_excess(recording: Recording) -> Metric:
         if np.isfinite(lower).any() or np.isfinite(upper).any():
             excess = passed(np.maximum(np.maximum(q - upper, lower - q), 0.0)).max(axis=0)
             joint = int(np.argmax(excess))
-            value = finite(excess[joint])
+            value = largest(excess)
             note = f"joint {joint + 1}" if excess[joint] > 0.0 else ""
     return _metric("joint_limit_excess", "Beyond a joint limit, max", value, "rad", note=note)

@@ -48,10 +48,10 @@ def ended(work: Callable[[Job], Outcome], jobs: Sequence[Job], scheduler: str
         futures = client.map(partial(_checked, work, digest()), jobs, pure=False)
         job_of = {future.key: job for future, job in zip(futures, jobs, strict=True)}
         for future in as_completed(futures):
-            error = future.exception() if future.status == "error" else None
-            if future.status != "finished" and not isinstance(error, KilledWorker):
-                raise ClusterError(f"{error or 'the scheduler is lost'}; finished runs are kept")
-            yield job_of[future.key], None if error else future.result()
+            broken = future.exception() if future.status == "error" else None
+            if future.status != "finished" and not isinstance(broken, KilledWorker):
+                raise ClusterError(f"{broken or 'the scheduler is lost'}; finished runs are kept")
+            yield job_of[future.key], None if broken else future.result()
             future.release()
 
 

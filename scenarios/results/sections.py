@@ -66,7 +66,7 @@ def _marks(runs: Sequence[Run]) -> str:
 def _stopped(run: Run) -> str:
     if run.fault is None:
         return ""
-    t = run.recording["t"] if run.recording else ()
+    t = run.recording["t"] if run.recording else np.zeros(0)
     return f"stopped at {t[-1]:.2f} s" if len(t) else "did not start"
 
 
@@ -80,7 +80,7 @@ def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
     for run in runs:
         rows = [(what, why, str(ticks), f"{t:.3f} s") for what, why, ticks, t in run.happened]
         if run.fault:
-            t = run.recording["t"] if run.recording else ()
+            t = run.recording["t"] if run.recording else np.zeros(0)
             rows.append((f"fault: {run.fault}", "run stopped", "–",
                          f"{t[-1]:.3f} s" if len(t) else "the start"))
         found += [(run.label if i == 0 else "", row) for i, row in enumerate(rows)]

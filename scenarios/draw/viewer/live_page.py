@@ -64,9 +64,10 @@ _VELOCITY = (
 def knobs(scenario: Scenario) -> list[tuple[Knob, float]]:
     """Return those of the settings that a scenario has, with their values."""
     gains = _ACCELERATION if scenario.control.level == "acceleration" else _VELOCITY
+    whole: Any = scenario
     return [(knob, float(value)) for knob in (*_BOTH, *gains)
             if isinstance(value := reduce(lambda of, name: getattr(of, name, None),
-                                          knob.key.split("."), scenario), int | float)]
+                                          knob.key.split("."), whole), int | float)]
 
 
 class LivePage:
