@@ -83,15 +83,6 @@ class Results:
         names = np.array([run.label for run in self.runs])
         return {label: names == label for label in self.labels}
 
-    def firsts(self) -> list[Job]:
-        """Return the first run of each label."""
-        return [next(run for run in self.runs if run.label == label) for label in self.labels]
-
-    def of(self, name: str, label: str) -> NDArray[np.float64]:
-        """Return the known values of a metric under a resolver."""
-        values = self.values[name][self._of[label]]
-        return np.asarray(values[np.isfinite(values)])
-
     @cached_property
     def samples(self) -> int:
         """Number of samples."""

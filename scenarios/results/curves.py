@@ -139,8 +139,9 @@ def spread(results: Results, metric: Metric) -> Figure:
     Box: quartiles with the median; line: 5th to 95th percentile; dots: smallest and largest value,
     where they are near. How many lie beyond the axis stands at its end.
     """
-    known = {label: metric.scale * values for label in results.labels
-             if (values := results.of(metric.name, label)).size}
+    columns = {label: results.column(metric.name, label) for label in results.labels}
+    known = {label: metric.scale * values[np.isfinite(values)]
+             for label, values in columns.items() if np.isfinite(values).any()}
     fig, (ax,) = drawing.figure(width=3.9, height=0.5 + 0.3 * len(known))
     colours = drawing.colours(results.labels)
     low, high = _limits(list(known.values()))

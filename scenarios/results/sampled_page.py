@@ -67,7 +67,8 @@ def name_of(run: Job) -> str:
 def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, Any]:
     """Return the content of the page for one group of runs."""
     failures = results.failures()
-    marked = flags({run.label: run.load() for run in results.firsts()})
+    marked = flags({label: next(run for run in results.runs if run.label == label).load()
+                    for label in results.labels})
     worst: dict[str, list[Metric]] = {}
     for metric, run in results.worst():
         worst.setdefault(run.key, []).append(metric)
