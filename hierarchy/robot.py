@@ -204,6 +204,16 @@ class Robot:
             robot.end_effector = robot.frame(end_effector, "end_effector frame").name
         return robot
 
+    @classmethod
+    def of_text(cls, text: str, name: str) -> Robot:
+        """Build a robot of `robot.model.saveToString()`; a damaged text raises RobotError."""
+        model = pin.Model()
+        try:
+            model.loadFromString(text)
+        except (RuntimeError, MemoryError, ValueError) as error:
+            raise RobotError(f"robot {name!r}: its model cannot be read: {error}") from error
+        return cls(model, name)
+
     @property
     def frame_names(self) -> list[str]:
         """Names of the frames that `frame` finds, including those of joints and links."""
@@ -407,6 +417,8 @@ def _units(joint: Any) -> tuple[str, ...]:
     kind = joint.shortname().removeprefix("JointModel")
     if kind == "Planar":
         return ("m", "m", "rad")
+    if kind == "Composite":
+        return tuple(unit for inner in joint.extract().joints for unit in _units(inner))
     slides = kind.startswith(("FreeFlyer", "Translation", "P"))
     return tuple("m" if slides and i < 3 else "rad" for i in range(joint.nv))
 

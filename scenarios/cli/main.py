@@ -17,18 +17,9 @@ from typing import Annotated
 import typer
 
 import scenarios.cli.runs
-import scenarios.cli.shown  # noqa: F401, both add their commands
-from scenarios.cli.options import (
-    INTERRUPTED,
-    AsJson,
-    Changes,
-    Plugins,
-    app,
-    complete_scenarios,
-    listed_in,
-    loaded,
-    output,
-)
+import scenarios.cli.shown  # both add their commands
+from scenarios.cli import options as opt
+from scenarios.cli.options import app
 from scenarios.cli.problems import problems
 from scenarios.cli.terminal import exit_code, first_line, print_json, print_list, print_lists, shown
 
@@ -40,7 +31,7 @@ def run_command(arguments: list[str]) -> int:
     """Run a command line and return its exit code; errors become one line on stderr."""
     try:
         code = app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False)
-        return int(code or 0) if code != INTERRUPTED else interrupted()
+        return int(code or 0) if code != opt.INTERRUPTED else interrupted()
     except typer.TyperException as error:
         return _wrong(f"{error.format_message()}{_given(error, arguments)}")
     except (KeyboardInterrupt, typer.Abort):
@@ -74,7 +65,7 @@ def root(version: Annotated[bool, typer.Option(
 
 
 @app.command("list")
-def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
+def list_(plugin: opt.Plugins = None, as_json: opt.AsJson = False) -> None:
     """List scenarios, groups, sweeps, resolvers, tasks and robots."""
     import solvers
     from hierarchy import plugins
@@ -101,8 +92,8 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
 
 
 @app.command()
-def library(out: Annotated[Path, output("Folder of the library: new or empty, or an existing one "
-                                        "with --check.")],
+def library(out: Annotated[Path, opt.output("Folder of the library: new or empty, or an existing "
+                                            "one with --check.")],
             resolvers: Annotated[str, typer.Option(
                 "--resolvers", metavar="NAMES", help="Of hcod, tpm, recursive, sns, merged.")
                 ] = "hcod,tpm,recursive,sns",
@@ -112,7 +103,7 @@ def library(out: Annotated[Path, output("Folder of the library: new or empty, or
             check: Annotated[bool, typer.Option(
                 "--check", help="Write nothing: compare the kernels of the library in the folder "
                                 "with those installed.")] = False,
-            as_json: AsJson = False) -> int:
+            as_json: opt.AsJson = False) -> int:
     """Write the resolvers as a C library.
 
     The same kernels, without Python.
@@ -132,7 +123,7 @@ def library(out: Annotated[Path, output("Folder of the library: new or empty, or
         return exit_code(f"{shown(out)}: {difference}" if difference else None)
     folder = claim(out)
     with whole(folder) as partial:
-        made = write(partial, listed_in(resolvers), target)
+        made = write(partial, opt.listed_in(resolvers), target)
     if as_json:
         print_json({"folder": shown(folder), **asdict(made)})
         return 0
@@ -145,8 +136,9 @@ def library(out: Annotated[Path, output("Folder of the library: new or empty, or
 
 @app.command()
 def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file or name.",
-                                              autocompletion=complete_scenarios)],
-          changes: Changes = None, plugin: Plugins = None, as_json: AsJson = False) -> None:
+                                              autocompletion=opt.complete_scenarios)],
+          changes: opt.Changes = None, plugin: opt.Plugins = None,
+          as_json: opt.AsJson = False) -> None:
     """Validate and summarize a scenario or robot file.
 
     Builds it and, for a scenario, runs the first tick.
@@ -159,7 +151,7 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
         found = robot_check.look_at(file, changes or [])
         told = robot_check
     else:
-        scenario = loaded(file, changes)
+        scenario = opt.loaded(file, changes)
         found, told = (scenario, first_tick(scenario)), scenario_check
     print_json(told.as_plain_data(*found)) if as_json else print(told.say(*found))
 
@@ -168,7 +160,7 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
 def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
         metavar="KEY", help="A key of a scenario file, such as avoidance.obstacles.path, or a "
                             "command. Default: all sections and commands.")] = None,
-          plugin: Plugins = None) -> None:
+          plugin: opt.Plugins = None) -> None:
     """Say what a key of a scenario file means."""
     from hierarchy.errors import UnknownNameError
     from scenarios.config import Scenario
@@ -195,7 +187,7 @@ def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
 
 
 @app.command()
-def doctor(as_json: AsJson = False) -> int:
+def doctor(as_json: opt.AsJson = False) -> int:
     """Check the installation and run a self-test."""
     from scenarios.cli.doctor import doctor_command
 
@@ -218,7 +210,7 @@ def _with_its_file(text: str, arguments: list[str]) -> str:
 def interrupted() -> int:
     """Say that the command was interrupted, and return its exit code."""
     print("hierarchy: interrupted", file=sys.stderr)
-    return INTERRUPTED
+    return opt.INTERRUPTED
 
 
 def _wrong(text: str) -> int:

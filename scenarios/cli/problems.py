@@ -47,7 +47,11 @@ def show(problem: Annotated[str, typer.Argument(metavar="FAMILY_OR_FILE",
                                                 help="Name of a family, or a file.")],
          seed: Seed = 0, count: Count = None, as_json: AsJson = False) -> None:
     """Describe a family or a file: sizes, rows, answers."""
-    said = _about(_named(problem, seed, count))
+    from scenarios.problems.families import family
+    from solvers.problems.files import read
+
+    said = _about(read(problem) if problem.endswith(".npz") else
+                  family(problem).half(seed, count))
     if as_json:
         return print_json(said)
     width = max(map(len, said))
@@ -96,18 +100,10 @@ def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of p
         print_json({**_about(collection), "wrong": wrong})
     else:
         known = len(collection.answers or ())
-        print(f"{shown(file)}: {len(collection.problems)} problems, {known} answers",
-              *(f"problem {p}: {why}" for p, why in wrong.items()), sep="\n")
-    for p in wrong if as_json else ():
-        print(f"problem {p}: {wrong[p]}", file=sys.stderr)
+        print(f"{shown(file)}: {len(collection.problems)} problems, {known} answers")
+    for p, why in wrong.items():
+        print(f"problem {p}: {why}", file=sys.stderr if as_json else sys.stdout)
     return int(bool(wrong))
-
-
-def _named(name: str, seed: int, count: int | None) -> Collection:
-    from scenarios.problems.families import family
-    from solvers.problems.files import read
-
-    return read(name) if name.endswith(".npz") else family(name).half(seed, count)
 
 
 def _about(collection: Collection) -> dict[str, Any]:
@@ -121,8 +117,9 @@ def _about(collection: Collection) -> dict[str, Any]:
             "half": head.half + (f", seed {head.seed}" if head.seed else ""),
             "problems": len(found),
             "sequence": f"ticks of {1e3 * head.period:g} ms" if head.sequence else "no",
-            "unknowns": _range([h.n for h in found]), "rows": _range([h.m for h in found]),
-            "levels": _range([len(h.sizes) for h in found]),
+            **{what: str(min(of)) if len(set(of)) == 1 else f"{min(of)} to {max(of)}"
+               for what, of in (("unknowns", [h.n for h in found]), ("rows", [h.m for h in found]),
+                                ("levels", [len(h.sizes) for h in found]))},
             "usual sizes": usual + (", and others" if len(sizes) > 2 else ""),
             "equalities": f"{100.0 * equal / max(rows, 1):.0f} % of the rows",
             "sha256": collection.digest}
@@ -134,7 +131,3 @@ def _about(collection: Collection) -> dict[str, Any]:
                  "largest shift, turn": f"{max(one.shift for one in answers):.1e}, "
                                         f"{max(one.turn for one in answers):.1e}"}
     return said
-
-
-def _range(values: list[int]) -> str:
-    return str(values[0]) if len(set(values)) == 1 else f"{min(values)} to {max(values)}"

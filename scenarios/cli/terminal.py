@@ -13,9 +13,7 @@ from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rich.text import Text
-
-    from scenarios.measure.runs import Cell, Row, Run
+    from scenarios.measure.runs import Row, Run
     from scenarios.results.columns import Results
 
 _WIDTH = 80   # columns of a terminal
@@ -67,7 +65,7 @@ def _finite(data: Any) -> Any:
 
 def print_table(runs: list[Run]) -> None:
     """Print the metrics of runs, where strict resolvers diverge, and the verdict by goal."""
-    from scenarios.measure.partings import partings
+    from scenarios.measure.motions import partings
     from scenarios.measure.runs import flags, table
     from scenarios.measure.verdict import lines, verdicts
 
@@ -101,7 +99,10 @@ def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: 
     console = Console(markup=False, highlight=False)
     console.print("", *above, sep="\n")
     heads = [re.sub(r"(?<=[^ :-])[ :-]", lambda at: at[0].strip() + "\n", one) for one in labels]
-    cells = [[_text(cell) for cell in row.cells] for row in rows]
+    cells = [[Text(cell.text + ("*" if cell.kind == "best" else " "),
+                   "bold" if cell.kind == "best" else "").append(
+                       f"\n{cell.more} " if cell.more else "", "not bold dim")
+              for cell in row.cells] for row in rows]
     widest = max(len(line) for text in (*heads, *(cell.plain for some in cells for cell in some))
                  for line in text.splitlines())
     fit = max(1, (_WIDTH - _NAMES) // (widest + 1))
@@ -114,15 +115,6 @@ def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: 
             laid_out.add_row(Text(row.heading), *some[first:first + beside])
         console.print("", laid_out)
     console.print(*below, sep="\n", end="\n" if below else "")
-
-
-def _text(cell: Cell) -> Text:
-    """Return a cell in bold with a star if it is the best, its second line dim."""
-    from rich.text import Text
-
-    best = cell.kind == "best"
-    text = Text(cell.text + ("*" if best else " "), "bold" if best else "")
-    return text.append(f"\n{cell.more} ", "not bold dim") if cell.more else text
 
 
 def print_list(what: str, entries: dict[str, str]) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import nan, sqrt
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,35 +21,6 @@ from scenarios.recording.recording import DepthView, Recording
 from solvers.certificate import TOLERANCE
 
 _SAME = 1e-9  # [m] of distances that are those recorded
-
-
-class Judged(NamedTuple):
-    """Fate (L,) and violation (L,) of each level, and the saturated entries (n,) of x."""
-
-    fate: NDArray[np.int8]
-    violation: Array
-    saturated: NDArray[np.int8]
-
-
-def judged(cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> Judged:
-    """Judge a command x (n,) by the rows of its tick; `accuracy` is the resolver's.
-
-    A row is on a side if it is as near to it as the resolver, or a certificate, may be.
-    """
-    near = max(TOLERANCE, accuracy) * (1.0 + sqrt(float(x @ x)))
-    n, levels = cell.robot.n, len(h.sizes)
-    found = Judged(np.zeros(levels, np.int8), np.zeros(levels), np.zeros(n, np.int8))
-    lower = h.lower if cell.activation is None else cell.activation.demanded(h)
-    _judge_levels(h.A, lower, h.upper, h.offsets, x, near, found.fate, found.violation)
-    if (limits := cell.limits) is not None:
-        if limits.name in h.names:
-            rows = slice(*h.offsets[h.names.index(limits.name):][:2])
-            box = h.lower[rows], h.upper[rows]
-        else:
-            box = limits.box(cell.state, "velocity" if cell.stack.level == "velocity"
-                             else "acceleration")
-        _find_saturated(x[:n], *box, near, found.saturated)
-    return found
 
 
 @final
@@ -69,14 +40,27 @@ class Fates:
                    controller.resolver.accuracy)
 
     def judge(self, tick: int, cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> None:
-        """Judge the command x (n,) of a tick; see `judged`."""
+        """Judge a command x (n,) by the rows of its tick; `accuracy` is the resolver's.
+
+        A row is on a side if it is as near to it as the resolver, or a certificate, may be.
+        """
+        near = max(TOLERANCE, accuracy) * (1.0 + sqrt(float(x @ x)))
         columns = self._columns.get(h.names)
         if columns is None:
             columns = np.array([self._names.index(name) for name in h.names], dtype=np.int64)
             self._columns[h.names] = columns
-        found = judged(cell, h, x, accuracy)
-        self._fate[tick, columns], self._violation[tick, columns] = found.fate, found.violation
-        self._saturated[tick] = found.saturated
+        fate, violation = np.zeros(len(columns), np.int8), np.zeros(len(columns))
+        lower = h.lower if cell.activation is None else cell.activation.demanded(h)
+        _judge_levels(h.A, lower, h.upper, h.offsets, x, near, fate, violation)
+        self._fate[tick, columns], self._violation[tick, columns] = fate, violation
+        if (limits := cell.limits) is not None:
+            if limits.name in h.names:
+                rows = slice(*h.offsets[h.names.index(limits.name):][:2])
+                box = h.lower[rows], h.upper[rows]
+            else:
+                box = limits.box(cell.state, "velocity" if cell.stack.level == "velocity"
+                                 else "acceleration")
+            _find_saturated(x[:cell.robot.n], *box, near, self._saturated[tick])
 
     def signals(self, recording: Recording) -> dict[str, NDArray[np.int8] | Array]:
         """Return the signals of a Recording; levels that were not judged are UNKNOWN."""
@@ -116,7 +100,10 @@ def judge(recording: Recording, cell: Cell) -> None:
 
 
 class Rows:
-    """Moves a cell through the recorded ticks; `meant` (T, n) is what their commands stand for."""
+    """Moves a cell through the recorded ticks.
+
+    meant : (T, n) what the commands stand for in the rows: at level "torque" the answers.
+    """
 
     def __init__(self, recording: Recording, cell: Cell) -> None:
         self._cell, level = cell, recording.scenario.control.level
@@ -125,7 +112,9 @@ class Rows:
         self._follows = level != "acceleration"  # whether rows depend on the last command
         self._first = self._v[0] if level == "velocity" else None
         self._carried: list[Array | None] = [None]  # by the contacts before each tick
-        self.meant = _meant(recording)
+        self.meant = recording["command"] if level != "torque" else np.hstack([
+            recording["planned_acceleration"],
+            recording["planned_force"].reshape(recording.ticks, -1)])
         if cell.contacts:
             for t, x in zip(self._t, self.meant, strict=True):
                 last = self._carried[-1]
@@ -155,14 +144,6 @@ class Rows:
         return cell.stack.hierarchy(cell.state, order)
 
 
-def _meant(recording: Recording) -> Array:
-    """Return what the commands stand for in the rows: at level "torque" the answers."""
-    if recording.scenario.control.level != "torque":
-        return recording["command"]
-    forces = recording["planned_force"].reshape(recording.ticks, -1)
-    return np.hstack([recording["planned_acceleration"], forces])
-
-
 def depth_view(recording: Recording, t: float | None = None) -> DepthView | None:
     """Take the image of a run's camera at time t [s]; None without a camera or before its first.
 
@@ -172,7 +153,9 @@ def depth_view(recording: Recording, t: float | None = None) -> DepthView | None
     scenario = recording.scenario
     if scenario.sensor.kind != "camera" or not recording.ticks:
         return None
-    k = _nearest(recording) if t is None else int(np.argmin(np.abs(recording["t"] - t)))
+    off = np.nan_to_num(recording["ee_distance"] if t is None else np.abs(recording["t"] - t),
+                        nan=np.inf, posinf=np.inf)
+    k = int(np.argmin(off)) if np.isfinite(off).any() else recording.ticks - 1
     sensor = scenario.sensor.model_copy(update={"latency": 0.0})
     cell = build(scenario.model_copy(update={"sensor": sensor, "plant": KinematicSection()}))
     moved = cell.state.move(float(recording["t"][k]), recording["q"][k], recording["v"][k])
@@ -182,11 +165,6 @@ def depth_view(recording: Recording, t: float | None = None) -> DepthView | None
     return None if image is None else DepthView(
         cell.state.t, image.copy(), cell.sensor.space.pinhole.packed(), seen.points.copy(),
         seen.distance.copy(), seen.nearest.copy(), seen.active)
-
-
-def _nearest(recording: Recording) -> int:
-    distance = np.where(np.isnan(recording["ee_distance"]), np.inf, recording["ee_distance"])
-    return int(np.argmin(distance)) if np.isfinite(distance).any() else recording.ticks - 1
 
 
 @compiled

@@ -16,9 +16,8 @@ from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.problem import Array
 from scenarios.cell.sensors.sensor import make_obstacles
 from scenarios.recording import listed
-from scenarios.recording.facts import RobotFacts
+from scenarios.recording.facts import RobotFacts, ends
 from scenarios.recording.fate import Fate, Levels, levels_at
-from scenarios.recording.tree import ends
 from scenarios.scene.curves import Areas, Series, marks_of, series
 from scenarios.scene.pushes import Pushes, pushes
 

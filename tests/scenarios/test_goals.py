@@ -146,5 +146,5 @@ def test_what_a_scenario_asks_is_in_its_words(name, asked):
 
 def test_a_run_so_far_says_how_far_it_is():
     run = Verdict("tpm", 1.2, 8.0, None, stands=False, goals=())
-    assert run.said == ("Ran for 1.20 of 8 s",)
+    assert run.on_page()["goals"] == ["Ran for 1.20 of 8 s"]
     assert Verdict("", 8.0, 8.0, None, stands=True, goals=()).end == "stood the whole 8 s"

@@ -8,8 +8,7 @@ from hand_made import HandMadeScenario, recording
 
 from scenarios import compare
 from scenarios.config.resolvers import default_resolvers
-from scenarios.measure.motions import motions
-from scenarios.measure.partings import partings
+from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run
 from solvers.qp import backends
 

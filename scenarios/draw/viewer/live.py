@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError
-from hierarchy.problem import Array
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.plant import KinematicSection
@@ -185,12 +184,8 @@ class Live:
             return
         step = _HAND * self.scenario.control.period
         for h in np.flatnonzero((self._wanted != self.obstacles.offset).any(axis=1)).tolist():
-            self.obstacles.shift(h, _toward(self.obstacles.offset[h], self._wanted[h], step))
+            here, way = self.obstacles.offset[h], self._wanted[h] - self.obstacles.offset[h]
+            length = float(np.linalg.norm(way))
+            self.obstacles.shift(h, self._wanted[h] if length <= step else
+                                 here + way * (step / length))
         self._offsets[self.recorder.ticks] = self.obstacles.offset
-
-
-def _toward(here: Array, there: Array, step: float) -> Array:
-    """Return the point (3,) at most `step` [m] from `here` toward `there`."""
-    way = there - here
-    length = float(np.linalg.norm(way))
-    return there if length <= step else here + way * (step / length)
