@@ -78,12 +78,12 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     at = References(State.at(kept.robot, *kept.start), kept.contacts) if kept else placed(scenario)
     sensor = sensor_of(scenario, at.start, (kept.scenario, kept.sensor) if kept else None)
     plant = kept.plant if kept else plant_of(
-        scenario, at.start, sensor.obstacles if sensor else Obstacles(), at.contacts_or_none)
+        scenario, at.start, sensor.obstacles if sensor else Obstacles(), at.contacts)
     tasks = tasks_of(scenario, at)
     differences = scenario.control.jacobian_derivative == "difference"
     state = kept.state if kept else State(at.robot,
                                           scenario.control.period if differences else None)
-    stack, order, activation = stacked(scenario, tasks, state, at.contacts_or_none)
+    stack, order, activation = stacked(scenario, tasks, state, at.contacts)
     return Cell(scenario, at.robot, (at.start.q, at.start.v), state, plant, stack, sensor,
                 tasks.areas, tasks.position, tasks.pointing, tasks.limits, order, tasks.listed,
-                activation, at.contacts_or_none)
+                activation, at.contacts)

@@ -89,7 +89,7 @@ def _first(scenario: Scenario, at: References) -> tuple[JointLimits | None, list
     except HierarchyError as error:
         raise ScenarioError(f"limits: {error}") from error
     bounded = scenario.limits is not None and scenario.limits.place == "bounds"
-    if at.contacts_or_none is not None:
+    if at.contacts is not None:
         physics = _physics(scenario, at.contacts)
         first = [*first, *physics] if bounded else [*physics, *first]
     return limits, above(model_rows(at.robot, scenario.control.period), first,

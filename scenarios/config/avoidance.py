@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from hierarchy.avoidance import Barrier, Obstacle, Repulsion
 from hierarchy.problem import Array
@@ -62,16 +63,14 @@ class ObstacleSection(Section):
     path: PathSection | None = None
     """Path of its middle, for one that moves."""
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         needs = {"point": (), "sphere": ("radius",), "capsule": ("radius", "half_length"),
                  "box": ("half_lengths",)}[self.shape]
         for key in ("radius", "half_length", "half_lengths"):
             if (getattr(self, key) is None) == (key in needs):
-                raise ValueError(f"a {self.shape} takes {listed(needs) if needs else 'no size'}")
+                yield f"a {self.shape} takes {listed(needs) if needs else 'no size'}"
         if (self.centre is None) == (self.path is None):
-            raise ValueError("give either a centre or a path")
-        return self
+            yield "give either a centre or a path"
 
     def make(self, name: str) -> Obstacle:
         """Return the obstacle, with its name in messages."""
@@ -157,13 +156,11 @@ class _Avoiding(Section):
         return tuple(_varied(obstacle, self.variation, number)
                      for number, obstacle in enumerate(self.obstacles))
 
-    @model_validator(mode="after")
-    def _varies_something(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         moves = self.variation is not None and self.variation.spread + self.variation.timing > 0.0
         if moves and not any(isinstance(obstacle.path, WaypointsSection)
                              for obstacle in self.obstacles):
-            raise ValueError("variation needs an obstacle with waypoints")
-        return self
+            yield "variation needs an obstacle with waypoints"
 
 
 class AvoidanceSection(_Avoiding):
@@ -194,13 +191,12 @@ class AvoidanceSection(_Avoiding):
     """Distance that metrics check for body and end effector, without effect on the run; by
     default `near`, for the body."""
 
-    @model_validator(mode="after")
-    def _areas_nested(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
+        yield from super()._wrong()
         if self.place == "null-space" and self.jacobian == "published":
-            raise ValueError('place = "null-space" goes with jacobian = "exact"')
+            yield 'place = "null-space" goes with jacobian = "exact"'
         if self.near > self.far:
-            raise ValueError(f"near = {self.near} m is beyond far = {self.far} m")
-        return self
+            yield f"near = {self.near} m is beyond far = {self.far} m"
 
     @property
     def thresholds(self) -> dict[str, float]:
@@ -255,12 +251,10 @@ class SeparationSection(BarrierSection, _Avoiding):
     """With control.stack = "smooth": width outside the clearance within which rows act."""
     obstacles: Obstacles = ()
 
-    @model_validator(mode="after")
-    def _areas_nested(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
+        yield from super()._wrong()
         if self.distance >= self.influence:
-            raise ValueError(f"distance = {self.distance} m is not below influence = "
-                             f"{self.influence} m")
-        return self
+            yield f"distance = {self.distance} m is not below influence = {self.influence} m"
 
     @property
     def thresholds(self) -> dict[str, float]:

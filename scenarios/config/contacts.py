@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from scenarios.config.sections import (
     Finite,
@@ -52,13 +53,11 @@ class ContactSection(Section):
     slides: Flag = False
     """Whether a point may move along its surface."""
 
-    @model_validator(mode="after")
-    def _is_a_sole_or_a_point(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         if (self.x is None) != (self.y is None):
-            raise ValueError("a sole has x and y, a point neither")
+            yield "a sole has x and y, a point neither"
         if self.x is not None and self.slides:
-            raise ValueError("only a point slides")
-        return self
+            yield "only a point slides"
 
 
 class ForcesSection(Section):

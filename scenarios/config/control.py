@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from scenarios.config.sections import Count, Flag, NotNegative, Section, Span, Time, Unit
 
@@ -95,23 +96,17 @@ class ControlSection(Section):
     transition_time: Span = 0.02
     """How long "blend" takes."""
 
-    @model_validator(mode="after")
-    def _makes_a_resolver(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         from solvers import make, names, variants
 
         for name in {*names(), *variants()} & self.options.keys():
             table = self.options[name]
             make(name, **(table if isinstance(table, dict) else {name: table}))
         make(self.resolver, **self.settings())
-        return self
-
-    @model_validator(mode="after")
-    def _can_be_kept(self) -> Self:
         if self.ticks > MOST_TICKS:
-            raise ValueError(f"duration = {self.duration:g} s at period = {self.period:g} s is "
-                             f"{self.duration / self.period:.3g} ticks; a recording keeps at most "
-                             f"{MOST_TICKS:,}")
-        return self
+            yield (f"duration = {self.duration:g} s at period = {self.period:g} s is "
+                   f"{self.duration / self.period:.3g} ticks; a recording keeps at most "
+                   f"{MOST_TICKS:,}")
 
     @property
     def ticks(self) -> int:

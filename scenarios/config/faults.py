@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from scenarios.config.robot import ControlPointSection
 from scenarios.config.sections import Length, Point, Section, Span, Time
@@ -39,17 +40,15 @@ class FaultSection(Section):
     radius: Length | None = None
     """Radius of the sphere."""
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         of_kind = {"nan_position": {"joint"}, "nan_velocity": {"joint"}, "nan_distance": {"point"},
                    "status": {"status"}, "overrun": {"takes"},
                    "obstacle": {"centre", "place", "radius"}}.get(self.kind, set())
         for key in ("joint", "point", "status", "takes", "centre", "place", "radius"):
             if getattr(self, key) is not None and key not in of_kind:
-                raise ValueError(f"a fault of kind {self.kind!r} takes no {key}")
+                yield f"a fault of kind {self.kind!r} takes no {key}"
         for key in of_kind & {"status", "takes", "radius"}:
             if getattr(self, key) is None:
-                raise ValueError(f"a fault of kind {self.kind!r} needs {key}")
+                yield f"a fault of kind {self.kind!r} needs {key}"
         if self.kind == "obstacle" and (self.centre is None) == (self.place is None):
-            raise ValueError("give either a centre or a place")
-        return self
+            yield "give either a centre or a place"

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
-
-from pydantic import model_validator
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
 
 from hierarchy.plugins import Group, register
 from scenarios.config.own import OwnSection, PartSection
@@ -30,12 +29,10 @@ class MeasurementSection(Section):
     filter_time: Time = 0.0
     """Time constant of that filter; 0 for none."""
 
-    @model_validator(mode="after")
-    def _of_its_kind(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         key = "velocity_noise" if self.velocity == "differenced" else "filter_time"
         if getattr(self, key) > 0.0:
-            raise ValueError(f"velocity = {self.velocity!r} takes no {key}")
-        return self
+            yield f"velocity = {self.velocity!r} takes no {key}"
 
     @property
     def ideal(self) -> bool:
@@ -49,6 +46,8 @@ class AnyPlant(PartSection):
 
     follows: ClassVar[bool] = False  # whether its state is what its commands add up to
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration", "torque")
+    kind: str
+    """Which kind it is."""
     feedback: Literal["measured", "commanded"] = "measured"
     """"measured": the controller receives the measured joints. "commanded": it receives its own
     commands, integrated to a joint position reference, as through FRI."""

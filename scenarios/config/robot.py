@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Self
+from collections.abc import Iterator
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hierarchy.robots.table import Base
 from scenarios.config.sections import (
@@ -37,11 +37,9 @@ class RobotPointSection(Section):
     offset: Point = (0.0, 0.0, 0.0)
     """Where the point is in that frame."""
 
-    @model_validator(mode="after")
-    def _is_somewhere(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         if (self.joint is None) == (self.frame is None):
-            raise ValueError("give either a joint or a frame")
-        return self
+            yield "give either a joint or a frame"
 
 
 class CapsuleSection(Section):
@@ -107,8 +105,6 @@ class StartSection(Section):
     allow_outside_limits: Flag = False
     """Whether joints may start beyond their limits, which is an error otherwise."""
 
-    @model_validator(mode="after")
-    def _is_one_posture(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         if self.q is not None and self.keyframe is not None:
-            raise ValueError("give either q or a keyframe")
-        return self
+            yield "give either q or a keyframe"

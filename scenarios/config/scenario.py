@@ -6,11 +6,10 @@ import dataclasses
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain
 from typing import TYPE_CHECKING, Any, Self
 
 import tomli_w
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 import scenarios.config.kinds  # noqa: F401, registers them
 from hierarchy import plugins
@@ -100,13 +99,12 @@ class Scenario(Section):
         plugins.require(modules or ())  # before the sections below, which have their kinds
         return modules
 
-    @model_validator(mode="after")
-    def _goes_together(self) -> Self:
-        for reason in chain(self._has_the_level_of_its_forces(), self._sections_go_together(),
-                            self._fits_its_stack(), self._lists_tasks_apart(),
-                            self._faults_have_a_sensor()):
-            raise ValueError(reason)
-        return self
+    def _wrong(self) -> Iterator[str]:
+        yield from self._has_the_level_of_its_forces()
+        yield from self._sections_go_together()
+        yield from self._fits_its_stack()
+        yield from self._lists_tasks_apart()
+        yield from self._faults_have_a_sensor()
 
     def _has_the_level_of_its_forces(self) -> Iterator[str]:
         torque = self.control.level == "torque"

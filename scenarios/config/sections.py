@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, get_args
+from typing import Annotated, Any, ClassVar, Self, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError, core_schema
 
 from hierarchy import plugins
@@ -78,6 +79,16 @@ class Section(BaseModel):
     tag: ClassVar[str] = "kind"
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False,
                               serialize_by_alias=True)
+
+    def _wrong(self) -> Iterator[str]:
+        """Yield what is wrong with the values of the section together."""
+        yield from ()
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> Self:
+        for reason in self._wrong():
+            raise ValueError(reason)
+        return self
 
 
 @dataclass(frozen=True)

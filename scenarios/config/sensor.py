@@ -16,6 +16,8 @@ class AnySensor(PartSection):
 
     has_frames: ClassVar[bool] = True    # that a fault may leave out
     is_recorded: ClassVar[bool] = False  # whether it shows no obstacle of the scenario
+    kind: str
+    """Which kind it is."""
     if TYPE_CHECKING:
         foot: ClassVar[float]
 

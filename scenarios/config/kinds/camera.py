@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import inf
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hierarchy.plugins import register
 from hierarchy.problem import Array
@@ -84,11 +85,9 @@ class DepthErrors(Section):
     outlier_size: Count = 2
     """Largest number of pixels from the middle of that square to its side."""
 
-    @model_validator(mode="after")
-    def _sees_something(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         if self.near >= self.far:
-            raise ValueError(f"near = {self.near} m must be below far = {self.far} m")
-        return self
+            yield f"near = {self.near} m must be below far = {self.far} m"
 
     @classmethod
     def none(cls, near: float = 0.0, far: float = inf) -> DepthErrors:
