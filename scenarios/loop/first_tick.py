@@ -80,9 +80,9 @@ def _of_contacts(controller: Controller) -> Iterator[str]:
     if cell.contacts is None:
         return
     yield from doubts(cell.scenario, cell.contacts)
-    if cell.limits is None or not controller.answered:
+    if cell.tasks.limits is None or not controller.answered:
         return
-    robot, limit = cell.robot, cell.limits.limits.acceleration
+    robot, limit = cell.robot, cell.tasks.limits.limits.acceleration
     asked = controller.resolution.x[robot.actuated:robot.n]
     i = int((np.abs(asked) / limit).argmax())
     if abs(asked[i]) > _FAR_BEYOND * limit[i]:

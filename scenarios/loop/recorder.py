@@ -76,7 +76,7 @@ class Recorder:
         self._log = _Log(rows(), rows(robot.nq), rows(robot.n),
                          rows(robot.n + len(controller.sent)), rows(3), rows(), rows(points),
                          np.full((ticks, len(_CHOICES)), -1, dtype=np.int16), rows(len(_TIMES)))
-        self._desired = rows(3, 3, count=ticks if cell.position else 0)
+        self._desired = rows(3, 3, count=ticks if cell.tasks.position else 0)
         self._answers = rows(len(controller.resolution.x), count=ticks if cell.contacts else 0)
         self._extra = {name: np.empty((ticks, *value.shape), value.dtype)
                        for name, value in cell.plant.extra.items()}
@@ -135,8 +135,8 @@ class Recorder:
         That is not part of the tick's time: a controller does not wait for it.
         """
         controller, cell, k = self._controller, self._cell, self.ticks - 1
-        if cell.position is not None:
-            cell.position.path.write(cell.state.t, self._desired[k])
+        if cell.tasks.position is not None:
+            cell.tasks.position.path.write(cell.state.t, self._desired[k])
         self._truth.look(k, controller)
         if controller.answered:
             for audit in self._audits:
@@ -173,15 +173,15 @@ class Recorder:
                    "command": log.given[:, n:].copy(), "ee_position": log.ee_position,
                    "order": order, "status": status, "iterations": iterations,
                    **dict(zip(_TIMES, log.times.T.copy(), strict=True))}
-        if cell.position is not None:
+        if cell.tasks.position is not None:
             desired = self._desired[rows, 0].copy()
             signals |= {"desired_position": desired,
                         "position_error": desired - log.ee_position}
-        if cell.pointing is not None:
+        if cell.tasks.pointing is not None:
             asked = np.array(["pointing" in names for names in self._orders])
             signals |= {"pointing_error": log.pointing_error, "pointing_active": asked[order]}
-        if cell.listed:
-            signals |= listed.signals(cell.robot, cell.listed, log.t, log.q, log.v)
+        if cell.tasks.listed:
+            signals |= listed.signals(cell.robot, cell.tasks.listed, log.t, log.q, log.v)
         if cell.contacts is not None:
             answers = self._answers[rows].copy()
             signals |= {"planned_acceleration": answers[:, :n],

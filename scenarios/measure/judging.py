@@ -41,7 +41,7 @@ def judged(cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> Judged:
     found = Judged(np.zeros(levels, np.int8), np.zeros(levels), np.zeros(n, np.int8))
     lower = h.lower if cell.activation is None else cell.activation.demanded(h)
     _judge_levels(h.A, lower, h.upper, h.offsets, x, near, found.fate, found.violation)
-    if (limits := cell.limits) is not None:
+    if (limits := cell.tasks.limits) is not None:
         if limits.name in h.names:
             rows = slice(*h.offsets[h.names.index(limits.name):][:2])
             box = h.lower[rows], h.upper[rows]
@@ -131,7 +131,7 @@ class Rows:
                 last = self._carried[-1]
                 self._carried.append(
                     last if np.isnan(x[0]) else cell.contacts.carried(t, x, last))
-        self._cone_error = (cell.pointing.follow_cone_error(cell.state) if cell.pointing
+        self._cone_error = (cell.tasks.pointing.follow_cone_error(cell.state) if cell.tasks.pointing
                             else lambda: nan)
         if "ee_distance" in recording:
             self._distance = np.column_stack([recording["control_point_distance"],
