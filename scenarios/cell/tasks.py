@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import inf
 from typing import NamedTuple
 
-from hierarchy import HierarchyError, Robot, Task
+from hierarchy import Robot, Task
 from hierarchy.avoidance import SurveillanceAreas
 from hierarchy.contacts import Contacts
 from hierarchy.task import check_period
@@ -84,10 +84,8 @@ def _check_there_are_any(scenario: Scenario, robot: Robot) -> None:
 
 def _first(scenario: Scenario, at: References) -> tuple[JointLimits | None, list[Task]]:
     """Return the joint limits, and all tasks at the top: mechanism, physics, limits."""
-    try:
+    with naming("limits"):
         limits, first = _limits(scenario, at.robot)
-    except HierarchyError as error:
-        raise ScenarioError(f"limits: {error}") from error
     bounded = scenario.limits is not None and scenario.limits.place == "bounds"
     if at.contacts is not None:
         physics = _physics(scenario, at.contacts)

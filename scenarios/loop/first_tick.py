@@ -11,7 +11,7 @@ import numpy as np
 from hierarchy.tasks.self_separation import SelfSeparation
 from hierarchy.words import listed
 from scenarios.cell.build import Cell
-from scenarios.cell.contacts import doubts
+from scenarios.cell.robot import doubts
 from scenarios.config import Scenario
 from scenarios.config.references import inseparable_pairs
 from scenarios.config.validation import doubtful_units
