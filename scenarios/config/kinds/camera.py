@@ -34,8 +34,9 @@ WIDEST = 3.5  # [standard deviations] at which noise is clipped, so that it is b
 
 
 class ImageSection(AnySensor):
-    """What sources of depth images have; see scenarios.cell.sensors.depth_space."""
+    """What sources of depth images have; see scenarios.cell.sensors.depth_sensor."""
 
+    made_by: ClassVar[str] = "scenarios.cell.sensors.depth_sensor:depth_sensor"
     latency: Time = 0.0
     """Time from taking a frame until it is available."""
     stale_after: Time = 0.2
@@ -130,7 +131,6 @@ class DepthErrors(Section):
 class CameraSection(DepthErrors, ImageSection):
     """A simulated depth camera that sees obstacles and robot; see scenarios.cell.sensors.camera."""
 
-    made_by: ClassVar[str] = "scenarios.cell.sensors.depth_sensor:camera"
     kind: Literal["camera"]
     width: Pixels = 640
     """Columns of the image."""
@@ -174,7 +174,6 @@ class FramesSection(ImageSection):
     See scenarios.cell.sensors.frames.
     """
 
-    made_by: ClassVar[str] = "scenarios.cell.sensors.depth_sensor:frames"
     is_recorded: ClassVar[bool] = True
     kind: Literal["frames"]
     folder: str
