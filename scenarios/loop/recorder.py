@@ -60,7 +60,8 @@ class Recorder:
     """Memory for a whole run, filled row by row.
 
     `ticks` is the number of rows written so far; `facts` are those of the first controller.
-    `audits` look at every tick that the controller has answered.
+    `audits` examine every tick that the controller has answered; in others their signals are NaN,
+    -1 or false.
     """
 
     def __init__(self, controller: Controller, ticks: int, audits: Sequence[Audit] = ()) -> None:
@@ -82,7 +83,9 @@ class Recorder:
                        for name, value in cell.plant.extra.items()}
         self._weights = np.empty(ticks if controller.blend else 0)
         self._events: list[Event] = []
-        self._truth, self._audits = Truth(ticks, cell), (ActiveSets(ticks), *audits)
+        self._always: tuple[Audit, ...] = (Truth(cell),)
+        self._audits: tuple[Audit, ...] = (*self._always, ActiveSets(), *audits)
+        self._audited: dict[str, NDArray[Any]] = {}
         self.facts = facts_of(cell.scenario, robot)
         self.follow(controller)
 
@@ -137,17 +140,23 @@ class Recorder:
         controller, cell, k = self._controller, self._cell, self.ticks - 1
         if cell.tasks.position is not None:
             cell.tasks.position.path.write(cell.state.t, self._desired[k])
-        self._truth.look(k, controller)
-        if controller.answered:
-            for audit in self._audits:
-                audit.look(k, controller)
+        for audit in self._audits if controller.answered else self._always:
+            for name, value in audit(k, controller).items():
+                self._rows_of(name, np.asarray(value))[k] = value
+
+    def _rows_of(self, name: str, value: NDArray[Any]) -> NDArray[Any]:
+        """Return the rows of an audit's signal, which begin when it is first given."""
+        if name not in self._audited:
+            nothing = {"f": np.nan, "i": -1, "b": False}[value.dtype.kind]
+            self._audited[name] = np.full((len(self._log.t), *value.shape), nothing, value.dtype)
+        return self._audited[name]
 
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return the run as recorded so far."""
         recording = replace(self.part(slice(self.ticks), scenario), fault=fault,
                             events=tuple(self._events))
-        for audit in (self._truth, *self._audits):
-            recording.signals.update(audit.signals(recording))
+        recording.signals.update((name, rows[:self.ticks].copy())
+                                 for name, rows in self._audited.items())
         return recording
 
     def part(self, rows: slice | NDArray[np.int64], scenario: Scenario) -> Recording:

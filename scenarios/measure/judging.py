@@ -54,7 +54,7 @@ def judged(cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> Judged:
 
 @final
 class Fates:
-    """Collects the fates of the tasks called `names` tick by tick; an Audit of a run."""
+    """Collects the fates of the tasks called `names` tick by tick; `look` is an Audit of a run."""
 
     def __init__(self, names: tuple[str, ...], ticks: int, joints: int) -> None:
         self._names = names
@@ -63,10 +63,11 @@ class Fates:
         self._saturated = np.zeros((ticks, joints), np.int8)
         self._columns: dict[tuple[str, ...], NDArray[np.int64]] = {}
 
-    def look(self, tick: int, controller: Any) -> None:
+    def look(self, tick: int, controller: Any) -> dict[str, Array]:
         """Judge the command of the tick that a Controller has just answered."""
         self.judge(tick, controller.cell, controller.hierarchy, controller.meant,
                    controller.resolver.accuracy)
+        return {}
 
     def judge(self, tick: int, cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> None:
         """Judge the command x (n,) of a tick; see `judged`."""
