@@ -22,9 +22,6 @@ class Unit:
 
     name: str
 
-    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
-        return {**handler(core), "unit": self.name}
-
 
 # Strict: true is not 1.0, and "5" is not 5. A whole number may be given for a float.
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
