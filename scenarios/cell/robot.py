@@ -22,7 +22,7 @@ from scenarios.cell.plants.ground import BALL
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.contacts import ContactSection
 from scenarios.config.errors import naming
-from scenarios.config.kinds.torque import TorqueSection
+from scenarios.config.plant import TorqueSection
 from scenarios.config.references import References
 from scenarios.config.robot import RobotPointSection, RobotSection, StartSection
 from solvers import make

@@ -16,7 +16,7 @@ from hierarchy.robots import DHTable
 from hierarchy.robots.table import Base
 from scenarios.cell.robot import contacts_of, sensed_points
 from scenarios.config import Scenario
-from scenarios.config.kinds.torque import TorqueSection
+from scenarios.config.plant import TorqueSection
 from scenarios.recording.tree import (
     Joint,
     Matrix,

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from hierarchy.problem import Array
-from scenarios.config.kinds.torque import PushSection
+from scenarios.config.plant import PushSection
 from scenarios.recording.facts import ContactPoint, Facts, RobotFacts
 
 if TYPE_CHECKING:

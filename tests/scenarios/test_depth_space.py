@@ -18,7 +18,7 @@ from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage, _caps
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
 from scenarios.config import ScenarioError
-from scenarios.config.kinds.camera import CameraSection, DepthErrors, ImageSection
+from scenarios.config.sensor import CameraSection, DepthErrors, ImageSection
 from scenarios.draw.figures.depth import depth_figure
 from scenarios.measure.judging import depth_view
 

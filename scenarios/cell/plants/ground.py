@@ -13,7 +13,7 @@ from hierarchy.contacts import Contact, Contacts
 from hierarchy.problem import Array
 from scenarios.cell.plants.mjcf import Element, add, add_body, axes, begin
 from scenarios.config import ScenarioError
-from scenarios.config.kinds.torque import TorqueSection
+from scenarios.config.plant import TorqueSection
 
 _LEAST = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
 _SKIN = 0.3             # friction of a link on another

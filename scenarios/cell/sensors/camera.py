@@ -18,7 +18,7 @@ from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.rendering import draw_scene
-from scenarios.config.kinds.camera import WIDEST, CameraSection, DepthErrors
+from scenarios.config.sensor import WIDEST, CameraSection, DepthErrors
 
 Image = NDArray[np.float32]
 _EDGE = 0.05       # [m] depth difference between two pixels at an edge
