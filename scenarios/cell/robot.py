@@ -18,13 +18,12 @@ from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.mechanism import Mechanism, model_rows
-from scenarios.cell.plants.ground import BALL
+from scenarios.cell.plants.mjcf import BALL
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.contacts import ContactSection
 from scenarios.config.errors import naming
 from scenarios.config.plant import TorqueSection
 from scenarios.config.references import References
-from scenarios.config.robot import RobotPointSection, RobotSection, StartSection
+from scenarios.config.robot import ContactSection, RobotPointSection, RobotSection, StartSection
 from solvers import make
 
 _REACHED = 1e-6      # [m]

@@ -83,7 +83,7 @@ class AnyPlant(PartSection):
 class KinematicSection(AnyPlant):
     """A robot that follows its commands exactly."""
 
-    made_by: ClassVar[str] = "scenarios.cell.plants.kinematic:KinematicArm"
+    made_by: ClassVar[str] = "scenarios.cell.plants.plant:KinematicArm"
     follows: ClassVar[bool] = True
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
     kind: Literal["kinematic"] = "kinematic"

@@ -16,12 +16,10 @@ from hierarchy import plugins
 from hierarchy.errors import expect
 from scenarios.config.avoidance import AvoidanceKind
 from scenarios.config.changes import Tag, change_all, parse_changes, without_none
-from scenarios.config.contacts import ContactSection, ForcesSection
-from scenarios.config.control import ControlSection
+from scenarios.config.control import ControlSection, FaultSection
 from scenarios.config.distributions import Parameters
-from scenarios.config.faults import FaultSection
 from scenarios.config.plant import KinematicSection, PlantKind
-from scenarios.config.robot import RobotSection, StartSection
+from scenarios.config.robot import ContactSection, ForcesSection, RobotSection, StartSection
 from scenarios.config.sections import Name, Section
 from scenarios.config.sensor import ExactSection, SensorKind
 from scenarios.config.stacks import RIVALS, unfit

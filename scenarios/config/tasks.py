@@ -60,10 +60,10 @@ class Made(PartSection):
         """Whether its rows are inequalities."""
         return False
 
-    def make(self, at: References) -> Task:
-        """Return the task: what `made_by` makes of the keys, of what is `asked`, and the title."""
+    def make(self, at: References, **more: Any) -> Task:
+        """Return the task: what `made_by` makes of the keys, of what is `asked`, and of `more`."""
         task: Task = self.made(at.robot, state=at.start, contacts=at.contacts, name=self.title,
-                               **self.asked(at))
+                               **{**self.asked(at), **more})
         return task
 
     def asked(self, at: References) -> dict[str, Any]:
@@ -130,11 +130,11 @@ class PositionTask(AlongSection):
     frame: ClassVar[str | None]
     axes: ClassVar[str]
 
-    def make(self, at: References) -> Task:
+    def make(self, at: References, **more: Any) -> Task:
         """Return the task, in its axes."""
         from hierarchy.tasks import Along, Position
 
-        task = super().make(at)
+        task = super().make(at, **more)
         assert isinstance(task, Position)
         return task if self.axes == "xyz" else Along(
             task, np.eye(3)[["xyz".index(axis) for axis in self.axes]].tolist(), self.title)
@@ -304,11 +304,11 @@ class OwnTask(Listed, OwnSection):
         """Whether its rows are inequalities, as the plugin's class says with `kind`."""
         return str(getattr(type(self).maker, "kind", "equality")) == "inequality"
 
-    def make(self, at: References) -> Task:
+    def make(self, at: References, **more: Any) -> Task:
         """Return the task; raises ScenarioError for whatever goes wrong in the user's code."""
         from hierarchy import Task
 
-        task = super().make(at)
+        task = super().make(at, **more)
         if not isinstance(task, Task):
             raise ScenarioError(f"the plugin made {brief(task)}, not a Task")
         if task.name != self.title:

@@ -14,8 +14,7 @@ from hierarchy.contacts import Contacts
 from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Array
 from hierarchy.tasks.mechanism import Mechanism
-from scenarios.cell.plants.ground import on_floor
-from scenarios.cell.plants.mjcf import Stops
+from scenarios.cell.plants.mjcf import Stops, on_floor
 from scenarios.cell.plants.physics import mujoco_module
 from scenarios.cell.plants.plant import whole_periods
 from scenarios.cell.plants.touch import Touch

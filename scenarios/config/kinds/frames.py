@@ -163,9 +163,9 @@ class ListedManipulability(Listed, TaskSection):
         """Whether its rows are inequalities."""
         return self.rows == "inequality"
 
-    def make(self, at: References) -> Task:
+    def make(self, at: References, **more: Any) -> Task:
         """Return the task."""
-        task = super().make(at)
+        task = super().make(at, **more)
         task.jacobian(at.start)  # refuses a robot that it is not for
         return task
 
