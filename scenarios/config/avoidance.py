@@ -108,24 +108,17 @@ def _varied(obstacle: ObstacleSection, variation: VariationSection,
     path = obstacle.path
     if not isinstance(path, WaypointsSection):
         return obstacle
-    times, points = _moved(np.array(path.times), np.array(path.points), variation.spread,
-                          variation.timing, np.random.default_rng((variation.seed, number)))
-    waypoints = {"times": tuple(times.tolist()), "points": tuple(map(tuple, points.tolist()))}
-    return obstacle.model_copy(update={"path": path.model_copy(update=waypoints)})
-
-
-def _moved(times: Array, points: Array, spread: float, timing: float,
-          random: np.random.Generator) -> tuple[Array, Array]:
-    """Return the times (W,) [s] and points (W, 3) [m] of randomly moved waypoints.
-
-    spread : largest displacement [m] of a point. timing : largest shift in time, as a share of half
-        the interval to its neighbours. The path still rests where it rested.
-    """
-    away = points + spread * _in_ball(random, len(points))
+    random = np.random.default_rng((variation.seed, number))
+    times, points = np.array(path.times), np.array(path.points)
+    away = points + variation.spread * _in_ball(random, len(points))
     for i in range(1, len(points)):
-        if (points[i] == points[i - 1]).all():
+        if (points[i] == points[i - 1]).all():  # it rests where it rested
             away[i] = away[i - 1]
-    return _shifted(times, timing, random), away
+    half = np.diff(times) / 2  # times still increase; the first is unchanged
+    room = np.concatenate([[0.0], np.minimum(half[:-1], half[1:]), half[-1:]])
+    times = times + variation.timing * room * random.uniform(-1.0, 1.0, len(times))
+    waypoints = {"times": tuple(times.tolist()), "points": tuple(map(tuple, away.tolist()))}
+    return obstacle.model_copy(update={"path": path.model_copy(update=waypoints)})
 
 
 def _in_ball(random: np.random.Generator, count: int) -> Array:
@@ -133,13 +126,6 @@ def _in_ball(random: np.random.Generator, count: int) -> Array:
     points = random.standard_normal((count, 3))
     radii = random.random((count, 1)) ** (1 / 3)
     return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True) * radii)
-
-
-def _shifted(times: Array, timing: float, random: np.random.Generator) -> Array:
-    """Return shifted times, still increasing; the first is unchanged."""
-    half = np.diff(times) / 2
-    room = np.concatenate([[0.0], np.minimum(half[:-1], half[1:]), half[-1:]])
-    return np.asarray(times + timing * room * random.uniform(-1.0, 1.0, len(times)))
 
 
 class _Avoiding(Section):

@@ -57,8 +57,8 @@ class Made(PartSection):
 
     @property
     def one_sided(self) -> bool:
-        """Whether its rows are inequalities."""
-        return False
+        """Whether its rows are inequalities, as the key or the constant `rows` says."""
+        return getattr(self, "rows", "equality") == "inequality"
 
     def make(self, at: References, **more: Any) -> Task:
         """Return the task: what `made_by` makes of the keys, of what is `asked`, and of `more`."""
@@ -167,11 +167,6 @@ class PointingTask(TaskSection):
     gain: Gain = 5.0
     made_by: ClassVar[str] = "hierarchy.tasks:Pointing"
     frame: ClassVar[str | None]
-
-    @property
-    def one_sided(self) -> bool:
-        """Whether its rows are inequalities."""
-        return self.rows == "inequality"
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return frame, half angle and kind."""

@@ -72,15 +72,14 @@ class ActiveSets:
 
     def number(self, h: Hierarchy, resolution: Resolution) -> int:
         """Return the number of the set of an answer."""
-        rows: Callable[[Hierarchy, NDArray[np.int8]], Iterator[Row]] = _rows
-        states = resolution.active
+        bounds, states = False, resolution.active
         if isinstance(resolution, SaturatedResolution):
-            rows, states = _bounds, resolution.saturated
+            bounds, states = True, resolution.saturated
         if states is None or resolution.status is not Status.SOLVED:
             return -1
-        key = h.names, rows, states.tobytes()
+        key = h.names, bounds, states.tobytes()
         if key not in self._seen:
-            acting = frozenset(rows(h, states))
+            acting = frozenset(_acting(h, states, bounds))
             self._seen[key] = self._numbers.setdefault(acting, len(self._numbers))
         return self._seen[key]
 
@@ -119,15 +118,9 @@ class Strictness:
         return {"moved_by_lower": float(np.linalg.norm(moved)) * share}
 
 
-def _rows(h: Hierarchy, active: NDArray[np.int8]) -> Iterator[Row]:
-    """Yield the acting inequality rows; `active` (m,) as in a Resolution."""
-    for i in np.flatnonzero((active != FREE) & (active != EQUAL)).tolist():
-        level = int((h.offsets[1:] <= i).sum())
-        yield h.names[level], i - int(h.offsets[level]), int(active[i])
-
-
-def _bounds(h: Hierarchy, saturated: NDArray[np.int8]) -> Iterator[Row]:
-    """Yield the saturated unknowns, as rows of the first level that has any."""
-    bounds = h.names[int(np.argmax(h.sizes > 0))]
-    for i in np.flatnonzero((saturated != FREE) & (saturated != EQUAL)).tolist():
-        yield bounds, i, int(saturated[i])
+def _acting(h: Hierarchy, states: NDArray[np.int8], bounds: bool) -> Iterator[Row]:
+    """Yield the rows of h that act; for `bounds` unknowns, as rows of the first level with any."""
+    first = int(np.argmax(h.sizes > 0))
+    for i in np.flatnonzero((states != FREE) & (states != EQUAL)).tolist():
+        level = first if bounds else int((h.offsets[1:] <= i).sum())
+        yield h.names[level], i if bounds else i - int(h.offsets[level]), int(states[i])

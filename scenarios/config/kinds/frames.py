@@ -158,11 +158,6 @@ class ListedManipulability(Listed, TaskSection):
     damping: Gain = 10.0
     gain: Gain = 5.0
 
-    @property
-    def one_sided(self) -> bool:
-        """Whether its rows are inequalities."""
-        return self.rows == "inequality"
-
     def make(self, at: References, **more: Any) -> Task:
         """Return the task."""
         task = super().make(at, **more)

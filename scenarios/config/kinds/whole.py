@@ -10,7 +10,7 @@ from hierarchy.paths import Still
 from hierarchy.plugins import register
 from scenarios.config.avoidance import BarrierSection
 from scenarios.config.sections import Finite, Gain, JointPosition, Stiffness
-from scenarios.config.tasks import AlongSection, Listed, PostureTask, TaskSection
+from scenarios.config.tasks import AlongSection, Listed, PostureTask, Rows, TaskSection
 
 if TYPE_CHECKING:
     from scenarios.config.references import References
@@ -76,11 +76,7 @@ class _Apart(Listed):
     """A task with one-sided rows between bodies."""
 
     unit: ClassVar[str] = "m"
-
-    @property
-    def one_sided(self) -> bool:
-        """Whether its rows are inequalities."""
-        return True
+    rows: ClassVar[Rows] = "inequality"
 
 
 @register("tasks", "self-collision", shipped=True)
