@@ -21,13 +21,13 @@ class PlainTick:
     """Ticks in numpy; `log` collects the signals of a recording."""
 
     def __init__(self, scenario: Scenario, cell: Cell) -> None:
-        if not (cell.sensor and cell.areas and cell.position and cell.pointing):
+        if not (cell.sensor and cell.tasks.areas and cell.tasks.position and cell.tasks.pointing):
             raise HierarchyError("the plain tick needs all tasks of `ellipse`")
-        self.cell, self.areas = cell, cell.areas
-        self.position, self.pointing = cell.position, cell.pointing
+        self.cell, self.areas = cell, cell.tasks.areas
+        self.position, self.pointing = cell.tasks.position, cell.tasks.pointing
         self.period = scenario.control.period
         self.obstacles = cell.sensor.obstacles.centres
-        self.frame = cell.position.frame
+        self.frame = cell.tasks.position.frame
         self.log: list[tuple[object, ...]] = []
 
     def step(self, t: float, q: Array, v: Array) -> Array:

@@ -148,12 +148,14 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
 
     robot_check.check_known(file)
     if robot_check.is_robot(file):
-        found = robot_check.look_at(file, changes or [])
-        told = robot_check
+        robot = robot_check.look_at(file, changes or [])
+        data, text = robot_check.as_plain_data(*robot), robot_check.say(*robot)
     else:
         scenario = opt.loaded(file, changes)
-        found, told = (scenario, first_tick(scenario)), scenario_check
-    print_json(told.as_plain_data(*found)) if as_json else print(told.say(*found))
+        found = first_tick(scenario)
+        data, text = scenario_check.as_plain_data(scenario, found), scenario_check.say(
+            scenario, found)
+    print_json(data) if as_json else print(text)
 
 
 @app.command("help")

@@ -25,7 +25,7 @@ _SAME = 1e-9  # [m] of distances that are those recorded
 
 @final
 class Fates:
-    """Collects the fates of the tasks called `names` tick by tick; an Audit of a run."""
+    """Collects the fates of the tasks called `names` tick by tick; `look` is an Audit of a run."""
 
     def __init__(self, names: tuple[str, ...], ticks: int, joints: int) -> None:
         self._names = names
@@ -34,10 +34,11 @@ class Fates:
         self._saturated = np.zeros((ticks, joints), np.int8)
         self._columns: dict[tuple[str, ...], NDArray[np.int64]] = {}
 
-    def look(self, tick: int, controller: Any) -> None:
+    def look(self, tick: int, controller: Any) -> dict[str, Array]:
         """Judge the command of the tick that a Controller has just answered."""
         self.judge(tick, controller.cell, controller.hierarchy, controller.meant,
                    controller.resolver.accuracy)
+        return {}
 
     def judge(self, tick: int, cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> None:
         """Judge a command x (n,) by the rows of its tick; `accuracy` is the resolver's.
@@ -53,7 +54,7 @@ class Fates:
         lower = h.lower if cell.activation is None else cell.activation.demanded(h)
         _judge_levels(h.A, lower, h.upper, h.offsets, x, near, fate, violation)
         self._fate[tick, columns], self._violation[tick, columns] = fate, violation
-        if (limits := cell.limits) is not None:
+        if (limits := cell.tasks.limits) is not None:
             if limits.name in h.names:
                 rows = slice(*h.offsets[h.names.index(limits.name):][:2])
                 box = h.lower[rows], h.upper[rows]
@@ -120,7 +121,7 @@ class Rows:
                 last = self._carried[-1]
                 self._carried.append(
                     last if np.isnan(x[0]) else cell.contacts.carried(t, x, last))
-        self._cone_error = (cell.pointing.follow_cone_error(cell.state) if cell.pointing
+        self._cone_error = (cell.tasks.pointing.follow_cone_error(cell.state) if cell.tasks.pointing
                             else lambda: nan)
         if "ee_distance" in recording:
             self._distance = np.column_stack([recording["control_point_distance"],

@@ -11,8 +11,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from scenarios.cell.build import Cell, build
-from scenarios.cell.stacked import stack_resolver
+from scenarios.cell.build import Cell, build, stack_resolver
 from scenarios.measure.causes import Cause, Solve, Tick, causes
 from scenarios.measure.judging import Rows
 from scenarios.measure.safety import STEPS

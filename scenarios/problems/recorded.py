@@ -18,7 +18,6 @@ from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.sampling import changed, drawn
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
-from scenarios.recording.recording import Recording
 from solvers import Status, certify, make
 from solvers.qp.backends import BACKENDS, installed
 
@@ -138,17 +137,15 @@ def window(scenario: Scenario, first: int, count: int) -> list[Hierarchy]:
 
 @final
 class _Window:
-    """Keeps the problems of all ticks from one on; an Audit."""
+    """Keeps the problems of all ticks from one on; an Audit without signals."""
 
     def __init__(self, first: int) -> None:
         self.first = first
         self.problems: list[Hierarchy] = []
 
-    def look(self, tick: int, controller: Controller) -> None:
+    def __call__(self, tick: int, controller: Controller) -> Mapping[str, Any]:
         if tick >= self.first:
             self.problems.append(controller.hierarchy.copy())
-
-    def signals(self, recording: Recording) -> Mapping[str, Any]:
         return {}
 
 

@@ -17,10 +17,9 @@ from hierarchy.avoidance import Capsule
 from hierarchy.problem import Array
 from hierarchy.robots import DHTable
 from hierarchy.robots.table import Base
-from scenarios.cell.contacts import contacts_of
-from scenarios.cell.robot import sensed_points
+from scenarios.cell.robot import contacts_of, sensed_points
 from scenarios.config import Scenario
-from scenarios.config.kinds.torque import TorqueSection
+from scenarios.config.plant import TorqueSection
 from solvers.resolver import Handles
 
 Vector = tuple[float, float, float]

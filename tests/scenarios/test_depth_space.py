@@ -14,12 +14,11 @@ from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
-from scenarios.cell.sensors.depth_sensor import _capsules
-from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
+from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage, _capsules
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
 from scenarios.config import ScenarioError
-from scenarios.config.kinds.camera import CameraSection, DepthErrors, ImageSection
+from scenarios.config.sensor import CameraSection, DepthErrors, ImageSection
 from scenarios.draw.figures.depth import depth_figure
 from scenarios.measure.judging import depth_view
 

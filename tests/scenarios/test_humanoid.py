@@ -107,7 +107,7 @@ def test_all_levels_above_the_posture_are_met(standing):
 def test_what_is_recorded_of_a_task_is_its_error(standing):
     cell, k = build(standing.scenario), 700
     cell.state.move(standing["t"][k], standing["q"][k], standing["v"][k])
-    for task in cell.listed:
+    for task in cell.tasks.listed:
         np.testing.assert_allclose(standing[f"task_error_{task.name.replace(' ', '_')}"][k],
                                    task.error(cell.state), atol=1e-15)
 

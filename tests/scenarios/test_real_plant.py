@@ -8,7 +8,7 @@ import pytest
 from hierarchy import Robot
 from hierarchy.contacts import Contacts
 from scenarios.cell.plants.torque import TorqueRobot
-from scenarios.config.kinds.torque import TorqueSection
+from scenarios.config.plant import TorqueSection
 from scenarios.measure.forces import standing
 
 pytest.importorskip("mujoco")

@@ -27,7 +27,7 @@ def test_in_the_null_space_avoidance_is_never_in_the_stack():
 
 def test_the_end_effector_still_has_its_own_repulsion():
     cell, seen = at_the_start(load("ellipse-nullspace"))
-    assert cell.position.repulsion_within == 0.1
+    assert cell.tasks.position.repulsion_within == 0.1
     for distance, active in ((0.05, True), (0.1, True), (0.11, False)):
         seen.distance[-1] = distance
         assert cell.order(seen, -1.0).repulsion is active

@@ -176,4 +176,4 @@ def test_limits_go_with_both_as_a_guard():
     for name in RIVALS:
         scenario = load(name, ["limits={acceleration=10.0, place='either'}"])
         assert not scenario.limits_in_stack
-        assert build(scenario).limits is not None
+        assert build(scenario).tasks.limits is not None

@@ -8,7 +8,7 @@ from standing import ROBOT, WEIGHT, feet, standing_stack
 from hierarchy import State
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
-from scenarios.config.kinds.torque import PushSection, TorqueSection
+from scenarios.config.plant import PushSection, TorqueSection
 from solvers import certify, make
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("with_mujoco")]

@@ -203,7 +203,7 @@ class LivePage:
         cell = self.live.controller.cell
         times = np.linspace(0.0, self.live.scenario.control.duration, _POINTS)
         self._paths = [np.array([task.path(t)[0] for t in times])
-                       for task in (cell.position, *cell.listed)
+                       for task in (cell.tasks.position, *cell.tasks.listed)
                        if isinstance(task, Position | PoseTask)]
         first = self._paths[0] if self._paths else np.zeros((1, 3))
         self.middle = (first.min(axis=0) + first.max(axis=0)) / 2 - self._path_offset()
