@@ -11,14 +11,17 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import product
+from math import inf
 from pathlib import Path
-from threading import Timer
+from threading import Event, Thread
+from time import monotonic
 from typing import Any, final
 
 from benchmark.packages import Entrant, MissingError, python_of
 
 START_LIMIT = 180.0  # [s] for imports, including compilation of kernels
-CRASHED, HUNG, LEFT_OUT = "crashed", "time limit", "left out after crashes"
+CRASHED, HUNG, LEFT_OUT, SLOW = "crashed", "time limit", "left out after crashes", "too slow"
+_WAITING = 10.0  # times the limit that an answer may take where other work has the processor
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -67,6 +70,8 @@ class Process:
     def ask(self, question: tuple[Any, ...], limit: float) -> Any:
         """Return the answer to (METHOD, ARGUMENTS...); EndedError if none comes in `limit` [s].
 
+        The limit is of processor time, so that other work on the machine ends nobody.
+
         The first question to a process may load and compile, and has more time; the next one after
         an end starts a new process.
         """
@@ -74,15 +79,16 @@ class Process:
             self._begin()
         assert self._process is not None
         assert self._process.stdin is not None
+        wait, more = _WAITING * limit, START_LIMIT if self._starts == 1 else 2.0 * limit
         if self._fresh:
-            limit += START_LIMIT if self._starts == 1 else 2.0 * limit
+            limit, wait = limit + more, wait + more
         self._fresh = False
         try:
             self._process.stdin.write(json.dumps(question) + "\n")
             self._process.stdin.flush()
         except OSError:  # it has ended; why, the log says
             pass
-        return self._next(limit)
+        return self._next(limit, wait)
 
     def _begin(self) -> None:
         entrant = self.entrant
@@ -102,29 +108,34 @@ class Process:
             self._log.close()
             raise MissingError(f"{python}: {error.strerror}") from error
         self._starts, self._fresh = self._starts + 1, True
-        self.about = self._next(START_LIMIT)
+        self.about = self._next(START_LIMIT, START_LIMIT)
 
-    def _next(self, limit: float) -> Any:
-        """Return the next line; raises EndedError if there is none within the limit [s]."""
+    def _next(self, limit: float, wait: float) -> Any:
+        """Return the next line; raises EndedError if there is none within the limits [s]."""
         assert self._process is not None
         assert self._process.stdout is not None
         self._hung = False
-        timer = Timer(limit, self._kill)
-        timer.start()
+        done = Event()
+        Thread(target=self._watch, args=(self._process, done, limit, wait)).start()
         try:
             line = self._process.stdout.readline()
         finally:
-            timer.cancel()
+            done.set()
         if line.endswith("\n"):
             return json.loads(line)
         kind, why = HUNG if self._hung else CRASHED, self._last_words()
         self.__exit__()
         raise EndedError(kind, why)
 
-    def _kill(self) -> None:
-        self._hung = True
-        assert self._process is not None
-        self._process.kill()
+    def _watch(self, process: subprocess.Popen[str], done: Event, limit: float, wait: float) -> None:
+        """End a process that works for `limit` [s], or for which `wait` [s] pass, before `done`."""
+        begin, until, left = _busy(process.pid), monotonic() + wait, limit
+        while not done.wait(left):
+            left = min(begin + limit - _busy(process.pid), until - monotonic())
+            if left <= 0.0:
+                self._hung = True
+                process.kill()
+                return
 
     def _last_words(self) -> str:
         assert self._process is not None
@@ -132,6 +143,16 @@ class Process:
         self._log.seek(0)
         lines = self._log.read().strip().splitlines()
         return f"ended with code {code}" + (f": {lines[-1]}" if lines else "")
+
+
+def _busy(process: int) -> float:
+    """Return the processor time of a process [s]; the time that has passed if it is not known."""
+    file = Path(f"/proc/{process}/stat")
+    try:
+        ticks = file.read_text().rpartition(")")[2].split()[11:13]
+    except OSError:
+        return monotonic()
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
 
 
 @final
@@ -165,21 +186,28 @@ class Field(ExitStack):
         return found
 
     def answers(self, questions: Iterable[tuple[Any, ...]], limit: float, most: int,
-                labels: Iterable[str] | None = None) -> dict[str, list[dict[str, Any]]]:
+                labels: Iterable[str] | None = None, patience: float = inf
+                ) -> dict[str, list[dict[str, Any]]]:
         """Return the answers to questions, or how and why a process ended without one.
 
-        An entrant whose process has ended `most` times is not asked the rest.
+        An entrant whose process has ended `most` times is not asked the rest, nor is one whose
+        answers say that they took more than `patience` [s] of processor time together.
         """
         found: dict[str, list[dict[str, Any]]] = {
             label: [] for label in (self.running if labels is None else labels)}
-        ends = dict.fromkeys(found, 0)
+        ends, spent = dict.fromkeys(found, 0), dict.fromkeys(found, 0.0)
         for question, (label, answers) in product(questions, found.items()):
             if ends[label] >= most:
                 answers.append({"ended": LEFT_OUT})
                 continue
+            if spent[label] > patience:
+                answers.append({"refused": SLOW})
+                continue
             try:
                 answers.append(self.running[label].ask(question, limit))
+                spent[label] += answers[-1].get("busy_s", 0.0)
             except EndedError as end:
                 ends[label] += 1
+                spent[label] += limit
                 answers.append({"ended": end.kind, "why": str(end)})
         return found

@@ -45,6 +45,6 @@ def take_turns(calls: Sequence[tuple[Mapping[str, Any], Callable[[], Any]]], sec
         while not times[0] or perf_counter() < end:
             for own, (_, call) in zip(times, calls, strict=True):
                 call()
-                own += timed(call, TURN)
+                own += timed(call, TURN)[0]
     return [{**about, "solves": len(own), **times_of(own)}
             for own, (about, _) in zip(times, calls, strict=True)]
