@@ -127,7 +127,8 @@ class Process:
         self.__exit__()
         raise EndedError(kind, why)
 
-    def _watch(self, process: subprocess.Popen[str], done: Event, limit: float, wait: float) -> None:
+    def _watch(self, process: subprocess.Popen[str], done: Event, limit: float, wait: float
+               ) -> None:
         """End a process that works for `limit` [s], or for which `wait` [s] pass, before `done`."""
         begin, until, left = _busy(process.pid), monotonic() + wait, limit
         while not done.wait(left):

@@ -131,10 +131,10 @@ def summary(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> Ro
     """Sum up the rows of one entrant.
 
     asked, right (share), wrong, modest, failed, ended, answered : problems by verdict. slow : not
-    asked because others took too long. absolute, relative, moved : largest of those called solved. Times, also warm and inside. iterations,
-    warm_iterations : medians. warm_right : share. same : whether all second solves gave the same
-    bits. memory [KiB]. rough : along sequences, the largest step of x beside that of the proved
-    answers. NaN : unknown.
+    asked because others took too long. absolute, relative, moved : largest of those called solved.
+    Times, also warm and inside. iterations, warm_iterations : medians. warm_right : share. same :
+    whether all second solves gave the same bits. memory [KiB]. rough : along sequences, the largest
+    step of x beside that of the proved answers. NaN : unknown.
 
     steps : of each sequence, by family, the largest step of the proved answers.
     """
