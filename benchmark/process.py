@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from itertools import product
 from math import inf
 from pathlib import Path
@@ -21,6 +20,7 @@ from benchmark.packages import Entrant, MissingError, python_of
 
 START_LIMIT = 180.0  # [s] for imports, including compilation of kernels
 CRASHED, HUNG, LEFT_OUT, SLOW = "crashed", "time limit", "left out after crashes", "too slow"
+_ROOT = Path(__file__).parents[1]  # from which every environment can import the benchmark
 _WAITING = 10.0  # times the limit that an answer may take where other work has the processor
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -33,25 +33,16 @@ class EndedError(MissingError):
         self.kind = kind
 
 
-@contextmanager
-def staged() -> Iterator[Path]:
-    """Give a folder from which environments without this project can import the benchmark."""
-    with tempfile.TemporaryDirectory() as temporary:
-        shutil.copytree(Path(__file__).parent, Path(temporary) / "benchmark",
-                        ignore=shutil.ignore_patterns("__pycache__", "studies", "reproduce"))
-        yield Path(temporary)
-
-
 @final
 class Process:
     """`benchmark.worker` for one entrant; MissingError where it cannot be had.
 
-    questions : MODULE:CLASS of what asks it. folder : of `staged`. about : what it says of itself.
+    questions : MODULE:CLASS of what asks it. about : what it says of itself.
     """
 
-    def __init__(self, entrant: Entrant, questions: str, folder: Path) -> None:
+    def __init__(self, entrant: Entrant, questions: str) -> None:
         self.entrant, self.questions = entrant, questions
-        self._folder, self._hung, self._fresh, self._starts = folder, False, False, 0
+        self._hung, self._fresh, self._starts = False, False, 0
         self._process: subprocess.Popen[str] | None = None
         self.about: dict[str, Any] = {}
         self._begin()
@@ -103,7 +94,7 @@ class Process:
                 [python, "-m", "benchmark.worker", self.questions, entrant.adapter,
                  json.dumps(dict(entrant.options)), entrant.package.name, core],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True,
-                cwd=self._folder, env=own)
+                cwd=_ROOT, env=own)
         except OSError as error:
             self._log.close()
             raise MissingError(f"{python}: {error.strerror}") from error
@@ -167,24 +158,11 @@ class Field(ExitStack):
         super().__init__()
         self.running: dict[str, Process] = {}
         self.missing: dict[str, str] = {}
-        folder = self.enter_context(staged())
         for one in entrants:
             try:
-                self.running[one.label] = self.enter_context(Process(one, questions, folder))
+                self.running[one.label] = self.enter_context(Process(one, questions))
             except MissingError as error:
                 self.missing[one.label] = str(error)
-
-    def ask(self, question: tuple[Any, ...], limit: float, labels: Iterable[str] | None = None
-            ) -> dict[str, Any]:
-        """Return the answers to a question; whose process ends within `limit` [s] is missing."""
-        found = {}
-        for label in tuple(self.running if labels is None else labels):
-            try:
-                found[label] = self.running[label].ask(question, limit)
-            except MissingError as error:
-                self.missing[label] = str(error)
-                del self.running[label]
-        return found
 
     def answers(self, questions: Iterable[tuple[Any, ...]], limit: float, most: int,
                 labels: Iterable[str] | None = None, patience: float = inf
@@ -205,7 +183,7 @@ class Field(ExitStack):
                 answers.append({"refused": SLOW})
                 continue
             try:
-                answers.append(self.running[label].ask(question, limit))
+                answers.append(self.running[label].ask(question, limit) or {})
                 spent[label] += answers[-1].get("busy_s", 0.0)
             except EndedError as end:
                 ends[label] += 1
