@@ -55,12 +55,13 @@ def block(name: str, stored: Stored, output: Callable[[str], str]) -> str:
     if name in ITEMS:
         return "\n".join(fill(f"- {text}", _WIDTH, subsequent_indent="  ")
                          for text in _items(ITEMS[name], rows, output))
-    known = {"asked-letter": _asked, "untested": _untested, **{
-        f"front-{one}": partial(fronts.table, stored.points, one) for one in fronts.FRONTS}}
+    known: dict[str, Callable[[], list[str]]] = {
+        "asked-letter": _asked, "untested": _untested,
+        **{f"front-{one}": partial(fronts.table, stored.points, one) for one in fronts.FRONTS}}
     if name in known:
         return "\n".join(known[name]())
-    of_rows = {"faults": _faults, **{f"found-{one}": partial(_found, family=one)
-                                     for one in FAMILIES}}
+    of_rows: dict[str, Callable[[Rows], list[str]]] = {
+        "faults": _faults, **{f"found-{one}": partial(_found, family=one) for one in FAMILIES}}
     return "\n".join(of_rows[name](rows)) if rows is not None else _NOTHING
 
 

@@ -10,7 +10,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmark.machine import machine
 from benchmark.packages import Entrant
 from benchmark.process import CRASHED, HUNG, Field
 from benchmark.report import Report
@@ -18,6 +17,7 @@ from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
 from benchmark.store import Row, Store
+from benchmark.timing import machine
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from scenarios.problems.answers import export, file_of, save
