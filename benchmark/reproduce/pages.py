@@ -83,7 +83,7 @@ def _printed(command: str, root: Path, out: Path) -> str:
     if done.returncode:
         raise CommandError(f"{command}: exit code {done.returncode}\n{done.stdout}")
     lines = [line.rstrip() for line in done.stdout.splitlines()
-             if not line.startswith("Numbers: ")]
+             if not line.startswith(("Numbers: ", "Page: "))]
     return "\n".join(lines).rstrip() + "\n"
 
 
