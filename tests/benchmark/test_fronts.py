@@ -36,7 +36,7 @@ def test_points_are_kept_and_shown(tmp_path):
     points = [Point("ellipse-hqp", "strict", {}, [1e-3, 1.0, 10.0], [2e-3, 1.0, 10.0], 4, 4,
                     ["m", "deg", "rad/s^2"]),
               Point("ellipse-hqp", "weighted", {"control.options.ratio": 7.0},
-                    [1e-3, 1.0, 10.0], [np.inf] * 3, 1, 4, ["m", "deg", "rad/s^2"])]
+                    [1e-3, 1.0, 10.0], [None] * 3, 1, 4, ["m", "deg", "rad/s^2"])]
     fronts.write(points, tmp_path / "fronts.json")
     assert fronts.read(tmp_path / "fronts.json") == points
     table = fronts.table(points, "ellipse-hqp")

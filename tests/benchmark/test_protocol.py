@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmark.reproduce import claims, protocol, verdicts
+from benchmark.reproduce import blocks, protocol, verdicts
 from benchmark.reproduce.avoidance import acceleration, measured
-from benchmark.reproduce.effect import blocked
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
 from hierarchy import Robot, State
 from scenarios import load
@@ -71,10 +70,10 @@ def test_a_run_that_ends_in_a_fault_has_the_worst_value():
 def test_the_blocked_test_is_wilcoxons_in_one_block_and_ignores_shifts_between_blocks(chance):
     scipy = pytest.importorskip("scipy.stats")
     apart = chance.standard_normal(40) + 0.3
-    found = blocked(apart, np.zeros(40, dtype=int))
+    found = verdicts.blocked(apart, np.zeros(40, dtype=int))
     assert found.p == pytest.approx(scipy.wilcoxon(apart, method="asymptotic").pvalue, rel=0.05)
     assert found.low < found.estimate < found.high
-    shifted = blocked(apart - found.low - 1e-9, np.zeros(40, dtype=int))
+    shifted = verdicts.blocked(apart - found.low - 1e-9, np.zeros(40, dtype=int))
     assert shifted.p == pytest.approx(0.05, abs=0.01)
     assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
 
@@ -86,7 +85,7 @@ def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
     for claim in PROTOCOL.claims:
         assert {claim.of, claim.rival} - {""} <= set(PROTOCOL.columns)
         assert bool(claim.quotation) == (claim.family == "letter")
-    assert len(claims.asked(PROTOCOL)) > 5
+    assert len(blocks.block("asked-letter", blocks.Stored(None, []), str).splitlines()) > 5
 
 
 def test_the_acceleration_of_a_point_is_its_second_difference(chance):

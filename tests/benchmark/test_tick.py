@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmark import tick
-from benchmark.plain import PlainTick
+from benchmark.tick import PlainTick
 from scenarios.cell.build import build
 from scenarios.config import load
 from scenarios.loop.simulation import simulate
