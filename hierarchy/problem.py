@@ -51,6 +51,13 @@ def _layout(sizes: bytes) -> tuple[Sizes, Sizes]:
     return kept.view(), offsets.view()  # whose `base` is another array
 
 
+@lru_cache(maxsize=256)
+def _giving(give: bytes, sizes: bytes) -> tuple[int, ...]:
+    """Return the levels with a row that gives, from the bytes of both."""
+    rows = np.flatnonzero(np.frombuffer(give) > 0.0)
+    return tuple(np.unique(np.searchsorted(_layout(sizes)[1], rows, side="right") - 1).tolist())
+
+
 class Hierarchy:
     """Levels of rows `lower <= A x <= upper`, most important first.
 
@@ -227,21 +234,25 @@ class Hierarchy:
     def giving(self) -> list[int]:
         """The levels with a row that gives."""
         give = self._give
-        if give is None:
-            return []
-        rows = np.flatnonzero(give > 0.0)
-        return sorted(set((np.searchsorted(self.offsets, rows, side="right") - 1).tolist()))
+        return [] if give is None else list(_giving(give.tobytes(), self.rows[3].tobytes()))
 
     def _bounds(self) -> Iterator[tuple[int, int]]:
         """Yield the first row of each level and the one after its last."""
         return pairwise(self.offsets.tolist())
 
-    def upper_part(self, count: int) -> Hierarchy:
-        """Return the first `count` levels, as views, none of which gives."""
-        m = self.offsets[count]
-        return self.changed(A=self.A[:m], lower=self.lower[:m], upper=self.upper[:m],
-                            sizes=self.sizes[:count], names=self.names[:count], give=None,
-                            named=None)
+    def upper_part(self, count: int, sides: tuple[Array, Array] | None = None) -> Hierarchy:
+        """Return the first `count` levels, as views, none of which gives.
+
+        sides : lower and upper (m,), in place of those of all levels.
+        """
+        A, lower, upper, sizes = self.rows
+        lower, upper = sides or (lower, upper)
+        m = int(_layout(sizes.tobytes())[1][count])
+        part = object.__new__(Hierarchy)
+        set_frozen(part, rows=(A[:m], lower[:m], upper[:m], sizes[:count]), start=self.start, m=m,
+                   n=self.n, names=self.names[:count], named=None, plain=self._metric is None,
+                   _reference=self._reference, _metric=self._metric, _give=None)
+        return part
 
     def relaxed(self, level: int, x: ArrayLike) -> Hierarchy:
         """Return the hierarchy whose level is relaxed by its violations at x and by its `give`.
