@@ -122,7 +122,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
             x[c] = d.free[c]
         _keep_staircase(lower, upper, record)
         return finish(x, staircase)
-    whole = last >= 0 and d.factor[last] > 0.0 and length_of(reference) == 0.0
+    whole = last >= 0 and d.factor[last] > 0.0
     for k in range(sizes.size + (not whole)):
         if code != SOLVED or (k <= last and d.factor[k] == 0.0):
             continue
