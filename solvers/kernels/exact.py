@@ -209,8 +209,8 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
             steps += tries
             code = _verified(s, code, YES)
     if code == SOLVED and neglects(s):
-        code, tries = _solve_with_light_rows(s, saved, limit - steps)
-        steps, blocks = steps + tries, blocks + tries
+        code, tries, more = _solve_with_light_rows(s, current, saved, limit - steps)
+        steps, blocks = steps + tries + more, blocks + tries
     elif code not in (SOLVED, NUMERICAL_FAILURE):
         finished = s.count[FINISHED]
         for c in range(n if finished == sizes.size or (code == UNPROVED and finished > 0) else 0):
@@ -224,22 +224,28 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
 
 
 @inlined
-def _solve_with_light_rows(s, saved, limit):
+def _solve_with_light_rows(s, current, saved, limit):
     """Go on with the rows that were neglected; return SOLVED if they make no answer large.
 
-    Else INACCURATE, with x as it was; and the tries.
+    Else INACCURATE, with x as it was; and the tries in blocks and row by row.
     """
-    largest = LARGER * (1.0 + length_of(s.x))
-    for c in range(s.x.size):
+    n, steps, largest = s.x.size, ZERO, LARGER * (1.0 + length_of(s.x))
+    for c in range(n):
         saved[c] = s.x[c]
+    s.count[FINISHED] = s.multiplier.shape[0]  # nothing else is saved
     restore(s)
     take_up(s)
-    code, tries = pivot_in_blocks(s, limit, NO)
+    code, tries = pivot_in_blocks(s, limit, YES)
+    if code != SOLVED and tries < limit:
+        restore(s)
+        code, steps, _ = pivot_one_by_one(
+            s, current, saved, min(limit - tries, SEARCH_STEPS * (s.A.shape[0] + n)), ZERO)
+        code = _verified(s, code, YES)
     if code == SOLVED and length_of(s.x) <= largest:
-        return code, tries
-    for c in range(s.x.size):
+        return code, tries, steps
+    for c in range(n):
         s.x[c] = saved[c]
-    return ZERO + INACCURATE, tries
+    return ZERO + INACCURATE, tries, steps
 
 
 @compiled
