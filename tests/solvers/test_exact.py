@@ -154,6 +154,26 @@ def test_damped_x_is_continuous_in_the_targets_under_a_box(name, angle):
         assert np.abs(x[1] - x[0]).max() <= 1e-6
 
 
+@pytest.mark.parametrize("name", ["hcod", "tpm"])
+def test_damped_x_is_continuous_where_a_bound_begins_to_act(name):
+    """A level alone passes the bound, the levels below move x away: it jumped by 3.6."""
+    resolver = make(name, damping=0.1)
+    for seed in range(60):
+        r = np.random.default_rng([seed, 3206])
+        n, half = 2 + seed % 6, 9.0
+        A, B = r.normal(size=(1 + seed % 2, n)), r.normal(size=(1, n))
+        A[-1] = A[0] * (seed % 2) + A[-1] * 10.0 ** r.uniform(-3.0, 0.0)
+        tasks, x = [(A, r.normal(size=len(A))), (B, r.normal(size=1))], []
+        for step in (0.0, 0.0, 1e-11):
+            limits = np.full(n, half)
+            if x:
+                limits[seed % n] = abs(x[0][seed % n])
+            h = Hierarchy.from_levels([(np.eye(n), -limits, limits),
+                                       (A, tasks[0][1] + step), tasks[1]])
+            x.append(resolver.solve(h).x)
+        assert np.abs(x[2] - x[1]).max() <= 1e-6
+
+
 @pytest.mark.filterwarnings("ignore:overflow")
 @pytest.mark.parametrize("below", [0, 1])
 def test_rows_of_any_size_are_solved_and_numbers_that_overflow_are_a_failure(below):

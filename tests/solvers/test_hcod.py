@@ -135,6 +135,19 @@ def test_rows_as_small_as_rounding_make_no_answer_large(seed):
         assert certify(h, res.x).certified
 
 
+def test_a_level_that_is_rounding_beside_others_counts_where_limits_hold_x():
+    """Recorded in an example of pink: a vertical motion of an arm that moves in a plane."""
+    limits, lifted = (np.eye(2), [-2.0] * 2, [2.0] * 2), ([[2.56e-18, 1.8e-18]], [-700.0])
+    h = Hierarchy.from_levels([limits, lifted])
+    res = HCOD.solve(h)
+    assert res.status is Status.SOLVED
+    np.testing.assert_array_equal(res.x, [-2.0, -2.0])
+    assert res.verified(h)
+    free = HCOD.solve(Hierarchy.from_levels([([[1.0, 0.0]], [0.5]), lifted]))
+    assert free.status is Status.INACCURATE
+    np.testing.assert_array_equal(free.x, [0.5, 0.0])
+
+
 def test_rows_whose_sides_cross_are_all_that_is_said():
     h = Hierarchy.from_levels([(np.eye(2), [0.0, 0.0], [1.0, 1.0])], names=["box"])
     h.lower[1] = 2.0
