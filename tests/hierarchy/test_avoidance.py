@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scene import BODY, OBSTACLES, ROBOT, TIP, place_of, states
 
-from hierarchy import HierarchyError, State
+from hierarchy import State
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.paths import Waypoints
@@ -102,12 +102,3 @@ def test_the_active_point_is_the_nearest_one_without_the_end_effector():
         assert seen.active == int(np.argmin(seen.distance[:8]))
         assert seen.minimal_distance == seen.distance[:8].min()
         assert seen.end_effector_distance == seen.distance[8]
-
-
-def test_an_obstacle_at_a_control_point_is_refused_at_the_start():
-    state = State.at(ROBOT, np.full(7, 0.4))
-    point = place_of(ROBOT.control_points[4], state.q)
-    obstacles = Obstacles([Obstacle("point", (5, 5, 5)),
-                           Obstacle("point", tuple(point), name="obstacle 2")])
-    with pytest.raises(HierarchyError, match=r"obstacle 2 .* touches control point 5"):
-        ExactDistances(ROBOT, obstacles, BODY, TIP).check_start(state)

@@ -1,13 +1,11 @@
 """Contacts and tasks over their forces, each against an algorithm that shares no code with it."""
 
-from dataclasses import fields, replace
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from standing import (
     ROBOT,
-    WEIGHT,
     external_forces,
     feet,
     moving_state,
@@ -18,24 +16,20 @@ from standing import (
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import UnknownNameError
-from hierarchy.paths import Still
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.table import TreeJoint, TreeTable
 from hierarchy.task import Task
 from hierarchy.tasks import (
     BaseDynamics,
-    CentreOfMass,
     CentreOfPressure,
     ContactForce,
     ContactMotion,
     Friction,
-    LeastForce,
     Momentum,
     Posture,
     Together,
     TorqueLimits,
 )
-from solvers import make
 
 STEP = 1e-6
 CONTACTS = soles_and_palm()
@@ -157,18 +151,6 @@ def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
     assert 0 < sum(seen) < 300
 
 
-@pytest.mark.parametrize("task", [
-    BaseDynamics(CONTACTS), ContactMotion(CONTACTS), Friction(CONTACTS),
-    CentreOfPressure(CONTACTS), ContactForce(CONTACTS, "left_hand", (1.0,)), LeastForce(CONTACTS),
-    Momentum(), Together((LeastForce(CONTACTS),)), TorqueLimits(ROBOT, contacts=CONTACTS)],
-    ids=lambda task: task.name)
-def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(task):
-    assert replace(task) == task
-    assert replace(task, name="another") != task
-    for record in (task, CONTACTS, CONTACTS.contacts[0]):
-        assert all(field.repr == field.init == field.compare for field in fields(record))
-
-
 def opening(ramp=0.2):
     """The left foot stays; the right one is open from 1 to 2 s."""
     left, right = feet().contacts
@@ -239,31 +221,6 @@ def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_
     assert contacts.carried(2.3, x, after)[1] == 100.0
 
 
-def test_lifting_a_loaded_foot_changes_torques_alike_whatever_the_largest_force():
-    """With 1e5 N for `largest` the ramp did nothing: the foot gave up 196 N in its last tick."""
-    standing = State.at(ROBOT, ROBOT.rest)
-    com = CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(standing)
-    found = []
-    for largest in (400.0, 1e5):
-        contacts, state = opening(0.1), State.at(ROBOT, ROBOT.rest)
-        stack = Stack([
-            Together([BaseDynamics(contacts), ContactMotion(contacts)], "physics"),
-            Together([TorqueLimits(ROBOT, contacts=contacts),
-                      Friction(contacts, largest=largest)], "limits"),
-            CentreOfMass(ROBOT, Still(com)), Posture(tuple(ROBOT.rest[7:])),
-            LeastForce(contacts)], "torque", contacts=contacts)
-        loads = []
-        for t in np.arange(0.895, 1.0, 0.001):
-            state.move(t, ROBOT.rest, np.zeros(ROBOT.n))
-            x = make("hcod").solve(stack.hierarchy(state)).x
-            loads.append(contacts.forces(x, "right_foot")[:, 2].sum())
-            state.carried = contacts.carried(t, x, state.carried)
-        found.append(loads)
-    np.testing.assert_allclose(found[0], found[1], atol=1e-6)
-    assert found[0][0] == pytest.approx(WEIGHT / 2)
-    assert np.abs(np.diff(found[0])).max() < 1.01 * WEIGHT / 2 / 100
-
-
 @pytest.mark.parametrize("target", [(20.0,), (1.0, 2.0, 3.0), (1.0, 2.0, 3.0, 0.4, 0.5, 0.6)])
 @pytest.mark.parametrize("name", ["left_hand", "right_foot"])
 def test_contact_force_rows_are_the_sum_over_the_points(target, name):
@@ -295,16 +252,6 @@ def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_t
     np.testing.assert_allclose(lower[6:9], -dJ - 20.0 * J @ state.v + 100.0 * gone, atol=1e-9)
     np.testing.assert_array_equal(lower, upper)
     assert np.abs(task.error(start)).max() < 1e-12
-
-
-def test_without_anchors_a_contact_is_damped_where_it_is():
-    state = moving_state(13)
-    task = ContactMotion(CONTACTS, damping=7.0)
-    rows = written(task, state)
-    drift = task.jacobian_derivative(state) @ state.v
-    np.testing.assert_allclose(rows[1], -drift - 7.0 * rows[0] @ state.v, atol=1e-9)
-    assert not task.error(state).any()
-    assert not written(task, state, "velocity")[1].any()
 
 
 @pytest.mark.parametrize("part", ["both", "linear", "angular"])

@@ -2,15 +2,11 @@
 
 import numpy as np
 import pytest
-from scene import BODY, FRAME, ROBOT, SENSOR, TIP, driven, state_at, states
+from scene import ROBOT, SENSOR, state_at, states
 
-from hierarchy import HierarchyError, Stack, State
-from hierarchy.avoidance import Obstacle, Obstacles
-from hierarchy.paths import Still
-from hierarchy.tasks import JointDamping, JointLimits, Position
+from hierarchy import HierarchyError, State
+from hierarchy.tasks import JointLimits
 from hierarchy.tasks.danger_bounds import DangerBounds
-from scenarios.cell.sensors import ExactDistances
-from solvers import make
 
 PERIOD, REACH, SHAPE = 1e-3, 0.5, 6.0
 LIMITS = JointLimits(ROBOT, 30.0, PERIOD)
@@ -103,33 +99,3 @@ def test_what_it_cannot_do_without_is_named(monkeypatch):
     monkeypatch.setattr(ROBOT, "velocity_limit", np.array([1.0, np.inf, 1, 1, 1, 1, 1]))
     with pytest.raises(HierarchyError, match="joint joint_2 has no velocity limit"):
         task()
-
-
-START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
-
-
-def closest(level, first, resolver, obstacles, goal, ticks=1500):
-    """Go to a goal; return the least distance of all points and the least slack of the box."""
-    sensor = ExactDistances(ROBOT, obstacles, BODY, TIP)
-    stack = Stack([first, Position(FRAME, goal)], level, reference=JointDamping(7, 5.0))
-    nearest, slack = np.inf, np.inf
-    for state, h, res in driven(stack, ticks, PERIOD, START, resolver, sensor=sensor):
-        nearest = min(nearest, state.measurement.distance.min())
-        slack = min(slack, (h.upper[:7] - res.x).min(), (res.x - h.lower[:7]).min())
-    return nearest, slack
-
-
-@pytest.mark.slow
-@levels
-@pytest.mark.parametrize("resolver", [make("sns"), make("sns", form="optimal", scales="miss")],
-                         ids=str)
-def test_with_sns_the_arm_stops_before_an_obstacle_on_its_way(level, resolver):
-    """The goal lies 0.3 m ahead, a ball of 5 cm half way to it."""
-    ahead = State.at(ROBOT, START).position(FRAME) + np.array([0.0, 0.0, 0.3])
-    obstacles = Obstacles([Obstacle("sphere", tuple(ahead - np.array([0.0, 0.0, 0.15])), (0.05,))])
-    goal = Still(tuple(ahead))
-    through, _ = closest(level, LIMITS, resolver, obstacles, goal)
-    before, slack = closest(level, task(reach=0.2), resolver, obstacles, goal)
-    assert through < -0.02
-    assert before > 0.0
-    assert slack >= 0.0

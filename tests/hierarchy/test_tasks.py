@@ -3,7 +3,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from scene import (
-    BODY,
     FRAME,
     PATH,
     ROBOT,
@@ -144,16 +143,6 @@ def test_the_cone_asks_for_one_side_and_its_surface_for_both():
         TASKS[name].writer(state, "acceleration", A, low, up, 0)()
         assert (up[0] == low[0]) == (upper == "equal")
         assert np.isinf(up[0]) == (upper == "infinite")
-
-
-def test_one_row_of_avoidance_is_the_projection_of_three():
-    q, v = STATES[6]
-    state = state_at(q, v)
-    r = state.measurement.direction[state.measurement.active]
-    one, three = TASKS["avoidance 1-D"], TASKS["avoidance 3-D"]
-    np.testing.assert_allclose(one.jacobian(state), r[None] @ three.jacobian(state))
-    np.testing.assert_allclose(one.error(state), [r @ three.error(state)])
-    assert one.error(state)[0] == pytest.approx(BODY(state.measurement.minimal_distance))
 
 
 def test_damping_brakes_in_proportion_to_speed_or_momentum():
