@@ -29,6 +29,7 @@ from hierarchy.tasks import (
 )
 
 NAN, INF = float("nan"), float("inf")
+A, B = np.eye(2), np.ones(2)
 ROBOT = Robot.load("kuka_lwr")
 STATE = State.at(ROBOT, [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0])
 FRAME = ROBOT.frame("end_effector")
@@ -88,6 +89,16 @@ class Own(Task):
     (lambda: Avoidance(["x"]), "control points[0]: expected a ControlPoint, got str 'x'"),
     (lambda: Separation(3, 4), "barrier: expected a Barrier, got int 4"),
     (lambda: DangerBounds(3, ROBOT.control_points), "limits: expected a JointLimits, got int 3"),
+    (lambda: Hierarchy.from_levels([(A + 1j, B)]), "A is not an array of real numbers: it is"),
+    (lambda: Hierarchy.from_levels([(A, ["1", "2"])]), "b is not an array of numbers: list ['1'"),
+    (lambda: Hierarchy.from_levels("A"), "levels: expected a list of (A, b)"),
+    (lambda: Hierarchy.from_levels([(A, B)], names=[1]), "names: expected a list of texts"),
+    (lambda: Hierarchy.from_levels([(A, B)] * 2, names=["a"] * 2), "2 levels are named 'a'"),
+    (lambda: State.at("kuka_lwr", np.zeros(7)), "State.at: robot: expected a Robot, got str"),
+    (lambda: Position("end_effector", THERE), "'position': frame is the name 'end_effector'; give"),
+    (lambda: JointLimits("kuka_lwr", 10.0, 0.01), "give Robot.load('kuka_lwr')"),
+    (lambda: Stack(["position"]), "a stack: expected a Task, got str 'position'"),
+    (lambda: Stack([Position(FRAME, THERE)]).hierarchy(ROBOT), "state: expected a State, got Rob"),
     # values out of their range
     (lambda: Obstacle("cone", (0, 0, 0)), "unknown obstacle shape 'cone'"),
     (lambda: Obstacle("sphere", (0, 0, 0)), "takes 1 positive"),

@@ -81,7 +81,7 @@ def make_set_up(folder, interpreter):
 @pytest.mark.parametrize(("statement", "heavy"), [
     ("import scenarios", {"numpy", "pydantic"}),
     ("import hierarchy", {"pinocchio"}), ("from hierarchy import Hierarchy", {"pinocchio"}),
-    ("import solvers", {"pinocchio"}),
+    ("import solvers, solvers.qp.backends", {"pinocchio", "qpsolvers", "proxsuite", "osqp"}),
     ("import scenarios.cli.main", {"numpy", "numba", "pinocchio", "scipy", "matplotlib"}),
     ("from scenarios.cli.main import run_command; run_command(['--help'])",
      {"numpy", "numba", "pinocchio", "pydantic", "matplotlib"}),

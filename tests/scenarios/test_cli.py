@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -23,14 +22,6 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(autouse=True)
 def in_an_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-
-
-def test_run_prints_its_metrics_and_keeps_the_run(tmp_path, capsys):
-    assert run_command(["run", "ellipse", *SHORT, "--out", "runs/a"]) == 0
-    out = capsys.readouterr().out
-    assert "Position error, rms [mm]" in out
-    assert "runs/a" in out
-    assert (tmp_path / "runs" / "a" / "run.npz").exists()
 
 
 @pytest.mark.parametrize(("damping", "said"), [
@@ -261,17 +252,6 @@ def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsy
     assert completed("hierarchy", "compare", "ladder")[-1] == "ladder"
     assert completed("hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc") == ["tpm,hcod"]
     assert completed("hierarchy", "sweep", "ell") == ["ellipse-starts"]
-
-
-def test_every_benchmark_is_a_command_and_listed(capsys):
-    folder = Path(__file__).parents[2] / "benchmark"
-    found = {path.stem if path.stem != "compare" else path.parent.name
-             for path in (*folder.glob("*.py"), *folder.glob("[a-r]*/[a-r]*.py"))
-             if "\ndef run(" in path.read_text() and path.parent.name not in ("peers", "reproduce")}
-    assert run_command(["bench", "--help"]) == 0
-    listed = capsys.readouterr().out
-    for name in (*found, "peers", "ik"):
-        assert f"  {name.replace('_', '-')}  " in listed
 
 
 def test_ctrl_c_while_it_is_starting_ends_the_command_quietly(tmp_path):

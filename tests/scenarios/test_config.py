@@ -47,16 +47,6 @@ def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
     assert t.control.settings() == {"damping": 0.01, "threshold": 0.1}
 
 
-def test_a_file_extends_another(tmp_path):
-    (tmp_path / "mine.toml").write_text(
-        'extends = "ellipse"\nname = "mine"\n[pointing]\nalpha_d = 12\n')
-    (tmp_path / "yours.toml").write_text(
-        'extends = "mine.toml"\nname = "yours"\n[control]\nperiod = 0.002\n')
-    s = load(tmp_path / "yours.toml")
-    assert (s.name, s.pointing.alpha_d, s.control.period) == ("yours", 12, 0.002)
-    assert s.avoidance == load("ellipse").avoidance
-
-
 def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     path = tmp_path / "idle.toml"
     path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'

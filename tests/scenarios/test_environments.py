@@ -53,11 +53,6 @@ def test_names_of_settings_that_differ_late_give_different_folders():
     assert max(len(one), len(other)) <= 200
 
 
-def test_a_text_that_names_a_path_which_is_not_utf_8_is_written(tmp_path):
-    write_text(tmp_path / "page.html", os.fsdecode(b"caf\xe9"))
-    assert (tmp_path / "page.html").read_bytes() == b"caf\\udce9"
-
-
 def test_a_run_that_cannot_be_saved_where_it_should_is_saved_elsewhere(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     (tmp_path / "file").touch()

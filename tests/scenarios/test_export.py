@@ -1,6 +1,5 @@
 """Exports: read back by the packages that others read them with, they are the recording."""
 
-import itertools
 import json
 from dataclasses import replace
 
@@ -14,7 +13,6 @@ from scenarios.cli.main import run_command
 from scenarios.export import export, foxglove
 from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Event
-from scenarios.scene import scene
 
 CONSTANT = {"joint_lower", "joint_upper", "velocity_limit"}
 
@@ -25,11 +23,6 @@ def run():
     recording.signals["ee_distance"][3] = np.nan
     recording.signals["minimal_distance"][4] = np.inf
     return replace(recording, events=(Event(5, "overrun", "hold"), Event(5, "inside", "brake")))
-
-
-def test_every_signal_of_the_ticks_is_a_column(run):
-    names = {column.name.partition("[")[0] for column in run.columns()}
-    assert names == {*run.signals, "stack", "events"} - CONSTANT
 
 
 @pytest.fixture(scope="module")
@@ -105,19 +98,6 @@ def test_frames_are_where_the_robot_is(run, messages):
             turned = Rotation.from_quat([frames[name]["rotation"][axis] for axis in "xyzw"])
             np.testing.assert_allclose(turned.as_matrix(),
                                        state.placements[i, :9].reshape(3, 3).T, atol=1e-9)
-
-
-@pytest.mark.parametrize("every", [1, 7])
-def test_the_path_taken_is_whole_when_its_pieces_are_joined(run, every):
-    drawn = scene(run, rate=100.0)
-    assert len(drawn.t) == 16
-    pieces = [[list(point.values()) for point in entity["lines"][0]["points"]]
-              for _, update in foxglove.scene_updates(drawn, every)
-              for entity in update["entities"] if entity["id"].startswith("path taken")]
-    for before, after in itertools.pairwise(pieces):
-        assert after[0] == before[-1]
-    joined = [pieces[0][0], *(point for piece in pieces for point in piece[1:])]
-    np.testing.assert_array_equal(joined, drawn.traced)
 
 
 def test_the_layout_shows_only_what_the_file_has(messages):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.measure.metrics import measure
@@ -38,23 +37,6 @@ def test_the_order_is_fixed_and_limits_come_first():
                                              "position", "pointing")
     assert names_of("avoidance.self_collision=0.02")[1:3] == ("separation", "self-separation")
     assert names_of("posture={role='task', target=[0,0,0,0,0,0,0]}")[-1] == "posture"
-
-
-@pytest.mark.parametrize("resolver", ["recursive", "tpm", "augmented", "reverse"])
-def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row(resolver):
-    with pytest.raises(HierarchyError, match=r"separation, row \d+: an inequality|joint limits"):
-        simulate(load("ellipse-hqp", [SHORT]).with_resolver(resolver))
-
-
-@pytest.mark.parametrize(("changes", "says"), [
-    (["avoidance.influence=0.05"], "0.05 m is not below influence"),
-    (["control.level=velocity", "limits.torque=0.5"], "needs control.level"),
-    (["limits.acceleration=0"], "limits.acceleration"),
-    (["limits.acceleration=[1.0, 2.0]"], "expected a number or"),
-])
-def test_what_does_not_go_together_is_said(changes, says):
-    with pytest.raises(HierarchyError, match=says):
-        build(load("ellipse-hqp", changes))
 
 
 def test_beside_one_sided_distances_algorithm_1_switches_the_cone_alone():

@@ -10,7 +10,6 @@ from hierarchy.tasks import CentreOfMass, Pointing, Pose, Position
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.config import Scenario
-from scenarios.draw.figures.picture import picture
 from scenarios.measure.metrics import measure
 
 pytestmark = pytest.mark.slow
@@ -112,17 +111,6 @@ def test_what_is_recorded_of_a_task_is_its_error(standing):
                                    task.error(cell.state), atol=1e-15)
 
 
-@pytest.mark.parametrize("name", ["humanoid", "dual-arm"])
-@pytest.mark.parametrize("resolver", ["recursive", "hcod", "hqp:backend=proxqp"])
-def test_strict_resolvers_agree_over_a_short_run(name, resolver):
-    scenario = load(name, ["control.duration=0.2"])
-    changed = scenario.with_resolver(resolver)
-    one, other = simulate(scenario), simulate(changed)
-    bound = max(1e-6, changed.make_resolver().accuracy)
-    assert abs(one["q"] - other["q"]).max() < bound
-    assert (other["status"] == 0).all()
-
-
 @pytest.mark.parametrize("name", ["tpm", "hcod"])
 def test_out_of_reach_strict_resolvers_keep_the_feet(name):
     run = simulate(load("humanoid-reach", ["control.duration=4.0"]).with_resolver(name))
@@ -132,14 +120,6 @@ def test_out_of_reach_strict_resolvers_keep_the_feet(name):
     assert np.linalg.norm(run["task_error_left_hand"][-1]) > 0.3, "nobody can reach that far"
     excess = np.maximum(run["q"] - run["joint_upper"], run["joint_lower"] - run["q"])
     assert excess.max() < 1e-6
-
-
-def test_the_picture_of_a_robot_that_branches_shows_its_body(standing):
-    from matplotlib.collections import PatchCollection
-    axes = picture({"tpm": standing}).axes[0]
-    bodies = [c for c in axes.collections if isinstance(c, PatchCollection)]
-    assert len(bodies) == 4
-    assert all(len(body.get_paths()) == 16 for body in bodies)
 
 
 def test_tasks_stand_behind_limits_position_and_pointing_in_their_order():

@@ -1,8 +1,6 @@
 """The ladder from `ellipse` to `ellipse-hqp`: one change at a time, run as one group."""
 
 import json
-import tomllib
-from itertools import pairwise
 
 import pytest
 
@@ -11,45 +9,18 @@ from hierarchy import HierarchyError
 from scenarios import compare, load
 from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError, members, shipped_groups
-from scenarios.config.reading import LIBRARY
 
 # What each step changes: a key, or a section as a whole.
 STEPS = {"ladder-1-staircase": "control.resolver", "ladder-2-limits": "limits",
          "ladder-3-undamped": "control.options.damping", "ladder-4-priority": "avoidance.near",
          "ladder-5-hcod": "control.resolver", "ladder-6-barrier": "avoidance",
          "ladder-7-cone": "control.stack"}
-WORDS = ("name", "title", "description")
-
-
-def flat(table, above=""):
-    """Dotted keys and values; an absent section is a key with the value None."""
-    for key, value in table.items():
-        if isinstance(value, dict) and value:
-            yield from flat(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value
-
-
-def differing(a, b):
-    """The keys that differ between two scenarios, words apart."""
-    first, second = (dict(flat(load(name).model_dump(mode="json"))) for name in (a, b))
-    return {key for key in {*first, *second} - set(WORDS)
-            if key not in first or key not in second or first[key] != second[key]}
 
 
 def test_the_group_is_the_ladder_from_its_first_step_to_its_last():
     assert members(["ladder"]) == ["ellipse", *STEPS]
     assert members(["strictness", "ladder"])[:2] == ["strictness", "ellipse"]
     assert "ladder" in shipped_groups()
-
-
-@pytest.mark.parametrize(("before", "name"), list(pairwise(["ellipse", *STEPS])))
-def test_a_step_extends_the_one_before_and_changes_what_it_says_and_nothing_else(name, before):
-    steps = tomllib.loads((LIBRARY / "ladder.toml").read_text())["variants"]
-    assert steps[name.removeprefix("ladder-")]["extends"] == before
-    found = differing(before, name)
-    assert found
-    assert all(key == STEPS[name] or key.startswith(f"{STEPS[name]}.") for key in found)
 
 
 @pytest.mark.slow

@@ -130,20 +130,15 @@ def on_a_circle(**changed):
 
 @pytest.mark.parametrize(("task", "said"), [
     (COUPLING | {"joints": {}}, "tasks.0.joints"),
-    (COUPLING | {"joints": {"joint_2": "1"}}, "tasks.0.joints.joint_2"),
-    (LOOK | {"target": [0.0, 1.0]}, "tasks.0.target"),
     (LOOK | {"axis": [0, 0, 1]}, "tasks.0.axis: only kind 'pointing' has it"),
     (RELATIVE | {"rotation": np.eye(3).tolist(), "orientation": False},
      "rotation goes with orientation = true"),
-    ({"kind": "manipulability", "frame": "end_effector"}, "tasks.0.least"),
     ({"kind": "manipulability", "frame": "end_effector", "least": 0.1, "part": "speed"},
      "tasks.0.part"),
     ({"kind": "collision"}, "needs [avoidance] with kind = \"separation\""),
-    ({"kind": "self-collision", "distance": True}, "tasks.0.distance"),
     ({"kind": "look_at", "frame": "end_effector"}, "'look-at'"),
     (on_a_circle(radiuss=1),
      "unknown key 'tasks.0.path.radiuss'; did you mean 'tasks.0.path.radius'?"),
-    (on_a_circle(radius="a"), "tasks.0.path.radius: Input should be a valid number, got 'a'"),
     (on_a_circle(times=[1]),
      "tasks.0.path.times: only kind 'waypoints' has it; the kind here is 'circle'"),
     (on_a_circle(kind="line"), "tasks.0.path.start: Field required"),
@@ -155,12 +150,9 @@ def test_wrong_values_are_named(task, said, tmp_path):
 
 @pytest.mark.parametrize(("task", "said"), [
     (COUPLING | {"joints": {"joint_9": 1.0}}, "tasks.0: unknown joint 'joint_9'"),
-    (LOOK | {"frame": "thumb"}, "tasks.0: frame: unknown frame 'thumb'"),
-    (RELATIVE | {"to": "thumb"}, "tasks.0: to: unknown frame 'thumb'"),
     ({"kind": "self-collision", "distance": 0.5}, "influence"),
     ({"kind": "position", "frame": "end_effector",
       "path": {"kind": "recorded", "file": "none.csv"}}, "none.csv cannot be read"),
-    (on_a_circle(radius=1, normal=[0, 0, 0]), "path of kind 'circle': circle: radius 1"),
     ({"kind": "position", "frame": "end_effector", "path": {
         "kind": "waypoints", "times": [0, 1], "points": [[0, 0, 0], [0, 0, 1]], "blend": 2.0}},
      "blend 2.0 s must be positive and at most 1 s"),

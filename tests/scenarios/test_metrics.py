@@ -108,18 +108,6 @@ def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_
     assert data["ticks"] == 5
 
 
-@pytest.mark.parametrize(("name", "unit", "scale", "lower_is_better"), [
-    ("position_error_rms", "mm", 1e3, True), ("cone_violation_max", "°", 1.0, True),
-    ("cone_violation_share", "%", 100.0, True), ("body_distance_min", "mm", 1e3, False),
-    ("ee_distance_min", "mm", 1e3, False), ("speed_max", "rad/s", 1.0, True),
-    ("acceleration_max", "rad/s²", 1.0, True), ("ticks_not_solved", "", 1.0, True),
-    ("time_resolve_median", "µs", 1e6, True), ("time_kinematics_median", "µs", 1e6, None)])
-def test_a_metric_says_its_unit_and_its_better_direction(name, unit, scale, lower_is_better):
-    metric = measure(recording())[name]
-    assert (metric.shown_unit, metric.scale) == (unit, scale)
-    assert metric.lower_is_better is lower_is_better
-
-
 def seen_by_a_camera(**signals):
     asked = hand_made.HandMadeScenario()
     asked.avoidance.promised = {"body": 0.2, "ee": 0.3}

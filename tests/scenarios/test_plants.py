@@ -8,7 +8,6 @@ from pendulum import LIMIT, URDF
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles
-from hierarchy.paths import Waypoints
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
@@ -109,24 +108,6 @@ def forearm(q=START):
     return placed[9:] + 0.195 * placed[6:9]
 
 
-def test_a_moving_obstacle_is_at_each_step_where_its_path_has_it(mujoco):
-    path = Waypoints((0.0, 1.0), ((1.0, -1.0, 0.0), (1.0, 1.0, 0.0)))
-    plant = arm(mujoco, obstacles=[
-        Obstacle("sphere", (0.0, 0.0, 0.0), (0.05,), path=path)])
-    step, seen = plant._step, []
-
-    def watched(model, data):
-        seen.append((data.time, data.mocap_pos[0].copy()))
-        step(model, data)
-
-    plant._step = watched
-    for _ in range(3):
-        plant.act(STILL)
-    assert len(seen) == 15
-    for t, centre in seen:
-        np.testing.assert_allclose(centre, path(t)[0], rtol=0, atol=1e-12)
-
-
 def test_the_reference_of_an_arm_held_back_does_not_run_away(mujoco):
     side = State.at(ROBOT, START).placements[5][0:3]
     # Joint 1 turns the arm about the vertical, with this sign toward the wall.
@@ -197,26 +178,6 @@ def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
     for k in range(run.ticks):
         command = controller.command(run["t"][k], run["q"][k], run["v"][k])
         np.testing.assert_array_equal(command, run["command"][k])
-
-
-def test_the_ellipse_away_from_obstacles_is_tracked(mujoco):
-    changes = ["control.duration=3.0", "control.period=0.005", "limits.acceleration=10.0",
-               "control.resolver=tpm", "avoidance.obstacles=[[5.0, 5.0, 5.0]]"]
-    exact = simulate(load("ellipse", changes))
-    run = simulate(load("ellipse", [*changes, "plant.kind=mujoco", "plant.feedback=commanded"]))
-    settled = run["t"] > 2.0
-    assert np.linalg.norm(exact["position_error"][settled], axis=1).max() < 0.4e-3
-    error = np.linalg.norm(run["desired_position"] - run["true_ee_position"], axis=1)[settled]
-    assert error.max() < 1.5e-3
-    assert np.sqrt(np.mean(error**2)) < 0.6e-3
-
-
-def test_a_commanded_state_is_what_the_commands_add_up_to(mujoco):
-    run = simulate(load("ellipse", [*PHYSICS, *NOISY, "plant.feedback=commanded"]))
-    exact = simulate(load("ellipse", SHORT))
-    np.testing.assert_allclose(run["q"], exact["q"], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(run["command"], exact["command"], rtol=0, atol=1e-9)
-    assert 1e-5 < np.abs(run["q"] - run["true_q"]).max() < 1e-2
 
 
 def test_contacts_are_measured_in_a_run(mujoco, tmp_path):

@@ -11,7 +11,7 @@ from scenarios.cli.main import run_command
 from scenarios.problems import answers, recorded
 from scenarios.problems.answers import export, save
 from scenarios.problems.families import FAMILIES, available, family
-from solvers import make, problems
+from solvers import problems
 from solvers.problems.files import read
 
 QUICK = ("EQ7", "INEQ7", "DEGEN7", *problems.KINDS, "recipe")
@@ -35,11 +35,6 @@ def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, capsys, 
             "'task-hierarchy[descriptions]'") in capsys.readouterr().err
 
 
-def test_every_family_of_the_generators_has_a_place():
-    assert set(problems.FAMILIES) | set(problems.KINDS) < set(FAMILIES)
-    assert {one.name for one in available()} <= set(FAMILIES)
-
-
 @pytest.mark.parametrize("name", QUICK)
 def test_halves_are_reproducible_and_never_the_same(name):
     one = family(name)
@@ -60,19 +55,6 @@ def smallest(h):
     """The smallest singular value of the tasks between the limits and the posture."""
     between = slice(int(h.offsets[1]), int(h.offsets[-2]))
     return np.linalg.svd(h.A[between], compute_uv=False)[-1]
-
-
-@pytest.mark.slow
-def test_a_recorded_sequence_is_that_of_the_closed_loop():
-    from scenarios.config import load
-    from scenarios.loop.simulation import simulate
-
-    found = family("ellipse-limits").half(0, 3).problems
-    scenario = load("ellipse-limits")
-    resolver, first = scenario.make_resolver(), int(0.4 * scenario.control.ticks)
-    run = simulate(load("ellipse-limits", [f"control.duration={(first + 3) * 0.001!r}"]))
-    for k, h in enumerate(found):
-        np.testing.assert_allclose(resolver.solve(h).x, run["a"][first + k], atol=1e-9)
 
 
 @pytest.mark.slow
@@ -131,18 +113,3 @@ def test_of_answers_without_a_whole_proof_the_one_that_is_proved_furthest_is_tak
     assert answers.answer(None) is proofs[1]
     proofs[2].complete = True
     assert answers.answer(None) is proofs[2]
-
-
-def test_problems_as_others_make_them_are_what_their_makers_describe():
-    for h in family("of-daqp").half(3, 5).problems:
-        x = make("hcod").solve(h).x
-        rows = slice(0, h.sizes[0])
-        apart = np.minimum(h.upper - h.A @ x, h.A @ x - h.lower)[rows]
-        assert (apart > -1e-9).all()
-        assert (apart < 1e-9).sum() == 8
-        assert np.linalg.cond(h.A[h.sizes[0]:]) ** 2 == pytest.approx(100.0)
-    sides = [(h.lower == h.upper, np.isinf(h.lower), np.isinf(h.upper))
-             for h in family("of-soth").half(3, 20).problems]
-    assert all(any(kind.any() for kind in some) for some in zip(*sides, strict=True))
-    ranks = [np.linalg.matrix_rank(h.A) - h.m for h in family("of-lexls").half(3, 20).problems]
-    assert min(ranks) < 0

@@ -47,14 +47,6 @@ def test_torques_follow_with_the_bandwidth_of_the_motors():
                                                       rel=0.05)
 
 
-def test_damping_and_friction_slow_the_joints():
-    robot, free = plant()
-    _, braked = plant(joint_damping=5.0, joint_friction=1.0, armature=0.1)
-    torque = np.full(robot.n, 5.0)
-    assert (np.abs(driven(braked, torque, 0.1).v).max()
-            < 0.8 * np.abs(driven(free, torque, 0.1).v).max())
-
-
 def test_links_that_touch_are_pushed_apart_and_those_that_overlap_at_the_start_are_not():
     _, touching = plant(self_collision=True)
     _, passing = plant()

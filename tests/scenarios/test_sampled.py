@@ -3,16 +3,12 @@
 import csv
 import json
 import os
-import signal
 import subprocess
 import sys
 from collections import Counter
-from contextlib import suppress
-from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
-import psutil
 import pytest
 from deadly import dies_of_one
 
@@ -170,15 +166,6 @@ def test_a_run_has_every_metric_of_its_scenario_as_sampled(tmp_path):
         m.name: m.value for m in expected.values() if m.group != "Computing"}
 
 
-@pytest.mark.parametrize(("measured", "reason"), [
-    (lambda _: (SimpleNamespace(ticks=3, fault=None), ()), None),
-    (mock.Mock(side_effect=ValueError("no")), "ValueError: no")])
-def test_a_run_is_timed_whether_it_ends_well_or_not(measured, reason, monkeypatch):
-    monkeypatch.setattr("scenarios.results.run.perf_counter", iter([10.0, 12.5]).__next__)
-    found = outcome(SimpleNamespace(key="a", load=lambda: None), measured)
-    assert (found.key, found.reason, found.wall_seconds) == ("a", reason, 2.5)
-
-
 @pytest.mark.slow
 def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path):
     distributed = pytest.importorskip("distributed", reason="needs the extra sweep")
@@ -221,47 +208,6 @@ def test_a_run_that_kills_its_process_costs_only_itself():
     found = {job.key: one for job, one in pool.ended(dies_of_one, jobs, 2)}
     assert len(found) == 6
     assert [key for key, one in found.items() if one is None] == ["2"]
-
-
-KILLED_AFTER_THE_FIRST_ROWS = """
-import os, pathlib, signal
-import psutil
-from scenarios.results.store import Store
-
-add = Store.add
-
-def add_and_die(store, job, outcome):
-    add(store, job, outcome)
-    workers = psutil.Process().children(recursive=True)
-    pathlib.Path("workers").write_text(" ".join(str(one.pid) for one in workers))
-    os.kill(os.getpid(), signal.SIGKILL)
-
-Store.add = add_and_die
-from scenarios.cli.start import main
-main()
-"""
-
-
-def alive(pids):
-    """The processes of these numbers that have not ended."""
-    for pid in pids:
-        with suppress(psutil.NoSuchProcess):
-            yield psutil.Process(pid)
-
-
-@pytest.mark.slow
-def test_a_sweep_that_is_killed_goes_on_where_it_stopped(tmp_path):
-    path, out = write(tmp_path, samples="8"), tmp_path / "out"
-    died = subprocess.run([sys.executable, "-c", KILLED_AFTER_THE_FIRST_ROWS, "sweep", str(path),
-                           "--out", str(out), "--workers", "2"], cwd=tmp_path, check=False)
-    assert died.returncode == -signal.SIGKILL
-    workers = (tmp_path / "workers").read_text().split()
-    assert workers
-    assert psutil.wait_procs(alive(map(int, workers)), timeout=60.0)[1] == []
-    before = made(out)
-    assert 0 < len(before) < 16
-    assert sweep(path, out, ALONE).made == 16 - len(before)
-    assert made(out) == Counter(read(out / "results.csv").keys())
 
 
 # What is kept

@@ -14,7 +14,7 @@ from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
 from scenarios.recording.facts import robot_facts
 from scenarios.recording.fate import Fate, levels_at
-from scenarios.scene import capsules, ends, scene, stage
+from scenarios.scene import ends, scene, stage
 
 SHORT = ["control.duration=1.5"]
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
@@ -135,20 +135,6 @@ def test_a_rate_that_is_none_is_refused(ellipse, runs, rate):
         scene(runs["ellipse"], rate)
 
 
-def test_a_robot_without_capsules_is_drawn_as_sticks(tmp_path):
-    file = tmp_path / "two.urdf"
-    file.write_text("""<robot name="two"><link name="base"/><link name="a"/><link name="b"/>
-<joint name="one" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="two" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.5 0 0"/>
-<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>""")
-    robot = Robot.from_file(file)
-    links = capsules(robot)
-    state = State(robot)
-    state.move(0.0, np.array([np.pi / 2, 0.0]), np.zeros(2))
-    assert np.allclose(ends(links, state.placements)[0, 1], [0.0, 0.5, 0.0])
-
-
 @pytest.mark.parametrize("name", TABLES)
 def test_no_robot_at_rest_is_below_the_floor(name):
     scenario = load("ellipse").model_copy(update={"robot": RobotSection(model=name)})
@@ -156,35 +142,3 @@ def test_no_robot_at_rest_is_below_the_floor(name):
     low = ends(fixed.robot.capsules[1:], fixed.robot.placements(fixed.robot.rest))[..., 2].min()
     assert low >= fixed.robot.floor
     assert stage_of(load("humanoid")).robot.floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
-
-
-def test_listed_tasks_have_their_paths_and_errors():
-    shown = scene(simulate(load("humanoid-reach", ["control.duration=0.4"])))
-    paths = {path.task: path for path in shown.paths}
-    assert {"left foot", "right hand", "centre of mass"} <= set(paths)
-    assert paths["centre of mass"].wanted is None
-    errors = next(one for one in shown.series if one.name == "Errors of tasks, positions")
-    hand = errors.value[:, errors.labels.index("right hand")]
-    missed = np.linalg.norm(paths["right hand"].wanted - paths["right hand"].actual, axis=1)
-    assert np.allclose(hand, missed)
-
-
-def test_after_a_camera_levels_are_those_judged_in_the_run():
-    """The kinematic arm, small images of something near: fates as of the same rows in the loop."""
-    near = "avoidance.obstacles=[{shape='sphere', radius=0.06, centre=[0.3, 0.45, 0.1]}]"
-    scenario = load("human", ["control.duration=0.5", "plant={kind='kinematic'}", near,
-                              "sensor.width=160", "sensor.height=120", "sensor.fx=131.25",
-                              "sensor.fy=131.25"])
-    recording = simulate(scenario)
-    levels = levels_at(recording, range(recording.ticks))
-    assert levels.known[1:].all()
-    given_up = levels.fate == Fate.MISSED
-    assert given_up.any()
-    assert (levels.violation[given_up] > 0.0).all()
-    absent = levels.fate == Fate.ABSENT
-    assert np.isnan(levels.violation[absent]).all()
-    for f, order in enumerate(recording["order"]):
-        there = {name for name, gone in zip(levels.names, absent[f], strict=True) if not gone}
-        assert there == set(recording.orders[order].split(" > "))
-    at = np.abs(recording["command"]) >= scenario.limits.acceleration * (1 - 1e-6)
-    assert (levels.saturated[at] != 0).all()

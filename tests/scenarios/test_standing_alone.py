@@ -124,14 +124,6 @@ def test_figures_metrics_and_tables_are_made_of_it(made, tmp_path):
     assert as_plain_data(load_run(folder)) == as_plain_data(run)
 
 
-def test_the_export_is_made_of_it(made, tmp_path):
-    pytest.importorskip("mcap")
-    folder, _, _ = made
-    file = tmp_path / "run.mcap"
-    assert run_command(["export", str(folder), "--out", str(file)]) == 0
-    assert file.stat().st_size > 0
-
-
 def test_facts_that_are_missing_or_damaged_are_named(made, tmp_path):
     folder, run, _ = made
     shutil.copytree(folder, tmp_path / "bad")

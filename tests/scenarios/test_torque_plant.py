@@ -37,15 +37,6 @@ def test_without_contact_it_accelerates_as_the_robots_model(seed):
     assert np.abs(found - expected).max() < 1e-3 * np.abs(expected).max()
 
 
-def test_a_period_moves_it_by_its_accelerations():
-    q, v, torques = in_the_air(7)
-    plant = TorqueRobot(ROBOT, CONTACTS, q, v, period=1e-5)
-    a = plant.accelerations(torques)
-    plant.act(torques)
-    np.testing.assert_allclose(plant.v, v + 1e-5 * a, atol=1e-4 * np.abs(1e-5 * a).max() + 1e-8)
-    np.testing.assert_allclose(plant.q, pin.integrate(ROBOT.model, q, 1e-5 * plant.v), atol=1e-8)
-
-
 def test_torques_arrive_late_by_the_delay_and_are_cut_off_at_their_limits():
     q, v, _ = in_the_air(8)
     plant = TorqueRobot(ROBOT, CONTACTS, q, v, section=plant_with(delay=0.002))
@@ -101,27 +92,3 @@ def test_it_stands_with_the_accelerations_and_forces_that_the_stack_predicts():
     assert sum(plant.forces().values())[2] == pytest.approx(WEIGHT, abs=0.5)
     assert np.linalg.norm(state.position(ROBOT.frame("left_foot"))
                           - start.position(ROBOT.frame("left_foot"))) < 2e-3
-
-
-def test_it_says_where_the_soles_slip_and_how_near_the_edge_the_pressure_is():
-    """A push from behind brings the centre of pressure to the toes; the robot then tips over."""
-    push = PushSection(joint="trunk_pitch", force=60.0, duration=0.5)
-    plant = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest, section=plant_with(pushes=(push,)))
-    stack, state = standing_stack(State.at(ROBOT, ROBOT.rest), CONTACTS), State(ROBOT)
-    resolver, memory, margins, supported = make("hcod"), None, [], []
-    for tick in range(300):
-        state.move(tick * 1e-3, plant.q, plant.v)
-        res = resolver.solve(stack.hierarchy(state), memory)
-        memory = res.memory
-        plant.act(CONTACTS.torques(state, res.x))
-        margins.append(plant.extra["pressure_margin"].min())
-        supported.append(float(plant.extra["support_margin"]))
-    assert 0.02 < margins[0] <= 0.04   # half the width of a sole is 0.04 m
-    assert min(margins) < 0.005
-    at_the_toes = next(k for k, margin in enumerate(margins) if margin < 0.005)
-    assert 0.05 < supported[at_the_toes] < 0.105 + 1e-9  # half the length of a sole is 0.105 m
-    assert plant.extra["slip"].max() < 0.01
-    before = pin.centerOfMass(  # where the step began
-        ROBOT.model, ROBOT.model.createData(),
-        pin.integrate(ROBOT.model, plant.q, -1e-3 * plant.v))
-    np.testing.assert_allclose(plant.extra["com"], before, atol=1e-6)

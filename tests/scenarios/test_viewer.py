@@ -33,22 +33,6 @@ def recording():
 # The frame that is drawn
 
 
-def test_a_run_that_goes_on_and_its_recording_show_the_same_frames():
-    live, seen = Live(LIMITED), {}
-    for k in range(600):
-        live.tick()
-        seen[k] = live.frame() if k % 20 == 0 else None
-    recorded = scene(live.recording(), rate=50.0)
-    for f, k in enumerate(recorded.ticks.tolist()):
-        if (now := seen.get(k)) is not None:
-            assert now.orders[now.order[0]] == recorded.orders[recorded.order[f]]
-            assert (now.active[0], now.linked[0]) == (recorded.active[f], recorded.linked[f])
-            assert (now.levels.saturated[0] == recorded.levels.saturated[f]).all()
-            fates = dict(zip(recorded.levels.names, recorded.levels.fate[f], strict=True))
-            assert fates.items() <= dict(
-                zip(now.levels.names, now.levels.fate[0], strict=True)).items()
-
-
 # A live run
 
 

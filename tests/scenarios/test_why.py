@@ -100,20 +100,3 @@ def test_a_tick_that_the_run_does_not_have_is_an_error(folder, capsys):
     assert "tick 999: the run has ticks 0 to 49" in capsys.readouterr().err
     with pytest.raises(HierarchyError, match="the run has ticks"):
         jumps(simulate(load("ellipse-hqp").with_changes({"control.duration": 0.002})), tick=0)
-
-
-def test_large_changes_are_among_the_events_of_report_and_replay(folder, monkeypatch):
-    from scenarios.draw.replay.page import html
-    from scenarios.measure import jumps as module
-    from scenarios.measure.run_folder import load_run
-    from scenarios.measure.runs import Run
-    from scenarios.results.sections import events
-
-    recording = load_run(folder)
-    assert not list(module.happened(recording))
-    monkeypatch.setattr(module, "STEPS", {"rad/s^2": 1e-6})
-    one = next(module.happened(recording))
-    assert one.what.startswith("acceleration of ")
-    rows = events([Run(recording.scenario, "hqp", "hqp", recording)])
-    assert rows[0] == ("hqp", (one.what, one.why, "1", f"{one.t:.3f} s"))
-    assert f"{one.what}: {one.why}"[:60] in html({"hqp": recording}, "why")

@@ -7,7 +7,7 @@ import pytest
 from hierarchy import Hierarchy, HierarchyError, Robot
 from hierarchy.paths import Still
 from hierarchy.tasks import Position
-from scenarios import compare, load, load_run, save, simulate
+from scenarios import compare, load, save, simulate
 from solvers import certify, explain, make, solve_ik
 
 SHORT = load("ellipse", ["control.duration=0.01"])
@@ -18,33 +18,20 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
 
 
 @pytest.mark.parametrize(("call", "said"), [
-    (lambda: load(3), "load: expected a path, got int 3"),
     (lambda: load(""), "load: expected a path, got str ''"),
-    (lambda: load(["ellipse"]), "load: expected a path, got list"),
-    (lambda: load("ellipse", 3), "--set: expected a list of \"key=value\", got int 3"),
     (lambda: load("ellipse", "control.period=1"), "expected a list of \"key=value\", got str"),
-    (lambda: load("ellipse", [3]), "expected \"key=value\", got int 3"),
-    (lambda: load("ellipse", {3: 1}), "a key: expected a str, got int 3"),
-    (lambda: SHORT.with_resolver(3), "with_resolver: expected a str, got int 3"),
     (lambda: SHORT.with_changes(3), "changes: expected a Mapping, got int 3"),
     (lambda: simulate(SHORT, progress=3), "simulate: progress: expected a function, got int 3"),
-    (lambda: simulate(SHORT, audits=3), "simulate: audits: expected an Iterable, got int 3"),
+    (lambda: simulate("elipse"), "unknown scenario 'elipse'; did you mean 'ellipse'?"),
     (lambda: simulate(None), "simulate: expected a Scenario, got NoneType None"),
     (lambda: compare(3), "compare: expected names, files, or what `load` returns, got int 3"),
-    (lambda: compare("ellipse", 3), "resolvers: expected a list of names, got int 3"),
     (lambda: compare("ellipse", "hcod"), "resolvers: expected a list of names, got str 'hcod'"),
-    (lambda: compare("ellipse", [3]), "with_resolver: expected a str"),
     (lambda: compare(SHORT, ["tpm"], out=3), "compare: out: expected a path, got int 3"),
-    (lambda: load_run(3), "load_run: expected a path, got int 3"),
     (lambda: save("ellipse", "x"), "save: expected a Recording, got str 'ellipse'"),
-    (lambda: solve_ik(ROBOT, Q, [HAND], dt="a"), "solve_ik: dt [s] = 'a'"),
     (lambda: solve_ik(ROBOT, Q, [HAND], limits="yes"), "limits: expected True, False or a task"),
-    (lambda: solve_ik(ROBOT, Q, [HAND], resolver=3), "resolver: expected a Resolver, got int 3"),
-    (lambda: certify(H, [0.0, 0.0], tolerance="a"), "certify: tolerance"),
+    (lambda: certify([], [0.0, 0.0]), "certify: h: expected a Hierarchy, got list"),
     (lambda: certify(H, [0.0, 0.0], tolerance=-1.0), "certify: tolerance"),
-    (lambda: explain(H, make("hcod").solve(H), "x"), "explain: tolerance"),
     (lambda: explain(H, make("hcod").solve(H), rows="ab"), "rows: expected a list of names"),
-    (lambda: explain(H, make("hcod").solve(H), rows=3), "rows: expected a list of names"),
     (lambda: Hierarchy.from_levels([([[10**400]], [1.0])]), "level 1"),
 ])
 def test_a_wrong_argument_is_refused_and_named(call, said):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rank_cases import CASES, build, family, rng
+from rank_cases import family, rng
 from sequences import moved
 
 from benchmark import batch as bench
@@ -68,16 +68,6 @@ def test_each_problem_gets_what_it_gets_alone(name, of, threads):
     assert_same(solve(Batch.of(hs), resolver, threads), [resolver.solve(h) for h in hs])
 
 
-@pytest.mark.slow
-@both
-@pytest.mark.parametrize("settings", [{}, {"damping": 0.05}], ids=["undamped", "damped"])
-def test_a_batch_agrees_at_any_rank(name, settings):
-    resolver = make(name, **settings)
-    for case in CASES:
-        h = build(case, with_reference=True)
-        assert_same(solve(Batch.of([h, h]), resolver), [resolver.solve(h)] * 2)
-
-
 def test_an_answer_that_is_inaccurate_alone_is_so_in_a_batch():
     resolver, statuses = make("hcod"), []
     for h in (*map(load, REGRESSIONS), *(structured(seed, ("tiny_rows",)) for seed in range(20))):
@@ -101,16 +91,6 @@ def test_bounds_and_their_memory_are_those_of_each_alone(resolver, half):
     again = [moved(h) for h in hs]
     assert_same(solve(Batch.of(again), resolver, memory=cold.memory),
                 [resolver.solve(h, res.memory) for h, res in zip(again, alone, strict=True)])
-
-
-def test_bounds_and_equalities_may_stand_in_one_batch():
-    free, tight = bounded(0, 9.0), bounded(1, 0.1)
-    pinned = Hierarchy(tight.A, tight.upper, tight.upper, tight.sizes, tight.reference, tight.names)
-    hs, resolver = [pinned, tight, free, pinned], make("tpm")
-    answer, alone = solve(Batch.of(hs), resolver), [resolver.solve(h) for h in hs]
-    assert_same(answer, alone)
-    warm = solve(Batch.of([pinned] * 4), resolver, memory=answer.memory)
-    assert_same(warm, [resolver.solve(pinned, res.memory) for res in alone])
 
 
 @both
@@ -163,17 +143,6 @@ def test_a_batch_may_be_empty_or_without_rows(name, shape):
     assert answer.x.shape == (count, 5)
     assert answer.solved.all()
     assert m or (answer.x == 1.0).all()
-
-
-def test_a_problem_that_fails_keeps_no_memory_and_the_others_keep_theirs():
-    hs = [bounded(seed, 0.3) for seed in range(3)]
-    cold = solve(Batch.of(hs), make("tpm"))
-    assert cold.memory.any(axis=1).all()
-    batch = Batch.of(hs)
-    batch.A[1, -1, 0] = np.nan
-    warm = solve(batch, make("tpm"), memory=cold.memory)
-    assert warm.status.tolist() == [Status.SOLVED, Status.NUMERICAL_FAILURE, Status.SOLVED]
-    assert warm.memory.any(axis=1).tolist() == [True, False, True]
 
 
 @pytest.mark.parametrize(("of", "damping"), [("EQ7over", 0.0), ("EQ7sing", 0.0), ("EQ7sing", 0.05)])

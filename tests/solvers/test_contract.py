@@ -138,15 +138,6 @@ def test_damping_means_the_same_to_every_strict_resolver(resolver, case):
         assert_close(resolver, damped.solve(h).x, oracle.solve(h, 0.05, threshold))
 
 
-@every(STRICT)
-def test_the_unit_of_a_level_does_not_matter(resolver):
-    for scale in (1e-6, 1e6):
-        levels = generic()
-        expected = resolver.solve(Hierarchy.from_levels(levels)).x
-        levels[1] = (levels[1][0] * scale, levels[1][1] * scale)
-        assert_close(resolver, resolver.solve(Hierarchy.from_levels(levels)).x, expected)
-
-
 @every(RESOLVERS)
 def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(resolver):
     for bad in (np.nan, np.inf, -np.inf):
@@ -291,18 +282,6 @@ def test_no_memory_changes_the_answer_and_its_own_leaves_little_to_do(resolver):
     assert gap(resolver.solve(free, cold.memory).x, resolver.solve(free).x) <= 1e-12
 
 
-@every(HQP)
-def test_a_memory_of_programs_does_no_harm(resolver):
-    for h, x, _ in list(family("INEQ7"))[:3]:
-        res = resolver.solve(h, resolver.solve(moved(h)).memory)
-        if res.status is Status.SOLVED:
-            assert_close(resolver, res.x, x)
-    h = Hierarchy.from_levels(generic())
-    for levels in (generic()[:2], [(np.eye(2), [1.0, 2.0])]):
-        memory = resolver.solve(Hierarchy.from_levels(levels)).memory
-        assert_close(resolver, resolver.solve(h, memory).x, resolver.solve(h).x)
-
-
 @pytest.mark.parametrize("name", names())
 def test_what_is_no_hierarchy_and_what_is_no_memory_are_refused(name):
     h = Hierarchy.from_levels([BOX, ([[1.0, 0.0]], [1.0])])
@@ -314,13 +293,6 @@ def test_what_is_no_hierarchy_and_what_is_no_memory_are_refused(name):
             make(name).solve(h, memory)
     with pytest.raises(HierarchyError, match=r"give the memory of .* resolution, res\.memory"):
         make("hcod").solve(h, make("hcod").solve(h))
-
-
-@every(RESOLVERS)
-def test_resolvers_are_immutable_and_equal_by_their_settings(resolver):
-    assert dataclasses.replace(resolver) == resolver
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        resolver.damping = 1.0
 
 
 @every(EQUALITIES_ONLY + BOUNDS)

@@ -96,18 +96,6 @@ def test_a_record_of_garbage_does_no_harm(library, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("array", ["A", "lower"])
-@pytest.mark.parametrize("value", [np.nan, 1e200])
-def test_violations_of_numbers_that_are_none_are_infinite(library, array, value):
-    h = box()
-    getattr(h, array).ravel()[0] = value
-    status, norms = library.violations(c.problem_of(h), np.ones(3), 3)
-    assert status == c.NUMERICAL_FAILURE
-    assert norms[0] == np.inf
-    assert np.isfinite(norms[1:]).all()
-
-
-@pytest.mark.slow
 @every_resolver
 @pytest.mark.parametrize("missing", [{"missing": 1}, {"missing": 10_000}, {"missing_values": 1}],
                          ids=str)

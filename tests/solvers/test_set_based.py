@@ -120,23 +120,3 @@ def test_a_row_with_two_sides_is_refused_with_its_level_and_sides():
                               names=["walls"])
     with pytest.raises(HierarchyError, match=r"walls, row 1: two sides, -1 <= a x <= 2"):
         SET_BASED.solve(h)
-
-
-def test_in_closed_loop_the_tip_stops_at_the_wall_and_the_joint_at_its_limit():
-    """An arm of three joints that is sent beyond a wall; then it is called back."""
-    q, period, wall, limit = np.array([0.6, 0.9, 0.5]), 0.006, 1.5, 1.2
-    values, farthest = [], -INF
-    for k in range(900):
-        p, J = tip(q)
-        rate = 2.0 * (np.array([2.2, 1.6] if k < 600 else [0.6, 1.8]) - p)
-        edge = [0.0 if p[0] >= wall else INF, 0.0 if q[1] >= limit else INF]
-        h = Hierarchy.from_levels([(np.vstack([J[:1], np.eye(3)[1:2]]), np.full(2, -INF), edge),
-                                   (J, rate)])
-        q = q + period * SET_BASED.solve(h).x
-        values.append(tip(q)[0][0] - wall)
-        farthest = max(farthest, q[1] - limit)
-    assert np.max(values) < 0.01, "at most what one period carries the tip over the wall"
-    assert np.min(np.abs(values[300:600])) < 0.01, "it was at the wall"
-    assert np.abs(np.array(values[450:600])).max() < 0.01, "and stayed there while sent beyond"
-    assert values[-1] < -0.5, "and left it when called back"
-    assert farthest < 0.01

@@ -16,18 +16,11 @@ from standing import (
 
 from hierarchy import Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
-from hierarchy.paths import Ellipse, Still
+from hierarchy.paths import Ellipse
 from hierarchy.tasks import (
-    BaseDynamics,
-    CentreOfMass,
     ContactForce,
-    ContactMotion,
-    Friction,
-    LeastForce,
-    Pose,
     Position,
     Posture,
-    Together,
     TorqueLimits,
 )
 from solvers import Status, certify, explain, make, problems
@@ -86,15 +79,6 @@ def test_hcod_is_certified_and_agrees_with_a_cascade_of_programs(shift, faces):
     assert np.abs(other.x - res.x).max() <= 1e-8 * (1.0 + np.abs(res.x).max())
 
 
-def test_explain_says_what_blocks_a_centre_of_mass_out_of_reach():
-    stack = standing_stack(STANDING, CONTACTS, (0.5, 0.0, 0.0))
-    h, res = solved(stack, STANDING)
-    lines = explain(h, res, rows=stack.row_names()).splitlines()
-    assert lines[:2] == ["physics is met.", "limits is met."]
-    assert lines[2].startswith("centre of mass is missed by")
-    assert "friction left_foot point" in lines[2]
-
-
 def test_torques_that_cannot_hold_the_weight_stay_within_limits_and_the_knees_are_named():
     """The body sinks: the stack says which torques hold the centre of mass back."""
     weak = 0.1
@@ -127,26 +111,6 @@ def test_an_arm_presses_on_a_table_while_its_tip_moves_along_it():
     efforts = pin.rnea(arm.model, arm.model.createData(), state.q, state.v,
                        contacts.accelerations(res.x), wrenches)
     np.testing.assert_allclose(contacts.torques(state, res.x), efforts, atol=1e-9)
-
-
-def test_a_foot_swings_as_a_pose_while_the_other_carries_all():
-    """The centre of mass is above the left foot: what a shift of weight leads to."""
-    left = feet().contacts[0]
-    contacts = Contacts(ROBOT, [left])
-    q = ROBOT.rest.copy()
-    state = State.at(ROBOT, q)
-    foot = ROBOT.frame("right_foot")
-    up = state.position(foot) + np.array([0.0, 0.0, 0.02])
-    stack = Stack([
-        Together([BaseDynamics(contacts), ContactMotion(contacts)], "physics"),
-        Together([TorqueLimits(ROBOT, contacts=contacts), Friction(contacts)], "limits"),
-        Pose(foot, Still(up), np.eye(3), name="swing foot"),
-        CentreOfMass(ROBOT, Still((0.0, 0.138, 0.76)), (0, 1)),
-        Posture(tuple(ROBOT.rest[7:])), LeastForce(contacts)], "torque", contacts=contacts)
-    h, res = solved(stack, state)
-    assert_physical(h, res.x, state, contacts)
-    lifted = stack["swing foot"].jacobian(state) @ contacts.accelerations(res.x)
-    np.testing.assert_allclose(lifted, [0.0, 0.0, 40.0 * 0.02, 0.0, 0.0, 0.0], atol=1e-8)
 
 
 IN_DOUBT = sorted((Path(__file__).parents[1] / "data/regressions/whole-body").glob("*.npz"))
