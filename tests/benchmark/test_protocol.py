@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from benchmark.reproduce import claims, protocol, verdicts
-from benchmark.reproduce.avoidance import acceleration, measured
+from benchmark.reproduce.avoidance import measured
 from benchmark.reproduce.effect import blocked
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
-from hierarchy import Robot, State
 from scenarios import load
 from scenarios.measure.statistics import holm
 from scenarios.results.sampled import Workers
@@ -87,22 +86,6 @@ def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
         assert {claim.of, claim.rival} - {""} <= set(PROTOCOL.columns)
         assert bool(claim.quotation) == (claim.family == "letter")
     assert len(claims.asked(PROTOCOL)) > 5
-
-
-def test_the_acceleration_of_a_point_is_its_second_difference(chance):
-    robot = Robot.load("kuka_lwr")
-    point = robot.control_points[6]
-    q, v, a = chance.standard_normal((3, 7))
-
-    def place(t):
-        state = State.at(robot, q + v * t + a * t * t / 2.0)
-        R = state.placements[point.joint, :9].reshape(3, 3).T
-        return R @ point.offset + state.placements[point.joint, 9:]
-
-    h = 1e-4
-    expected = (place(h) - 2.0 * place(0.0) + place(-h)) / h**2
-    found = acceleration(State.at(robot, q, v), point.joint, place(0.0), a)
-    assert found == pytest.approx(expected, abs=1e-5)
 
 
 def test_undamped_the_avoidance_task_is_met():

@@ -109,13 +109,6 @@ def test_a_command_that_fails_leaves_the_others(tmp_path, capsys):
     assert whole.minutes(2467.4) == "41:07 min"
 
 
-def test_runs_and_pages_are_chosen_by_name():
-    assert whole.chosen([], ROOT) == (["protocol", "fronts"], PAGES)
-    assert whole.chosen(["docs/batch.md", "protocol"], ROOT) == (["protocol"], ["docs/batch.md"])
-    with pytest.raises(HierarchyError, match=r"'docs/view\.md'"):
-        whole.chosen(["docs/view.md"], ROOT)
-
-
 @pytest.fixture
 def documents(tmp_path):
     """A checkout that has documents only."""
@@ -148,24 +141,3 @@ def test_a_seed_that_has_ended_is_stored_whatever_ends_the_command(
     assert said in capsys.readouterr().err
     assert protocol.read(documents / ROWS) == new
     assert "it fell" in (documents / "docs/results/loops.md").read_text()
-
-
-def test_an_output_is_written_as_its_command_ends(documents, monkeypatch):
-    command, printed = "hierarchy bench batch --seconds 4", "Batches on ten\n"
-    monkeypatch.setattr(whole, "outputs", ending_with(KeyboardInterrupt(), (command, printed)))
-    assert whole.run(["docs/batch.md"], documents / "out", root=documents) == 130
-    assert pages.file_of(command, documents).read_text() == printed
-    assert f"```\n{printed}```" in (documents / "docs/batch.md").read_text()
-
-
-def test_a_page_that_cannot_be_filled_does_not_keep_others_from_it(documents):
-    page = documents / "docs/results/loops.md"
-    page.write_text(page.read_text() + "<!-- reproduce: other -->\n<!-- end of other -->\n")
-    changed, lacking = pages.fill(documents, STORED)
-    assert changed == []
-    assert [why.partition(":")[0] for why in lacking] == ["docs/results/loops.md"]
-
-
-def test_quick_needs_runs(tmp_path):
-    with pytest.raises(HierarchyError, match=r"--quick makes runs, and docs/batch\.md has"):
-        whole.run(["docs/batch.md"], tmp_path, True, 1)

@@ -50,13 +50,6 @@ def test_a_row_for_everybody_in_every_family_asked(few, tmp_path, capsys, monkey
     assert "…" not in out
 
 
-def test_a_backend_that_is_not_installed_is_named_and_not_skipped_silently(monkeypatch):
-    monkeypatch.setattr(resolvers, "installed", lambda name: name != "daqp")
-    field, missing = resolvers.field()
-    assert missing["hqp daqp"] == missing[HIERARCHICAL] == "pip install 'task-hierarchy[qp]'"
-    assert not {"hqp daqp", HIERARCHICAL} & {one.label for one in field}
-
-
 def test_fresh_problems_are_timed_and_reported_apart(few):
     found = resolvers.run(seconds=0.001, families=("EQ7", "INEQ7"), seed=10_000_000, count=4,
                           resolvers=["hcod"])

@@ -11,6 +11,7 @@ from hierarchy.paths import Blended, Ellipse, Still, Waypoints, circle, line
 from hierarchy.robots import TABLES, link_capsules
 from hierarchy.tasks import (
     Avoidance,
+    CentreOfMass,
     CumulatedRepulsion,
     DangerBounds,
     JointCoupling,
@@ -130,6 +131,9 @@ class Own(Task):
     (lambda: Avoidance(()), "control point"),
     (lambda: Avoidance(POINTS, 1).jacobian(STATE), "no measurement"),
     (lambda: JointDamping(7, 1.0, "momentum"), "weight"),
+    (lambda: CentreOfMass(ROBOT, THERE, ()), "axes"),
+    (lambda: CentreOfMass(ROBOT, THERE, (1, 0)), "in this order"),
+    (lambda: CentreOfMass(ROBOT, THERE, (0, 3)), "must be some of 0, 1, 2"),
     (lambda: JointDamping(7, -1.0), "damping"),
     (lambda: RelativePose(FRAME, "joint_3", (0, 0, 0)), "to is the name 'joint_3'"),
     (lambda: JointCoupling(ROBOT, {"joint_9": 1.0}), "unknown joint 'joint_9'"),

@@ -11,7 +11,7 @@ from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
 from scenarios.config.kinds.torque import TorqueSection
-from scenarios.loop.first_tick import contact_warnings, first_tick
+from scenarios.loop.first_tick import first_tick
 
 changed = load("stand-push").with_changes
 ANKLE = ROBOT.rest[ROBOT.coordinate("left_ankle_pitch")]
@@ -61,17 +61,6 @@ def test_a_floor_with_less_friction_than_the_controller_counts_on_is_named():
     assert [line for line in found if "friction" in line] == [
         "contact 'left_foot': the controller counts on a friction of 0.7, and the plant has 0.4 "
         "(plant.friction): it may slip"]
-
-
-def test_an_acceleration_far_beyond_its_limit_is_named():
-    """`tpm` has no limits in its stack: the hand is to stop from 40 rad/s within 1/20 s."""
-    v = np.zeros(ROBOT.n)
-    v[ROBOT.velocity_names.index("left_elbow")] = 40.0
-    found = contact_warnings(changed({"start.v": v.tolist(), "control.resolver": "tpm"}))
-    assert len(found) == 1
-    assert "the first tick asks joint left_shoulder_pitch for -" in found[0]
-    assert "times its limit of 300 (limits.acceleration)" in found[0]
-    assert contact_warnings(changed({"start.v": v.tolist()})) == ()
 
 
 # Faults

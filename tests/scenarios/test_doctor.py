@@ -53,15 +53,6 @@ def test_a_missing_package_says_how_to_get_it(monkeypatch):
     assert found["export"].well is None
 
 
-def test_an_older_package_first_on_the_path_is_named_with_its_file(monkeypatch, tmp_path):
-    (tmp_path / "old_one.py").write_text("__version__ = '2.0'\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(doctor, "_version", lambda package: "3.1")
-    found = doctor._imported(Requirement("old-one>=3,<4"))
-    assert found.well is False
-    assert found.found == f"2.0 in {tmp_path / 'old_one.py'}, not the 3.1 that is installed"
-
-
 def test_a_version_outside_the_range_is_not_well(monkeypatch):
     monkeypatch.setattr(doctor, "_version", lambda package: "3.3.1")
     found = doctor._imported(Requirement("html>=4,<5"))

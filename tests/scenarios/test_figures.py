@@ -64,27 +64,6 @@ def test_a_run_far_beyond_the_others_is_cut_and_says_so():
     assert drawn["a"].axes[0].get_ylim()[1] < 10.0
 
 
-def letters(name, **changed):
-    """A run made by hand that passes for the whole run of a shipped scenario."""
-    return recording(load(name), **changed)
-
-
-def test_only_the_letters_own_runs_have_the_numbers_of_its_figures():
-    def stems(run):
-        return {letter._named(figure, run)[0] for figure in letter.SIMULATION}
-
-    assert not [stem for stem in stems(recording()) if stem.startswith("figure")]
-    assert {stem for stem in stems(letters("ellipse")) if stem.startswith("figure")} == {
-        "figure-4b-joint-velocities", "figure-5-distances"}
-    assert "figure-4a-joint-velocities" in stems(letters("ellipse-velocity"))
-    assert "figure-6-velocities-and-distance" in stems(letters("ellipse-3d"))
-    other = load("ellipse").with_resolver("hcod"), load("ellipse", ["pointing.alpha_d=6.0"])
-    for scenario in other:
-        assert not [stem for stem in stems(recording(scenario)) if stem.startswith("figure")]
-    assert not [stem for stem in stems(letters("ellipse", fault="stopped"))
-                if stem.startswith("figure")]
-
-
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory):
     short = load("ellipse", ["control.duration=0.3"])

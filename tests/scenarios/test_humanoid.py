@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from scene import compiled_rows
 
-from hierarchy import Robot, State, Task
-from hierarchy.errors import HierarchyError
+from hierarchy import Robot, State
 from hierarchy.paths import Ellipse
 from hierarchy.tasks import CentreOfMass, Pointing, Pose, Position
 from scenarios import load, simulate
@@ -37,7 +37,7 @@ CASES = [(name, task) for name, robot in ROBOTS.items() for task in tasks(robot)
 
 
 @pytest.mark.parametrize(("name", "task"), CASES)
-def test_jacobian_and_its_derivative_agree_with_central_differences(name, task):
+def test_jacobian_derivative_and_compiled_rows_are_right_on_a_robot_with_branches(name, task):
     robot = ROBOTS[name]
     task = tasks(robot)[task]
     for q, v in some_states(robot, 2):
@@ -45,44 +45,15 @@ def test_jacobian_and_its_derivative_agree_with_central_differences(name, task):
             return State.at(robot, robot.integrate(q, step), v, 0.7)
 
         state = State.at(robot, q, v, 0.7)
-        J = task.jacobian(state)
         if task.name != "pose":  # whose rows are the angular velocity, not the error's derivative
             columns = [(task.error(moved(-STEP * e)) - task.error(moved(STEP * e))) / (2 * STEP)
                        for e in np.eye(robot.n)]
-            np.testing.assert_allclose(J, np.transpose(columns), atol=2e-8)
+            np.testing.assert_allclose(task.jacobian(state), np.transpose(columns), atol=2e-8)
         later, before = moved(STEP * v), moved(-STEP * v)
         difference = (task.jacobian(later) - task.jacobian(before)) / (2 * STEP)
         np.testing.assert_allclose(task.jacobian_derivative(state), difference, atol=2e-8)
-
-
-@pytest.mark.parametrize(("level", "differences"), [("velocity", None), ("acceleration", 1e-3)])
-@pytest.mark.parametrize(("name", "task"), CASES)
-def test_compiled_rows_equal_those_of_the_plain_methods(name, task, level, differences):
-    robot = ROBOTS[name]
-    task = tasks(robot)[task]
-    q, v = some_states(robot, 1)[0]
-    state = State.at(robot, q, v, 0.7, differences)
-    state.move(0.8, robot.integrate(q, 1e-3 * v), v)
-    written, plain = [(np.zeros((task.dimension, robot.n)), np.zeros(task.dimension),
-                       np.zeros(task.dimension)) for _ in range(2)]
-    task.writer(state, level, *written, row=0)()
-    Task.writer(task, state, level, *plain, row=0)()
-    for a, b in zip(written, plain, strict=True):
-        np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10)
-
-
-BARE = ('<robot name="bare"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
-        '<parent link="a"/><child link="b"/></joint></robot>')
-
-
-@pytest.mark.parametrize(("robot", "axes", "said"), [
-    ("humanoid", (), "axes"), ("humanoid", (1, 0), "in this order"),
-    ("humanoid", (0, 3), "must be some of 0, 1, 2"), ("bare.urdf", (0,), "'bare' has no masses")])
-def test_a_centre_of_mass_that_makes_no_sense_is_refused(robot, axes, said, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bare.urdf").write_text(BARE)
-    with pytest.raises(HierarchyError, match=said):
-        CentreOfMass(Robot.load(robot), PATH, axes)
+        for level in ("velocity", "acceleration"):
+            compiled_rows(task, state, level, rtol=1e-10)
 
 
 @pytest.fixture(scope="module")

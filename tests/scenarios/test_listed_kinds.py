@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError, State, plugins
-from hierarchy.tasks import JointCoupling, Manipulability, SelfSeparation, Separation
+from hierarchy.tasks import JointCoupling, SelfSeparation, Separation
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import KinematicArm
-from scenarios.cell.sensors import ExactDistances
 from scenarios.config.plant import AnyPlant
 from scenarios.config.sections import Unit
-from scenarios.config.sensor import AnySensor
 from scenarios.config.tasks import Listed
 from scenarios.measure.metrics import measure
 
@@ -54,23 +52,6 @@ def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path)
     run = simulate(scenario_of(tmp_path, task, control=at_level(level)))
     assert run.fault is None
     assert measure(run)[metric].value < (0.1 if "look" in metric else 1e-3)  # deg, or m and rad
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-def test_manipulability_is_kept_while_the_hand_reaches_out(level, tmp_path):
-    reach = {"kind": "position", "frame": "end_effector", "offset": [0.03, 0.12, 0.02]}
-    keep = {"kind": "manipulability", "frame": "end_effector", "least": 0.08}
-
-    def least(*tasks):
-        run = simulate(scenario_of(tmp_path, *tasks, control=at_level(level)))
-        robot = build(run.scenario).robot
-        task = Manipulability(robot.frame("end_effector"), 0.0)
-        assert run.fault is None
-        return min(task.value(State.at(robot, q)) for q in run["q"][::20])
-
-    assert least(reach) < 0.07
-    assert least(keep, reach) > 0.08
 
 
 @pytest.mark.slow
@@ -239,17 +220,3 @@ def test_a_new_plant_is_its_class_and_one_section(kinds, tmp_path):
             for plant in ({"kind": "kinematic"}, {"kind": "slow", "share": 0.5})]
     exact, slow = (run["q"][1] - run["q"][0] for run in runs)
     np.testing.assert_allclose(slow, 0.5 * exact)
-
-
-def test_a_new_sensor_is_its_class_and_one_section(kinds, tmp_path):
-    @plugins.register("sensors", "near", shipped=True)
-    class NearSection(AnySensor):
-        foot: ClassVar[float] = 0.0
-        kind: Literal["near"]
-
-        def made(self, robot, **given):
-            return given["exact"]
-
-    avoidance = {"kind": "separation", "obstacles": [[0.1, 0.5, 0.1]]}
-    cell = build(scenario_of(tmp_path, COUPLING, avoidance=avoidance, sensor={"kind": "near"}))
-    assert isinstance(cell.sensor, ExactDistances)

@@ -13,7 +13,6 @@ from balanced import Balanced
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.notebook import html_table, numbers
 from scenarios import compare, load, simulate
-from solvers import certify, make
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
@@ -48,16 +47,6 @@ def test_numbers_are_in_one_line_with_four_digits_without_rounding_and_their_mid
 def test_a_hierarchy_shows_its_levels(h):
     cells = Balanced(h._repr_html_()).cells
     assert cells[-8:] == ["<limits>", "2", "0", "2", "hand & arm", "1", "1", "0"]
-
-
-@pytest.mark.slow
-def test_resolution_and_certificate_show_how_they_ended(h):
-    found = make("hcod").solve(h)
-    assert "solved: nothing to do" in Balanced(found._repr_html_()).cells
-    shown = Balanced(certify(h, found.x)._repr_html_()).cells
-    assert shown[0].startswith("Certificate: certified")
-    assert "<limits>" in shown
-    assert "not optimal" in repr(certify(h, np.zeros(2)))
 
 
 @pytest.mark.slow

@@ -1,12 +1,10 @@
 """Where strict resolvers part: the tick, and what was different before it."""
 
-import json
 
 import numpy as np
 import pytest
 from hand_made import HandMadeScenario, recording
 
-from scenarios import compare
 from scenarios.config.resolvers import default_resolvers
 from scenarios.measure.motions import motions
 from scenarios.measure.partings import partings
@@ -64,17 +62,6 @@ def test_a_run_that_is_not_finite_has_parted():
 def test_resolvers_that_are_not_strict_need_not_agree():
     """Neither as the one compared with, nor as the one compared."""
     assert partings([run_of(LETTER), run_of("recursive"), run_of("augmented", away_from(1))]) == []
-
-
-@pytest.mark.slow
-def test_the_numbers_hold_it(tmp_path):
-    from scenarios import load
-
-    compare([load("ellipse", ["control.duration=0.02"])], ["tpm", "hqp"],
-            out=tmp_path / "a")
-    (one,) = json.loads((tmp_path / "a" / "comparison.json").read_text())["partings"]["ellipse"]
-    assert (one["label"], one["from"], one["tick"]) == ("hqp proxqp", "tpm", None)
-    assert one["largest_rad"] < 1e-9
 
 
 def test_a_backend_that_is_not_installed_leaves_the_default_comparison_and_is_named(monkeypatch):

@@ -7,7 +7,7 @@ import pytest
 from pendulum import LIMIT, URDF
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import Obstacle, Obstacles
+from hierarchy.avoidance import Obstacles
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
@@ -88,17 +88,6 @@ def test_servos_stay_within_the_effort_limits(mujoco):
     assert (most > 0.99 * ROBOT.effort_limit).any()
 
 
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-def test_the_reference_keeps_the_joint_range(mujoco, level):
-    plant = arm(mujoco, STILL, level=level)
-    for k in range(800):
-        plant.act(np.ones(7) if level == "velocity" or k < 200 else STILL)
-        assert (plant.reference_q <= ROBOT.upper + 1e-15).all()
-    np.testing.assert_allclose(plant.reference_q, ROBOT.upper, rtol=0, atol=1e-12)
-    assert (plant.q < ROBOT.upper + 0.01).all()
-    np.testing.assert_array_equal(plant.reference_v, STILL)
-
-
 # Contacts.
 
 
@@ -106,20 +95,6 @@ def forearm(q=START):
     """The middle of the forearm, a capsule along the z axis of the frame of joint 5."""
     placed = State.at(ROBOT, q).placements[5]
     return placed[9:] + 0.195 * placed[6:9]
-
-
-def test_the_reference_of_an_arm_held_back_does_not_run_away(mujoco):
-    side = State.at(ROBOT, START).placements[5][0:3]
-    # Joint 1 turns the arm about the vertical, with this sign toward the wall.
-    sign = np.sign(np.cross([0.0, 0.0, 1.0], forearm()) @ side)
-    wall = Obstacle("box", tuple(forearm() + 0.17 * side), (0.1, 0.1, 0.1),
-                    State.at(ROBOT, START).placements[5][:9].reshape(3, 3).T)
-    plant = arm(mujoco, obstacles=[wall], servo={"lead": 0.05})
-    for _ in range(200):
-        plant.act(0.5 * sign * np.eye(7)[0])
-        assert (np.abs(plant.reference_q - plant.q) < 0.05 + 0.02).all()
-    assert plant.extra["contacts"] > 0
-    assert plant.extra["contact_force"] > 1.0
 
 
 # What the controller is told.

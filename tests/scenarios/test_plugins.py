@@ -60,11 +60,6 @@ def along(frame: Frame, path: Path, name: str):
     return Position(frame, path, name=name)
 
 
-@register("tasks", "broken")
-def broken(depth: float):
-    raise KeyError("a mistake of mine")
-
-
 @register("resolvers", "halved")
 @dataclass(frozen=True, kw_only=True)
 class Halved(Resolver):
@@ -93,26 +88,6 @@ class Weak(KinematicArm):
 
     def act(self, command):
         super().act(self.share * command)
-
-
-@register("sensors", "coarse")
-class Coarse:
-    """Distances in steps [m]."""
-
-    outside = 0.0
-
-    def __init__(self, exact, step: float = 0.01):
-        self.exact, self.step = exact, step
-        self.points, self.obstacles = exact.points, exact.obstacles
-        self.measurement = exact.measurement
-
-    def measure(self, state):
-        seen = self.exact.measure(state)
-        seen.distance[:] = np.floor(seen.distance / self.step) * self.step
-        return seen
-
-    def check_start(self, state):
-        self.exact.check_start(state)
 '''
 
 SCENARIO = '''
@@ -189,14 +164,6 @@ def test_a_file_alone_loads_no_code(command, capsys, folder):
     assert "doors_of_mine" not in sys.modules
 
 
-@pytest.mark.parametrize("text", ["name='x'\nplugins='mine'", "name='x'\nplugins=[1]",
-                                  "name='x'\nplugins={a=1}"])
-def test_plugins_are_a_list_of_modules(text, folder):
-    (folder / "own.toml").write_text(text)
-    with pytest.raises(HierarchyError, match="plugins: expected a list of modules"):
-        load("own.toml")
-
-
 def test_a_plugin_that_cannot_be_imported_says_why(capsys, folder):
     assert "plugin 'nowhere' cannot be imported: ModuleNotFoundError" in said(
         ["check", "ellipse", "--plugin", "nowhere"], capsys)[1]
@@ -263,17 +230,6 @@ def test_wrong_keys_of_own_kinds_are_named(change, said):
     plugins.allow("doors_of_mine")
     with pytest.raises(HierarchyError, match=re.escape(said)):
         simulate(load("own.toml", [change]))
-
-
-@pytest.mark.slow
-def test_what_goes_wrong_in_a_plugin_is_said_with_its_name():
-    plugins.allow("doors_of_mine")
-    broken = load("own.toml", {"tasks": [{"kind": "broken", "depth": 1.0}]})
-    with pytest.raises(HierarchyError, match="task of kind 'broken': KeyError: 'a mistake of mine"):
-        simulate(broken)
-    missing = load("own.toml", {"tasks.1.frame": "thumb"})
-    with pytest.raises(HierarchyError, match="task of kind 'along': unknown frame 'thumb'"):
-        simulate(missing)
 
 
 @pytest.mark.parametrize(("group", "line", "use"), [

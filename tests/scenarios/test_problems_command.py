@@ -1,14 +1,11 @@
 """`hierarchy problems`: families listed, halves exported, files checked."""
 
 import json
-from itertools import pairwise
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from scenarios.cli.main import run_command
-from scenarios.problems import answers, recorded
+from scenarios.problems import recorded
 from scenarios.problems.answers import export, save
 from scenarios.problems.families import FAMILIES, available, family
 from solvers import problems
@@ -40,33 +37,6 @@ def test_halves_are_reproducible_and_never_the_same(name):
     one = family(name)
     assert one.half(3, 2).digest == one.half(3, 2).digest
     assert len({one.half(seed, 2).digest for seed in (0, 1, 2)}) == 3
-
-
-@pytest.mark.parametrize("name", ["singular-lwr", "singular-dual-arm", "singular-humanoid"])
-def test_postures_are_singular_or_close_to_it_or_neither(name):
-    kept = [smallest(h) for h in family(name).half(1, 12).problems]
-    singular, near, other = (np.array(kept[kind::3]) for kind in range(3))
-    assert (singular < 1e-12).all()
-    assert (near > 1e-12).all()
-    assert np.median(near) < 0.1 * np.median(other)
-
-
-def smallest(h):
-    """The smallest singular value of the tasks between the limits and the posture."""
-    between = slice(int(h.offsets[1]), int(h.offsets[-2]))
-    return np.linalg.svd(h.A[between], compute_uv=False)[-1]
-
-
-@pytest.mark.slow
-def test_a_sequence_with_a_plant_is_as_long_as_asked_and_has_consecutive_ticks():
-    pytest.importorskip("mujoco")
-    made = family("stand-push").half(3, 4)
-    assert (len(made.problems), made.head.sequence, made.head.period) == (4, True, 0.001)
-    levels = [h.names for h in made.problems]
-    assert levels[0][0] == "physics"
-    assert levels == levels[:1] * 4
-    steps = [abs(after.A - before.A).max() for before, after in pairwise(made.problems)]
-    assert 0.0 < max(steps) < 0.1
 
 
 def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
@@ -104,12 +74,3 @@ def test_check_finds_an_answer_that_is_not_proved(capsys, tmp_path):
     save(found, tmp_path)
     assert run_command(["problems", "check", str(file)]) == 1
     assert "problem 1: level 1: least violation" in capsys.readouterr().out
-
-
-def test_of_answers_without_a_whole_proof_the_one_that_is_proved_furthest_is_taken(monkeypatch):
-    proofs = [SimpleNamespace(complete=False, judged=judged) for judged in (1, 3, 2)]
-    monkeypatch.setattr(answers, "_candidates", lambda _: proofs)
-    monkeypatch.setattr(answers, "prove", lambda _, candidates: candidates[0])
-    assert answers.answer(None) is proofs[1]
-    proofs[2].complete = True
-    assert answers.answer(None) is proofs[2]

@@ -122,40 +122,6 @@ def test_nothing_is_wider_than_the_window(page, width, dark):
     assert page.run("document.getElementById('play').getBoundingClientRect().bottom") <= 740
 
 
-@pytest.fixture
-def without(page):
-    """Open the page where the contexts of a canvas that are named are missing."""
-    added, address = [], page.address
-
-    def opened(*kinds):
-        added.append(page.call("Page.addScriptToEvaluateOnNewDocument", source=f"""
-            const get = HTMLCanvasElement.prototype.getContext;
-            HTMLCanvasElement.prototype.getContext = function(kind, ...rest) {{
-                return {json.dumps(kinds)}.includes(kind) ? null : get.call(this, kind, ...rest); }}
-            """)["identifier"])
-        page.look_at("about:blank")
-        page.look_at(address, 1000, 600)
-        return page
-
-    yield opened
-    for script in added:
-        page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
-    page.look_at(address, 1000, 600)
-
-
-def test_without_webgl_the_arm_is_sketched_and_moves(without):
-    page = without("webgl")
-    assert page.run("player.stage.flat")
-    first = page.screenshot()
-    page.run("player.seek(1.5)")
-    assert page.screenshot() != first
-    colours = page.run("""(() => { const seen = new Set(), {pen} = player.stage.painter;
-        const {data} = pen.getImageData(150, 150, 300, 300);
-        for (let i = 0; i < data.length; i += 4) seen.add(data.slice(i, i + 3).join());
-        return seen.size; })()""")
-    assert colours > 20
-
-
 def test_the_command_takes_several_runs_and_a_name(runs, tmp_path):
     folders = [str(save(run, tmp_path / label)) for label, run in runs.items()]
     file = tmp_path / "new" / "two.html"

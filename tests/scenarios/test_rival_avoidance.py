@@ -1,9 +1,7 @@
 """The avoidance of the letter's references [5] and [10], as scenarios."""
 
 import numpy as np
-import pytest
 
-from hierarchy import HierarchyError
 from hierarchy.tasks import CumulatedRepulsion, DangerBounds
 from scenarios import load
 from scenarios.cell.build import build
@@ -25,14 +23,6 @@ def test_in_the_null_space_avoidance_is_never_in_the_stack():
     assert cell.stack.reference.within == 0.15
 
 
-def test_the_end_effector_still_has_its_own_repulsion():
-    cell, seen = at_the_start(load("ellipse-nullspace"))
-    assert cell.position.repulsion_within == 0.1
-    for distance, active in ((0.05, True), (0.1, True), (0.11, False)):
-        seen.distance[-1] = distance
-        assert cell.order(seen, -1.0).repulsion is active
-
-
 def test_what_the_null_space_gets_moves_no_task_of_the_stack():
     """At full rank the rows hold to rounding, while the null-space term differs from damping."""
     wide = {"avoidance.far": 0.6, "control.options": {"form": "staircase"}}
@@ -45,11 +35,6 @@ def test_what_the_null_space_gets_moves_no_task_of_the_stack():
     x, without = resolver.solve(h).x, resolver.solve(damped).x
     np.testing.assert_allclose(h.A @ x, h.lower, atol=1e-9)
     assert np.abs(x - without).max() > 1e-3
-
-
-def test_wrong_jacobians_are_of_the_letter_s_own_avoidance_only():
-    with pytest.raises(HierarchyError, match=r'place = "null-space" goes with jacobian = "exact"'):
-        load("ellipse-published", ["avoidance.place=null-space"])
 
 
 def test_danger_closes_the_box_of_joints_and_pushes_nothing():

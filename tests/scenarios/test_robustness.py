@@ -135,44 +135,8 @@ def test_an_arm_comes_to_rest_without_frames_and_goes_on_when_they_return(name, 
 
 # An obstacle that is already near when the run starts.
 
-NEARBY = {"the end effector": [0.25, 0.6, 0.1], "the elbow": [0.28, 0.187, 0.196]}
-
-
-@pytest.mark.parametrize(("name", "resolver", "near", "level", "parts"), [
-    (*SCHEMES[1], "the end effector", "acceleration", "physics"),
-    (*SCHEMES[1], "the elbow", "velocity", "kinematic"),
-    (*SCHEMES[2], "the end effector", "velocity", "physics"),
-    (*SCHEMES[2], "the elbow", "acceleration", "kinematic")])
-def test_what_is_near_at_the_start_is_left_at_once(name, resolver, near, level, parts):
-    """With limits in the stack the distance never falls by more than a millimetre.
-
-    Limits as a guard cut commands joint by joint and promise no such thing: under `recursive` the
-    end effector comes back to the obstacle in less than a second.
-    """
-    found = run(name, resolver, sphere(NEARBY[near]), seconds=0.75, parts=parts, level=level)
-    distance = np.minimum(found["ee_distance"], found["minimal_distance"])
-    assert distance[0] < 0.2
-    assert distance.min() > distance[0] - 1e-3
-    assert distance[40] > distance[0] + 5e-3
-    assert distance[100] > distance[0] + 0.02
-    assert not touched(found)
-
 
 # A target that cannot be reached: an obstacle comes and stays on it.
-
-ONTO = sphere(times=[0.0, 2.0], points=[[0.9, 0.6, 0.2], [0.1, 0.6, 0.0]])
-
-
-@pytest.mark.parametrize(("level", "parts"), [
-    ("acceleration", "physics"), ("velocity", "kinematic")])
-def test_separation_rests_at_its_distance_from_an_obstacle_on_the_target(level, parts):
-    """The distance is kept to a centimetre, the arm comes to rest there, nothing is touched."""
-    found = run("human-hqp", "hcod", ONTO, "avoidance.distance=0.2", seconds=6.0, parts=parts,
-                level=level)
-    assert found["ee_distance"].min() > 0.19
-    assert found["ee_distance"][-1] == pytest.approx(0.2, abs=1e-3)
-    assert speed(found)[-100:].max() < 0.05
-    assert not touched(found)
 
 
 # Starts that are singular, on or beyond a limit, or too fast.

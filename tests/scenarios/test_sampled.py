@@ -17,7 +17,7 @@ from scenarios import load, shipped, simulate
 from scenarios.cli.main import run_command
 from scenarios.config.sampling import changed, drawn
 from scenarios.measure import metrics
-from scenarios.results import cluster, pool
+from scenarios.results import pool
 from scenarios.results.plan import load_sweep, plan, shipped_sweeps
 from scenarios.results.run import Job, Outcome, outcome
 from scenarios.results.sampled import Workers, compare_starts, sweep
@@ -79,14 +79,6 @@ def test_a_wrong_file_is_refused_before_anything_is_run(parameters, changed, say
     assert run_command(["sweep", str(path), "--out", str(tmp_path / "out")]) == 2
     assert says in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_unreadable_files_and_unknown_names_are_named(tmp_path):
-    (tmp_path / "bad.toml").write_text("name = ")
-    with pytest.raises(HierarchyError, match=r"bad\.toml"):
-        load_sweep(tmp_path / "bad.toml")
-    with pytest.raises(HierarchyError, match="'ellipse-starts'"):
-        load_sweep("ellipse-start")
 
 
 def test_every_shipped_sweep_can_be_planned():
@@ -182,16 +174,6 @@ def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path):
     assert first == second == third
     assert sum(metric == "reached_end" for _, _, metric in first) == 6
     assert ("tpm", "2", "start.q.6") in first
-
-
-def test_a_part_that_is_not_there_and_a_scheduler_that_does_not_answer_are_named(tmp_path, capsys,
-                                                                               monkeypatch):
-    pytest.importorskip("distributed", reason="needs the extra sweep")
-    monkeypatch.setattr(cluster, "_PATIENCE", 0.5)
-    command = ["sweep", str(write(tmp_path)), "--out", str(tmp_path / "out")]
-    for option in (["--part", "3/2"], ["--part", "3"], ["--scheduler", "tcp://127.0.0.1:1"]):
-        assert run_command([*command, *option]) == 2
-        assert option[1] in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -5,23 +5,15 @@ import pytest
 from hand_made import recording as hand_made
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.robots import TABLES
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.cell.robot import make_robot
-from scenarios.config.robot import RobotSection
 from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
-from scenarios.recording.facts import robot_facts
 from scenarios.recording.fate import Fate, levels_at
-from scenarios.scene import ends, scene, stage
+from scenarios.scene import scene
 
 SHORT = ["control.duration=1.5"]
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
-
-
-def stage_of(scenario):
-    return stage(robot_facts(make_robot(scenario.robot), scenario.sensor.foot), scenario)
 
 
 @pytest.fixture(scope="module")
@@ -103,18 +95,6 @@ def test_no_peak_between_two_frames_is_lost(runs):
         assert ((curve.low <= curve.value) & (curve.value <= curve.high)).all()
 
 
-def test_marks_have_their_symbols_in_plain_text(ellipse):
-    assert [ellipse.series[i].marks for i in (1, 2, 3)] == [
-        (("α_d", 5.0),), (("ε₁", 0.05), ("ε₂", 0.15)), (("ε_ee", 0.1),)]
-    assert ellipse.stage.areas == (("ε₁", 0.05), ("ε₂", 0.15))
-
-
-def test_the_axis_of_a_cone_is_drawn_with_unit_length():
-    fixed = stage_of(load("ellipse", ["pointing.axis=[0, 3, 4]"]))
-    np.testing.assert_allclose(fixed.axis, [0.0, 0.6, 0.8])
-    assert fixed.half_angle == pytest.approx(np.radians(5.0))
-
-
 def test_frames_end_where_the_state_stops_being_finite():
     q = np.zeros((5, 7))
     q[3:] = np.nan
@@ -133,12 +113,3 @@ def test_levels_that_were_not_judged_are_unknown_where_they_are_in_the_stack():
 def test_a_rate_that_is_none_is_refused(ellipse, runs, rate):
     with pytest.raises(HierarchyError, match="rate"):
         scene(runs["ellipse"], rate)
-
-
-@pytest.mark.parametrize("name", TABLES)
-def test_no_robot_at_rest_is_below_the_floor(name):
-    scenario = load("ellipse").model_copy(update={"robot": RobotSection(model=name)})
-    fixed = stage_of(scenario)
-    low = ends(fixed.robot.capsules[1:], fixed.robot.placements(fixed.robot.rest))[..., 2].min()
-    assert low >= fixed.robot.floor
-    assert stage_of(load("humanoid")).robot.floor == pytest.approx(0.0, abs=1e-6)  # it stands on it

@@ -12,9 +12,7 @@ import pytest
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.robots import TABLES
 from scenarios import load, load_run, save, simulate
-from scenarios.cli.main import run_command
 from scenarios.draw.replay.page import html
-from scenarios.measure.metrics import as_plain_data
 from scenarios.recording.tree import joint_units, placements, tree_of
 from scenarios.scene import scene
 
@@ -114,14 +112,6 @@ def test_a_scene_has_arm_obstacle_and_every_level(made):
     assert np.allclose(shown.distance[:, -1], run["ee_distance"][shown.ticks], atol=1e-12)
     assert shown.levels.known.all()
     assert shown.levels.names == ("joint limits", "separation", "position")
-
-
-def test_figures_metrics_and_tables_are_made_of_it(made, tmp_path):
-    folder, run, _ = made
-    assert run_command(["figures", str(folder), "--out", str(tmp_path / "figures")]) == 0
-    assert {"picture.svg", "stack.svg", "tick-times.png"} <= {
-        path.name for path in (tmp_path / "figures").iterdir()}
-    assert as_plain_data(load_run(folder)) == as_plain_data(run)
 
 
 def test_facts_that_are_missing_or_damaged_are_named(made, tmp_path):

