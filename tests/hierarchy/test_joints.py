@@ -173,5 +173,7 @@ def test_joint_limits_cover_a_floating_base_where_it_has_limits():
     np.testing.assert_array_equal(low[6:], joints.box(state, "acceleration")[0])
     sent = both.clamp(state, "acceleration", np.append([9.0, np.nan], np.zeros(34)))
     np.testing.assert_allclose(sent[:2], [1.0, 0.0])
+    sent = joints.clamp(state, "acceleration", np.append([np.nan, 1e6], np.full(34, 1e6)))
+    np.testing.assert_allclose(sent[[0, 1, 20]], [0.0, 1e6, 5.0])
     with pytest.raises(HierarchyError, match="has a fixed base"):
         JointLimits(ROBOT, 5.0, T, base_acceleration=(1.0, 1.0))

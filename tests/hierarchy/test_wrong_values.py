@@ -168,6 +168,8 @@ class Own(Task):
     (lambda: Loop(0.1).run(print, print, NAN), "loop: duration"),
     (lambda: Stack(metric="inertia"), "'mass' or None, got 'inertia'"),
     (lambda: Stack(metric=-np.eye(7)), "not positive definite"),
+    (lambda: ROBOT.limit_base(1.0, 1.0), "its base is fixed"),
+    (lambda: Robot.load("humanoid").limit_base(0.0, 1.0), "linear speed of the base = 0"),
     (lambda: Robot.named("kuka_lvr"), "did you mean 'kuka_lwr'"),
     (lambda: ROBOT.frame("end_efector"), "did you mean 'end_effector'"),
     (lambda: ROBOT.control_point("elbow", (0, 0, 0)), "unknown joint 'elbow'"),

@@ -31,6 +31,7 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: solve_ik(ROBOT, Q, [HAND], limits="yes"), "limits: expected True, False or a task"),
     (lambda: certify([], [0.0, 0.0]), "certify: h: expected a Hierarchy, got list"),
     (lambda: certify(H, [0.0, 0.0], tolerance=-1.0), "certify: tolerance"),
+    (lambda: explain(H, make("weighted").solve(H)), "hcod"),
     (lambda: explain(H, make("hcod").solve(H), rows="ab"), "rows: expected a list of names"),
     (lambda: Hierarchy.from_levels([([[10**400]], [1.0])]), "level 1"),
 ])

@@ -20,6 +20,7 @@ def test_names_are_sorted_and_each_makes_its_resolver():
     assert list(names()) == sorted(names())
     assert {"recursive", "tpm", "hqp", "augmented"} <= set(names())
     assert all(make(name).name == name for name in names())
+    assert make("weighted", weights=(10, 1), backend="daqp").label == "weighted 10/1 daqp"
 
 
 @pytest.mark.parametrize("name", [*names(), "tpm-published"])
