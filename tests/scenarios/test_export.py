@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from hierarchy import HierarchyError, Robot, State
 from scenarios import load, simulate
 from scenarios.cli.main import run_command
-from scenarios.export import export
+from scenarios.export import export, foxglove
 from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Event
 
@@ -144,3 +144,15 @@ def test_the_command_exports_a_run_beside_it_or_where_it_is_told(run, tmp_path, 
     assert run_command(["export", str(folder), "--format", "csv"]) == 2
     assert "to_dataframe" in capsys.readouterr().err
     assert run_command(["export", str(tmp_path / "none")]) == 2
+
+
+@pytest.mark.parametrize("shape", ["box", "capsule", "point"])
+def test_every_shape_of_an_obstacle_is_drawn_at_its_size(shape):
+    from hierarchy.avoidance import Obstacle
+
+    size = {"box": (0.1, 0.2, 0.3), "capsule": (0.05, 0.2), "point": ()}[shape]
+    drawn = foxglove.obstacle(0.0, 0, Obstacle(shape, (1.0, 2.0, 3.0), size), np.array([1., 2, 3]))
+    part = drawn[{"box": "cubes", "capsule": "cylinders", "point": "spheres"}[shape]][0]
+    expected = {"box": [0.2, 0.4, 0.6], "capsule": [0.1, 0.1, 0.4], "point": [0.02] * 3}[shape]
+    np.testing.assert_allclose([*part["size"].values()], expected)
+    assert len(drawn["spheres"]) == {"box": 0, "capsule": 2, "point": 1}[shape]

@@ -105,3 +105,20 @@ def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event(
     assert ax.get_title(loc="left") == "Place in the stack, 2 changes"
     assert ax.get_ylim() == (2.5, -0.5)  # half a row around the three
     assert "fault" in [text.get_text() for text in ax.texts]
+
+
+def letters(name, **changed):
+    """A run made by hand that passes for the whole run of a shipped scenario."""
+    return recording(load(name), **changed)
+
+
+def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
+    names = ("ellipse-35deg-equality", "ellipse", "ellipse-velocity", "ellipse-35deg", "ellipse-3d")
+    runs = [letters(name, v=np.full((5, 7), float(i))) for i, name in enumerate(names)]
+    drawn = dict(letter._together(runs))
+    assert list(drawn) == ["figure-4-joint-velocities", "figure-5-distances",
+                           "figure-6-velocities-and-distance", "figure-7-pointing-error"]
+    headings = [ax.get_title(loc="left")[:4] for ax in drawn["figure-5-distances"].axes]
+    assert headings == ["(a) ", "(b) ", "Body"]
+    speeds = [ax.lines[0].get_ydata()[0] for ax in drawn["figure-4-joint-velocities"].axes]
+    assert speeds == [2.0, 1.0]  # the velocity level is (a)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hierarchy import Robot
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.measure.metrics import measure
@@ -53,3 +54,28 @@ def test_the_strictness_scenario_measures_what_a_lower_task_moves():
     scenario = load("strictness", ["control.duration=0.3"])
     weighted = simulate(scenario.with_resolver("weighted:ratio=10"))
     assert measure(weighted)["moved_by_lower_max"].value > 1e-7
+
+
+ROBOT = Robot.named("kuka_lwr")
+BEYOND = [1.1657, -0.9476, 0.5844, float(ROBOT.upper[3]) + 0.1, 1.1464, 1.7695, 0.0]
+STARTS = {"stretched": "start.q=[0, 0, 0, 0, 0, 0, 0]",
+          "beyond a limit": f"start={{q={BEYOND}, allow_outside_limits=true}}",
+          "too fast": "start.v=[3, -3, 3, -3, 4, -3, 3]"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", STARTS)
+@pytest.mark.parametrize(("name", "resolver"), [
+    ("human", "recursive"), ("human", "sns"), ("human-hqp", "hcod")])
+def test_any_start_is_recovered_from_within_the_limit_of_acceleration(name, resolver, how):
+    """A joint beyond its limit comes back without going farther out; too fast, it slows down."""
+    run = simulate(load(name, ["control.duration=1.0", "plant={kind='kinematic'}", STARTS[how],
+                               "sensor={kind='exact'}"]).with_resolver(resolver))
+    assert run.fault is None
+    assert np.abs(run["command"]).max() <= run.scenario.limits.acceleration * (1.0 + 1e-9)
+    out = np.maximum(run["q"] - ROBOT.upper, ROBOT.lower - run["q"])
+    assert (np.diff(np.maximum(out, 0.0), axis=0) <= 1e-12).all()
+    assert out[60:].max() <= 1e-12
+    excess = np.maximum(np.abs(run["v"]) / ROBOT.velocity_limit - 1.0, 0.0)
+    assert (np.diff(excess, axis=0) < 1e-9).all()
+    assert excess[-1].max() == 0.0

@@ -180,7 +180,8 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
 # Mistakes.
 
 
-def test_without_mujoco_the_extra_is_named(monkeypatch, capsys):
+def test_without_mujoco_the_extra_is_named(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "mujoco", None)
     assert run_command(["run", "ellipse", "--set", "plant.kind=mujoco", "--duration", "0.01"]) == 2
     assert "pip install 'task-hierarchy[sim]'" in capsys.readouterr().err
@@ -202,3 +203,20 @@ def test_only_an_arm_given_as_a_table_has_physics(mujoco, tmp_path):
     with pytest.raises(ScenarioError, match="robot 'arm' is not one of kuka_lwr"):
         build(load("ellipse", ["plant.kind=mujoco", f"robot.model={tmp_path}/arm.urdf",
                                "robot.end_effector=hand", "start={q=[0.0]}"]))
+
+
+@pytest.mark.parametrize("level", ["acceleration", "velocity"])
+@pytest.mark.parametrize("far", [0.05, 0.3])
+def test_the_servos_of_a_joint_beyond_its_limit_are_led_back_without_a_jump(mujoco, far, level):
+    """The reference once went to the limit at once, and its rate of 20 rad/s was kept."""
+    q = START.copy()
+    q[3] = ROBOT.upper[3] + far
+    arm = PhysicsArm(ROBOT, q, np.zeros(7), 0.005, level)
+    command, reference = np.zeros(7), []
+    for k in range(100):
+        command[3] = -2.0 * (k < 50) if level == "acceleration" else -min(0.01 * k, 0.5)
+        arm.act(command)
+        reference.append(arm.reference_v[3])
+    assert np.abs(np.diff(reference, prepend=0.0)).max() <= 0.01 + 1e-12
+    assert arm.q[3] == pytest.approx(arm.reference_q[3], abs=0.01)
+    assert arm.q[3] < q[3] - 0.1

@@ -2,13 +2,14 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from scenarios.cli.main import run_command
 from scenarios.problems import recorded
 from scenarios.problems.answers import export, save
 from scenarios.problems.families import FAMILIES, available, family
-from solvers import problems
+from solvers import make, problems
 from solvers.problems.files import read
 
 QUICK = ("EQ7", "INEQ7", "DEGEN7", *problems.KINDS, "recipe")
@@ -74,3 +75,18 @@ def test_check_finds_an_answer_that_is_not_proved(capsys, tmp_path):
     save(found, tmp_path)
     assert run_command(["problems", "check", str(file)]) == 1
     assert "problem 1: level 1: least violation" in capsys.readouterr().out
+
+
+def test_problems_as_others_make_them_are_what_their_makers_describe():
+    for h in family("of-daqp").half(3, 5).problems:
+        x = make("hcod").solve(h).x
+        rows = slice(0, h.sizes[0])
+        apart = np.minimum(h.upper - h.A @ x, h.A @ x - h.lower)[rows]
+        assert (apart > -1e-9).all()
+        assert (apart < 1e-9).sum() == 8
+        assert np.linalg.cond(h.A[h.sizes[0]:]) ** 2 == pytest.approx(100.0)
+    sides = [(h.lower == h.upper, np.isinf(h.lower), np.isinf(h.upper))
+             for h in family("of-soth").half(3, 20).problems]
+    assert all(any(kind.any() for kind in some) for some in zip(*sides, strict=True))
+    ranks = [np.linalg.matrix_rank(h.A) - h.m for h in family("of-lexls").half(3, 20).problems]
+    assert min(ranks) < 0

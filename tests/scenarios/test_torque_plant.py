@@ -3,13 +3,12 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing import ROBOT, WEIGHT, feet, standing_stack
+from standing import ROBOT, feet
 
 from hierarchy import State
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
 from scenarios.config.kinds.torque import PushSection, TorqueSection
-from solvers import certify, make
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("with_mujoco")]
 
@@ -70,25 +69,3 @@ def test_a_push_gives_the_whole_robot_its_momentum():
     with pytest.raises(ScenarioError, match=r"plant.pushes: .*trunk_pich"):
         TorqueRobot(ROBOT, CONTACTS, q, section=plant_with(pushes=(
             PushSection(joint="trunk_pich", force=1.0),)))
-
-
-def test_it_stands_with_the_accelerations_and_forces_that_the_stack_predicts():
-    """Contacts of MuJoCo are soft: it stands 1 mm deep, and after 1 s the difference is small."""
-    start = State.at(ROBOT, ROBOT.rest)
-    plant, stack = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest), standing_stack(start, CONTACTS)
-    state, resolver, memory = State(ROBOT), make("hcod"), None
-    for tick in range(1000):
-        state.move(tick * 1e-3, plant.q, plant.v)
-        h = stack.hierarchy(state)
-        res = resolver.solve(h, memory)
-        memory = res.memory
-        torques = CONTACTS.torques(state, res.x)
-        plant.act(torques)
-    assert certify(h, res.x).certified
-    error = plant.accelerations(torques) - CONTACTS.accelerations(res.x)
-    assert np.abs(error).max() < 0.02  # [rad/s^2, m/s^2]
-    for name, force in plant.forces().items():
-        np.testing.assert_allclose(force, CONTACTS.forces(res.x, name).sum(axis=0), atol=0.5)
-    assert sum(plant.forces().values())[2] == pytest.approx(WEIGHT, abs=0.5)
-    assert np.linalg.norm(state.position(ROBOT.frame("left_foot"))
-                          - start.position(ROBOT.frame("left_foot"))) < 2e-3

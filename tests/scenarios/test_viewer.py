@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from headless import chromium
 
-from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
 from scenarios.config import load
 from scenarios.draw.viewer.live import Live
@@ -89,27 +88,6 @@ def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
     assert drawn.centres[-1, 0] == pytest.approx([0.1, 0.5, 0.2])
     assert drawn.levels.known[0]
     assert not drawn.levels.known[-1]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("spoil", [
-    lambda live: live.change({"avoidance.near": 0.3}),
-    lambda live: live.change({"pointing.alpha_d": float("nan")}),
-    lambda live: live.change({"position.stiffness": -1.0}),
-    lambda live: live.switch("recursive"),
-    lambda live: live.switch("tmp"),
-    lambda live: live.drag(7, (0.0, 0.0, 0.0)),
-    lambda live: live.drag(0, (0.0, 0.0, float("inf"))),
-], ids=["far below near", "nan", "negative", "no bounds", "no such", "no obstacle", "infinite"])
-def test_what_cannot_be_is_refused_and_the_run_goes_on(spoil, recording):
-    live = Live(LIMITED)
-    ticks(live, 300)
-    with pytest.raises(HierarchyError):
-        spoil(live)
-    ticks(live, 300)
-    assert live.over
-    assert (live.recording()["q"] == recording["q"]).all()
-    assert live.changes == []
 
 
 # Pages, without a browser

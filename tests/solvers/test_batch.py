@@ -145,39 +145,31 @@ def test_a_batch_may_be_empty_or_without_rows(name, shape):
     assert m or (answer.x == 1.0).all()
 
 
-@pytest.mark.parametrize(("of", "damping"), [("EQ7over", 0.0), ("EQ7sing", 0.0), ("EQ7sing", 0.05)])
-def test_jax_agrees_with_the_kernel(of, damping):
-    in_jax = jax_backend()
-    batch, resolver = Batch.of(problems_of(of)), make("tpm", damping=damping)
-    ours, theirs = solve(batch, resolver), in_jax.solve(batch, resolver)
-    np.testing.assert_array_equal(ours.status, theirs.status)
-    assert_near(theirs.x, ours.x)
+def assert_near(x, expected):
+    error = np.linalg.norm(x - expected, axis=1) / (1.0 + np.linalg.norm(expected, axis=1))
+    assert error.max() < 1e-9
 
 
-def test_jax_fails_alone_and_refuses_as_the_kernel_does():
-    in_jax, batch = jax_backend(), Batch.of(problems_of("EQ7", copies=1))
+def test_jax_agrees_with_the_kernel_fails_alone_and_refuses():
+    pytest.importorskip("jax")
+    from solvers.batch import on_jax
+
+    for of, damping in (("EQ7over", 0.0), ("EQ7sing", 0.0), ("EQ7sing", 0.05)):
+        batch, resolver = Batch.of(problems_of(of)), make("tpm", damping=damping)
+        ours, theirs = solve(batch, resolver), on_jax.solve(batch, resolver)
+        np.testing.assert_array_equal(ours.status, theirs.status)
+        assert_near(theirs.x, ours.x)
+    batch = Batch.of(problems_of("EQ7", copies=1))
     batch.A[3, 0, 0], batch.lower[5, 0] = np.nan, np.inf
-    answer = in_jax.solve(batch)
+    answer = on_jax.solve(batch)
     assert np.flatnonzero(~answer.solved).tolist() == [3, 5]
     assert not answer.x[[3, 5]].any()
     assert_near(answer.x, solve(batch).x)
     batch.upper[11, 4] += 1.0
     with pytest.raises(HierarchyError, match="problem 11, level 3, row 0: an inequality"):
-        in_jax.solve(batch)
+        on_jax.solve(batch)
     with pytest.raises(HierarchyError, match="hcod is not available in jax"):
-        in_jax.solve(batch, make("hcod"))
-
-
-def jax_backend():
-    pytest.importorskip("jax")
-    from solvers.batch import on_jax as batch_jax
-
-    return batch_jax
-
-
-def assert_near(x, expected):
-    error = np.linalg.norm(x - expected, axis=1) / (1.0 + np.linalg.norm(expected, axis=1))
-    assert error.max() < 1e-9
+        on_jax.solve(batch, make("hcod"))
 
 
 @pytest.mark.slow

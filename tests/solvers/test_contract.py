@@ -89,31 +89,6 @@ def some(resolver, name):
     return list(family(name))[:SLOW if resolver in HQP else PROBLEMS]
 
 
-@on_cases(STRICT)
-def test_lower_levels_leave_upper_levels_untouched(resolver, case):
-    h = build(case, True)
-    full = h.violations(resolver.solve(h).x)
-    for count in range(1, len(h.sizes)):
-        upper = Hierarchy.from_levels(list(h.levels())[:count], h.reference)
-        assert_close(resolver, full[:count], upper.violations(resolver.solve(upper).x))
-
-
-@on_cases(STRICT)
-def test_the_null_space_projector_is_symmetric_and_idempotent(resolver, case):
-    h = build(case, True)
-    zero = np.zeros(h.m)
-    P = np.array([resolver.solve(Hierarchy(h.A, zero, zero, h.sizes, unit, h.names)).x
-                  for unit in np.eye(h.n)])
-    assert_close(resolver, P, P.T)
-    assert_close(resolver, P @ P, P)
-    assert round(np.trace(P)) == h.n - np.linalg.matrix_rank(scaled(h.A), tol=1e-8)
-
-
-def scaled(A):
-    size = np.linalg.norm(A, axis=1, keepdims=True)
-    return A / np.where(size > 0, size, 1.0) if len(A) else np.zeros((1, A.shape[1]))
-
-
 @on_cases(RESOLVERS)
 def test_a_solve_is_repeatable_and_leaves_its_input_alone(resolver, case):
     h, same = build(case, True), build(case, True)

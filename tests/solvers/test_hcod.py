@@ -5,7 +5,7 @@ import pytest
 from rank_cases import family
 
 from hierarchy import Hierarchy
-from solvers import Status, certify, explain, make
+from solvers import Status, explain, make
 from solvers.problems import structured
 
 INF = np.inf
@@ -26,14 +26,6 @@ def test_an_answer_found_by_hand():
     assert res.active.tolist() == [1, 1, 2, 2, 2]
     assert res.holds_back[:2].tolist() == [1, 1]
     assert res.multipliers[:2] == pytest.approx([1.5, 0.75])
-
-
-@pytest.mark.parametrize("name", ["EQ7", "EQ7over", "EQ7sing", "EQ30L8"])
-@pytest.mark.parametrize("damping", [0.0, 0.5])
-def test_equalities_alone_are_the_staircase_to_the_last_digit(name, damping):
-    hcod, tpm = make("hcod", damping=damping), make("tpm", damping=damping)
-    for h, _, _ in family(name):
-        np.testing.assert_array_equal(hcod.solve(h).x, tpm.solve(h).x)
 
 
 @pytest.mark.slow
@@ -95,15 +87,6 @@ def test_explain_names_the_rows_that_are_missed_by_most_and_not_those_missed_by_
                                (np.eye(3), [2.0, 1.5, 1.05], [INF] * 3)], names=["limits", "wish"])
     said = explain(h, HCOD.solve(h), rows=["a", "b", "c"] * 2).splitlines()[1]
     assert said.startswith("wish is missed by 1.12, at a and b: held back by limits a at")
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_rows_as_small_as_rounding_make_no_answer_large(seed):
-    h = structured(seed, ("tiny_rows",))
-    res = make("hcod").solve(h)
-    assert np.abs(res.x).max() < 1e6  # such a row alone in its level would ask for 1e14
-    if res.status is Status.SOLVED:
-        assert certify(h, res.x).certified
 
 
 def test_rows_whose_sides_cross_are_all_that_is_said():

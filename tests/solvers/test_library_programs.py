@@ -90,14 +90,6 @@ def test_the_examples_of_one_call_compile_without_a_warning_and_run(folder, tmp_
     assert said(once) == "status 0, x = 0.9 0.1\n"
 
 
-@needs_c
-@pytest.mark.slow
-def test_the_example_of_a_loop_keeps_its_bounds(folder, tmp_path):
-    loop = built(tmp_path / "loop", EXAMPLES / "loop.c", folder, "-std=c99", *STRICT)
-    assert re.match(r"6000 ticks, 0 braked, speeds at a bound [1-9]\d* times, error at most 0\.",
-                    said(loop))
-
-
 @pytest.fixture(scope="module")
 def replay(folder, tmp_path_factory):
     if COMPILER is None:
@@ -167,7 +159,7 @@ def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, na
 
 @needs_c
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "words"), [("loop.c", "6000 ticks, 0 braked"),
+@pytest.mark.parametrize(("name", "words"), [("loop.c", "6000 ticks, 0 braked, speeds"),
                                              ("once.cpp", "status 0, x = 0.9 0.1")])
 def test_the_examples_pass_the_address_sanitizer(folder, tmp_path, name, words):
     program = built(tmp_path / "program", EXAMPLES / name, folder, "-g",

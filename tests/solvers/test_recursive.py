@@ -100,16 +100,3 @@ def test_each_method_bounds_x_near_a_singularity(settings):
 
 
 # -- recursion and staircase are one answer --------------------------------------------------------
-
-
-def test_damped_levels_hand_an_undamped_null_space_down():
-    """Else damping one level would let the next one spoil it."""
-    A = np.array([[1.0, 0.0, 0.0], [1.0, 1e-4, 0.0]])
-    upper, lower = (A, [1.0, -1.0]), ([[1.0, 1.0, 1.0]], [5.0])
-    for name in ("recursive", "tpm"):
-        resolver = make(name, damping=0.05)
-        alone = Hierarchy.from_levels([upper])
-        both = Hierarchy.from_levels([upper, lower])
-        x = resolver.solve(both).x
-        assert abs(both.violations(x)[0] - alone.violations(resolver.solve(alone).x)[0]) < 1e-12
-        assert both.violations(x)[1] < 1e-12
