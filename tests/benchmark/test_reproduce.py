@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmark.reproduce import pages, protocol, whole
-from benchmark.reproduce.blocks import ROWS, Stored, cell
+from benchmark.reproduce.blocks import ROWS, Stored
 from benchmark.reproduce.protocol import PROTOCOL, Rows
 from hierarchy.errors import HierarchyError
 
@@ -66,24 +66,6 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
                        (page("python a.py | EQ8 .. EQ9"), r"no line of the output .* with 'EQ8'")):
         with pytest.raises(HierarchyError, match=says):
             fill(text)
-
-
-def test_a_table_gets_the_medians_of_its_rows_and_columns(tmp_path):
-    pages.file_of("hierarchy bench resolvers", tmp_path).write_text(BENCH)
-    table = "| | EQ7 [us] | INEQ7 | notes |\n|---|---|---|---|\n{}"
-    old = "| `hcod`, warm | 9 | 9 | kept |\n| `hqp` | 9 | 9 | too |\n"
-    new = "| `hcod`, warm | 1.9 | – | kept |\n| `hqp` | – | 1443 | too |\n"
-    mark = "table of hierarchy bench resolvers"
-    assert pages.filled(page(mark, table.format(old)), tmp_path, "page.md", STORED) == page(
-        mark, table.format(new))
-
-
-def test_a_finding_names_a_number_that_was_printed():
-    assert cell(BENCH, {"table": "INEQ7", "row": "hqp proxqp", "place": "2"}) == "1945"
-    alike = "title\nsns 10   1  2\nsns      3  4\n\nsns 5 6\n"
-    assert cell(alike, {"table": "title", "row": "sns", "place": "1"}) == "3"
-    with pytest.raises(HierarchyError, match="no row 'sns' below 'EQ7'"):
-        cell(BENCH, {"table": "EQ7", "row": "sns", "place": "1"})
 
 
 def test_a_command_is_run_once_for_the_same_code(tmp_path):

@@ -13,11 +13,9 @@ from standing import (
     written,
 )
 
-from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy import HierarchyError, Stack, State
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import UnknownNameError
-from hierarchy.robots.from_table import from_table
-from hierarchy.robots.table import TreeJoint, TreeTable
 from hierarchy.task import Task
 from hierarchy.tasks import (
     BaseDynamics,
@@ -56,7 +54,7 @@ def random_x(seed):
 # Contacts
 
 
-def test_the_contact_jacobian_is_the_derivative_of_the_positions():
+def test_contact_jacobian_and_drift_are_derivatives_of_the_positions():
     state = moving_state(1)
     J = CONTACTS.jacobian(state)
     for c, e in enumerate(np.eye(N)):
@@ -64,20 +62,9 @@ def test_the_contact_jacobian_is_the_derivative_of_the_positions():
                          for s in (1, -1))
         np.testing.assert_allclose(J[:, c], (positions(later) - positions(before)) / (2 * STEP),
                                    atol=1e-8)
-
-
-def test_the_contact_drift_is_the_change_of_the_jacobian_times_the_velocity():
     state = moving_state(2)
     change = CONTACTS.jacobian(moved(state, STEP)) - CONTACTS.jacobian(moved(state, -STEP))
     np.testing.assert_allclose(CONTACTS.drift(state), change @ state.v / (2 * STEP), atol=1e-7)
-
-
-def test_torques_are_those_of_inverse_dynamics_with_external_forces():
-    state, x = moving_state(3), random_x(3)
-    wrenches = external_forces(state, CONTACTS, CONTACTS.forces(x))
-    efforts = pin.rnea(ROBOT.model, ROBOT.model.createData(), state.q, state.v,
-                       CONTACTS.accelerations(x), wrenches)
-    np.testing.assert_allclose(CONTACTS.torques(state, x), efforts[6:], atol=1e-10)
 
 
 # Rows of the tasks
@@ -272,15 +259,12 @@ def test_momentum_rows_are_the_rate_of_the_momentum(part):
     assert len(task.row_names) == task.dimension
 
 
-def test_the_derivative_of_the_momentum_matrix_agrees_with_central_differences():
+def test_the_momentum_has_its_derivative_and_approaches_its_target():
     """pinocchio has a function for it whose result does not."""
     state, task = moving_state(15), Momentum()
     later, before = (task.jacobian(moved(state, s * STEP)) for s in (1, -1))
     np.testing.assert_allclose(task.jacobian_derivative(state), (later - before) / (2 * STEP),
                                atol=1e-7)
-
-
-def test_a_momentum_target_is_approached():
     state = moving_state(16)
     task = Momentum("linear", (1.0, 2.0, 3.0), damping=5.0)
     gone = np.array([1.0, 2.0, 3.0]) - task.jacobian(state) @ state.v
@@ -307,13 +291,6 @@ def test_together_has_the_rows_of_its_tasks_in_order():
 
 
 # Bad input
-
-
-def massless():
-    table = TreeTable("light", (TreeJoint("one", "", (0.0, 0.0, 0.0), "z", (-90, 90), 1.0, 1.0),),
-                      (), "one")
-    found = from_table(table)
-    return Robot(found.model, "light", "one")
 
 
 FRAME = ROBOT.frame("left_foot")

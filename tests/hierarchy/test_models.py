@@ -91,12 +91,9 @@ def holds(capsule, point):
     return np.linalg.norm(point - start - share * way) <= capsule.radius + 1e-9
 
 
-def test_the_end_effector_proposed_is_the_frame_with_a_tools_name(arm):
+def test_a_tool_is_the_end_effector_and_primitives_are_capsules(arm):
     assert Robot.from_file(arm()).end_effector == "tool0"
     assert Robot.from_file(arm(), "fore").end_effector == "fore"
-
-
-def test_capsules_are_proposed_from_primitives(arm):
     upper = Robot.from_file(arm()).capsules[1]
     assert (upper.joint, upper.radius) == (1, 0.05)
     np.testing.assert_allclose([upper.start, upper.end], [(0, 0, 0), (0, 0, 0.4)], atol=1e-12)
@@ -153,13 +150,6 @@ def test_what_cannot_be_said_of_a_floating_base_is_refused(arm):
         TorqueLimits(robot)
     with pytest.raises(HierarchyError, match="floating base"):
         DangerBounds(JointLimits(robot, 5.0, 0.01), robot.control_points)
-
-
-def test_a_file_with_the_name_of_a_table_is_not_that_table(arm):
-    robot = Robot.load(str(arm().rename(arm().with_name("humanoid.urdf"))))
-    assert (robot.name, robot.table) == ("humanoid", None)
-    assert Robot.load("humanoid").table is not None
-    assert separable_pairs(robot, 0.01) == [(0, 2)]
 
 
 def test_locked_joints_are_no_joints(arm):

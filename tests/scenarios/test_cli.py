@@ -173,17 +173,6 @@ def test_an_error_in_the_page_costs_no_run_and_says_where_they_are(tmp_path, mon
     assert len(list((tmp_path / "b").rglob("run.npz"))) == 2
 
 
-def test_a_change_stands_in_the_title_and_an_inexact_resolver_is_named(capsys):
-    assert run_command(["run", "ellipse", *SHORT, "--set", "pointing.alpha_d=35"]) == 0
-    said = capsys.readouterr().out
-    assert "5 deg" not in said
-    assert "(pointing.alpha_d=35)" in said
-    assert "tpm-published: inexact where a level loses rank" in said
-    assert run_command(["run", "ellipse", *SHORT, "--resolver", "weighted"]) == 0
-    assert "weighted: trades levels off" in (said := capsys.readouterr().out)
-    assert "inexact" not in said
-
-
 def said(arguments, capsys, code=0):
     """Run a command with --json and return what it printed, which is one JSON object."""
     assert run_command([*arguments, "--json"]) == code

@@ -159,19 +159,6 @@ QUICK = [f"sensor={{{VIEW}, width=160, height=120, fx=131.0, fy=131.0}}",
          "control.duration=0.6", "plant={}", "control.resolver=hqp", "control.options={}"]
 
 
-def test_the_camera_tells_the_controller_what_exact_distances_would_nearly():
-    """With balls near the arm of `human`; no more is known of thickness than that it hides."""
-    for ball in ([0.4, 0.75, 0.2], [-0.3, 0.6, 0.1], [0.0, 0.4, 0.5]):
-        obstacle = f"avoidance.obstacles=[{{shape='sphere', centre={ball}, radius=0.08}}]"
-        camera, exact = (build(load("human", [obstacle, f"sensor={sensor}"])).sensor
-                         for sensor in (f"{{{VIEW}, ideal=true}}", "{kind='exact'}"))
-        state = State.at(ROBOT, [1.1657, -0.9476, 0.5844, 1.4408, 1.1464, 1.7695, 0.0])
-        seen, known = camera.measure(state), exact.measure(state)
-        near = known.distance < 0.4
-        assert near.any()
-        assert (seen.distance[near] < known.distance[near] + 0.01).all()
-
-
 @pytest.mark.parametrize(("changes", "said"), [
     (["sensor={kind='camera', position=[1,1,1], look_at=[1,1,1]}"], "look_at"),
     (["sensor.kind=camera", "sensor.rotation=[[1,0,0],[0,1,0],[0,0,-1]]"], "rotation"),

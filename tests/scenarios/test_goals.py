@@ -5,9 +5,10 @@ import pytest
 from hand_made import recording
 
 from scenarios import load, simulate
+from scenarios.measure.given_up import given_up
 from scenarios.measure.goals import goals, percent
 from scenarios.measure.runs import Run
-from scenarios.measure.verdict import Verdict, lines, table, verdict, verdicts
+from scenarios.measure.verdict import lines, table, verdict, verdicts
 
 
 def goal(name, fault=None, **signals):
@@ -40,12 +41,6 @@ def test_median_worst_and_share_count_from_when_the_target_was_first_reached():
 def test_who_starts_beyond_a_limit_and_comes_back_has_not_passed_it(q, flag, worst):
     one = goal("joint limits", **joint(q))
     assert (one.flag, one.worst) == (flag, pytest.approx(worst))
-
-
-def test_a_distance_is_a_promise_in_metres_and_an_unknown_one_is_no_breach():
-    one = goal("body", minimal_distance=[1.0, np.nan, 0.03, 1.0, 1.0])  # 50 mm are asked
-    assert one.promise
-    assert (one.worst, one.share) == pytest.approx((0.02, 0.25))
 
 
 def test_a_cone_is_kept_in_degrees():
@@ -116,7 +111,29 @@ def test_what_a_scenario_asks_is_in_its_words(name, asked):
     assert found.items() >= asked.items()
 
 
-def test_a_run_so_far_says_how_far_it_is():
-    run = Verdict("tpm", 1.2, 8.0, None, stands=False, goals=())
-    assert run.said == ("Ran for 1.20 of 8 s",)
-    assert Verdict("", 8.0, 8.0, None, stands=True, goals=()).end == "stood the whole 8 s"
+@pytest.mark.slow
+def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
+    run = simulate(load("strictness", ["control.duration=0.3"]))
+    position, posture = given_up(run)
+    assert (position.level, posture.level) == ("position", "posture")
+    assert 0.5 < position.share <= 1.0
+    assert position.seconds == pytest.approx(position.share * 0.3)
+    held = dict(position.held_by)
+    assert max(held.values()) == 1.0
+    assert all(name.startswith("joint limits joint_") and name.endswith(" side") for name in held)
+    assert "position" in dict(posture.held_by)
+    assert str(position).startswith(f"row missed: position in {100 * position.share:.0f} % of its "
+                                    f"ticks ({position.seconds:.3g} s); held back by joint limits ")
+
+
+@pytest.mark.slow
+def test_a_run_that_meets_all_gives_nothing_up():
+    assert given_up(simulate(load("ellipse-hqp", ["control.duration=0.05"]))) == ()
+
+
+@pytest.mark.slow
+def test_only_how_long_is_said_where_the_rows_are_not_known():
+    changes = ["control.duration=0.05", "avoidance.distance=0.12", "avoidance.influence=0.4"]
+    for one in given_up(simulate(load("ellipse-smooth", changes))):
+        assert one.held_by == ()
+        assert 0.0 < one.share <= 1.0

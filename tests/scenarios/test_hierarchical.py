@@ -6,7 +6,9 @@ import pytest
 from hierarchy import Robot
 from scenarios import load, simulate
 from scenarios.cell.build import build
+from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
+from solvers import certify
 
 SHORT = "control.duration=1.5"
 
@@ -79,3 +81,28 @@ def test_any_start_is_recovered_from_within_the_limit_of_acceleration(name, reso
     excess = np.maximum(np.abs(run["v"]) / ROBOT.velocity_limit - 1.0, 0.0)
     assert (np.diff(excess, axis=0) < 1e-9).all()
     assert excess[-1].max() == 0.0
+
+
+def hierarchies(changes=(), ticks=10):
+    """The hierarchies of the first ticks of `ellipse-mass`, with what was sent."""
+    scenario = load("ellipse-mass", list(changes))
+    cell = build(scenario)
+    controller, period = Controller(scenario, cell), scenario.control.period
+    for tick in range(ticks):
+        x = controller.command(tick * period, cell.plant.q, cell.plant.v)
+        yield controller.hierarchy, x, cell.state.mass_matrix()
+        cell.plant.act(x)
+
+
+@pytest.mark.slow
+def test_every_command_is_certified_in_the_inertia_of_its_tick():
+    for h, x, M in hierarchies():
+        np.testing.assert_array_equal(h.metric, M)
+        assert certify(h, x).certified
+
+
+@pytest.mark.slow
+def test_bounds_in_the_inertia_are_for_resolvers_of_any_rows():
+    assert load("ellipse-limits").asks == "bounds"
+    assert load("ellipse-limits", ["control.metric=mass"]).asks == "inequalities"
+    assert load("ellipse", ["control.metric=mass"]).asks == "equalities"

@@ -9,6 +9,7 @@ from hierarchy import Hierarchy, HierarchyError
 from hierarchy.gate import check_rotation
 from scenarios import load
 from scenarios.cli.main import run_command
+from scenarios.cli.progress import lines
 from scenarios.config.validation import doubtful_units
 from scenarios.toml_text import read_toml
 from solvers import Resolution, Resolver, Status
@@ -102,3 +103,23 @@ def test_a_nan_of_a_resolver_of_a_plugin_is_a_failure(an_arm_hierarchy):
 def test_errors_inside_a_resolver_of_a_plugin_are_not_hidden(an_arm_hierarchy):
     with pytest.raises(AttributeError, match="nonsense"):
         mine(lambda h: h.nonsense).solve(an_arm_hierarchy)
+
+
+def told(capsys, *steps):
+    """Return the lines printed for steps of (time, done) of 100."""
+    now = [0.0]
+    say = lines("ticks", clock=lambda: now[0])
+    for t, done in steps:
+        now[0] = t
+        say("tpm", done, 100)
+    return capsys.readouterr().err.splitlines()
+
+
+def test_a_short_command_is_silent(capsys):
+    assert told(capsys, (0.0, 0), (5.0, 50), (9.0, 100)) == []
+
+
+def test_a_long_one_says_every_ten_seconds_how_far_it_is_and_what_is_left(capsys):
+    said = told(capsys, (0.0, 0), (6.0, 10), (12.0, 20), (18.0, 30), (24.0, 40), (60.0, 100))
+    assert said == ["tpm: 20 of 100 ticks, about 48 s left",
+                    "tpm: 40 of 100 ticks, about 36 s left"]

@@ -81,7 +81,7 @@ def test_a_data_frame_has_a_column_for_each_number(run, library, monkeypatch):
 
 
 @pytest.mark.slow
-def test_without_a_library_a_data_frame_says_what_to_install(run, monkeypatch):
+def test_a_data_frame_says_what_to_install_without_a_library(run, monkeypatch):
     for name in ("pandas", "polars"):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(HierarchyError, match="needs pandas or polars: pip install pandas"):

@@ -113,15 +113,6 @@ def test_play_moves_the_arm_and_pause_stops_it(page):
     assert page.run("player.t") == stopped
 
 
-@pytest.mark.parametrize("width", [360, 800, 1400])
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-def test_nothing_is_wider_than_the_window(page, width, dark):
-    page.look_at(page.address, width, 740, dark)
-    page.painted()
-    assert page.run("document.documentElement.scrollWidth") <= width
-    assert page.run("document.getElementById('play').getBoundingClientRect().bottom") <= 740
-
-
 def test_the_command_takes_several_runs_and_a_name(runs, tmp_path):
     folders = [str(save(run, tmp_path / label)) for label, run in runs.items()]
     file = tmp_path / "new" / "two.html"

@@ -12,7 +12,6 @@ from headless import chromium
 from scenarios.config import load
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
-from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
 from scenarios.recording.recording import Event
 from scenarios.results.page import comparison_page as page
@@ -88,16 +87,6 @@ def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
     assert list(comparison(*runs).groups()) == ["tpm-published"]
     assert not any(best(line) for line in table(runs))
     assert "none is marked as best" in text
-
-
-@pytest.mark.slow
-def test_runs_of_the_same_motion_are_drawn_once_and_named_together():
-    runs = [made(LETTER), made("hqp", q=np.full((5, 7), 1e-8)),
-            made("augmented", q=np.ones((5, 7)))]
-    assert [one.labels for one in motions(runs)] == [("tpm-published", "hqp"), ("augmented",)]
-    text = page(comparison(*runs))
-    assert "tpm-published and hqp are the same motion to 1e-08 rad" in text
-    assert len(re.findall(r'aria-label="hand-made, [^"]*: Joint velocities"', text)) == 2
 
 
 @pytest.mark.slow

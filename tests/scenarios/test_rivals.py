@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
-from hierarchy.tasks import Pointing
+from hierarchy.tasks import CumulatedRepulsion, DangerBounds, Pointing
 from hierarchy.tasks.tangent_cone import TangentCone
 from scenarios import load, simulate
 from scenarios.cell.build import build
@@ -71,31 +71,6 @@ def test_the_tangent_cone_of_the_letters_cone_has_its_jacobian_and_refuses_accel
         TangentCone(Pointing(FRAME, (1.0, 0.0, 0.0), 0.3))
 
 
-def pseudoinverse(X, least=1e-9):
-    """Singular values up to `least` are rounding of rows that depend on those above."""
-    U, s, Vt = np.linalg.svd(X, full_matrices=False)
-    keep = s > least
-    return Vt[keep].T / s[keep] @ U[:, keep].T
-
-
-def test_the_set_based_command_is_that_of_the_rows_that_it_says_are_active():
-    for q in near_obstacles("ellipse-set-based", 5, 0.1):
-        controller = controller_at("ellipse-set-based", q, "avoidance.distance=0.1",
-                                   "control.options.damping=0.0", "control.resolver=recursive")
-        h, active = controller.hierarchy, controller.resolution.active
-        x, N = np.zeros(7), np.eye(7)
-        for level in range(len(h.sizes)):
-            rows = [i for i in range(h.offsets[level], h.offsets[level + 1]) if active[i]]
-            if rows:
-                X = h.A[rows] @ N
-                inverse = pseudoinverse(X)
-                x = x + inverse @ (h.lower[rows] - h.A[rows] @ x)
-                N = N - inverse @ X
-        np.testing.assert_allclose(controller.resolution.x, x, atol=1e-6 * (1 + np.abs(x).max()))
-        ignored = np.isfinite(h.lower) & (active == 0)
-        assert (h.A[ignored] @ x >= -1e-8).all()
-
-
 def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
     for q in near_obstacles("ellipse-smooth", 5, 0.1):
         controller = controller_at("ellipse-smooth", q, "avoidance.rate=3.0",
@@ -156,3 +131,34 @@ def test_limits_go_with_both_as_a_guard():
         scenario = load(name, ["limits={acceleration=10.0, place='either'}"])
         assert not scenario.limits_in_stack
         assert build(scenario).limits is not None
+
+
+# The avoidance of the letter's references [5] and [10].
+
+
+NEAR = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])  # the start of `ellipse`
+
+
+def at_the_start(scenario):
+    cell = build(scenario)
+    cell.state.move(0.3, NEAR, np.linspace(-0.3, 0.3, 7))
+    return cell, cell.sensor.measure(cell.state)
+
+
+def test_in_the_null_space_avoidance_is_never_in_the_stack():
+    cell, _ = at_the_start(load("ellipse-nullspace"))
+    assert set(cell.order.possible) == {("position",), ("position", "pointing")}
+    assert isinstance(cell.stack.reference, CumulatedRepulsion)
+    assert len(cell.stack.reference.points) == 8
+    assert cell.stack.reference.within == 0.15
+
+
+def test_danger_closes_the_box_of_joints_and_pushes_nothing():
+    scenario = load("ellipse-danger-bounds")
+    cell, seen = at_the_start(scenario)
+    box = cell.stack["joint limits"]
+    assert isinstance(box, DangerBounds)
+    assert box.reach == 0.15
+    seen.distance[:8] = 0.04
+    assert "avoidance" not in cell.order(seen, 1.0).order
+    assert scenario.make_resolver().name == "sns"

@@ -27,14 +27,11 @@ def ellipse(runs):
 
 
 @pytest.mark.slow
-def test_frames_are_the_ticks_nearest_to_their_times(runs, ellipse):
+def test_frames_placements_and_distances_are_those_recorded(runs, ellipse):
     assert ellipse.ticks[0] == 0
     assert ellipse.ticks[-1] == runs["ellipse"].ticks - 1
     assert np.abs(np.diff(ellipse.t)[:-1] - 1 / 30).max() < 1.1e-3
     assert np.array_equal(ellipse.t, runs["ellipse"]["t"][ellipse.ticks])
-
-
-def test_placements_and_links_are_those_of_the_kinematics(runs, ellipse):
     robot = Robot.named("kuka_lwr")
     for f in (0, 20, -1):
         state = State.at(robot, runs["ellipse"]["q"][ellipse.ticks[f]])
@@ -45,9 +42,6 @@ def test_placements_and_links_are_those_of_the_kinematics(runs, ellipse):
         tip = robot.frame(robot.end_effector)
         assert np.allclose(chain[-1, 1], state.position(tip))
         assert np.allclose(ellipse.axis[f], state.rotation(tip)[:, 2])
-
-
-def test_points_and_distances_are_those_recorded(runs, ellipse):
     recording, ticks = runs["ellipse"], ellipse.ticks
     assert np.allclose(ellipse.traced, recording["ee_position"][ticks], atol=1e-12)
     assert np.allclose(ellipse.distance[:, :-1], recording["control_point_distance"][ticks])

@@ -38,7 +38,7 @@ def test_spans_out_of_reach_must_be_in_order():
         load("strictness", [f"position.path = {still}"])
 
 
-def test_ticks_within_reach_frozen_and_returned():
+def test_frozen_returned_and_jerk_are_counted():
     t = np.arange(6.0)
     spans = ((1.0, 2.0), (4.0, 4.5))
     assert within_reach(t, spans).tolist() == [True, False, False, True, False, True]
@@ -48,9 +48,6 @@ def test_ticks_within_reach_frozen_and_returned():
     error = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
     assert frozen(t, v, error, spans).tolist() == [False, False, False, True, False, False]
     assert frozen(t, v, error, ()).tolist() == [False, True, True, True, True, False]
-
-
-def test_the_jerk_of_a_ramp_is_its_slope():
     t = np.array([0.0, 0.1, 0.3])
     np.testing.assert_allclose(jerk(t, np.array([[0.0], [1.0], [3.0]])), [[10.0], [10.0]])
 

@@ -81,7 +81,7 @@ def short():
     return simulate(SHORT, certified=True)
 
 
-def test_a_run_records_torques_plans_and_what_the_floor_does(short):
+def test_a_run_records_torques_plans_and_what_the_floor_does_and_has_their_metrics(short):
     assert short.fault is None
     assert short["certified"].all()
     robot = build(SHORT).robot
@@ -95,9 +95,6 @@ def test_a_run_records_torques_plans_and_what_the_floor_does(short):
     pushed = np.flatnonzero(short["push"].any(axis=1))
     np.testing.assert_array_equal(pushed, np.arange(5, 15))
     np.testing.assert_allclose(short["push"][5], [120.0, 0.0, 0.0])
-
-
-def test_its_metrics_have_units_and_say_what_the_signals_do(short):
     found = measure(short)
     assert found["slip_max"].value == short["slip"].max()
     step = np.abs(np.diff(short["command"], axis=0)).max()

@@ -95,7 +95,7 @@ def no_way_back(request, monkeypatch):
     monkeypatch.setattr("scenarios.cell.sensors.camera.DepthCamera.__init__", broken)
 
 
-def test_what_is_loaded_is_what_was_run(made):
+def test_what_is_loaded_is_what_was_run_and_its_scene_is_whole(made):
     folder, run, _ = made
     again = load_run(folder)
     assert again.facts == run.facts
@@ -103,9 +103,6 @@ def test_what_is_loaded_is_what_was_run(made):
     assert again.facts.resolver.label == "hcod"
     assert again.facts.robot.position_units == ("rad", "rad", "rad", "1", "1")
     assert again.facts.robot.joint_names == ("turn", "shoulder", "elbow", "wrist")
-
-
-def test_a_scene_has_arm_obstacle_and_every_level(made):
     folder, run, _ = made
     shown = scene(load_run(folder))
     assert np.allclose(shown.traced, run["ee_position"][shown.ticks], atol=1e-12)

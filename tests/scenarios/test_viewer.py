@@ -35,7 +35,8 @@ def recording():
 # A live run
 
 
-def test_a_live_run_that_nobody_touches_is_the_run_itself(recording):
+def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_its_settings(
+        recording):
     live = Live(LIMITED)
     ticks(live, 700)
     assert live.over
@@ -44,9 +45,6 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself(recording):
     assert "changed" not in found
     for name in ("t", "q", "v", "command", "order"):
         assert (found[name] == recording[name]).all(), name
-
-
-def test_a_live_run_that_starts_again_keeps_its_settings_and_nothing_of_its_motion(recording):
     live = Live(LIMITED)
     ticks(live, 10)
     live.drag(0, (0.0, 0.0, 0.1))

@@ -8,7 +8,6 @@ import pytest
 from rank_cases import family, rng
 from sequences import moved
 
-from benchmark import batch as bench
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, make
 from solvers.batch import Batch, solve, stacked
@@ -170,11 +169,3 @@ def test_jax_agrees_with_the_kernel_fails_alone_and_refuses():
         on_jax.solve(batch)
     with pytest.raises(HierarchyError, match="hcod is not available in jax"):
         on_jax.solve(batch, make("hcod"))
-
-
-@pytest.mark.slow
-def test_the_benchmark_counts_problems_of_every_way():
-    rows = bench.run((8,), 0.0, (("EQ7", "tpm"), ("INEQ7", "hcod"))).rows["batch"]
-    assert {(row["family"], row["way"]) for row in rows} >= {
-        (of, way) for of in ("EQ7", "INEQ7") for way in ("one by one", "1 thread")}
-    assert all(row["rate"] > 0.0 and row["calls"] >= 3 for row in rows)

@@ -6,7 +6,6 @@ from rank_cases import family
 
 from hierarchy import Hierarchy
 from solvers import Status, explain, make
-from solvers.problems import structured
 
 INF = np.inf
 HCOD = make("hcod")
@@ -115,42 +114,6 @@ def test_a_tall_level_that_can_be_met_is_met(n, m):
         assert res.status is Status.SOLVED
         assert h.violations(res.x)[0] <= 1e-12
         assert res.iterations <= 2 * h.m
-
-
-def hard(count=15):
-    """Problems that take more than ten iterations, and whether their rows are far from parallel."""
-    found, seed = [], 0
-    while len(found) < count:
-        h = structured(seed, ("nearly_parallel" if seed % 2 else "opposed",))
-        if seed % 4 == 0:
-            h = tall(5, 60, seed)
-        res = HCOD.solve(h)
-        if res.status is Status.SOLVED and res.iterations > 10:
-            found.append((h, seed % 2 == 0))
-        seed += 1
-    return found
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("budget", "endless"), [(5, 1), (10, 0)])
-def test_a_problem_solved_in_slices_ends_with_the_answer_of_one_solve(budget, endless):
-    """But for one, in which a single row enters at the cost of more than five that leave."""
-    sliced, problems_left = make("hcod", max_iterations=budget), 0
-    for h, clear in hard():
-        whole, memory = HCOD.solve(h), None
-        for _ in range(50):
-            res = sliced.solve(h, memory)
-            assert res.iterations <= budget
-            memory = res.memory
-            if res.status is not Status.ITERATION_LIMIT:
-                break
-            k = res.unfinished if clear else 0
-            np.testing.assert_allclose(h.violations(res.x)[:k], h.violations(whole.x)[:k],
-                                       atol=1e-7 * (1 + np.abs(whole.x).max()))
-        problems_left += res.status is not Status.SOLVED
-        if res.status is Status.SOLVED:
-            np.testing.assert_allclose(res.x, whole.x, atol=1e-8 * (1 + np.abs(whole.x).max()))
-    assert problems_left <= endless
 
 
 def arm(angle):

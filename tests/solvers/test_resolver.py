@@ -14,6 +14,7 @@ from hierarchy.errors import UnknownNameError
 from solvers import Resolution, Status, make, names
 from solvers.resolvers.set_based import SetBased
 from solvers.resolvers.settled import Settled
+from solvers.workspace import WORKSPACE
 
 
 def test_names_are_sorted_and_each_makes_its_resolver():
@@ -140,3 +141,51 @@ def test_a_first_hierarchy_is_solved_without_pinocchio_matplotlib_and_qpsolvers(
 def output_of(code):
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return run.stdout.strip()
+
+
+# Work space: its content never matters.
+
+
+KERNELS = [make("tpm"), make("sns"), make("tpm-published"), make("recursive"), make("augmented"),
+           make("hcod"), make("hcod", damping=0.1), make("tpm", damping=0.1),
+           make("tpm-published", damping=0.1)]
+
+
+def levels(n, inequalities, seed=0):
+    rng = np.random.default_rng(seed)
+    A, b = rng.normal(size=(4, n // 3, n)), rng.normal(size=(4, n // 3))
+    return Hierarchy.from_levels(
+        [(A[k], b[k], b[k] + 1.0) if inequalities and k % 2 else (A[k], b[k]) for k in range(4)])
+
+
+def repeating(h):
+    """The hierarchy with the first row of its first level in its first and second level twice."""
+    for row in (1, h.sizes[0]):
+        h.A[row], h.lower[row], h.upper[row] = h.A[0], h.lower[0], h.upper[0]
+    return h
+
+
+def problems(resolver, n):
+    yield levels(n, False)
+    yield repeating(levels(n, False))
+    if resolver.handles == "inequalities" and not resolver.damping:
+        yield levels(n, True)
+
+
+@pytest.mark.parametrize("resolver", KERNELS, ids=str)
+def test_it_grows_with_the_hierarchy(resolver, monkeypatch):
+    for h in problems(resolver, 60):
+        monkeypatch.setattr(WORKSPACE, "array", np.empty(1))
+        small = resolver.solve(h)
+        monkeypatch.setattr(WORKSPACE, "array", np.empty(1_000_000))
+        assert small.status is Status.SOLVED
+        np.testing.assert_array_equal(small.x, resolver.solve(h).x)
+
+
+@pytest.mark.parametrize("resolver", KERNELS, ids=str)
+@pytest.mark.parametrize("left", [np.nan, np.inf, 1e300])
+def test_what_was_left_in_it_does_not_matter(resolver, left, monkeypatch):
+    for h in problems(resolver, 9):
+        before = resolver.solve(h).x
+        monkeypatch.setattr(WORKSPACE, "array", np.full(4096, left))
+        np.testing.assert_array_equal(resolver.solve(h).x, before)

@@ -11,7 +11,6 @@ from standing import (
     external_forces,
     feet,
     standing_stack,
-    stepping,
 )
 
 from hierarchy import Robot, Stack, State
@@ -127,26 +126,3 @@ def test_a_tick_whose_rows_are_parallel_up_to_the_rank_tolerance_is_settled(path
         assert one.status in settled
         assert certify(h, one.x).certified
         assert h.violations(one.x)[:2].max() < 1e-6, "physics and limits hold, to 1 uN"
-
-
-@pytest.mark.slow
-def test_a_step_in_place_ramps_its_torques_and_comes_down_where_it_went_up():
-    """The bound on torque steps is stated: 10 N m per tick of 4 ms, by a ramp of 0.2 s."""
-    worst, doubted = {}, 0
-    for ramp in (0.0, 0.2):
-        torques = []
-        for h, res, contacts, state in stepping(ramp):
-            doubted += res.status is Status.INACCURATE
-            force = contacts.forces(res.x, "right_foot")
-            torques.append(contacts.torques(state, res.x))
-            assert (np.abs(torques[-1]) <= ROBOT.effort_limit[6:] + 1e-3).all()
-            if 1.2 <= state.t <= 1.8:
-                assert np.abs(force).max() < 1e-9
-            assert h.violations(res.x)[2] < 1e-6, "the centre of mass never gives way"
-        steps = np.abs(np.diff(torques, axis=0)).max(axis=1)
-        worst[ramp] = steps.max()
-        height = state.position(ROBOT.frame("right_foot"))[2]
-        assert abs(height - STANDING.position(ROBOT.frame("right_foot"))[2]) < 1e-3
-        assert force[:, 2].sum() > 30.0, "it carries again"
-    assert worst[0.2] < 10.0 < 18.0 < worst[0.0]
-    assert doubted == 0
