@@ -8,11 +8,10 @@ Each mutant is one change: a comparison, an arithmetic or boolean operator, a co
 value. Its module is replaced as it is imported, in the tests and in every program that they start;
 the checkout is not touched, so kernels come from the cache. The tests are those that run the
 changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
-once, and again when tests have changed), or --tests: first those not marked slow, then, where these
-pass, the slow ones. A line that tests run only in other processes, or that runs as its module is
-imported, has the tests of its module. Of many tests MOST are taken: a case of each function first,
-those first that run few lines. Prints every survivor with its line, and the share of survivors. A
-mutant that takes over three times the CPU time of the unchanged tests, and LEAST, counts as killed.
+once, and again when tests have changed), or --tests. A line that tests run only in other processes,
+or that runs as its module is imported, has the tests of its module. Of many tests MOST are taken: a
+case of each function first, those first that run few lines. Prints every survivor with its line,
+and the share of survivors. A mutant whose tests take more CPU time than --limit counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
 `strict=` of zip (a check that does not fire where shapes have been checked), what only a type
@@ -25,15 +24,13 @@ import argparse
 import ast
 import contextlib
 import marshal
-import math
 import os
 import random
 import resource
 import signal
+import subprocess
 import sys
 import tempfile
-import time
-import traceback
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -53,15 +50,9 @@ ROOT = Path(__file__).parents[1]
 SAMPLED = ("hierarchy", "solvers", "scenarios")
 MAP = ROOT / "build" / "tests-of-lines"
 MOST = 40  # tests of a mutant
-MARKS = ("not slow", "slow")
-LEAST = 20.0  # CPU time that any mutant has [s]
 COMPILED = ("compiled", "unlocked", "inlined", "measured")
 # The folder of kernels, and the integer codes that kernels read.
 OF_KERNELS = ("solvers/kernels/", "solvers/status.py")
-
-IMPORTED_ONCE = ("numpy", "numba", "numba.np.arraymath", "scipy.optimize", "scipy.stats",
-                 "scipy.spatial.transform", "pinocchio", "qpsolvers", "osqp", "matplotlib.pyplot",
-                 "pydantic", "typer", "rich.console", "jinja2", "mujoco")
 
 # Loaded by every Python that is started: takes the code of one module from a file.
 HOOK = '''
@@ -272,108 +263,46 @@ def tests_of(mutant: Mutant) -> tuple[str, ...]:
     if "frozen=" in line:
         return records
     known = lines_of(mutant.module)
-    tests = [*(known.get(mutant.line) or known[0])]
     default = mutant.module.startswith("scenarios/config/") and not known.get(mutant.line)
-    random.Random(mutant.line).shuffle(tests)
     seen, order = Counter[str](), dict[str, tuple[int, int]]()
-    for test in tests:
+    for test in sorted(known.get(mutant.line) or known[0]):
         function = test.partition("[")[0]
         order[test] = seen[function], footprints()[test]
         seen[function] += 1
-    chosen = sorted(tests, key=order.__getitem__)[:MOST]
-    return ("field(" in line) * records + default * keys + tuple(sorted(chosen))
+    chosen = sorted(order, key=order.__getitem__)[:MOST]
+    return ("field(" in line) * records + default * keys + tuple(chosen)
 
 
+@dataclass(frozen=True)
 class Runner:
-    """Runs tests with one module replaced, each time in a fork of this process.
+    """Runs tests in a process of their own, with one module replaced in all that they start."""
 
-    What the packages import from elsewhere is imported before, once, and so are the kernels with
-    what they import; a mutant of one of these modules makes a fork import all packages anew.
-    """
+    folder: Path
+    limit: int  # CPU time [s]
 
-    def __init__(self, folder: Path, limit: float) -> None:
-        self.folder, self.limit = folder, limit
-        self.seconds: dict[tuple[tuple[str, ...], str], float] = {}
-        (folder / "sitecustomize.py").write_text(HOOK)
-        for name in IMPORTED_ONCE:
-            with contextlib.suppress(ImportError):
-                import_module(name)
-        sys.path.insert(0, str(ROOT))
-        for file in sorted((ROOT / "solvers" / "kernels").glob("*.py")):
-            import_module(f"solvers.kernels.{file.stem}")
+    def passes(self, tests: tuple[str, ...], **environment: str) -> bool:
+        """Whether tests pass with this environment, in time."""
+        path = os.pathsep.join((str(self.folder), str(ROOT)))
+        with (self.folder / "output").open("w") as output, subprocess.Popen(
+                [sys.executable, "-m", "pytest", "-qx", "-n0", "-pno:cacheprovider", *tests],
+                cwd=ROOT, stdout=output, stderr=output, start_new_session=True,
+                preexec_fn=self._limited, env={**os.environ, "PYTHONPATH": path, **environment},
+        ) as process:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(20.0 * self.limit)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+        return process.returncode in (0, 5)  # 5: nothing was to be run
 
-    def unchanged(self, tests: tuple[str, ...], mark: str) -> float:
-        """Return the CPU time of tests on the packages as they are [s]; exit if they fail."""
-        if (tests, mark) not in self.seconds:
-            passed, self.seconds[tests, mark] = self._run([*tests], mark, {}, self.limit)
-            if not passed:
-                sys.exit(f"{(self.folder / 'output').read_text()}\n{tests} ({mark}) fails without "
-                         f"any change, or takes over {self.limit:g} s")
-        return self.seconds[tests, mark]
+    def _limited(self) -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (self.limit, self.limit))
 
     def survives(self, module: str, code: CodeType, tests: tuple[str, ...]) -> bool:
         """Whether the tests pass with this code of a module."""
+        (self.folder / "sitecustomize.py").write_text(HOOK)
         (self.folder / "mutant").write_bytes(marshal.dumps(code))
-        environment = {"MUTANT_NAME": name_of(module), "MUTANT_FILE": str(ROOT / module),
-                       "MUTANT_CODE": str(self.folder / "mutant")}
-        for mark in MARKS:
-            passed, used = self._run([*tests], mark, environment, LEAST)
-            if not passed and used > 0.9 * LEAST:  # it may have been cut off
-                limit = 3.0 * self.unchanged(tests, mark)
-                if limit > LEAST:
-                    passed, _ = self._run([*tests], mark, environment, limit)
-            if not passed:
-                return False
-        return True
-
-    def _run(self, tests: list[str], mark: str, environment: dict[str, str],
-             limit: float) -> tuple[bool, float]:
-        """Return whether the tests pass, and their CPU time [s], which `limit` bounds."""
-        child = os.fork()
-        if child == 0:
-            try:
-                self._become(environment, math.ceil(limit))
-                code = int(pytest.main(["-q", "-x", "-p", "no:cacheprovider", "-m", mark, *tests]))
-            except BaseException:
-                traceback.print_exc()
-                code = 1
-            finally:
-                sys.stdout.flush()
-                sys.stderr.flush()
-                os._exit(code)
-        code, used = _ended(child, 20.0 * limit)
-        return code in (0, 5), used.ru_utime + used.ru_stime  # 5: no test has this mark
-
-    def _become(self, environment: dict[str, str], limit: int) -> None:
-        """Make this fork what a fresh Python in a session of its own would be."""
-        os.setsid()
-        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-        output = os.open(self.folder / "output", os.O_CREAT | os.O_TRUNC | os.O_WRONLY)
-        for stream in (1, 2):
-            os.dup2(output, stream)
-        os.chdir(ROOT)
-        path = [str(self.folder), str(ROOT)]
-        os.environ.update(environment, PYTHONPATH=os.pathsep.join(path), PYTHONSAFEPATH="1")
-        sys.path[:] = [*path, *(place for place in sys.path if place != str(ROOT / "tests"))]
-        if environment.get("MUTANT_NAME") in sys.modules:
-            for name in [*sys.modules]:
-                if name.partition(".")[0] in ("hierarchy", "solvers", "scenarios"):
-                    del sys.modules[name]
-        exec(HOOK, {})
-
-
-def _ended(child: int, limit: float) -> tuple[int, resource.struct_rusage]:
-    """Wait for a fork, end it and all that it started; return its exit status and its usage."""
-    end = time.monotonic() + limit
-    pid = 0
-    while pid == 0:
-        pid, status, used = os.wait4(child, os.WNOHANG)
-        if pid == 0 and time.monotonic() > end:
-            os.kill(child, signal.SIGKILL)
-        time.sleep(0.02)
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(child, signal.SIGKILL)
-    return os.waitstatus_to_exitcode(status), used
+        return self.passes(tests, MUTANT_NAME=name_of(module), MUTANT_FILE=str(ROOT / module),
+                           MUTANT_CODE=str(self.folder / "mutant"))
 
 
 def main() -> None:
@@ -386,8 +315,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--start", type=int, default=1, metavar="N",
                         help="leave out what comes before mutant N of the sample")
-    parser.add_argument("--limit", type=float, default=900.0,
-                        help="CPU time limit of unchanged tests [s]")
+    parser.add_argument("--limit", type=int, default=300,
+                        help="CPU time that the tests of a mutant have [s]")
     options = parser.parse_args()
     if options.map:
         write_map(options.tests or ["tests"])
@@ -407,12 +336,11 @@ def main() -> None:
 
 def _try(sample: list[Mutant], start: int, tests: list[str] | None, runner: Runner) -> int:
     """Return how many mutants from `start` on survive, and print them."""
-    broken = compile("raise ImportError", "broken", "exec")
     first = tuple(tests or tests_of(sample[0]))
-    if runner.survives(sample[0].module, broken, first):
+    if not runner.passes(first):
+        sys.exit(f"{(runner.folder / 'output').read_text()}\n{first} fails without any change")
+    if runner.survives(sample[0].module, compile("raise ImportError", "", "exec"), first):
         sys.exit("the tests pass without the module")
-    for mark in MARKS:
-        runner.unchanged(first, mark)  # which ends where they fail
     alive = 0
     for done, mutant in enumerate(sample[start - 1:], start):
         described, code = mutant.code()

@@ -1,7 +1,6 @@
 """Accuracy and growth: their arms, their references, who reaches what, their rows."""
 
 
-import exact
 import numpy as np
 import oracle
 import pytest
@@ -9,8 +8,6 @@ import pytest
 from benchmark import arms
 from benchmark.solve import accuracy, growth
 from benchmark.solve.ours import Ours
-from scenarios.problems.answers import answer
-from solvers import names
 
 pytestmark = pytest.mark.slow
 
@@ -47,25 +44,6 @@ def test_the_damped_reference_is_that_of_the_oracle():
     for h in accuracy.hierarchies(accuracy.CASES[2], 20, 0)[0]:
         np.testing.assert_allclose(accuracy.damped(h, 0.05, 0.1), oracle.solve(h, 0.05, 0.1),
                                    atol=1e-9)
-
-
-@pytest.mark.parametrize("case", [c for c in accuracy.CASES if not c.damping], ids=lambda c: c.name)
-def test_the_least_that_a_task_can_miss_is_what_the_exact_answer_misses(case):
-    for h, least in zip(*accuracy.hierarchies(case, 5, 3), strict=True):
-        x = exact.exact(h)
-        np.testing.assert_allclose(answer(h).x, x, rtol=1e-12, atol=1e-12)
-        rounding = 1e-14 * (1.0 + np.linalg.norm(x))
-        np.testing.assert_allclose(h.violations(x), least, atol=rounding)
-
-
-def test_a_row_for_every_resolver_and_case(tables):
-    errors, _ = tables
-    labels = set(names()) - {"hqp"} | {"tpm-published", "reverse in-order", "hqp proxqp"}
-    for case in accuracy.CASES:
-        rows = [row for row in errors if row["case"] == case.name]
-        expected = labels if case.damping else labels | {accuracy.NUMPY}
-        assert {row["entrant"] for row in rows} == expected
-        assert all(row["failed"] == 0 and row["arms"] == 50 for row in rows)
 
 
 def test_strict_resolvers_reach_all_that_the_tasks_can_have(tables):

@@ -16,20 +16,16 @@ from benchmark.packages import OWN, Entrant
 from benchmark.process import CRASHED, HUNG, LEFT_OUT, Field
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
-from benchmark.solve.entrants import ENTRANTS, chosen, compiled
-from benchmark.solve.interface import read_problems
-from benchmark.solve.judge import cells, judge, judged, right_within, summaries, summary
+from benchmark.solve.entrants import chosen, compiled
+from benchmark.solve.judge import judge, judged, summary
 from benchmark.solve.open import QUESTIONS, asked, improve
-from benchmark.solve.views import lead
-from benchmark.store import Store
 from benchmark.worker import Repeats
 from hierarchy import Hierarchy
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
-from solvers import certify, make, names
+from solvers import certify, make
 from solvers.problems.files import Collection, Head, read
 from solvers.proof import prove
-from solvers.qp.backends import BACKENDS
 
 HELPERS = Path(__file__).parents[1] / "helpers"
 SOLVE = Path(solve.__file__).parent
@@ -65,13 +61,6 @@ def run_entrant(entrant, file, limit=10.0):
 
 def fake(name, **options):
     return Entrant(name, OWN, f"{HELPERS / 'fake_entrants.py'}:{name}", options)
-
-
-def test_every_resolver_of_the_project_is_an_entrant():
-    labels = {row.label for row in ENTRANTS}
-    assert {name for name in names() if name != "hqp"} <= labels
-    assert {f"hqp {name}" for name in BACKENDS} <= labels
-    assert len(labels) == len(ENTRANTS)
 
 
 @pytest.mark.slow
@@ -138,16 +127,6 @@ def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path
     assert max(row["warm_iterations"] for row in rows["hcod"][1:]) < rows["hcod"][0]["iterations"]
 
 
-def test_the_worker_reads_the_problems_that_were_written(tmp_path):
-    from solvers import problems
-
-    found = tuple(problems.structured(seed) for seed in range(5))
-    Collection(Head("mixed", "", "fresh", 1), found).save(tmp_path / "mixed.npz")
-    for h, one in zip(found, read_problems(tmp_path / "mixed.npz"), strict=True):
-        for name in ("A", "lower", "upper", "sizes", "reference"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(h, name))
-
-
 def raw(x, collected, problem=0, solved=True, **more):
     said = {"entrant": "one", "version": "1", "family": "simple", "half": "fresh", "seed": 7,
             "sha256": collected.digest, "problem": problem, "solved": solved, "same": True,
@@ -201,38 +180,6 @@ def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():
     assert np.isnan(whole["warm_median_us"])
 
 
-def test_shares_right_are_told_for_every_threshold():
-    one = collection([simple(3.0)])
-    rows = judge([raw([3.0 + 1e-4, 1.0], one), raw([3.0, 1.0], one, entrant="modest", solved=False),
-                  raw(None, one, entrant="asked nothing", refused="no")], {one.digest: one})
-    shares = right_within(rows, np.array([1e-9, 1e-3]))
-    assert {label: share.tolist() for label, share in shares.items()} == {
-        "one": [0.0, 1.0], "modest": [0.0, 0.0]}
-
-
-def test_hqp_and_its_rivals_have_the_same_settings():
-    known = {one.label: dict(one.options) for one in ENTRANTS}
-    for name, backend in BACKENDS.items():
-        if not backend.options:
-            continue
-        for words in ("defaults", "tight"):
-            rival = known[f"cascade {name}" + ("" if words == "defaults" else f", {words}")]
-            assert rival == known[f"hqp {name}, {words}"]
-        assert known[f"cascade {name}, as hqp"] == {"backend": name, **backend.options}
-
-
-def test_the_three_sentences_name_who_solves_most_and_who_is_faster():
-    one = collection([simple(3.0)])
-    rows = judge([raw([3.0, 1.0], one, entrant="hcod", cold_ns=[4000]),
-                  raw([3.0, 1.0], one, entrant="other", cold_ns=[1000]),
-                  raw([9.0, 1.0], one, entrant="wrong", cold_ns=[10])], {one.digest: one})
-    said = lead("Fresh", summaries(rows), cells(rows))
-    assert said == [
-        "Fresh: solved most often, of those that can be asked at least 95 % of the problems: hcod "
-        "and other, 100%.", "More often right than hcod: none.",
-        "As often right as hcod, and faster: simple (other, 1.00 µs against 4.00 µs)."]
-
-
 @pytest.mark.parametrize(("call", "said"), [
     (lambda: compiled([Path("a.so")], []), "1 libraries and 0 names"),
     (lambda: compiled([Path("a.so")], ["a"]), r"a\.so does not exist"),
@@ -241,17 +188,6 @@ def test_the_three_sentences_name_who_solves_most_and_who_is_faster():
 def test_an_entrant_that_is_not_there_is_refused(call, said):
     with pytest.raises(HierarchyError, match=said):
         call()
-
-
-def test_entrants_are_chosen_in_the_order_that_is_asked_for():
-    assert [row.label for row in chosen(["tpm", "hcod"])] == ["tpm", "hcod"]
-
-
-def test_a_file_of_rows_that_is_damaged_is_named(tmp_path):
-    (tmp_path / "rows").mkdir()
-    (tmp_path / "rows" / "old.jsonl.gz").write_bytes(b"no gzip")
-    with pytest.raises(HierarchyError, match=r"old\.jsonl\.gz cannot be read .*; remove it"):
-        Store(tmp_path).rows()
 
 
 @pytest.mark.slow

@@ -1,7 +1,6 @@
 """Other packages: the same robots, known answers of each adapter, fair judgement."""
 
 import json
-import re
 import sys
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -9,15 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmark.packages import PACKAGES, Entrant, MissingError, Package, install, python_of
-from benchmark.peers import moving, reaching, standing
+from benchmark.packages import PACKAGES, Entrant, MissingError, Package, python_of
+from benchmark.peers import reaching, standing
 from benchmark.peers.compare import joined
 from benchmark.peers.moving import ENTRANTS, QUESTIONS, START, make_scenes, run
 from benchmark.peers.ours import stand
 from benchmark.peers.scenes import Arm, Stand
 from benchmark.peers.standing import Judge, followed, make_scene
 from benchmark.process import Field
-from benchmark.report import Report
 from benchmark.solve import entrants as solvers_
 from benchmark.solve import open as solve
 from benchmark.urdf import urdf
@@ -25,7 +23,6 @@ from benchmark.worker import load
 from hierarchy import Hierarchy, Robot, State
 from hierarchy.paths import Still
 from hierarchy.tasks import Pose, Position
-from scenarios.cli.main import run_command
 from solvers.problems.files import Collection, Head
 
 ROOT = Path(__file__).parents[2]
@@ -77,26 +74,6 @@ def test_the_arm_read_from_its_urdf_moves_and_weighs_as_ours(tmp_path):
         np.testing.assert_allclose(b.rotation(same), a.rotation(end), rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(b.mass_matrix(), a.mass_matrix(), rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(b.bias_effort(), a.bias_effort(), rtol=0.0, atol=1e-12)
-
-
-def test_the_humanoid_read_from_its_urdf_weighs_as_ours(tmp_path):
-    ours, file = Robot.named("humanoid"), tmp_path / "humanoid.urdf"
-    feet = [ours.frame("left_foot"), ours.frame("right_foot")]
-    file.write_text(urdf(ours, feet))
-    read = Robot.from_file(file, "left_foot", base="floating")
-    order = [ours.velocity_names.index(name) for name in read.velocity_names]
-    np.testing.assert_array_equal(read.effort_limit[6:], ours.effort_limit[order][6:])
-    moved = [*range(7), *(i + 1 for i in order[6:])]
-    rng = np.random.default_rng(0)
-    for _ in range(10):
-        q, v = ours.integrate(ours.rest, rng.normal(size=ours.n)), rng.normal(size=ours.n)
-        a, b = State.at(ours, q, v), State.at(read, q[moved], v[order])
-        np.testing.assert_allclose(b.mass_matrix(), a.mass_matrix()[np.ix_(order, order)],
-                                   rtol=0.0, atol=1e-10)
-        np.testing.assert_allclose(b.bias_effort(), a.bias_effort()[order], rtol=0.0, atol=1e-10)
-        for foot in feet:
-            np.testing.assert_allclose(b.position(read.frame(foot.name)), a.position(foot),
-                                       rtol=0.0, atol=1e-12)
 
 
 # -- known answers ---------------------------------------------------------------------------------
@@ -200,15 +177,6 @@ def test_a_scene_arrives_as_it_was_sent(tmp_path):
         assert json.dumps(asdict(read(json.loads(sent)))) == sent
 
 
-def test_a_package_that_pip_refused_is_missing_with_what_pip_said(alone, monkeypatch):
-    nobody = Package("nobody", "no_such_module", ("nobody==1",))
-    said = iter(["", "ERROR: No matching distribution found"])
-    monkeypatch.setattr("benchmark.packages._said", lambda command: next(said))
-    assert install([nobody]) == {"nobody": "ERROR: No matching distribution found"}
-    with pytest.raises(MissingError, match="pip failed: ERROR: No matching distribution found"):
-        python_of(nobody)
-
-
 @pytest.mark.slow
 def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
     found = run([fake("posture"), fake("refuses"), fake("lost"), fake("ends"), NOBODY], ticks=1100)
@@ -232,18 +200,6 @@ def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
     found.write(tmp_path / "out")
     assert json.loads((tmp_path / "out" / "missing.json").read_text()) == found.missing
     assert (tmp_path / "out" / "peers.csv").is_file()
-
-
-def test_the_command_writes_a_folder_for_each_scene(tmp_path, monkeypatch, capsys):
-    for scene in (moving, standing):
-        monkeypatch.setattr(scene, "run", lambda: Report("title", [], {"peers": [{"a": 1}]},
-                                                         {"nobody": "not installed"}, True))
-    assert run_command(["bench", "peers", "--out", str(tmp_path / "out")]) == 0
-    assert {path.name for path in (tmp_path / "out").glob("*")} == {"moving", "standing"}
-    assert (tmp_path / "out" / "standing" / "peers.csv").is_file()
-    assert run_command(["bench", "peers", "--scene", "stand", "--out", str(tmp_path / "a")]) == 1
-    assert re.search(r"^nobody +not installed$", capsys.readouterr().out, re.MULTILINE)
-    assert run_command(["bench", "peers", "--scene", "stnd"]) == 2
 
 
 def test_wrong_answers_to_stand_are_found(tmp_path):

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from benchmark.reproduce import blocks, protocol, verdicts
-from benchmark.reproduce.avoidance import acceleration, measured
+from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, dominated
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
-from hierarchy import Robot, State
-from scenarios import load
+from scenarios.config import load
 from scenarios.measure.statistics import holm
 from scenarios.results.sampled import Workers
 
@@ -88,28 +87,6 @@ def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
     assert len(blocks.block("asked-letter", blocks.Stored(None, []), str).splitlines()) > 5
 
 
-def test_the_acceleration_of_a_point_is_its_second_difference(chance):
-    robot = Robot.load("kuka_lwr")
-    point = robot.control_points[6]
-    q, v, a = chance.standard_normal((3, 7))
-
-    def place(t):
-        state = State.at(robot, q + v * t + a * t * t / 2.0)
-        R = state.placements[point.joint, :9].reshape(3, 3).T
-        return R @ point.offset + state.placements[point.joint, 9:]
-
-    h = 1e-4
-    expected = (place(h) - 2.0 * place(0.0) + place(-h)) / h**2
-    found = acceleration(State.at(robot, q, v), point.joint, place(0.0), a)
-    assert found == pytest.approx(expected, abs=1e-5)
-
-
-def test_undamped_the_avoidance_task_is_met():
-    changes = {"control.duration": 0.3, "control.options.damping": 0.0}
-    metrics = {one.name: one.value for one in measured(load("ellipse", changes))[1]}
-    assert metrics["avoidance_error_rms"] < 1e-9
-
-
 @pytest.mark.slow
 def test_runs_are_resumed_and_noise_is_small(tmp_path):
     short = {"lwr": {**PROTOCOL.layouts["lwr"], "control.duration": 0.02}}
@@ -124,3 +101,28 @@ def test_runs_are_resumed_and_noise_is_small(tmp_path):
     assert exact == pytest.approx(noisy, rel=1e-4)
     protocol.write(first, tmp_path / "rows.json")
     assert protocol.read(tmp_path / "rows.json") == first
+
+
+def test_trials_lie_within_the_bounds_evenly_in_the_logarithm():
+    found = Method("weighted", free={"a": (0.1, 1000.0)}).trials(32, seed=1)
+    values = np.array([one["a"] for one in found])
+    assert values.min() >= 0.1
+    assert values.max() <= 1000.0
+    assert 12 <= (values < 10.0).sum() <= 20
+    assert Method("hcod").trials(32, seed=1) == [{}]
+
+
+def test_only_what_nothing_else_improves_is_on_the_front():
+    scores = np.array([[1.0, 4.0], [2.0, 2.0], [2.0, 3.0], [np.inf, np.inf]])
+    assert [dominated(scores, k) for k in range(4)] == [False, False, True, True]
+    assert not dominated(np.full((2, 2), np.inf), 0)
+
+
+def test_every_method_can_take_its_settings():
+    for front in FRONTS.values():
+        for given in front.method.values():
+            method = Method(**given)
+            scenario = load(front.scenario, GIVEN["plant"].get(front.plant, {}))
+            for settings in method.trials(2, seed=1):
+                scenario.with_resolver(method.resolver).with_changes(
+                    {**method.set, **settings}).make_resolver()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmark.reproduce import pages, protocol, whole
-from benchmark.reproduce.blocks import ROWS, Stored, cell
+from benchmark.reproduce.blocks import ROWS, Stored
 from benchmark.reproduce.protocol import PROTOCOL, Rows
 from hierarchy.errors import HierarchyError
 
@@ -68,24 +68,6 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
             fill(text)
 
 
-def test_a_table_gets_the_medians_of_its_rows_and_columns(tmp_path):
-    pages.file_of("hierarchy bench resolvers", tmp_path).write_text(BENCH)
-    table = "| | EQ7 [us] | INEQ7 | notes |\n|---|---|---|---|\n{}"
-    old = "| `hcod`, warm | 9 | 9 | kept |\n| `hqp` | 9 | 9 | too |\n"
-    new = "| `hcod`, warm | 1.9 | – | kept |\n| `hqp` | – | 1443 | too |\n"
-    mark = "table of hierarchy bench resolvers"
-    assert pages.filled(page(mark, table.format(old)), tmp_path, "page.md", STORED) == page(
-        mark, table.format(new))
-
-
-def test_a_finding_names_a_number_that_was_printed():
-    assert cell(BENCH, {"table": "INEQ7", "row": "hqp proxqp", "place": "2"}) == "1945"
-    alike = "title\nsns 10   1  2\nsns      3  4\n\nsns 5 6\n"
-    assert cell(alike, {"table": "title", "row": "sns", "place": "1"}) == "3"
-    with pytest.raises(HierarchyError, match="no row 'sns' below 'EQ7'"):
-        cell(BENCH, {"table": "EQ7", "row": "sns", "place": "1"})
-
-
 def test_a_command_is_run_once_for_the_same_code(tmp_path):
     script = tmp_path / "script.py"
     script.write_text("print('one  ')\nprint('Numbers: runs/a')\n")
@@ -107,13 +89,6 @@ def test_a_command_that_fails_leaves_the_others(tmp_path, capsys):
     assert "left as it is: python bad.py: exit code 3\nhalf" in said
     assert re.search(r"^  0:0\d min$", said, re.MULTILINE)
     assert whole.minutes(2467.4) == "41:07 min"
-
-
-def test_runs_and_pages_are_chosen_by_name():
-    assert whole.chosen([], ROOT) == (["protocol", "fronts"], PAGES)
-    assert whole.chosen(["docs/batch.md", "protocol"], ROOT) == (["protocol"], ["docs/batch.md"])
-    with pytest.raises(HierarchyError, match=r"'docs/view\.md'"):
-        whole.chosen(["docs/view.md"], ROOT)
 
 
 @pytest.fixture
@@ -148,24 +123,3 @@ def test_a_seed_that_has_ended_is_stored_whatever_ends_the_command(
     assert said in capsys.readouterr().err
     assert protocol.read(documents / ROWS) == new
     assert "it fell" in (documents / "docs/results/loops.md").read_text()
-
-
-def test_an_output_is_written_as_its_command_ends(documents, monkeypatch):
-    command, printed = "hierarchy bench batch --seconds 4", "Batches on ten\n"
-    monkeypatch.setattr(whole, "outputs", ending_with(KeyboardInterrupt(), (command, printed)))
-    assert whole.run(["docs/batch.md"], documents / "out", root=documents) == 130
-    assert pages.file_of(command, documents).read_text() == printed
-    assert f"```\n{printed}```" in (documents / "docs/batch.md").read_text()
-
-
-def test_a_page_that_cannot_be_filled_does_not_keep_others_from_it(documents):
-    page = documents / "docs/results/loops.md"
-    page.write_text(page.read_text() + "<!-- reproduce: other -->\n<!-- end of other -->\n")
-    changed, lacking = pages.fill(documents, STORED)
-    assert changed == []
-    assert [why.partition(":")[0] for why in lacking] == ["docs/results/loops.md"]
-
-
-def test_quick_needs_runs(tmp_path):
-    with pytest.raises(HierarchyError, match=r"--quick makes runs, and docs/batch\.md has"):
-        whole.run(["docs/batch.md"], tmp_path, True, 1)

@@ -63,13 +63,6 @@ def test_an_example_is_short_and_says_first_what_it_shows(name):
     assert re.match(r'"""[A-Z].*\n\nLevels: ', text)
 
 
-@pytest.mark.parametrize("name", ["ur5", "tray"])
-def test_a_file_says_how_to_run_it_with_equal_weights(name):
-    text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
-    assert f"# hierarchy run examples/{name}.toml\n" in text
-    assert all(f"--set {change}" in text for change in EQUAL)
-
-
 def loaded(name):
     """The module of an example."""
     spec = importlib.util.spec_from_file_location(f"example_{name}", EXAMPLES / f"{name}.py")

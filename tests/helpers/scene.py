@@ -140,7 +140,7 @@ def driven(stack, ticks, period, start, resolver=None, differences=False, sensor
 def compiled_rows(task, state, level, rtol=1e-12):
     """The rows that a task writes (A, lower, upper), checked against those of its plain methods."""
     count = task.dimension + 2
-    written, plain = [(np.full((count, 7), 5.0), np.full(count, 5.0), np.full(count, 5.0))
+    written, plain = [(np.full((count, state.n), 5.0), np.full(count, 5.0), np.full(count, 5.0))
                       for _ in range(2)]
     task.writer(state, level, *written, row=1)()
     Task.writer(task, state, level, *plain, row=1)()

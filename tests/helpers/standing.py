@@ -5,20 +5,18 @@ import pinocchio as pin
 
 from hierarchy import Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
-from hierarchy.paths import Still, Waypoints
+from hierarchy.paths import Still
 from hierarchy.tasks import (
     BaseDynamics,
     CentreOfMass,
     ContactMotion,
     Friction,
     LeastForce,
-    Pose,
     Position,
     Posture,
     Together,
     TorqueLimits,
 )
-from solvers import make
 
 ROBOT = Robot.named("humanoid")
 GRAVITY = 9.81
@@ -68,38 +66,6 @@ def external_forces(state, contacts, forces):
         local = state._placement(joint)[0].T @ force
         wrenches[joint] += pin.Force(local, np.cross(offset, local))
     return wrenches
-
-
-def stepping(ramp, period=0.004, duration=2.6):
-    """A step in place by the model itself: the weight shifts, the right foot rises and comes down.
-
-    Yields time [s], hierarchy, resolution, contacts and state of each tick; the foot is open from
-    1.2 to 1.8 s. Before and after it carries some 50 N.
-    """
-    left, right = feet().contacts
-    right = Contact(right.frame, right.points, right.friction, open=((1.2, 1.8),), ramp=ramp)
-    contacts = Contacts(ROBOT, [left, right])
-    state, foot = State.at(ROBOT, ROBOT.rest), right.frame
-    com, low = CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(state), state.position(foot)
-    over_left = com + np.array([0.0, 0.1085 - com[1], 0.0])
-    lift = Waypoints((1.2, 1.5, 1.8), [low, low + np.array([0.0, 0.0, 0.04]), low])
-    stack = Stack([
-        Together([BaseDynamics(contacts), ContactMotion(contacts)], "physics"),
-        Together([TorqueLimits(ROBOT, contacts=contacts), Friction(contacts, largest=300.0)],
-                 "limits"),
-        CentreOfMass(ROBOT, Waypoints((0.0, 0.8), [com, over_left])),
-        Pose(foot, lift, state.rotation(foot), 200.0, 30.0, name="swing foot"),
-        Posture(tuple(ROBOT.rest[7:])), LeastForce(contacts)], "torque", contacts=contacts)
-    resolver, memory = make("hcod"), None
-    for _ in range(round(duration / period)):
-        h = stack.hierarchy(state)
-        res = resolver.solve(h, memory)
-        memory = res.memory
-        yield h, res, contacts, state
-        state.carried = contacts.carried(state.t, res.x, state.carried)
-        a = contacts.accelerations(res.x)
-        v = state.v + period * a
-        state.move(state.t + period, ROBOT.integrate(state.q, period * (v - period * a / 2)), v)
 
 
 def written(task, state, level="acceleration", n=ROBOT.n):

@@ -2,15 +2,11 @@
 
 import numpy as np
 import pytest
-from scene import BODY, FRAME, ROBOT, SENSOR, TIP, driven, state_at, states
+from scene import ROBOT, SENSOR, place_of, state_at, states
 
 from hierarchy import HierarchyError, Stack, State
-from hierarchy.avoidance import Obstacle, Obstacles
-from hierarchy.paths import Still
-from hierarchy.tasks import JointDamping, JointLimits, Position
+from hierarchy.tasks import CumulatedRepulsion, JointDamping, JointLimits, Posture
 from hierarchy.tasks.danger_bounds import DangerBounds
-from scenarios.cell.sensors import ExactDistances
-from solvers import make
 
 PERIOD, REACH, SHAPE = 1e-3, 0.5, 6.0
 LIMITS = JointLimits(ROBOT, 30.0, PERIOD)
@@ -78,21 +74,6 @@ def test_the_box_is_never_empty_lies_in_that_of_the_limits_and_lets_a_joint_brak
             assert (halt <= up).all()
 
 
-@levels
-def test_the_rows_are_the_identity_with_the_box_as_sides(level):
-    for q, v in STATES[:5]:
-        state = state_at(q, v)
-        A, low, up = np.full((9, 7), 5.0), np.full(9, 5.0), np.full(9, 5.0)
-        task().writer(state, level, A, low, up, 1)()
-        np.testing.assert_array_equal(A[1:8], np.eye(7))
-        np.testing.assert_array_equal([low[1:8], up[1:8]], task().box(state, level))
-        assert (A[[0, 8]] == 5.0).all()
-        assert (low[[0, 8]] == up[[0, 8]]).all()
-        assert not task().jacobian_derivative(state).any()
-        np.testing.assert_array_equal(task().jacobian(state), np.eye(7))
-        np.testing.assert_array_equal(task().error(state), LIMITS.error(state))
-
-
 def test_what_it_cannot_do_without_is_named(monkeypatch):
     with pytest.raises(HierarchyError, match="needs at least one control point"):
         DangerBounds(LIMITS, ())
@@ -105,31 +86,50 @@ def test_what_it_cannot_do_without_is_named(monkeypatch):
         task()
 
 
-START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
+WITHIN = 0.5
 
 
-def closest(level, first, resolver, obstacles, goal, ticks=1500):
-    """Go to a goal; return the least distance of all points and the least slack of the box."""
-    sensor = ExactDistances(ROBOT, obstacles, BODY, TIP)
-    stack = Stack([first, Position(FRAME, goal)], level, reference=JointDamping(7, 5.0))
-    nearest, slack = np.inf, np.inf
-    for state, h, res in driven(stack, ticks, PERIOD, START, resolver, sensor=sensor):
-        nearest = min(nearest, state.measurement.distance.min())
-        slack = min(slack, (h.upper[:7] - res.x).min(), (res.x - h.lower[:7]).min())
-    return nearest, slack
+def by_hand(state, acceleration, lever, h=1e-5):
+    """The sum, with Jacobians as central differences of places."""
+    seen, total = state.measurement, np.zeros(7)
+    for k in range(8):
+        if seen.distance[k] > WITHIN:
+            continue
+        r = seen.direction[k].copy()
+
+        def row(q, point=ROBOT.control_points[k], r=r):
+            return np.array([r @ (place_of(point, q + s) - place_of(point, q - s)) / (2 * h)
+                             for s in h * np.eye(7)])
+
+        J = row(state.q)
+        drift = (row(state.q + 1e-4 * state.v) - row(state.q - 1e-4 * state.v)) @ state.v / 2e-4
+        asked = seen.magnitude[k] - (drift if acceleration else 0.0)
+        total += J * asked / max(J @ J, lever**2)
+    return total
 
 
-@pytest.mark.slow
-@levels
-@pytest.mark.parametrize("resolver", [make("sns"), make("sns", form="optimal", scales="miss")],
-                         ids=str)
-def test_with_sns_the_arm_stops_before_an_obstacle_on_its_way(level, resolver):
-    """The goal lies 0.3 m ahead, a ball of 5 cm half way to it."""
-    ahead = State.at(ROBOT, START).position(FRAME) + np.array([0.0, 0.0, 0.3])
-    obstacles = Obstacles([Obstacle("sphere", tuple(ahead - np.array([0.0, 0.0, 0.15])), (0.05,))])
-    goal = Still(tuple(ahead))
-    through, _ = closest(level, LIMITS, resolver, obstacles, goal)
-    before, slack = closest(level, task(reach=0.2), resolver, obstacles, goal)
-    assert through < -0.02
-    assert before > 0.0
-    assert slack >= 0.0
+@pytest.mark.parametrize("lever", [0.05, 0.6])
+def test_it_is_the_sum_of_what_each_near_point_asks_for(lever):
+    task, counted = CumulatedRepulsion(7, ROBOT.control_points, WITHIN, lever=lever), 0
+    for q, v in states(4, seed=3):
+        state = state_at(q, v)
+        counted += int((state.measurement.distance[:8] <= WITHIN).sum())
+        np.testing.assert_allclose(task.reference_acceleration(state), by_hand(state, True, lever),
+                                   rtol=1e-4, atol=1e-4)
+        np.testing.assert_allclose(task.reference_velocity(state), by_hand(state, False, lever),
+                                   rtol=1e-6, atol=1e-8)
+    assert 8 < counted < 32, "some points are near, and some are not"
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+@pytest.mark.parametrize("base", [None, JointDamping(7, 3.0), Posture((0.1,) * 7)])
+def test_a_stack_has_it_as_its_null_space_term_added_to_the_base(level, base):
+    task = CumulatedRepulsion(7, ROBOT.control_points, WITHIN, base)
+    stack = Stack([Posture((0.0,) * 7, name="any")], level, task)
+    for q, v in states(3):
+        state = state_at(q, v)
+        for _ in range(2):  # nothing of the tick before is left
+            found = stack.hierarchy(state).reference.copy()
+        expected = CumulatedRepulsion(7, ROBOT.control_points, WITHIN)
+        sides = [getattr(one, f"reference_{level}")(state) for one in (expected, base) if one]
+        np.testing.assert_allclose(found, sum(sides), atol=1e-12)

@@ -6,8 +6,7 @@ import pytest
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.paths import Still
-from hierarchy.tasks import JointCoupling, JointLimits, Position, Posture
+from hierarchy.tasks import JointCoupling, JointLimits, Posture
 from solvers import solve_ik
 
 T = 0.01  # [s]
@@ -164,20 +163,6 @@ def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_
         free.configuration({"d": 0.0})
 
 
-def test_inverse_kinematics_limits_the_speed_of_a_floating_base():
-    robot = Robot.load("humanoid")
-    far = Position(robot.frame("left_hand"), Still((5.0, 0.0, 1.0)))
-    v = solve_ik(robot, robot.rest, [far]).v
-    assert (np.abs(v[:6]) <= np.repeat([2.0, 3.0], 3) + 1e-9).all()
-    robot.limit_base(0.5, np.inf)
-    v = solve_ik(robot, robot.rest, [far]).v
-    assert np.abs(v[:3]).max() == pytest.approx(0.5)
-    with pytest.raises(RobotError, match="linear speed of the base = 0"):
-        robot.limit_base(0.0, 1.0)
-    with pytest.raises(RobotError, match="its base is fixed"):
-        ROBOT.limit_base(1.0, 1.0)
-
-
 def test_joint_limits_cover_a_floating_base_where_it_has_limits():
     robot = Robot.load("humanoid")
     joints, both = JointLimits(robot, 5.0, T), JointLimits(robot, 5.0, T, base_speed=(0.1, 0.2))
@@ -188,5 +173,7 @@ def test_joint_limits_cover_a_floating_base_where_it_has_limits():
     np.testing.assert_array_equal(low[6:], joints.box(state, "acceleration")[0])
     sent = both.clamp(state, "acceleration", np.append([9.0, np.nan], np.zeros(34)))
     np.testing.assert_allclose(sent[:2], [1.0, 0.0])
+    sent = joints.clamp(state, "acceleration", np.append([np.nan, 1e6], np.full(34, 1e6)))
+    np.testing.assert_allclose(sent[[0, 1, 20]], [0.0, 1e6, 5.0])
     with pytest.raises(HierarchyError, match="has a fixed base"):
         JointLimits(ROBOT, 5.0, T, base_acceleration=(1.0, 1.0))

@@ -7,11 +7,12 @@ import sys
 import numba
 import pytest
 
-HELPER = """
+NUMBERS, HELPER = "ONE = 1.0\n", """
 from hierarchy.jit import compiled
+from numbers_here import ONE
 @compiled
 def f(x):
-    return x + 1.0
+    return x + ONE
 """
 USER = """
 from hierarchy.jit import compiled
@@ -30,6 +31,7 @@ pytestmark = [
 @pytest.fixture
 def ask(tmp_path):
     """Runs a kernel in a new process with settings; returns what it prints on both streams."""
+    (tmp_path / "numbers_here.py").write_text(NUMBERS)
     (tmp_path / "helper.py").write_text(HELPER)
     (tmp_path / "user.py").write_text(USER)
 
@@ -47,11 +49,23 @@ def files(folder):
     return [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in str(path)]
 
 
-def test_a_changed_helper_is_noticed(ask, tmp_path):
+@pytest.mark.parametrize(("file", "old", "new"), [
+    ("helper.py", "x + ONE", "x + 91.0"), ("numbers_here.py", "1.0", "91.0")])
+def test_a_changed_helper_or_number_is_noticed(ask, tmp_path, file, old, new):
     folder = str(tmp_path / "cache")
     assert ask(XDG_CACHE_HOME=folder)[0] == ["11.0", "1"]
-    (tmp_path / "helper.py").write_text(HELPER.replace("1.0", "91.0"))
+    (tmp_path / file).write_text((tmp_path / file).read_text().replace(old, new))
     assert ask(XDG_CACHE_HOME=folder)[0] == ["101.0", "1"]
+
+
+@pytest.mark.parametrize("damage", [lambda kept: kept[:50],
+                                    lambda kept: kept[:-1] + bytes([kept[-1] ^ 1])])
+def test_a_damaged_cache_is_compiled_again(ask, tmp_path, damage):
+    cache = tmp_path / "cache"
+    ask(XDG_CACHE_HOME=str(cache))
+    (kept,) = (file for file in files(cache) if file.name.startswith("user.g-"))
+    kept.write_bytes(damage(kept.read_bytes()))
+    assert ask(XDG_CACHE_HOME=str(cache))[0] == ["11.0", "1"]
 
 
 def test_a_helper_that_was_compiled_again_is_found_by_its_callers(ask, tmp_path):
@@ -95,3 +109,61 @@ def test_a_file_that_another_user_can_have_written_is_not_loaded(ask, tmp_path, 
     except PermissionError:
         pytest.skip("only root can give files away")
     assert ask(XDG_CACHE_HOME=str(cache))[0] == ["11.0", "1"]
+
+
+KEPT = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from kept_kernels import Two, halves, hashed, last, squares
+from numba import njit
+import numpy as np
+print(hashed("kept") == hash("kept"), last(Two(np.arange(3.0), np.ones(3))))
+print(squares(np.arange(3.0)).tolist())
+print(sum(squares._cache_misses.values()), "numba.np.npyimpl" in sys.modules)
+print(halves(np.arange(3.0)).tolist())
+print("scipy.linalg" in sys.modules)
+print(float(njit(lambda x: np.cumsum(x)[-1])(np.arange(3.0))))
+"""
+KEPT_KERNELS = """
+from typing import NamedTuple
+
+from hierarchy.jit import compiled
+import numpy as np
+
+class Two(NamedTuple):
+    first: np.ndarray
+    second: np.ndarray
+
+@compiled
+def hashed(text):
+    return hash(text) + np.zeros(1, np.int64)[0]
+
+@compiled
+def last(two):
+    return two.first[1:][-1] + two.second[:2][-1]
+
+@compiled
+def squares(x):
+    y = np.empty(x.size)
+    for i in range(x.size):
+        y[i] = x[i] * x[i]
+    return y
+
+@compiled
+def halves(x):
+    return squares(x / 2.0)
+"""
+
+
+def test_a_kept_kernel_loads_without_what_compiling_needs_and_others_compile_after_it(tmp_path):
+    (tmp_path / "kept_kernels.py").write_text(KEPT_KERNELS)
+    said = []
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", KEPT, tmp_path], text=True, check=True,
+                              capture_output=True,
+                              env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")})
+        said.append(done.stdout.splitlines())
+        for file in (tmp_path / "cache").rglob("*halves*"):
+            file.unlink()
+    assert [lines.pop(2) for lines in said] == ["1 True", "0 False"]
+    assert said[0] == said[1] == ["True 3.0", "[0.0, 1.0, 4.0]", "[0.0, 0.25, 1.0]", "False", "3.0"]

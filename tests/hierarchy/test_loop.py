@@ -142,15 +142,6 @@ def test_a_priority_that_is_not_given_is_said_and_one_that_is_is_given_back():
     assert "SCHED_FIFO at priority 10000 was not given" in str(log)
 
 
-def test_a_summary_has_percentiles_of_lateness_and_duration():
-    _, log = ran([0.125] * 6 + [0.0] * 2)
-    found = log.summary()
-    assert found["duration"]["median"] == found["duration"]["max"] == 0.125
-    assert list(found["late"]) == ["median", "p95", "p99.9", "max"]
-    assert "8 ticks of 250 ms, 0 overruns, 0 skipped; all ticks were run" in str(log)
-    assert "nan" in str(Loop(PERIOD).log)
-
-
 # --- the watchdog -------------------------------------------------------------------------------
 
 

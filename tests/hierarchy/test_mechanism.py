@@ -9,7 +9,7 @@ from hierarchy.contacts import Contacts
 from hierarchy.robots.found import Coupled, Loop
 from hierarchy.tasks import Posture
 from hierarchy.tasks.mechanism import Mechanism, model_rows
-from solvers import make, solve_ik
+from solvers import make
 
 PERIOD = 0.001  # [s]
 TILT = pin.exp3(np.array([0.4, -0.3, 0.2]))
@@ -145,30 +145,3 @@ def test_a_chain_in_a_plane_moves_although_its_file_is_rounded(rigid, rounding):
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
     assert np.abs(ends[0] - begin).max() > 0.1, "it moved"
     assert Mechanism(exact).gap(ends[0])[0] < 1e-8 + 20.0 * rounding
-
-
-GRIPPER = """<robot name="g"><link name="base"/>{0}</robot>"""
-JOINT = """<link name="{0}"/><joint name="{0}" type="{2}"><parent link="{1}"/><child link="{0}"/>
-<origin xyz="0.05 0 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="3" effort="9"/>{3}
-</joint>"""
-
-
-@pytest.mark.parametrize("kind", ["revolute", "continuous"])
-def test_a_gripper_with_mimic_joints_stays_one_in_inverse_kinematics(kind, tmp_path):
-    follow = '<mimic joint="driver" multiplier="{}" offset="{}"/>'
-    joints = [("driver", "base", ""), ("knuckle", "driver", follow.format(-1, 0)),
-              ("left", "base", follow.format(1, 0.1)), ("right", "base", follow.format(-0.5, 0))]
-    path = tmp_path / "g.urdf"
-    path.write_text(GRIPPER.format("".join(JOINT.format(name, parent, kind, mimic)
-                                           for name, parent, mimic in joints)))
-    robot = Robot.load(path)
-    q = Mechanism(robot).closed(robot.rest)
-    for _ in range(300):
-        step = solve_ik(robot, q, [Posture({"driver": 0.6, "left": -0.5}, gain=5.0)],
-                        resolver="hcod")
-        q = robot.integrate(q, 0.01 * step.v)
-        found = robot.values(q)
-        expected = [-found["driver"], found["driver"] + 0.1, -0.5 * found["driver"]]
-        np.testing.assert_allclose([found[name] for name in ("knuckle", "left", "right")],
-                                   expected, atol=1e-9)
-    assert np.abs(robot.vector(q)).max() > 0.05, "it moved"

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ import pytest
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance.self_collision import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.robots.shapes import _capsule_of, bounding_capsule
+from hierarchy.robots.shapes import bounding_capsule
 from hierarchy.tasks import DangerBounds, JointLimits, TorqueLimits
 from scenarios.cell.robot import make_robot
 from scenarios.cli.main import run_command
@@ -91,12 +91,9 @@ def holds(capsule, point):
     return np.linalg.norm(point - start - share * way) <= capsule.radius + 1e-9
 
 
-def test_the_end_effector_proposed_is_the_frame_with_a_tools_name(arm):
+def test_a_tool_is_the_end_effector_and_primitives_are_capsules(arm):
     assert Robot.from_file(arm()).end_effector == "tool0"
     assert Robot.from_file(arm(), "fore").end_effector == "fore"
-
-
-def test_capsules_are_proposed_from_primitives(arm):
     upper = Robot.from_file(arm()).capsules[1]
     assert (upper.joint, upper.radius) == (1, 0.05)
     np.testing.assert_allclose([upper.start, upper.end], [(0, 0, 0), (0, 0, 0.4)], atol=1e-12)
@@ -124,13 +121,6 @@ def test_a_mesh_that_is_missing_is_said_and_not_fatal(arm, name):
     assert [capsule.joint for capsule in robot.capsules] == [0, 1]
 
 
-def test_a_mesh_that_cannot_be_read_leaves_the_other_shapes(arm, tmp_path):
-    (tmp_path / "part.stl").write_text("no mesh")
-    robot = Robot.from_file(arm('<mesh filename="part.stl"/>'))
-    assert "meshes cannot be read" in robot.missing[0]
-    assert [capsule.joint for capsule in robot.capsules] == [0, 1]
-
-
 def test_an_mjcf_without_the_mesh_of_what_is_only_seen_keeps_its_other_shapes(body, tmp_path):
     path = body()
     (tmp_path / "shell.obj").unlink()
@@ -141,14 +131,6 @@ def test_an_mjcf_without_the_mesh_of_what_is_only_seen_keeps_its_other_shapes(bo
                     .replace('name="arm">', 'name="arm"><inertial mass="1" pos="0 0 0" '
                                             'diaginertia="1 1 1"/>'))
     assert [capsule.radius for capsule in Robot.from_file(path).capsules][1:] == [0.05]
-
-
-def test_the_capsule_of_a_cone_has_its_axis():
-    cone = SimpleNamespace(radius=0.1, halfLength=0.4)
-    start, end, radius = _capsule_of(cone, "Cone")
-    np.testing.assert_allclose([*start[:2], *end[:2]], 0.0, atol=1e-12)
-    assert radius == pytest.approx(0.1)
-    assert end[2] + radius == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -162,43 +144,12 @@ def test_a_bounding_capsule_holds_all_points(seed):
     assert off.max() == pytest.approx(radius, abs=1e-9)
 
 
-def test_a_base_floats_where_it_is_asked_to(arm, body):
-    assert Robot.from_file(arm()).base == "fixed"
-    floating = Robot.from_file(arm(), base="floating")
-    assert (floating.base, floating.n, floating.nq, floating.actuated) == ("floating", 9, 10, 6)
-    assert Robot.from_file(body()).base == "floating", "the file has a free joint"
-    fixed = Robot.from_file(body(), base="fixed")
-    assert (fixed.n, fixed.joint_names) == (1, ("hinge",))
-    assert fixed.capsules[0].joint == 0
-
-
-def test_joint_limits_leave_the_base_alone(arm):
-    robot = Robot.from_file(arm(), base="floating")
-    task = JointLimits(robot, 5.0, 0.01)
-    state = State.at(robot, robot.rest)
-    assert task.dimension == 3
-    np.testing.assert_array_equal(task.jacobian(state), np.eye(9)[6:])
-    A, lower, upper = np.full((3, 9), 7.0), np.zeros(3), np.zeros(3)
-    task.writer(state, "acceleration", A, lower, upper, 0)()
-    np.testing.assert_array_equal(A, np.eye(9)[6:])
-    x = np.array([np.nan, 1e6, 0, 0, 0, 0, 1e6, np.nan, 0.0])
-    sent = task.clamp(state, "acceleration", x)
-    np.testing.assert_allclose(sent, [0, 1e6, 0, 0, 0, 0, 5, 0, 0])
-
-
 def test_what_cannot_be_said_of_a_floating_base_is_refused(arm):
     robot = Robot.from_file(arm(), base="floating")
     with pytest.raises(HierarchyError, match="contact forces"):
         TorqueLimits(robot)
     with pytest.raises(HierarchyError, match="floating base"):
         DangerBounds(JointLimits(robot, 5.0, 0.01), robot.control_points)
-
-
-def test_a_file_with_the_name_of_a_table_is_not_that_table(arm):
-    robot = Robot.load(str(arm().rename(arm().with_name("humanoid.urdf"))))
-    assert (robot.name, robot.table) == ("humanoid", None)
-    assert Robot.load("humanoid").table is not None
-    assert separable_pairs(robot, 0.01) == [(0, 2)]
 
 
 def test_locked_joints_are_no_joints(arm):
@@ -233,27 +184,6 @@ def test_neighbours_of_the_tree_are_not_kept_apart(arm):
     humanoid = Robot.named("humanoid")
     for i, j in separable_pairs(humanoid, 0.01):
         assert humanoid.capsules[i].joint != humanoid.parents[humanoid.capsules[j].joint]
-
-
-@pytest.mark.slow
-def test_check_says_what_was_found_and_gives_a_section_that_makes_the_same_robot(arm, capsys,
-                                                                                 tmp_path):
-    path = str(arm('<mesh filename="part.stl"/>'))
-    assert run_command(["check", path]) == 0
-    said = capsys.readouterr().out
-    for part in ("base            fixed, 3 velocities", "elbow", "0.5         2         3",
-                 "end effector    tool0, proposed; 3 joints move it",
-                 "capsules        2, proposed from the collision geometry",
-                 "missing         mesh 'part.stl' of link 'fore' is not there", "[robot]"):
-        assert part in said
-    import tomllib
-    section = tomllib.loads(said[said.index("[robot]"):])["robot"]
-    again, before = make_robot(RobotSection.model_validate(section)), Robot.load(path)
-    assert again.end_effector == before.end_effector
-    for one, other in zip(again.control_points, before.control_points, strict=True):
-        assert one.joint == other.joint
-        np.testing.assert_allclose(one.offset, other.offset, atol=1e-4)
-    assert [c.joint for c in again.capsules] == [c.joint for c in before.capsules]
 
 
 @pytest.mark.parametrize(("name", "feet"), [
@@ -331,18 +261,6 @@ def test_arms_of_example_robot_data_are_read_with_their_meshes(name, joints, end
     assert len(robot.capsules) >= 8
     assert len(robot.control_points) == 8
     assert np.isfinite([robot.lower, robot.upper]).all()
-
-
-@pytest.mark.usefixtures("example_robot_data")
-def test_the_panda_follows_its_ellipse_within_its_limits():
-    from scenarios import load, simulate
-
-    run = simulate(load("panda-ellipse"))
-    error = np.linalg.norm(run["position_error"], axis=1)
-    assert error[run["t"] > 2.0].max() < 1e-3
-    assert (run["q"] >= run["joint_lower"]).all()
-    assert (run["q"] <= run["joint_upper"]).all()
-    assert run["minimal_distance"].min() > 0.05
 
 
 # What is wrong in a file is named before pinocchio reads it, which would end the process or say

@@ -30,13 +30,15 @@ def test_kinematics_equal_the_table_multiplied_out():
         np.testing.assert_allclose(state.rotation(frame), T[:3, :3], atol=1e-14)
 
 
-def test_a_state_is_moved_without_making_another():
+def test_a_state_is_moved_without_making_another_and_one_of_another_robot_is_named():
     state = State.at(ROBOT, np.zeros(7))
     views = [state.J, state.dJ, state.placements]
     state.move(1.0, np.ones(7), np.ones(7))
     fresh = State.at(ROBOT, np.ones(7), np.ones(7))
     for view, name in zip(views, ("J", "dJ", "placements"), strict=True):
         np.testing.assert_array_equal(view, getattr(fresh, name))
+    with pytest.raises(RobotError, match=r"q has shape \(6,\), expected \(7,\)"):
+        State.at(ROBOT, [0.0] * 6)
 
 
 @pytest.mark.parametrize(("robot", "what", "entry", "name"), [
@@ -52,11 +54,6 @@ def test_an_entry_that_is_not_finite_is_named_by_its_own_joint(robot, what, entr
         with pytest.raises(RobotError) as error:
             State.at(robot, **given)
         assert f"{what}[{entry}] ({name}) is {value}" in str(error.value)
-
-
-def test_a_state_of_another_robot_is_named():
-    with pytest.raises(RobotError, match=r"q has shape \(6,\), expected \(7,\)"):
-        State.at(ROBOT, [0.0] * 6)
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -27,13 +27,10 @@ def test_insert_remove_swap_and_reorder_by_name():
     assert len(s) == 3
 
 
-def test_rows_are_named_in_the_order_of_the_stack_or_in_another():
+def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_buffers():
     s = Stack([TASKS["position"], LookAt(FRAME, (0.3, 0.3, 0.6))])
     assert s.row_names() == ("x", "y", "z", "x", "y")
     assert s.row_names(("look-at",)) == ("x", "y")
-
-
-def test_rows_of_the_hierarchy_are_those_of_the_tasks_in_order():
     state = state_at(Q, V)
     h = stack().hierarchy(state, ("avoidance", "position"))
     assert h.names == ("avoidance", "position")
@@ -41,9 +38,6 @@ def test_rows_of_the_hierarchy_are_those_of_the_tasks_in_order():
     np.testing.assert_array_equal(h.A[:3], TASKS["avoidance 3-D"].jacobian(state))
     np.testing.assert_array_equal(h.A[3:], TASKS["position"].jacobian(state))
     assert h.is_equality
-
-
-def test_the_same_order_is_written_into_the_same_buffers():
     s, state = stack(), state_at(Q, V)
     first = s.hierarchy(state)
     A = first.A.copy()

@@ -3,7 +3,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from scene import (
-    BODY,
     FRAME,
     PATH,
     ROBOT,
@@ -114,7 +113,7 @@ def test_a_fast_task_of_a_user_writes_the_rows_of_the_plain_one(level):
         np.testing.assert_array_equal(plain, fast)
 
 
-def test_position_reference_is_the_closed_loop_of_the_letter():
+def test_references_of_position_and_damping_are_those_of_the_letter():
     task = Position(FRAME, PATH, stiffness=40.0, damping=20.0, gain=3.0)
     q, v = STATES[2]
     state = State.at(ROBOT, q, v, 0.7)
@@ -122,9 +121,6 @@ def test_position_reference_is_the_closed_loop_of_the_letter():
     error, rate = p - state.position(FRAME), dp - task.jacobian(state) @ v
     np.testing.assert_allclose(task.reference_acceleration(state), ddp + 20 * rate + 40 * error)
     np.testing.assert_allclose(task.reference_velocity(state), dp + 3 * error)
-
-
-def test_end_effector_repulsion_is_added_within_its_area_only():
     q, v = STATES[3]
     state = state_at(q, v)
     near = state.measurement.end_effector_distance
@@ -134,6 +130,12 @@ def test_end_effector_repulsion_is_added_within_its_area_only():
     added = TIP(near) * state.measurement.direction[-1]
     np.testing.assert_allclose(inside.reference_acceleration(state), plain + added)
     np.testing.assert_allclose(outside.reference_acceleration(state), plain)
+    q, v = STATES[7]
+    state = State.at(ROBOT, q, v)
+    np.testing.assert_allclose(JointDamping(7, 5.0).reference_acceleration(state), -5 * v)
+    np.testing.assert_allclose(JointDamping(7, 2.0, "mass").reference_acceleration(state),
+                               -2 * state.mass_matrix() @ v)
+    np.testing.assert_allclose(JointDamping(7).reference_velocity(state), 0)
 
 
 def test_the_cone_asks_for_one_side_and_its_surface_for_both():
@@ -144,25 +146,6 @@ def test_the_cone_asks_for_one_side_and_its_surface_for_both():
         TASKS[name].writer(state, "acceleration", A, low, up, 0)()
         assert (up[0] == low[0]) == (upper == "equal")
         assert np.isinf(up[0]) == (upper == "infinite")
-
-
-def test_one_row_of_avoidance_is_the_projection_of_three():
-    q, v = STATES[6]
-    state = state_at(q, v)
-    r = state.measurement.direction[state.measurement.active]
-    one, three = TASKS["avoidance 1-D"], TASKS["avoidance 3-D"]
-    np.testing.assert_allclose(one.jacobian(state), r[None] @ three.jacobian(state))
-    np.testing.assert_allclose(one.error(state), [r @ three.error(state)])
-    assert one.error(state)[0] == pytest.approx(BODY(state.measurement.minimal_distance))
-
-
-def test_damping_brakes_in_proportion_to_speed_or_momentum():
-    q, v = STATES[7]
-    state = State.at(ROBOT, q, v)
-    np.testing.assert_allclose(JointDamping(7, 5.0).reference_acceleration(state), -5 * v)
-    np.testing.assert_allclose(JointDamping(7, 2.0, "mass").reference_acceleration(state),
-                               -2 * state.mass_matrix() @ v)
-    np.testing.assert_allclose(JointDamping(7).reference_velocity(state), 0)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.5, 3.0, np.pi - 1e-9, np.pi])
@@ -253,14 +236,11 @@ def test_a_gain_that_is_left_out_is_the_same_in_python_and_in_a_file(task, secti
         assert getattr(task, gain) == section.model_fields[gain].default
 
 
-def test_manipulability_is_yoshikawas():
+def test_manipulability_is_yoshikawas_and_has_no_row_at_a_singular_posture():
     task = TASKS["manipulability"]
     state = state_at(*STATES[4])
     J = np.array(Position(task.frame, PATH).jacobian(state))
     assert task.value(state) == pytest.approx(np.sqrt(np.linalg.det(J @ J.T)), rel=1e-9)
-
-
-def test_manipulability_has_no_row_at_a_singular_posture():
     task = TASKS["manipulability"]
     straight = State.at(ROBOT, np.zeros(7))
     assert task.value(straight) < 1e-12

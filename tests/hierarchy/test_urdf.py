@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hierarchy import HierarchyError, Robot, State
+from hierarchy import Robot, State
 from hierarchy.errors import RobotError
 
 LIMIT = '<limit lower="-1" upper="1" velocity="2" effort="3"/>'
@@ -215,8 +215,3 @@ def test_a_folder_and_a_missing_file_are_no_unknown_robots(tmp_path):
         Robot.load(tmp_path)
     with pytest.raises(RobotError, match="does not exist"):
         Robot.load("nowhere.SDF")
-
-
-def test_an_end_effector_that_the_file_lacks_is_refused(load):
-    with pytest.raises(HierarchyError, match="unknown end_effector frame 'tool'"):
-        load(*two_joints("revolute"), end_effector="tool")

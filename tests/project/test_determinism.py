@@ -3,7 +3,6 @@
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
 from scenarios import load, save, simulate
@@ -41,16 +40,3 @@ def test_another_process_writes_the_same_bytes(tmp_path):
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "other"), *RUNS["ellipse"]],
                    check=True)
     assert (tmp_path / "other" / "run.npz").read_bytes() == mine
-
-
-def test_another_seed_gives_other_bytes(tmp_path):
-    other = run_of("ellipse-noisy", ["plant.measurement.seed=5"])
-    assert bytes_of(run_of("ellipse-noisy"), tmp_path / "a") != bytes_of(other, tmp_path / "b")
-
-
-def test_times_are_in_a_file_of_their_own(tmp_path):
-    folder = save(run_of("ellipse"), tmp_path / "run")
-    with np.load(folder / "run.npz") as data, np.load(folder / "timings.npz") as times:
-        assert not [name for name in data.files if name.startswith("time_")]
-        assert set(times.files) == {f"time_{part}"
-                                    for part in ("kinematics", "rows", "resolve", "tick")}

@@ -81,12 +81,6 @@ def test_what_needs_an_extra_says_which(clean, tmp_path):
         assert "Traceback" not in done.stderr
 
 
-def test_the_problems_of_the_benchmark_are_part_of_it(clean, tmp_path):
-    said = json.loads(run(clean / "hierarchy", "problems", "show", "EQ7", "--json", cwd=tmp_path,
-                          env=UNCOMPILED))
-    assert (said["problems"], said["unknowns"]) == (50, "7")
-
-
 @pytest.mark.parametrize("command", [["bench", "open", "--fresh", "1"], ["reproduce", "--quick"]])
 def test_what_needs_a_checkout_says_so(clean, tmp_path, command):
     done = subprocess.run([str(clean / "hierarchy"), *command], capture_output=True, text=True,

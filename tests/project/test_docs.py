@@ -15,7 +15,6 @@ from sphinx.util.inventory import InventoryFile
 import hierarchy
 import scenarios
 import solvers
-from benchmark.studies.gallery import main as draw_gallery
 from hierarchy.tasks import TASKS
 from scenarios.config import shipped
 
@@ -150,11 +149,3 @@ def test_every_scenario_is_in_the_gallery_with_a_picture(name):
     assert shown, (f"run `python -m benchmark.studies.gallery {name}` and give it a section in "
                    "docs/gallery.md, as the others have it")
     assert picture.stat().st_size < LARGEST
-
-
-def test_the_command_of_the_gallery_draws_a_picture_and_prints_numbers(tmp_path, capsys):
-    draw_gallery(["strictness", "--out", str(tmp_path / "new")])
-    picture = (tmp_path / "new" / "strictness.png").read_bytes()
-    assert picture.startswith(b"\x89PNG")
-    assert len(picture) < LARGEST
-    assert re.match(r"strictness: .*Joint speed, max 3.56\d rad/s", capsys.readouterr().out)

@@ -156,17 +156,3 @@ def test_a_tutorial_can_be_followed_from_top_to_bottom(document, tmp_path):
                 if line.startswith("hierarchy "):
                     assert run_command(shlex.split(line, comments=True)[1:]) == 0, line
     assert followed >= {"toml", "python", "sh"}
-
-
-def test_the_task_of_the_guide_serves_in_a_stack():
-    from hierarchy import Robot, Stack, State
-    from solvers import make
-
-    names = {"__name__": "document"}
-    exec("\n".join(blocks("docs/extending/task.md", "python")), names)
-    robot = Robot.named("kuka_lwr")
-    state, hand = State.at(robot, [0.1] * 7), robot.frame("end_effector")
-    height = state.position(hand)[2] + 0.1
-    for task in (names["Above"](hand, height), names["FastAbove"](hand, height)):
-        x = make("hcod").solve(Stack([task], "velocity").hierarchy(state)).x
-        assert task.jacobian(state)[0] @ x == pytest.approx(10.0 * 0.1)

@@ -6,10 +6,16 @@ import re
 import subprocess
 import sys
 import tomllib
+from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 
 import pytest
+
+import hierarchy
+import scenarios.measure
+import solvers
 
 ROOT = Path(__file__).parents[2]
 LINK = re.compile(r"\[[^\]]*\]\((?!https?://|#|mailto:)([^)#\s]+)")
@@ -81,7 +87,7 @@ def make_set_up(folder, interpreter):
 @pytest.mark.parametrize(("statement", "heavy"), [
     ("import scenarios", {"numpy", "pydantic"}),
     ("import hierarchy", {"pinocchio"}), ("from hierarchy import Hierarchy", {"pinocchio"}),
-    ("import solvers", {"pinocchio"}),
+    ("import solvers, solvers.qp.backends", {"pinocchio", "qpsolvers", "proxsuite", "osqp"}),
     ("import scenarios.cli.main", {"numpy", "numba", "pinocchio", "scipy", "matplotlib"}),
     ("from scenarios.cli.main import run_command; run_command(['--help'])",
      {"numpy", "numba", "pinocchio", "pydantic", "matplotlib"}),
@@ -181,3 +187,29 @@ def test_no_function_has_more_than_eight_positional_arguments(functions):
                     if one.arg not in ("self", "cls")]) > 8
             and not any(".command" in ast.unparse(mark) for mark in node.decorator_list)]
     assert many == ["solvers/adapters/for_pink.py: solve_ik"]
+
+
+PACKAGES = (hierarchy, solvers, scenarios.measure)
+CHANGED_IN_PLACE = {"solvers.resolvers.hqp._Cascade"}
+
+
+def records(package):
+    """Every dataclass that is defined in a package whose modules can be imported here."""
+    for module in walk_packages(package.__path__, f"{package.__name__}."):
+        try:
+            found = vars(import_module(module.name)).values()
+        except ImportError:  # an optional package is missing
+            continue
+        yield from (one for one in found if isinstance(one, type) and is_dataclass(one)
+                    and one.__module__ == module.name)
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
+def test_records_are_frozen_and_what_they_compute_is_neither_shown_nor_compared(package):
+    loose = {f"{one.__module__}.{one.__qualname__}" for one in records(package)
+             if not one.__dataclass_params__.frozen}
+    assert loose == {name for name in CHANGED_IN_PLACE if name.startswith(package.__name__)}
+    computed = [(f"{one.__qualname__}.{field.name}", field) for one in records(package)
+                if f"{one.__module__}.{one.__qualname__}" not in CHANGED_IN_PLACE
+                for field in fields(one) if not field.init]
+    assert [name for name, field in computed if field.repr or field.compare] == []

@@ -6,7 +6,6 @@ import pytest
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.avoidance.obstacles import distance_to_obstacle
-from hierarchy.robots import TABLES, link_capsules
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.config.sensor import CameraSection, DepthErrors
 
@@ -75,20 +74,6 @@ def test_every_pixel_has_the_depth_at_which_its_ray_meets_the_shape(name):
     whole = (seen > 0.0) * 4 == beside  # inside or outside with all neighbours
     for i, j in zip(v[whole[v, u]], u[whole[v, u]], strict=True):
         assert seen[i, j] == pytest.approx(traced(SHAPES[name], pinhole, j, i), rel=2e-6), (i, j)
-
-
-def test_the_robot_is_seen_where_its_capsules_are():
-    position = np.array([0.3, 2.0, 0.5])
-    pinhole = Pinhole(position=position, rotation=looking_at(position, (0.0, 0.3, 0.1)))
-    capsules = link_capsules(TABLES["kuka_lwr"])
-    seen = depths(camera(capsules=capsules, pinhole=pinhole))
-    for capsule in capsules:
-        placement = STATE.placements[capsule.joint]
-        for share in (0.0, 0.3, 1.0):
-            offset = np.array(capsule.start) * (1 - share) + np.array(capsule.end) * share
-            axis = placement[9:] + placement[:9].reshape(3, 3).T @ offset
-            u, v, depth = pinhole.project(axis)
-            assert 0.0 < seen[round(v), round(u)] < depth - 0.9 * capsule.radius + 1e-3
 
 
 @pytest.mark.parametrize("depth", [1.0, 3.0])

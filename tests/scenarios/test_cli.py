@@ -1,10 +1,8 @@
 import importlib
 import json
-import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -13,7 +11,6 @@ from hand_made import recording
 
 from scenarios import compare, load, load_run
 from scenarios.cli.main import app, run_command
-from scenarios.draw.figures import letter
 from scenarios.results import comparing
 
 SHORT = ["--duration", "0.02"]
@@ -23,14 +20,6 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(autouse=True)
 def in_an_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-
-
-def test_run_prints_its_metrics_and_keeps_the_run(tmp_path, capsys):
-    assert run_command(["run", "ellipse", *SHORT, "--out", "runs/a"]) == 0
-    out = capsys.readouterr().out
-    assert "Position error, rms [mm]" in out
-    assert "runs/a" in out
-    assert (tmp_path / "runs" / "a" / "run.npz").exists()
 
 
 @pytest.mark.parametrize(("damping", "said"), [
@@ -94,21 +83,6 @@ def test_a_fault_is_reported_and_the_run_kept(tmp_path, capsys, monkeypatch):
     assert run_command(["run", "ellipse", "--out", "a"]) == 1
     assert "fault: interrupted at tick 5" in capsys.readouterr().err
     assert (tmp_path / "a" / "run.npz").exists()
-
-
-def test_ctrl_c_in_a_comparison_keeps_what_was_run_and_runs_no_more(tmp_path, monkeypatch):
-    begun = []
-
-    def interrupted_at_the_second(scenario, progress=None):
-        begun.append(scenario.control.resolver)
-        return recording(scenario, "interrupted at tick 5" if len(begun) == 2 else None)
-
-    simulation_is(interrupted_at_the_second, monkeypatch)
-    assert run_command(["compare", "ellipse", "--resolvers", "tpm,recursive,hqp",
-                        "--workers", "1", "--out", "b"]) == 1
-    assert begun == ["tpm", "recursive"]
-    assert {path.name for path in (tmp_path / "b" / "ellipse").iterdir()} == {"tpm", "recursive"}
-    assert "interrupted at tick 5" in (tmp_path / "b" / "index.html").read_text()
 
 
 def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, capsys):
@@ -199,32 +173,6 @@ def test_an_error_in_the_page_costs_no_run_and_says_where_they_are(tmp_path, mon
     assert len(list((tmp_path / "b").rglob("run.npz"))) == 2
 
 
-def test_figures_do_not_depend_on_the_users_matplotlib(tmp_path, monkeypatch):
-    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nsavefig.bbox: tight\n")
-    settings = {**os.environ, "MPLBACKEND": "no-such-backend", "MATPLOTLIBRC": str(tmp_path)}
-    draw = ("from pathlib import Path; import hand_made; from scenarios.draw.figures import letter;"
-            "letter.SIMULATION = letter.SIMULATION[:2]; Path('a').mkdir();"
-            "letter.write_all([hand_made.recording()], Path('a'))")
-    subprocess.run([sys.executable, "-c", draw], cwd=tmp_path, check=True, env={
-        **settings, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))})
-    drawn = sorted((tmp_path / "a").glob("*.svg"))
-    monkeypatch.setattr(letter, "SIMULATION", letter.SIMULATION[:2])
-    letter.write_all([recording()], tmp_path)
-    assert drawn
-    assert all(one.read_bytes() == (tmp_path / one.name).read_bytes() for one in drawn)
-
-
-def test_a_change_stands_in_the_title_and_an_inexact_resolver_is_named(capsys):
-    assert run_command(["run", "ellipse", *SHORT, "--set", "pointing.alpha_d=35"]) == 0
-    said = capsys.readouterr().out
-    assert "5 deg" not in said
-    assert "(pointing.alpha_d=35)" in said
-    assert "tpm-published: inexact where a level loses rank" in said
-    assert run_command(["run", "ellipse", *SHORT, "--resolver", "weighted"]) == 0
-    assert "weighted: trades levels off" in (said := capsys.readouterr().out)
-    assert "inexact" not in said
-
-
 def said(arguments, capsys, code=0):
     """Run a command with --json and return what it printed, which is one JSON object."""
     assert run_command([*arguments, "--json"]) == code
@@ -261,17 +209,6 @@ def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsy
     assert completed("hierarchy", "compare", "ladder")[-1] == "ladder"
     assert completed("hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc") == ["tpm,hcod"]
     assert completed("hierarchy", "sweep", "ell") == ["ellipse-starts"]
-
-
-def test_every_benchmark_is_a_command_and_listed(capsys):
-    folder = Path(__file__).parents[2] / "benchmark"
-    found = {path.stem if path.stem != "compare" else path.parent.name
-             for path in (*folder.glob("*.py"), *folder.glob("[a-r]*/[a-r]*.py"))
-             if "\ndef run(" in path.read_text() and path.parent.name not in ("peers", "reproduce")}
-    assert run_command(["bench", "--help"]) == 0
-    listed = capsys.readouterr().out
-    for name in (*found, "peers", "ik"):
-        assert f"  {name.replace('_', '-')}  " in listed
 
 
 def test_ctrl_c_while_it_is_starting_ends_the_command_quietly(tmp_path):

@@ -1,9 +1,14 @@
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
 from scenarios.cell.build import build
+from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError, load, shipped
+from scenarios.config.reference import keys_of, sections
 
 
 @pytest.mark.parametrize("name", shipped())
@@ -47,16 +52,6 @@ def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
     assert t.control.settings() == {"damping": 0.01, "threshold": 0.1}
 
 
-def test_a_file_extends_another(tmp_path):
-    (tmp_path / "mine.toml").write_text(
-        'extends = "ellipse"\nname = "mine"\n[pointing]\nalpha_d = 12\n')
-    (tmp_path / "yours.toml").write_text(
-        'extends = "mine.toml"\nname = "yours"\n[control]\nperiod = 0.002\n')
-    s = load(tmp_path / "yours.toml")
-    assert (s.name, s.pointing.alpha_d, s.control.period) == ("yours", 12, 0.002)
-    assert s.avoidance == load("ellipse").avoidance
-
-
 def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     path = tmp_path / "idle.toml"
     path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'
@@ -85,3 +80,35 @@ def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_besid
     (_, one), _ = paths(1, 0.1, 0.0)
     (_, other), _ = paths(2, 0.1, 0.0)
     assert np.abs(one - other).max() > 0.01
+
+
+# The reference of keys.
+
+
+EXTENSIONS = Path(__file__).parents[2] / "docs" / "_ext"
+
+
+def test_every_key_has_a_meaning():
+    assert not [f"{place} {section.__name__}.{key.name}" for place, section in sections()
+                for key in keys_of(section) if not key.meaning]
+
+
+def test_the_page_of_keys_is_as_the_program_has_them(monkeypatch):
+    monkeypatch.setattr(sys, "path", [str(EXTENSIONS), *sys.path])
+    import scenario_keys
+
+    assert scenario_keys.written() == scenario_keys.PAGE.read_text(encoding="utf-8"), (
+        "run `python docs/_ext/scenario_keys.py`")
+
+
+@pytest.mark.parametrize(("asked", "said"), [
+    ("avoidance.obstacles.path", ["Path of its middle", 'with kind = "waypoints"', "list: 3 × numb"
+                                  "er [m], required"]),
+    ("tasks.0.gain", ['[[tasks]] with kind = "pose"', "[1/s], default 10.0", "default 5.0"]),
+    ("control.period", ["number > 0 ≤ 1 [s], default 0.001", "Time from tick to tick."]),
+    ("start.q", ["[rad or m]"]), ("duration", ["control.duration", "faults.duration"]),
+    ("run", ["Usage: hierarchy run"]), ("tasks", ["[[tasks]]"])])
+def test_help_says_what_a_key_means(asked, said, capsys):
+    assert run_command(["help", asked]) == 0
+    text = capsys.readouterr().out
+    assert all(one in text for one in said)

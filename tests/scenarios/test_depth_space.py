@@ -14,13 +14,11 @@ from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
-from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage, _capsules
+from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
 from scenarios.config import ScenarioError
-from scenarios.config.sensor import CameraSection, DepthErrors, ImageSection
-from scenarios.draw.figures.depth import depth_figure
-from scenarios.measure.judging import depth_view
+from scenarios.config.sensor import CameraSection, ImageSection
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
@@ -106,60 +104,6 @@ def camera_of(*obstacles, errors=IDEAL, capsules=CAPSULES, **settings):
     return DepthCamera(section, SIDE, Obstacles(obstacles), capsules)
 
 
-def facing_surface(obstacle, place):
-    """The nearest point of an obstacle to a place, and how its normal faces the camera, or None."""
-    exact = ExactDistances(ROBOT, Obstacles([obstacle]))
-    exact._joints[:], exact._offsets[:] = 0, place
-    seen = exact.measure(STATE)
-    nearest = np.array(place) - seen.distance[0] * seen.direction[0]
-    ray = nearest - np.asarray(SIDE.position)
-    return nearest, -float(seen.direction[0] @ ray) / np.linalg.norm(ray), seen.distance[0]
-
-
-def overestimate(point, error):
-    """Largest overestimate [m] of the distance to a surface that SIDE sees at `point`.
-
-    `error` [m] is that of its reading; a missing pixel adds one pixel. There is no bound on
-    underestimates: hidden space counts as occupied, and the nearest of many noisy pixels is too
-    near on average.
-    """
-    depth = SIDE.project(point)[2]
-    pixel = depth * np.hypot(1.0 / SIDE.fx, 1.0 / SIDE.fy)
-    return np.linalg.norm(point - np.asarray(SIDE.position)) / depth * (error + pixel)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("noisy", [False, True], ids=["ideal", "noisy"])
-def test_the_distance_to_a_surface_that_is_seen_is_never_overestimated_beyond_its_bound(noisy):
-    """Of random spheres, capsules and boxes, where the nearest point of the surface is seen."""
-    errors = {"missing": 0.0, "missing_at_edges": 0.0, "outliers": 0.0} if noisy else IDEAL
-    rng, judged, shapes, worst = np.random.default_rng(7), 0, set(), 0.0
-    for i in range(150):
-        shape = ("sphere", "capsule", "box")[i % 3]
-        size = {"sphere": (0.15,), "capsule": (0.08, 0.2), "box": (0.15, 0.1, 0.2)}[shape]
-        turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        obstacle = Obstacle(shape, tuple(rng.uniform((-0.5, -0.5, -0.3), (0.5, 0.6, 0.6))), size,
-                            turned * np.linalg.det(turned))
-        place = np.array(obstacle.centre) + rng.normal(size=3) * 0.25
-        nearest, facing, D = facing_surface(obstacle, place)
-        u, v, depth = SIDE.project(nearest)
-        if facing < 0.3 or D < 0.02 or not (5 < u < 314 and 5 < v < 234):
-            continue
-        scene = camera_of(obstacle, errors=errors, capsules=(), seed=i, backdrop=0.0)
-        space = space_of(SIDE, at(place), (), region=2.0)
-        obstacles = ObstacleImage.empty(SIDE.height, SIDE.width)
-        space.find_obstacles(scene.image(0, STATE)[0], STATE.placements, obstacles)
-        estimate = space.measure(obstacles, STATE.placements).distance[0]
-        bound = overestimate(nearest, DepthErrors(**errors).bound(depth) if noisy else 0.0)
-        assert estimate - D <= bound, (i, estimate, D, bound)
-        if not noisy and SIDE.project(place)[2] < depth:  # nothing is in its shadow
-            assert estimate >= D - 1e-6
-        judged, worst = judged + 1, max(worst, (estimate - D) / bound)
-        shapes.add(shape)
-    assert judged > 40
-    assert len(shapes) == 3
-
-
 def test_the_arm_does_not_avoid_itself():
     """Wherever it is, and whatever the camera gets wrong but for outliers in blobs."""
     camera = camera_of(errors={"outliers": 0.0})
@@ -170,12 +114,6 @@ def test_the_arm_does_not_avoid_itself():
         space.find_obstacles(*camera.image(i, state), obstacles)
         assert (camera.scene < 3.9).mean() > 0.005
         assert np.isinf(space.measure(obstacles, state.placements).distance).all()
-
-
-@pytest.mark.parametrize(("robot", "foot", "more"), [
-    (ROBOT, 0.0, 0), (ROBOT, 0.31, 1), (Robot.named("kuka_lwr", "floating"), 0.31, 0)])
-def test_a_fixed_robot_may_stand_on_a_foot(robot, foot, more):
-    assert len(_capsules(robot, foot)) == len(robot.capsules) + more
 
 
 # The sensor in the loop.
@@ -221,38 +159,6 @@ QUICK = [f"sensor={{{VIEW}, width=160, height=120, fx=131.0, fy=131.0}}",
          "control.duration=0.6", "plant={}", "control.resolver=hqp", "control.options={}"]
 
 
-def troubles(run):
-    return {kind: [event.tick for event in run.events if event.kind == kind]
-            for kind in {event.kind for event in run.events}}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "kind"), [("human", "no_frames"), ("human-hqp", "dark_frames")])
-def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
-    """Frames at 0, 1/30, 2/30 s, then none up to 0.4 s; blind is 0.1 s after the last."""
-    run = simulate(load(name, [*QUICK, "sensor.stale_after=0.1", "start.v=[0.1,0,0,0,0,0,0]",
-                               f"faults=[{{kind='{kind}', at=0.08, duration=0.32}}]"]))
-    assert run.fault is None
-    ticks = troubles(run).pop("stale")
-    assert ticks == list(range(ticks[0], 80))
-    assert ticks[0] in (35, 36)  # the last frame was taken in tick 14, at 0.07 s
-    assert np.abs(run["v"][79]).max() < 0.5 * np.abs(run["v"][ticks[0]]).max()
-    assert {event.action for event in run.events} == {"brake"}
-
-
-def test_the_camera_tells_the_controller_what_exact_distances_would_nearly():
-    """With balls near the arm of `human`; no more is known of thickness than that it hides."""
-    for ball in ([0.4, 0.75, 0.2], [-0.3, 0.6, 0.1], [0.0, 0.4, 0.5]):
-        obstacle = f"avoidance.obstacles=[{{shape='sphere', centre={ball}, radius=0.08}}]"
-        camera, exact = (build(load("human", [obstacle, f"sensor={sensor}"])).sensor
-                         for sensor in (f"{{{VIEW}, ideal=true}}", "{kind='exact'}"))
-        state = State.at(ROBOT, [1.1657, -0.9476, 0.5844, 1.4408, 1.1464, 1.7695, 0.0])
-        seen, known = camera.measure(state), exact.measure(state)
-        near = known.distance < 0.4
-        assert near.any()
-        assert (seen.distance[near] < known.distance[near] + 0.01).all()
-
-
 @pytest.mark.parametrize(("changes", "said"), [
     (["sensor={kind='camera', position=[1,1,1], look_at=[1,1,1]}"], "look_at"),
     (["sensor.kind=camera", "sensor.rotation=[[1,0,0],[0,1,0],[0,0,-1]]"], "rotation"),
@@ -274,17 +180,6 @@ def written(tmp_path_factory):
     return write(folder, run, frames=6), run
 
 
-@pytest.mark.slow
-def test_a_run_on_written_frames_goes_as_with_the_camera_until_they_end(written):
-    folder, run = written
-    again = simulate(load("human", [f"sensor={{kind='frames', folder='{folder}'}}",
-                                    "control.duration=0.5"]))
-    end = 34  # of the sixth frame's time, the seventh is not there
-    np.testing.assert_allclose(again["ee_distance"][:end], run["ee_distance"][:end], atol=1e-2)
-    np.testing.assert_allclose(again["q"][:end], run["q"][:end], atol=1e-3)
-    assert troubles(again)["stale"][-1] == again.ticks - 1
-
-
 def test_frames_that_cannot_be_used_are_refused_by_name(written, tmp_path):
     folder, _ = written
     with pytest.raises(HierarchyError, match="has no frames"):
@@ -301,16 +196,20 @@ def test_frames_that_cannot_be_used_are_refused_by_name(written, tmp_path):
             RecordedFrames(tmp_path, ROBOT)
 
 
+def troubles(run):
+    return {kind: [event.tick for event in run.events if event.kind == kind]
+            for kind in {event.kind for event in run.events}}
+
+
 @pytest.mark.slow
-def test_the_figure_shows_points_and_distances_and_nothing_where_there_is_none():
-    ball = "avoidance.obstacles=[{shape='sphere', centre=[0.4, 0.75, 0.2], radius=0.08}]"
-    run = simulate(load("human", [*QUICK, "control.duration=0.05", ball]))
-    fig = depth_figure(depth_view(run, 0.04))
-    labels = [text.get_text() for text in fig.axes[0].get_legend().get_texts()]
-    assert [label.rpartition(" ")[2] for label in labels] == ["m", "m"]
-    fig.canvas.draw()
-    away = "avoidance.obstacles=[{shape='sphere', centre=[4.0, 0.75, 0.2], radius=0.08}]"
-    fig = depth_figure(simulate(load("human", [*QUICK, "control.duration=0.05", away])).depth)
-    assert fig.axes[0].get_legend() is None
-    exact = simulate(load("human", ["sensor={kind='exact'}", "plant={}", "control.duration=0.05"]))
-    assert exact.depth is None
+@pytest.mark.parametrize(("name", "kind"), [("human", "no_frames"), ("human-hqp", "dark_frames")])
+def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
+    """Frames at 0, 1/30, 2/30 s, then none up to 0.4 s; blind is 0.1 s after the last."""
+    run = simulate(load(name, [*QUICK, "sensor.stale_after=0.1", "start.v=[0.1,0,0,0,0,0,0]",
+                               f"faults=[{{kind='{kind}', at=0.08, duration=0.32}}]"]))
+    assert run.fault is None
+    ticks = troubles(run).pop("stale")
+    assert ticks == list(range(ticks[0], 80))
+    assert ticks[0] in (35, 36)  # the last frame was taken in tick 14, at 0.07 s
+    assert np.abs(run["v"][79]).max() < 0.5 * np.abs(run["v"][ticks[0]]).max()
+    assert {event.action for event in run.events} == {"brake"}

@@ -1,15 +1,16 @@
 """A command ends well where streams, names and disks are not as usual, and keeps what has run."""
 
+import json
 import os
 import subprocess
 import sys
-import tempfile
 
 import pytest
 
-from scenarios import load, load_run, simulate
+from scenarios import load_run
+from scenarios.cli import doctor
+from scenarios.cli.main import run_command
 from scenarios.files import OutputError, claim, slug, whole, write_text
-from scenarios.measure import run_folder
 
 COMMAND = [sys.executable, "-c", "from scenarios.cli.start import main; main()"]
 RUN = [*COMMAND, "run", "ellipse", "--duration", "0.02", "--out", "a"]
@@ -53,20 +54,6 @@ def test_names_of_settings_that_differ_late_give_different_folders():
     assert max(len(one), len(other)) <= 200
 
 
-def test_a_text_that_names_a_path_which_is_not_utf_8_is_written(tmp_path):
-    write_text(tmp_path / "page.html", os.fsdecode(b"caf\xe9"))
-    assert (tmp_path / "page.html").read_bytes() == b"caf\\udce9"
-
-
-def test_a_run_that_cannot_be_saved_where_it_should_is_saved_elsewhere(tmp_path, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    (tmp_path / "file").touch()
-    said = run_folder.kept(simulate(load("ellipse", ["control.duration=0.02"])),
-                           tmp_path / "file")
-    assert "cannot be written" in said
-    assert load_run(said.partition("the run is in ")[2]).ticks == 20
-
-
 def test_an_interruption_that_breaks_the_compiler_is_still_an_interruption(tmp_path):
     code = ("import os, signal; from scenarios.cli import doctor, start\n"
             "def broken(_):\n"
@@ -78,3 +65,38 @@ def test_an_interruption_that_breaks_the_compiler_is_still_an_interruption(tmp_p
     done = subprocess.run([sys.executable, "-c", code, "doctor"], cwd=tmp_path, text=True,
                           capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (130, "hierarchy: interrupted\n")
+
+
+@pytest.mark.slow
+def test_the_doctor_finds_all_well_here(capsys):
+    assert run_command(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "No problems found." in out
+    assert "20 of 20 answers certified" in out
+    assert "200 ticks of ellipse" in out
+
+
+@pytest.mark.slow
+def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, capsys):
+    def broken():
+        raise RuntimeError("no such kernel")
+
+    monkeypatch.setattr(doctor, "_resolvers_agree", broken)
+    assert run_command(["doctor", "--json"]) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert said["well"] is False
+    bad = [one for one in said["findings"] if one["well"] is False]
+    assert [one["what"] for one in bad] == ["resolvers agree"]
+    assert "RuntimeError: no such kernel" in bad[0]["found"]
+
+
+@pytest.mark.slow
+def test_a_missing_package_says_how_to_get_it(monkeypatch):
+    there = doctor._version
+    monkeypatch.setattr(doctor, "_version", lambda package: (
+        None if package in ("osqp", "mcap") else there(package)))
+    found = {one.what: one for one in [*doctor._versions(), *doctor._extras()]}
+    assert found["osqp"].well is False
+    assert found["osqp"].remedy == "pip install osqp"
+    assert found["export"].remedy == "pip install 'task-hierarchy[export]'"
+    assert found["export"].well is None

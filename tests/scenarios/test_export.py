@@ -1,6 +1,5 @@
 """Exports: read back by the packages that others read them with, they are the recording."""
 
-import itertools
 import json
 from dataclasses import replace
 
@@ -14,7 +13,6 @@ from scenarios.cli.main import run_command
 from scenarios.export import export, foxglove
 from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Event
-from scenarios.scene import scene
 
 CONSTANT = {"joint_lower", "joint_upper", "velocity_limit"}
 
@@ -25,11 +23,6 @@ def run():
     recording.signals["ee_distance"][3] = np.nan
     recording.signals["minimal_distance"][4] = np.inf
     return replace(recording, events=(Event(5, "overrun", "hold"), Event(5, "inside", "brake")))
-
-
-def test_every_signal_of_the_ticks_is_a_column(run):
-    names = {column.name.partition("[")[0] for column in run.columns()}
-    assert names == {*run.signals, "stack", "events"} - CONSTANT
 
 
 @pytest.fixture(scope="module")
@@ -107,19 +100,6 @@ def test_frames_are_where_the_robot_is(run, messages):
                                        state.placements[i, :9].reshape(3, 3).T, atol=1e-9)
 
 
-@pytest.mark.parametrize("every", [1, 7])
-def test_the_path_taken_is_whole_when_its_pieces_are_joined(run, every):
-    drawn = scene(run, rate=100.0)
-    assert len(drawn.t) == 16
-    pieces = [[list(point.values()) for point in entity["lines"][0]["points"]]
-              for _, update in foxglove.scene_updates(drawn, every)
-              for entity in update["entities"] if entity["id"].startswith("path taken")]
-    for before, after in itertools.pairwise(pieces):
-        assert after[0] == before[-1]
-    joined = [pieces[0][0], *(point for piece in pieces for point in piece[1:])]
-    np.testing.assert_array_equal(joined, drawn.traced)
-
-
 def test_the_layout_shows_only_what_the_file_has(messages):
     found, _, layout = messages
     panels = layout["configById"]
@@ -137,18 +117,6 @@ def leaves(node):
     if isinstance(node, str):
         return {node}
     return leaves(node["first"]) | leaves(node["second"])
-
-
-@pytest.mark.parametrize("shape", ["box", "capsule", "point"])
-def test_every_shape_of_an_obstacle_is_drawn_at_its_size(shape):
-    from hierarchy.avoidance import Obstacle
-
-    size = {"box": (0.1, 0.2, 0.3), "capsule": (0.05, 0.2), "point": ()}[shape]
-    drawn = foxglove.obstacle(0.0, 0, Obstacle(shape, (1.0, 2.0, 3.0), size), np.array([1., 2, 3]))
-    part = drawn[{"box": "cubes", "capsule": "cylinders", "point": "spheres"}[shape]][0]
-    expected = {"box": [0.2, 0.4, 0.6], "capsule": [0.1, 0.1, 0.4], "point": [0.02] * 3}[shape]
-    np.testing.assert_allclose([*part["size"].values()], expected)
-    assert len(drawn["spheres"]) == {"box": 0, "capsule": 2, "point": 1}[shape]
 
 
 @pytest.mark.parametrize(("name", "said"), [
@@ -176,3 +144,15 @@ def test_the_command_exports_a_run_beside_it_or_where_it_is_told(run, tmp_path, 
     assert run_command(["export", str(folder), "--format", "csv"]) == 2
     assert "to_dataframe" in capsys.readouterr().err
     assert run_command(["export", str(tmp_path / "none")]) == 2
+
+
+@pytest.mark.parametrize("shape", ["box", "capsule", "point"])
+def test_every_shape_of_an_obstacle_is_drawn_at_its_size(shape):
+    from hierarchy.avoidance import Obstacle
+
+    size = {"box": (0.1, 0.2, 0.3), "capsule": (0.05, 0.2), "point": ()}[shape]
+    drawn = foxglove.obstacle(0.0, 0, Obstacle(shape, (1.0, 2.0, 3.0), size), np.array([1., 2, 3]))
+    part = drawn[{"box": "cubes", "capsule": "cylinders", "point": "spheres"}[shape]][0]
+    expected = {"box": [0.2, 0.4, 0.6], "capsule": [0.1, 0.1, 0.4], "point": [0.02] * 3}[shape]
+    np.testing.assert_allclose([*part["size"].values()], expected)
+    assert len(drawn["spheres"]) == {"box": 0, "capsule": 2, "point": 1}[shape]

@@ -8,7 +8,6 @@ import pytest
 
 from hierarchy import HierarchyError
 from scenarios.cell.build import build
-from scenarios.cli.main import run_command
 from scenarios.config import load
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import measure
@@ -104,16 +103,6 @@ def test_every_fault_under_every_policy(fault, policy, name, limited):
     assert np.abs(run["v"][-1]).max() > 1e-2  # it moves again
 
 
-def test_an_answer_under_a_bad_status_may_be_used():
-    clean = simulate(scenario("ellipse", None))
-    for status in ("iteration_limit", "backend_failure", "inaccurate"):
-        fault = faults(("status", f"status='{status}'"))
-        run = simulate(scenario("ellipse", fault, kind=status, policy="use"))
-        np.testing.assert_array_equal(run["q"], clean["q"])
-        assert {(event.kind, event.action) for event in run.events} == {(status, "use")}
-        assert len(run.events) == LASTS
-
-
 def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
     run = simulate(scenario("ellipse", faults(("nan_position", "")), kind="not_finite",
                             policy="hold"))
@@ -129,31 +118,10 @@ def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
          "first_time": pytest.approx((AT + 10) * 1e-3)}]
 
 
-@pytest.mark.slow
-def test_the_command_line_says_what_happened_and_fails_only_where_the_run_ended(
-        tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    arguments = ["run", "ellipse", "--duration", "0.2", "--set", faults(("nan_position", ""))]
-    assert run_command(arguments) == 0
-    said = capsys.readouterr().out
-    assert "not_finite: brake in 60 ticks, first in tick 50 (t = 0.050 s)\n" in said
-    assert "Ticks braked" in said
-    assert run_command([*arguments, "--set", "control.policy.not_finite=stop"]) == 1
-    captured = capsys.readouterr()
-    assert "not_finite: stop in 1 ticks" in captured.out
-    assert "fault: stopped by its policy at t = 0.050 s: not_finite" in captured.err
-
-
 @pytest.mark.parametrize(("fault", "said"), [
-    ("{kind='nan_positon', at=1, duration=1}", "faults.0.kind: unknown value"),
     ("{kind='status', at=1, duration=1}", "'status' needs status"),
-    ("{kind='status', at=1, duration=1, status='solved'}", "faults.0.status: unknown value"),
     ("{kind='stale', at=1, duration=1, joint=3}", "'stale' takes no joint"),
-    ("{kind='overrun', at=1, duration=1}", "'overrun' needs takes"),
     ("{kind='obstacle', at=1, duration=1, radius=0.1}", "either a centre or a place"),
-    ("{kind='stale', at=-1, duration=1}", "faults.0.at"),
-    ("{kind='stale', at=1, duration=0}", "faults.0.duration"),
-    ("{kind='stale', at=1, durration=1, duration=1}", "did you mean 'faults.0.duration'"),
     ("{kind='nan_position', at=1, duration=1, joint=8}", "faults.0.joint = 8: robot 'kuka_lwr'"),
     ("{kind='nan_distance', at=1, duration=1, point=10}", "faults.0.point = 10: robot"),
     ("{kind='obstacle', at=1, duration=1, radius=0.1, place={joint='elbow', offset=[0, 0, 0]}}",

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError
+from hierarchy import Robot
 from scenarios import load, simulate
 from scenarios.cell.build import build
+from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
+from solvers import certify
 
 SHORT = "control.duration=1.5"
 
@@ -40,23 +42,6 @@ def test_the_order_is_fixed_and_limits_come_first():
     assert names_of("posture={role='task', target=[0,0,0,0,0,0,0]}")[-1] == "posture"
 
 
-@pytest.mark.parametrize("resolver", ["recursive", "tpm", "augmented", "reverse"])
-def test_resolvers_that_cannot_do_inequalities_refuse_with_the_level_and_the_row(resolver):
-    with pytest.raises(HierarchyError, match=r"separation, row \d+: an inequality|joint limits"):
-        simulate(load("ellipse-hqp", [SHORT]).with_resolver(resolver))
-
-
-@pytest.mark.parametrize(("changes", "says"), [
-    (["avoidance.influence=0.05"], "0.05 m is not below influence"),
-    (["control.level=velocity", "limits.torque=0.5"], "needs control.level"),
-    (["limits.acceleration=0"], "limits.acceleration"),
-    (["limits.acceleration=[1.0, 2.0]"], "expected a number or"),
-])
-def test_what_does_not_go_together_is_said(changes, says):
-    with pytest.raises(HierarchyError, match=says):
-        build(load("ellipse-hqp", changes))
-
-
 def test_beside_one_sided_distances_algorithm_1_switches_the_cone_alone():
     cell = build(load("ellipse-hqp", ["control.stack=switched"]))
     assert cell.order(None, 1.0).order == ("joint limits", "separation", "position", "pointing")
@@ -71,3 +56,53 @@ def test_the_strictness_scenario_measures_what_a_lower_task_moves():
     scenario = load("strictness", ["control.duration=0.3"])
     weighted = simulate(scenario.with_resolver("weighted:ratio=10"))
     assert measure(weighted)["moved_by_lower_max"].value > 1e-7
+
+
+ROBOT = Robot.named("kuka_lwr")
+BEYOND = [1.1657, -0.9476, 0.5844, float(ROBOT.upper[3]) + 0.1, 1.1464, 1.7695, 0.0]
+STARTS = {"stretched": "start.q=[0, 0, 0, 0, 0, 0, 0]",
+          "beyond a limit": f"start={{q={BEYOND}, allow_outside_limits=true}}",
+          "too fast": "start.v=[3, -3, 3, -3, 4, -3, 3]"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", STARTS)
+@pytest.mark.parametrize(("name", "resolver"), [
+    ("human", "recursive"), ("human", "sns"), ("human-hqp", "hcod")])
+def test_any_start_is_recovered_from_within_the_limit_of_acceleration(name, resolver, how):
+    """A joint beyond its limit comes back without going farther out; too fast, it slows down."""
+    run = simulate(load(name, ["control.duration=1.0", "plant={kind='kinematic'}", STARTS[how],
+                               "sensor={kind='exact'}"]).with_resolver(resolver))
+    assert run.fault is None
+    assert np.abs(run["command"]).max() <= run.scenario.limits.acceleration * (1.0 + 1e-9)
+    out = np.maximum(run["q"] - ROBOT.upper, ROBOT.lower - run["q"])
+    assert (np.diff(np.maximum(out, 0.0), axis=0) <= 1e-12).all()
+    assert out[60:].max() <= 1e-12
+    excess = np.maximum(np.abs(run["v"]) / ROBOT.velocity_limit - 1.0, 0.0)
+    assert (np.diff(excess, axis=0) < 1e-9).all()
+    assert excess[-1].max() == 0.0
+
+
+def hierarchies(changes=(), ticks=10):
+    """The hierarchies of the first ticks of `ellipse-mass`, with what was sent."""
+    scenario = load("ellipse-mass", list(changes))
+    cell = build(scenario)
+    controller, period = Controller(scenario, cell), scenario.control.period
+    for tick in range(ticks):
+        x = controller.command(tick * period, cell.plant.q, cell.plant.v)
+        yield controller.hierarchy, x, cell.state.mass_matrix()
+        cell.plant.act(x)
+
+
+@pytest.mark.slow
+def test_every_command_is_certified_in_the_inertia_of_its_tick():
+    for h, x, M in hierarchies():
+        np.testing.assert_array_equal(h.metric, M)
+        assert certify(h, x).certified
+
+
+@pytest.mark.slow
+def test_bounds_in_the_inertia_are_for_resolvers_of_any_rows():
+    assert load("ellipse-limits").asks == "bounds"
+    assert load("ellipse-limits", ["control.metric=mass"]).asks == "inequalities"
+    assert load("ellipse", ["control.metric=mass"]).asks == "equalities"

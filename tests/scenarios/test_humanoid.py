@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
+from scene import compiled_rows
 
-from hierarchy import Robot, State, Task
-from hierarchy.errors import HierarchyError
+from hierarchy import Robot, State
 from hierarchy.paths import Ellipse
 from hierarchy.tasks import CentreOfMass, Pointing, Pose, Position
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.config import Scenario
-from scenarios.draw.figures.picture import picture
 from scenarios.measure.metrics import measure
 
 pytestmark = pytest.mark.slow
@@ -38,7 +37,7 @@ CASES = [(name, task) for name, robot in ROBOTS.items() for task in tasks(robot)
 
 
 @pytest.mark.parametrize(("name", "task"), CASES)
-def test_jacobian_and_its_derivative_agree_with_central_differences(name, task):
+def test_jacobian_derivative_and_compiled_rows_are_right_on_a_robot_with_branches(name, task):
     robot = ROBOTS[name]
     task = tasks(robot)[task]
     for q, v in some_states(robot, 2):
@@ -46,44 +45,15 @@ def test_jacobian_and_its_derivative_agree_with_central_differences(name, task):
             return State.at(robot, robot.integrate(q, step), v, 0.7)
 
         state = State.at(robot, q, v, 0.7)
-        J = task.jacobian(state)
         if task.name != "pose":  # whose rows are the angular velocity, not the error's derivative
             columns = [(task.error(moved(-STEP * e)) - task.error(moved(STEP * e))) / (2 * STEP)
                        for e in np.eye(robot.n)]
-            np.testing.assert_allclose(J, np.transpose(columns), atol=2e-8)
+            np.testing.assert_allclose(task.jacobian(state), np.transpose(columns), atol=2e-8)
         later, before = moved(STEP * v), moved(-STEP * v)
         difference = (task.jacobian(later) - task.jacobian(before)) / (2 * STEP)
         np.testing.assert_allclose(task.jacobian_derivative(state), difference, atol=2e-8)
-
-
-@pytest.mark.parametrize(("level", "differences"), [("velocity", None), ("acceleration", 1e-3)])
-@pytest.mark.parametrize(("name", "task"), CASES)
-def test_compiled_rows_equal_those_of_the_plain_methods(name, task, level, differences):
-    robot = ROBOTS[name]
-    task = tasks(robot)[task]
-    q, v = some_states(robot, 1)[0]
-    state = State.at(robot, q, v, 0.7, differences)
-    state.move(0.8, robot.integrate(q, 1e-3 * v), v)
-    written, plain = [(np.zeros((task.dimension, robot.n)), np.zeros(task.dimension),
-                       np.zeros(task.dimension)) for _ in range(2)]
-    task.writer(state, level, *written, row=0)()
-    Task.writer(task, state, level, *plain, row=0)()
-    for a, b in zip(written, plain, strict=True):
-        np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10)
-
-
-BARE = ('<robot name="bare"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
-        '<parent link="a"/><child link="b"/></joint></robot>')
-
-
-@pytest.mark.parametrize(("robot", "axes", "said"), [
-    ("humanoid", (), "axes"), ("humanoid", (1, 0), "in this order"),
-    ("humanoid", (0, 3), "must be some of 0, 1, 2"), ("bare.urdf", (0,), "'bare' has no masses")])
-def test_a_centre_of_mass_that_makes_no_sense_is_refused(robot, axes, said, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bare.urdf").write_text(BARE)
-    with pytest.raises(HierarchyError, match=said):
-        CentreOfMass(Robot.load(robot), PATH, axes)
+        for level in ("velocity", "acceleration"):
+            compiled_rows(task, state, level, rtol=1e-10)
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +61,7 @@ def standing():
     return simulate(load("humanoid"))
 
 
-def test_all_levels_above_the_posture_are_met(standing):
+def test_all_levels_above_the_posture_are_met_and_their_errors_recorded(standing):
     assert standing.fault is None
     found = measure(standing)
     for name in ("left_foot", "right_foot", "centre_of_mass"):
@@ -102,25 +72,11 @@ def test_all_levels_above_the_posture_are_met(standing):
     assert found["task_gaze_max_settled"].value < 0.05
     assert found["task_left_foot_turned_rms"].unit == "deg"
     assert found["joint_limit_excess"].value == 0.0
-
-
-def test_what_is_recorded_of_a_task_is_its_error(standing):
     cell, k = build(standing.scenario), 700
     cell.state.move(standing["t"][k], standing["q"][k], standing["v"][k])
     for task in cell.tasks.listed:
         np.testing.assert_allclose(standing[f"task_error_{task.name.replace(' ', '_')}"][k],
                                    task.error(cell.state), atol=1e-15)
-
-
-@pytest.mark.parametrize("name", ["humanoid", "dual-arm"])
-@pytest.mark.parametrize("resolver", ["recursive", "hcod", "hqp:backend=proxqp"])
-def test_strict_resolvers_agree_over_a_short_run(name, resolver):
-    scenario = load(name, ["control.duration=0.2"])
-    changed = scenario.with_resolver(resolver)
-    one, other = simulate(scenario), simulate(changed)
-    bound = max(1e-6, changed.make_resolver().accuracy)
-    assert abs(one["q"] - other["q"]).max() < bound
-    assert (other["status"] == 0).all()
 
 
 @pytest.mark.parametrize("name", ["tpm", "hcod"])
@@ -132,14 +88,6 @@ def test_out_of_reach_strict_resolvers_keep_the_feet(name):
     assert np.linalg.norm(run["task_error_left_hand"][-1]) > 0.3, "nobody can reach that far"
     excess = np.maximum(run["q"] - run["joint_upper"], run["joint_lower"] - run["q"])
     assert excess.max() < 1e-6
-
-
-def test_the_picture_of_a_robot_that_branches_shows_its_body(standing):
-    from matplotlib.collections import PatchCollection
-    axes = picture({"tpm": standing}).axes[0]
-    bodies = [c for c in axes.collections if isinstance(c, PatchCollection)]
-    assert len(bodies) == 4
-    assert all(len(body.get_paths()) == 16 for body in bodies)
 
 
 def test_tasks_stand_behind_limits_position_and_pointing_in_their_order():

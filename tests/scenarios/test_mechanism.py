@@ -8,7 +8,7 @@ from hierarchy import Robot, State, plugins
 from hierarchy.contacts import Contacts
 from hierarchy.paths import Still
 from hierarchy.robots.found import Coupled, Loop
-from hierarchy.tasks import Position, Posture
+from hierarchy.tasks import Position
 from hierarchy.tasks.mechanism import Mechanism
 from scenarios import simulate
 from scenarios.cell.build import build
@@ -159,19 +159,6 @@ def test_an_ankle_with_two_pushrods_stays_closed(level, rod, tmp_path):
     assert largest_residual(path, [reached.q]) < 1e-9
 
 
-@pytest.mark.parametrize(("rod", "resolver"), [(BALL, "hcod"), (CROSS, "tpm")])
-def test_an_ankle_stays_closed_in_a_loop_of_inverse_kinematics(rod, resolver, tmp_path):
-    path, robot = ankle_at(tmp_path, rod)
-    goal = Posture({"pitch": -0.8, "roll": 0.2}, gain=10.0, robot=robot)
-    q, memory = [robot.rest], None
-    for _ in range(60):
-        step = solve_ik(robot, q[-1], [goal], memory=memory, resolver=resolver, limits=False)
-        memory = step.memory
-        q.append(robot.integrate(q[-1], 0.01 * step.v))
-    assert np.abs(robot.difference(q[0], q[-1])).max() > 0.1, "it moved"
-    assert largest_residual(path, q) < 1e-9
-
-
 @pytest.mark.parametrize("added", [0.0, 0.5])
 def test_the_torque_plant_has_the_armature_of_the_robots_file(added, tmp_path):
     mujoco = pytest.importorskip("mujoco")
@@ -188,12 +175,6 @@ def test_the_torque_plant_has_the_armature_of_the_robots_file(added, tmp_path):
     expected = data.qacc.copy()
     expected[:3] = data.xmat[1].reshape(3, 3).T @ expected[:3]
     np.testing.assert_allclose(plant.accelerations(np.array([3.0, -2.0])), expected, rtol=1e-6)
-
-
-def test_chains_of_the_torque_plant_are_as_stiff_as_its_time_step_allows(tmp_path):
-    _, robot = ankle_at(tmp_path, CROSS)
-    model = TorqueRobot(robot, Contacts(robot, []), robot.rest).model
-    np.testing.assert_allclose(model.eq_solref, [[2.0 * model.opt.timestep, 1.0]] * 2)
 
 
 FALLING = """<mujoco><default><joint armature=".2"/></default><worldbody><body name="trunk">

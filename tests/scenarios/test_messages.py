@@ -5,10 +5,11 @@ import re
 import numpy as np
 import pytest
 
-from hierarchy import Hierarchy, HierarchyError, Robot
+from hierarchy import Hierarchy, HierarchyError
 from hierarchy.gate import check_rotation
 from scenarios import load
 from scenarios.cli.main import run_command
+from scenarios.cli.progress import lines
 from scenarios.config.validation import doubtful_units
 from scenarios.toml_text import read_toml
 from solvers import Resolution, Resolver, Status
@@ -20,16 +21,10 @@ def an_arm_hierarchy():
 
 
 @pytest.mark.parametrize(("line", "caret", "mend"), [
-    ('resolver == "hcod"', 11, "write one ="), ('resolver: "hcod"', 9, "write = between"),
-    ('resolver "hcod"', 10, "write key = value"), ("resolver =", 11, "write a value"),
     ("resolver = hcod", 12, 'put text in quotes: "hcod"'),
     ('resolver = "hcod', 17, "close the text with the quote"),
     ("resolver = “hcod”", 12, 'straight quotes'), ("q = [1 2]", 8, "write a comma before this"),
-    ("q = [1, 2", 5, "close this ["), ("q = [1, 2\n\n[robot]", 5, "close this ["),
-    ("x = −1", 5, "write - for this minus sign"), ("x = .5", 5, "a digit before the point"),
     ("x = 0.001 s", 11, "without unit"), ("x = 1,5", 6, "a decimal point as ."),
-    ("x = True", 5, "in lower case"), ("x = 1 // much", 7, "a comment begins with #"),
-    ("[robot", 7, "with ]"), ("[my robot]", 5, "in quotes"), ("größe = 1", 3, "in quotes"),
     ('file = "C:\\models"', 13, "write / for each"), ("x = {a = 1,}", 12, "the comma before }"),
     ("a = 1\na = 2", 1, "leave out one"), ("[a]\n[a]", 1, "[[name]]")])
 def test_a_slip_in_a_file_shows_line_caret_and_mend(line, caret, mend, tmp_path):
@@ -52,8 +47,6 @@ def test_a_file_with_a_byte_order_mark_and_names_in_any_alphabet_is_read(tmp_pat
 
 @pytest.mark.parametrize(("asked", "said"), [
     ("elipse", "did you mean 'ellipse'? The nearest of "), ("m.urdf", "'m.urdf' is a robot"),
-    ("a.py", "to be run by `python a.py`"), (".", "'.' is a folder"), ("tpm", "is a resolver"),
-    ("kuka_lwr", "is a robot"), ("posture", "is a kind of task"),
     ("ellipse-starts", "to be run by `hierarchy sweep ellipse-starts`")])
 def test_what_is_no_scenario_is_told_with_what_it_is(asked, said, capsys):
     assert run_command(["run", asked]) == 2
@@ -68,22 +61,6 @@ def test_a_wrong_frame_is_told_with_file_and_key(tmp_path, capsys):
     assert run_command(["check", str(file)]) == 2
     assert "mine.toml: robot: unknown end_effector frame 'left_fot'; did you mean 'left_foot'?" in (
         capsys.readouterr().err)
-
-
-def test_a_robot_of_an_installed_package_is_found_by_a_name_that_is_nearly_its_own(monkeypatch):
-    monkeypatch.setattr("hierarchy.robots.names._installed",
-                        lambda: {"example_robot_data": ["panda", "talos"]})
-    with pytest.raises(HierarchyError, match=r"packages have example_robot_data:panda\.$"):
-        Robot.load("pandda")
-
-
-def test_a_sweep_is_not_run_and_a_scenario_is_no_sweep(tmp_path, capsys):
-    sweep, one = tmp_path / "sweep.toml", tmp_path / "one.toml"
-    sweep.write_text("name = 's'\nscenarios = ['ellipse']\nsamples = 3\n")
-    one.write_text("extends = 'ellipse'\nname = 'one'\n")
-    for command, file, said in [("run", sweep, "is a sweep"), ("sweep", one, "is a scenario")]:
-        assert run_command([command, str(file)]) == 2
-        assert said in capsys.readouterr().err
 
 
 def test_values_in_millimetres_are_doubted():
@@ -110,7 +87,6 @@ def mine(returned):
 
 @pytest.mark.parametrize(("returned", "said"), [
     (lambda h: np.zeros(h.n), "solve: expected a Resolution, got ndarray"),
-    (lambda h: 1.0, "got float 1.0; return solvers.Resolution(x)"),
     (lambda h: Resolution(1.0), "solve: x: expected an array of 7 floats, got float 1.0"),
     (lambda h: Resolution(np.zeros(3)), "expected an array of 7 floats")])
 def test_what_a_resolver_of_a_plugin_returns_is_judged(returned, said, an_arm_hierarchy):
@@ -122,3 +98,28 @@ def test_a_nan_of_a_resolver_of_a_plugin_is_a_failure(an_arm_hierarchy):
     found = mine(lambda h: Resolution(np.full(h.n, np.nan))).solve(an_arm_hierarchy)
     assert found.status is Status.NUMERICAL_FAILURE
     assert (found.x == 0.0).all()
+
+
+def test_errors_inside_a_resolver_of_a_plugin_are_not_hidden(an_arm_hierarchy):
+    with pytest.raises(AttributeError, match="nonsense"):
+        mine(lambda h: h.nonsense).solve(an_arm_hierarchy)
+
+
+def told(capsys, *steps):
+    """Return the lines printed for steps of (time, done) of 100."""
+    now = [0.0]
+    say = lines("ticks", clock=lambda: now[0])
+    for t, done in steps:
+        now[0] = t
+        say("tpm", done, 100)
+    return capsys.readouterr().err.splitlines()
+
+
+def test_a_short_command_is_silent(capsys):
+    assert told(capsys, (0.0, 0), (5.0, 50), (9.0, 100)) == []
+
+
+def test_a_long_one_says_every_ten_seconds_how_far_it_is_and_what_is_left(capsys):
+    said = told(capsys, (0.0, 0), (6.0, 10), (12.0, 20), (18.0, 30), (24.0, 40), (60.0, 100))
+    assert said == ["tpm: 20 of 100 ticks, about 48 s left",
+                    "tpm: 40 of 100 ticks, about 36 s left"]

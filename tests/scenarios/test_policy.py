@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from hierarchy import Robot, State
-from hierarchy.tasks import JointLimits
 from scenarios.config import load
 from scenarios.config.control import PolicySection
 from scenarios.loop.controller import Controller
@@ -168,23 +166,3 @@ def test_a_point_inside_an_obstacle_is_trouble_and_may_be_left_by_the_answer(act
     assert list(c.policy.events) == [("inside", action)]
     assert c.answered
     assert (x is c.resolution.x) == (action == "use")
-
-
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-def test_whatever_is_asked_commands_stay_within_the_joint_limits(level):
-    robot = Robot.named("kuka_lwr")
-    limits = JointLimits(robot, 5.0, PERIOD)
-    rng = np.random.default_rng(3)
-    q, v = rng.uniform(0.8 * robot.lower, 0.8 * robot.upper), np.zeros(7)
-    state = State.at(robot, q)
-    p = Policy(PolicySection(stale="hold", inaccurate="use", patience=50), level, PERIOD,
-               lambda x: limits.clamp(state, level, x))
-    for k in range(2000):
-        state.move(k * PERIOD, q, v)
-        low, up = limits.box(state, level)
-        troubles = ([], ["stale"], ["inaccurate"], ["overrun"])[rng.integers(4)]
-        x = p.choose(k * PERIOD, troubles, 50.0 * rng.normal(size=7), v)
-        assert ((low <= x) & (x <= up)).all()
-        q = q + (x * PERIOD if level == "velocity" else v * PERIOD + x * PERIOD**2 / 2)
-        v = x if level == "velocity" else v + x * PERIOD
-    assert ((robot.lower <= q) & (q <= robot.upper)).all()

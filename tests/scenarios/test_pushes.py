@@ -89,14 +89,3 @@ def test_every_shipped_scenario_of_torques_can_be_replayed(name):
             assert (scene(run).pushes.table[..., 2] == load(name).plant.height).all()
         if path.wanted is not None:
             np.testing.assert_allclose(now.wanted[0], path.wanted[0], atol=1e-9)
-
-
-def test_the_viewers_show_the_same_live_and_afterwards():
-    pytest.importorskip("mujoco")
-    run = simulate(STANDING.with_changes({"control.duration": 0.02}))
-    live = Live(run.scenario)
-    live.tick()
-    now, after = live.frame(), scene(run)
-    assert [one.name for one in now.series] == [one.name for one in after.series]
-    for one, other in zip(now.pushes.at(0), after.pushes.at(0), strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-9)

@@ -3,7 +3,6 @@ import re
 
 import numpy as np
 import pytest
-from hand_made import recording as hand_made
 from headless import chromium
 from packing import unpacked
 
@@ -62,13 +61,6 @@ def test_the_data_are_those_of_the_recording(runs, document):
             error, 1e3 * np.linalg.norm(recording["position_error"][shown.ticks], axis=1))
 
 
-def test_a_minute_at_30_hz_takes_less_than_a_megabyte_and_a_half(runs, document):
-    """Size grows with the frames: 60 a run here, of which a minute has 1800."""
-    code = len(html({"x": hand_made()}, "x"))
-    for_a_frame = (len(document) - code) / sum(len(scene(run).t) for run in runs.values())
-    assert for_a_frame * 1800 + code < 1.5e6
-
-
 # In a browser.
 
 
@@ -119,88 +111,6 @@ def test_play_moves_the_arm_and_pause_stops_it(page):
     assert stopped > at_first
     assert page.screenshot() != before
     assert page.run("player.t") == stopped
-
-
-def test_scrubbing_moves_the_cursor_of_every_curve(page):
-    places = "player.curves.cursors.map(cursor => +cursor.getAttribute('x1'))"
-    assert len(set(page.run(places))) == 1
-    page.run("""(() => { const scrub = document.getElementById('scrub');
-        scrub.value = 1.0; scrub.dispatchEvent(new Event('input')); })()""")
-    after = page.run(places)
-    assert after == [page.run("player.curves.x(1)")] * len(after)
-    assert page.run("player.t") == 1.0
-
-
-def test_runs_stand_side_by_side_and_can_be_hidden(page):
-    page.press("s")
-    page.painted()
-    assert page.run("[...document.querySelectorAll('#names span')].map(s => s.textContent)") == [
-        "tpm-published", "recursive"]
-    page.run("document.querySelectorAll('#legend button')[1].click()")
-    page.painted()
-    assert page.run("document.querySelectorAll('.card')[1].hidden")
-    assert page.run("document.querySelectorAll('#names span').length") == 1
-
-
-@pytest.mark.parametrize("width", [360, 800, 1400])
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-def test_nothing_is_wider_than_the_window(page, width, dark):
-    page.look_at(page.address, width, 740, dark)
-    page.painted()
-    assert page.run("document.documentElement.scrollWidth") <= width
-    assert page.run("document.getElementById('play').getBoundingClientRect().bottom") <= 740
-
-
-@pytest.fixture
-def without(page):
-    """Open the page where the contexts of a canvas that are named are missing."""
-    added, address = [], page.address
-
-    def opened(*kinds):
-        added.append(page.call("Page.addScriptToEvaluateOnNewDocument", source=f"""
-            const get = HTMLCanvasElement.prototype.getContext;
-            HTMLCanvasElement.prototype.getContext = function(kind, ...rest) {{
-                return {json.dumps(kinds)}.includes(kind) ? null : get.call(this, kind, ...rest); }}
-            """)["identifier"])
-        page.look_at("about:blank")
-        page.look_at(address, 1000, 600)
-        return page
-
-    yield opened
-    for script in added:
-        page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
-    page.look_at(address, 1000, 600)
-
-
-def test_without_webgl_the_arm_is_sketched_and_moves(without):
-    page = without("webgl")
-    assert page.run("player.stage.flat")
-    first = page.screenshot()
-    page.run("player.seek(1.5)")
-    assert page.screenshot() != first
-    colours = page.run("""(() => { const seen = new Set(), {pen} = player.stage.painter;
-        const {data} = pen.getImageData(150, 150, 300, 300);
-        for (let i = 0; i < data.length; i += 4) seen.add(data.slice(i, i + 3).join());
-        return seen.size; })()""")
-    assert colours > 20
-
-
-def test_embedded_it_is_as_tall_as_its_content_whatever_the_frame(browser, runs, tmp_path):
-    inner = html(runs, "x", embedded=True).replace("&", "&amp;").replace('"', "&quot;")
-    file = tmp_path / "outer.html"
-    file.write_text(f'<!DOCTYPE html><meta charset="utf-8"><iframe id="f" srcdoc="{inner}" '
-                    'style="width: 100%; height: 640px; border: 0"></iframe>', encoding="utf-8")
-    browser.complaints.clear()
-    browser.look_at(file.as_uri(), 1000, 700)
-    inside = "document.getElementById('f').contentDocument.documentElement"
-    browser.wait(f"{inside}.querySelectorAll('.curve').length > 4")
-    assert browser.run(f"{inside}.querySelector('#notice').hidden")
-    whole = browser.run(f"{inside}.querySelector('main').offsetHeight")
-    assert whole > 640
-    assert browser.run(f"Math.max(...[...{inside}.querySelectorAll('.curve')].map("
-                       "one => one.getBoundingClientRect().bottom))") <= whole
-    assert browser.run(f"{inside}.querySelector('header').offsetHeight") == 0
-    assert browser.complaints == []
 
 
 def test_the_command_takes_several_runs_and_a_name(runs, tmp_path):

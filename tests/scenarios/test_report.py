@@ -12,9 +12,7 @@ from headless import chromium
 from scenarios.config import load
 from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
-from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
-from scenarios.measure.verdict import lines, verdicts
 from scenarios.recording.recording import Event
 from scenarios.results.page import comparison_page as page
 from scenarios.results.page import run_command
@@ -92,26 +90,6 @@ def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
 
 
 @pytest.mark.slow
-def test_the_page_shows_verdict_replay_table_stack_panels_commands_settings():
-    text = page(comparison(made(LETTER), made("hqp")))
-    places = [text.index(mark) for mark in (
-        'class="verdict"', "<h2>Replay", "<h2>In numbers", "<h2>The stack over time",
-        "<h2>Side by side", "<h2>How to reproduce this<", "<h2>Settings",
-        "hierarchy compare hand-made</code>")]
-    assert places == sorted(places)
-
-
-@pytest.mark.slow
-def test_runs_of_the_same_motion_are_drawn_once_and_named_together():
-    runs = [made(LETTER), made("hqp", q=np.full((5, 7), 1e-8)),
-            made("augmented", q=np.ones((5, 7)))]
-    assert [one.labels for one in motions(runs)] == [("tpm-published", "hqp"), ("augmented",)]
-    text = page(comparison(*runs))
-    assert "tpm-published and hqp are the same motion to 1e-08 rad" in text
-    assert len(re.findall(r'aria-label="hand-made, [^"]*: Joint velocities"', text)) == 2
-
-
-@pytest.mark.slow
 def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
     run = made(LETTER, contacts=[0, 1, 0, 0, 0], **SOFTLY)
     run = dataclasses.replace(run, recording=dataclasses.replace(
@@ -135,16 +113,6 @@ def test_every_run_has_a_command_that_makes_it_again():
     assert command == ["hierarchy", "run", f"runs/a/{run.folder}/scenario.toml"]
     unchanged = Run(load("ellipse").with_resolver("hcod"), "hcod", "hcod")
     assert run_command(unchanged, "runs/a") == "hierarchy run ellipse --resolver hcod"
-
-
-def test_a_comparison_says_in_a_line_what_it_compares():
-    text = repr(comparison(made(LETTER), made("hqp", fault="diverged at tick 5")))
-    assert text == "Comparison(hand-made under tpm-published, hqp; 2 runs, 1 faults)"
-
-
-def test_the_numbers_as_data_hold_the_verdicts():
-    both = comparison(made(LETTER), made("hqp"))
-    assert both.as_plain_data()["verdicts"] == {"hand-made": list(lines(verdicts(both.runs)))}
 
 
 @pytest.mark.slow

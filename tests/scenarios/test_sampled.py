@@ -3,16 +3,12 @@
 import csv
 import json
 import os
-import signal
 import subprocess
 import sys
 from collections import Counter
-from contextlib import suppress
-from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
-import psutil
 import pytest
 from deadly import dies_of_one
 
@@ -21,7 +17,7 @@ from scenarios import load, shipped, simulate
 from scenarios.cli.main import run_command
 from scenarios.config.sampling import changed, drawn
 from scenarios.measure import metrics
-from scenarios.results import cluster, pool
+from scenarios.results import pool
 from scenarios.results.plan import load_sweep, plan, shipped_sweeps
 from scenarios.results.run import Job, Outcome, outcome
 from scenarios.results.sampled import Workers, compare_starts, sweep
@@ -83,14 +79,6 @@ def test_a_wrong_file_is_refused_before_anything_is_run(parameters, changed, say
     assert run_command(["sweep", str(path), "--out", str(tmp_path / "out")]) == 2
     assert says in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_unreadable_files_and_unknown_names_are_named(tmp_path):
-    (tmp_path / "bad.toml").write_text("name = ")
-    with pytest.raises(HierarchyError, match=r"bad\.toml"):
-        load_sweep(tmp_path / "bad.toml")
-    with pytest.raises(HierarchyError, match="'ellipse-starts'"):
-        load_sweep("ellipse-start")
 
 
 def test_every_shipped_sweep_can_be_planned():
@@ -170,15 +158,6 @@ def test_a_run_has_every_metric_of_its_scenario_as_sampled(tmp_path):
         m.name: m.value for m in expected.values() if m.group != "Computing"}
 
 
-@pytest.mark.parametrize(("measured", "reason"), [
-    (lambda _: (SimpleNamespace(ticks=3, fault=None), ()), None),
-    (mock.Mock(side_effect=ValueError("no")), "ValueError: no")])
-def test_a_run_is_timed_whether_it_ends_well_or_not(measured, reason, monkeypatch):
-    monkeypatch.setattr("scenarios.results.run.perf_counter", iter([10.0, 12.5]).__next__)
-    found = outcome(SimpleNamespace(key="a", load=lambda: None), measured)
-    assert (found.key, found.reason, found.wall_seconds) == ("a", reason, 2.5)
-
-
 @pytest.mark.slow
 def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path):
     distributed = pytest.importorskip("distributed", reason="needs the extra sweep")
@@ -197,16 +176,6 @@ def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path):
     assert ("tpm", "2", "start.q.6") in first
 
 
-def test_a_part_that_is_not_there_and_a_scheduler_that_does_not_answer_are_named(tmp_path, capsys,
-                                                                               monkeypatch):
-    pytest.importorskip("distributed", reason="needs the extra sweep")
-    monkeypatch.setattr(cluster, "_PATIENCE", 0.5)
-    command = ["sweep", str(write(tmp_path)), "--out", str(tmp_path / "out")]
-    for option in (["--part", "3/2"], ["--part", "3"], ["--scheduler", "tcp://127.0.0.1:1"]):
-        assert run_command([*command, *option]) == 2
-        assert option[1] in capsys.readouterr().err
-
-
 @pytest.mark.slow
 def test_only_the_runs_that_are_not_there_are_made(tmp_path):
     assert sweep(write(tmp_path), tmp_path / "out", ALONE).made == 6
@@ -221,47 +190,6 @@ def test_a_run_that_kills_its_process_costs_only_itself():
     found = {job.key: one for job, one in pool.ended(dies_of_one, jobs, 2)}
     assert len(found) == 6
     assert [key for key, one in found.items() if one is None] == ["2"]
-
-
-KILLED_AFTER_THE_FIRST_ROWS = """
-import os, pathlib, signal
-import psutil
-from scenarios.results.store import Store
-
-add = Store.add
-
-def add_and_die(store, job, outcome):
-    add(store, job, outcome)
-    workers = psutil.Process().children(recursive=True)
-    pathlib.Path("workers").write_text(" ".join(str(one.pid) for one in workers))
-    os.kill(os.getpid(), signal.SIGKILL)
-
-Store.add = add_and_die
-from scenarios.cli.start import main
-main()
-"""
-
-
-def alive(pids):
-    """The processes of these numbers that have not ended."""
-    for pid in pids:
-        with suppress(psutil.NoSuchProcess):
-            yield psutil.Process(pid)
-
-
-@pytest.mark.slow
-def test_a_sweep_that_is_killed_goes_on_where_it_stopped(tmp_path):
-    path, out = write(tmp_path, samples="8"), tmp_path / "out"
-    died = subprocess.run([sys.executable, "-c", KILLED_AFTER_THE_FIRST_ROWS, "sweep", str(path),
-                           "--out", str(out), "--workers", "2"], cwd=tmp_path, check=False)
-    assert died.returncode == -signal.SIGKILL
-    workers = (tmp_path / "workers").read_text().split()
-    assert workers
-    assert psutil.wait_procs(alive(map(int, workers)), timeout=60.0)[1] == []
-    before = made(out)
-    assert 0 < len(before) < 16
-    assert sweep(path, out, ALONE).made == 16 - len(before)
-    assert made(out) == Counter(read(out / "results.csv").keys())
 
 
 # What is kept

@@ -5,23 +5,15 @@ import pytest
 from hand_made import recording as hand_made
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.robots import TABLES
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.cell.robot import make_robot
-from scenarios.config.robot import RobotSection
 from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
-from scenarios.recording.facts import robot_facts
 from scenarios.recording.fate import Fate, levels_at
-from scenarios.scene import capsules, ends, scene, stage
+from scenarios.scene import scene
 
 SHORT = ["control.duration=1.5"]
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
-
-
-def stage_of(scenario):
-    return stage(robot_facts(make_robot(scenario.robot), scenario.sensor.foot), scenario)
 
 
 @pytest.fixture(scope="module")
@@ -35,14 +27,11 @@ def ellipse(runs):
 
 
 @pytest.mark.slow
-def test_frames_are_the_ticks_nearest_to_their_times(runs, ellipse):
+def test_frames_placements_and_distances_are_those_recorded(runs, ellipse):
     assert ellipse.ticks[0] == 0
     assert ellipse.ticks[-1] == runs["ellipse"].ticks - 1
     assert np.abs(np.diff(ellipse.t)[:-1] - 1 / 30).max() < 1.1e-3
     assert np.array_equal(ellipse.t, runs["ellipse"]["t"][ellipse.ticks])
-
-
-def test_placements_and_links_are_those_of_the_kinematics(runs, ellipse):
     robot = Robot.named("kuka_lwr")
     for f in (0, 20, -1):
         state = State.at(robot, runs["ellipse"]["q"][ellipse.ticks[f]])
@@ -53,9 +42,6 @@ def test_placements_and_links_are_those_of_the_kinematics(runs, ellipse):
         tip = robot.frame(robot.end_effector)
         assert np.allclose(chain[-1, 1], state.position(tip))
         assert np.allclose(ellipse.axis[f], state.rotation(tip)[:, 2])
-
-
-def test_points_and_distances_are_those_recorded(runs, ellipse):
     recording, ticks = runs["ellipse"], ellipse.ticks
     assert np.allclose(ellipse.traced, recording["ee_position"][ticks], atol=1e-12)
     assert np.allclose(ellipse.distance[:, :-1], recording["control_point_distance"][ticks])
@@ -103,18 +89,6 @@ def test_no_peak_between_two_frames_is_lost(runs):
         assert ((curve.low <= curve.value) & (curve.value <= curve.high)).all()
 
 
-def test_marks_have_their_symbols_in_plain_text(ellipse):
-    assert [ellipse.series[i].marks for i in (1, 2, 3)] == [
-        (("α_d", 5.0),), (("ε₁", 0.05), ("ε₂", 0.15)), (("ε_ee", 0.1),)]
-    assert ellipse.stage.areas == (("ε₁", 0.05), ("ε₂", 0.15))
-
-
-def test_the_axis_of_a_cone_is_drawn_with_unit_length():
-    fixed = stage_of(load("ellipse", ["pointing.axis=[0, 3, 4]"]))
-    np.testing.assert_allclose(fixed.axis, [0.0, 0.6, 0.8])
-    assert fixed.half_angle == pytest.approx(np.radians(5.0))
-
-
 def test_frames_end_where_the_state_stops_being_finite():
     q = np.zeros((5, 7))
     q[3:] = np.nan
@@ -133,58 +107,3 @@ def test_levels_that_were_not_judged_are_unknown_where_they_are_in_the_stack():
 def test_a_rate_that_is_none_is_refused(ellipse, runs, rate):
     with pytest.raises(HierarchyError, match="rate"):
         scene(runs["ellipse"], rate)
-
-
-def test_a_robot_without_capsules_is_drawn_as_sticks(tmp_path):
-    file = tmp_path / "two.urdf"
-    file.write_text("""<robot name="two"><link name="base"/><link name="a"/><link name="b"/>
-<joint name="one" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="two" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.5 0 0"/>
-<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>""")
-    robot = Robot.from_file(file)
-    links = capsules(robot)
-    state = State(robot)
-    state.move(0.0, np.array([np.pi / 2, 0.0]), np.zeros(2))
-    assert np.allclose(ends(links, state.placements)[0, 1], [0.0, 0.5, 0.0])
-
-
-@pytest.mark.parametrize("name", TABLES)
-def test_no_robot_at_rest_is_below_the_floor(name):
-    scenario = load("ellipse").model_copy(update={"robot": RobotSection(model=name)})
-    fixed = stage_of(scenario)
-    low = ends(fixed.robot.capsules[1:], fixed.robot.placements(fixed.robot.rest))[..., 2].min()
-    assert low >= fixed.robot.floor
-    assert stage_of(load("humanoid")).robot.floor == pytest.approx(0.0, abs=1e-6)  # it stands on it
-
-
-def test_listed_tasks_have_their_paths_and_errors():
-    shown = scene(simulate(load("humanoid-reach", ["control.duration=0.4"])))
-    paths = {path.task: path for path in shown.paths}
-    assert {"left foot", "right hand", "centre of mass"} <= set(paths)
-    assert paths["centre of mass"].wanted is None
-    errors = next(one for one in shown.series if one.name == "Errors of tasks, positions")
-    hand = errors.value[:, errors.labels.index("right hand")]
-    missed = np.linalg.norm(paths["right hand"].wanted - paths["right hand"].actual, axis=1)
-    assert np.allclose(hand, missed)
-
-
-def test_after_a_camera_levels_are_those_judged_in_the_run():
-    """The kinematic arm, small images of something near: fates as of the same rows in the loop."""
-    near = "avoidance.obstacles=[{shape='sphere', radius=0.06, centre=[0.3, 0.45, 0.1]}]"
-    scenario = load("human", ["control.duration=0.5", "plant={kind='kinematic'}", near,
-                              "sensor.width=160", "sensor.height=120", "sensor.fx=131.25",
-                              "sensor.fy=131.25"])
-    recording = simulate(scenario)
-    levels = levels_at(recording, range(recording.ticks))
-    assert levels.known[1:].all()
-    given_up = levels.fate == Fate.MISSED
-    assert given_up.any()
-    assert (levels.violation[given_up] > 0.0).all()
-    absent = levels.fate == Fate.ABSENT
-    assert np.isnan(levels.violation[absent]).all()
-    for f, order in enumerate(recording["order"]):
-        there = {name for name, gone in zip(levels.names, absent[f], strict=True) if not gone}
-        assert there == set(recording.orders[order].split(" > "))
-    at = np.abs(recording["command"]) >= scenario.limits.acceleration * (1 - 1e-6)
-    assert (levels.saturated[at] != 0).all()

@@ -25,7 +25,7 @@ def test_every_answer_is_certified_where_asked_and_nothing_is_where_not(run):
     assert "certified" not in run
 
 
-def test_row_0_is_the_start_and_its_command_leads_to_the_state_of_the_next(run):
+def test_row_0_is_the_start_and_the_stack_is_recorded_as_the_measurements_ask(run):
     np.testing.assert_array_equal(run["q"][0], load("ellipse").start.q)
     assert not run["v"][0].any()
     assert run.ticks == 18850
@@ -37,9 +37,6 @@ def test_row_0_is_the_start_and_its_command_leads_to_the_state_of_the_next(run):
     np.testing.assert_array_equal(velocity_run["v"][1:], velocity_run["command"][:-1])
     np.testing.assert_allclose(velocity_run["a"][:-1], np.diff(velocity_run["v"], axis=0) / T,
                                atol=1e-9)
-
-
-def test_the_stack_is_recorded_as_the_measurements_ask(run):
     np.testing.assert_array_equal(run["pointing_active"], run["pointing_error"] > 0)
     assert 0 < run["pointing_active"].mean() < 1
     in_order = np.array(["pointing" in order for order in run.orders])[run["order"]]
@@ -61,7 +58,7 @@ def test_a_scenario_may_have_any_of_its_tasks():
     assert cone["pointing_error"][-1] < 0.01
 
 
-def test_an_interrupted_run_keeps_what_was_run():
+def test_progress_is_told_and_an_interrupted_run_keeps_what_was_run():
     def interrupt(done, total):
         if done == 1000:
             signal.raise_signal(signal.SIGINT)
@@ -69,9 +66,6 @@ def test_an_interrupted_run_keeps_what_was_run():
     run = simulate(load("ellipse", SHORT), progress=interrupt)
     assert run.fault == "interrupted at tick 1000"
     assert run.ticks == len(run["q"]) == len(run["time_tick"]) == 1000
-
-
-def test_progress_is_told_to_the_end():
     seen = []
     simulate(load("ellipse", ["control.duration=1.2"]), lambda *args: seen.append(args))
     assert seen == [(0, 1200), (500, 1200), (1000, 1200), (1200, 1200)]

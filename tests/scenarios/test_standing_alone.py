@@ -12,9 +12,7 @@ import pytest
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.robots import TABLES
 from scenarios import load, load_run, save, simulate
-from scenarios.cli.main import run_command
 from scenarios.draw.replay.page import html
-from scenarios.measure.metrics import as_plain_data
 from scenarios.recording.facts import robot_facts
 from scenarios.scene import scene
 
@@ -97,7 +95,7 @@ def no_way_back(request, monkeypatch):
     monkeypatch.setattr("scenarios.cell.sensors.camera.DepthCamera.__init__", broken)
 
 
-def test_what_is_loaded_is_what_was_run(made):
+def test_what_is_loaded_is_what_was_run_and_its_scene_is_whole(made):
     folder, run, _ = made
     again = load_run(folder)
     assert again.facts == run.facts
@@ -105,31 +103,12 @@ def test_what_is_loaded_is_what_was_run(made):
     assert again.facts.resolver.label == "hcod"
     assert again.facts.robot.position_units == ("rad", "rad", "rad", "1", "1")
     assert again.facts.robot.joint_names == ("turn", "shoulder", "elbow", "wrist")
-
-
-def test_a_scene_has_arm_obstacle_and_every_level(made):
     folder, run, _ = made
     shown = scene(load_run(folder))
     assert np.allclose(shown.traced, run["ee_position"][shown.ticks], atol=1e-12)
     assert np.allclose(shown.distance[:, -1], run["ee_distance"][shown.ticks], atol=1e-12)
     assert shown.levels.known.all()
     assert shown.levels.names == ("joint limits", "separation", "position")
-
-
-def test_figures_metrics_and_tables_are_made_of_it(made, tmp_path):
-    folder, run, _ = made
-    assert run_command(["figures", str(folder), "--out", str(tmp_path / "figures")]) == 0
-    assert {"picture.svg", "stack.svg", "tick-times.png"} <= {
-        path.name for path in (tmp_path / "figures").iterdir()}
-    assert as_plain_data(load_run(folder)) == as_plain_data(run)
-
-
-def test_the_export_is_made_of_it(made, tmp_path):
-    pytest.importorskip("mcap")
-    folder, _, _ = made
-    file = tmp_path / "run.mcap"
-    assert run_command(["export", str(folder), "--out", str(file)]) == 0
-    assert file.stat().st_size > 0
 
 
 def test_facts_that_are_missing_or_damaged_are_named(made, tmp_path):

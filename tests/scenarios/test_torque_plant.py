@@ -1,15 +1,18 @@
 """A humanoid in MuJoCo with torque motors: its physics is that of the robot's model."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing import ROBOT, WEIGHT, feet, standing_stack
+from standing import ROBOT, feet
 
-from hierarchy import State
+from hierarchy import Robot, State
+from hierarchy.contacts import Contacts
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
 from scenarios.config.plant import PushSection, TorqueSection
-from solvers import certify, make
+from scenarios.measure.forces import standing
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("with_mujoco")]
 
@@ -35,15 +38,6 @@ def test_without_contact_it_accelerates_as_the_robots_model(seed):
                        np.concatenate([np.zeros(6), torques]))
     found = TorqueRobot(ROBOT, CONTACTS, q, v).accelerations(torques)
     assert np.abs(found - expected).max() < 1e-3 * np.abs(expected).max()
-
-
-def test_a_period_moves_it_by_its_accelerations():
-    q, v, torques = in_the_air(7)
-    plant = TorqueRobot(ROBOT, CONTACTS, q, v, period=1e-5)
-    a = plant.accelerations(torques)
-    plant.act(torques)
-    np.testing.assert_allclose(plant.v, v + 1e-5 * a, atol=1e-4 * np.abs(1e-5 * a).max() + 1e-8)
-    np.testing.assert_allclose(plant.q, pin.integrate(ROBOT.model, q, 1e-5 * plant.v), atol=1e-8)
 
 
 def test_torques_arrive_late_by_the_delay_and_are_cut_off_at_their_limits():
@@ -81,47 +75,78 @@ def test_a_push_gives_the_whole_robot_its_momentum():
             PushSection(joint="trunk_pich", force=1.0),)))
 
 
-def test_it_stands_with_the_accelerations_and_forces_that_the_stack_predicts():
-    """Contacts of MuJoCo are soft: it stands 1 mm deep, and after 1 s the difference is small."""
-    start = State.at(ROBOT, ROBOT.rest)
-    plant, stack = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest), standing_stack(start, CONTACTS)
-    state, resolver, memory = State(ROBOT), make("hcod"), None
-    for tick in range(1000):
-        state.move(tick * 1e-3, plant.q, plant.v)
-        h = stack.hierarchy(state)
-        res = resolver.solve(h, memory)
-        memory = res.memory
-        torques = CONTACTS.torques(state, res.x)
-        plant.act(torques)
-    assert certify(h, res.x).certified
-    error = plant.accelerations(torques) - CONTACTS.accelerations(res.x)
-    assert np.abs(error).max() < 0.02  # [rad/s^2, m/s^2]
-    for name, force in plant.forces().items():
-        np.testing.assert_allclose(force, CONTACTS.forces(res.x, name).sum(axis=0), atol=0.5)
-    assert sum(plant.forces().values())[2] == pytest.approx(WEIGHT, abs=0.5)
-    assert np.linalg.norm(state.position(ROBOT.frame("left_foot"))
-                          - start.position(ROBOT.frame("left_foot"))) < 2e-3
 
 
-def test_it_says_where_the_soles_slip_and_how_near_the_edge_the_pressure_is():
-    """A push from behind brings the centre of pressure to the toes; the robot then tips over."""
-    push = PushSection(joint="trunk_pitch", force=60.0, duration=0.5)
-    plant = TorqueRobot(ROBOT, CONTACTS, ROBOT.rest, section=plant_with(pushes=(push,)))
-    stack, state = standing_stack(State.at(ROBOT, ROBOT.rest), CONTACTS), State(ROBOT)
-    resolver, memory, margins, supported = make("hcod"), None, [], []
-    for tick in range(300):
-        state.move(tick * 1e-3, plant.q, plant.v)
-        res = resolver.solve(stack.hierarchy(state), memory)
-        memory = res.memory
-        plant.act(CONTACTS.torques(state, res.x))
-        margins.append(plant.extra["pressure_margin"].min())
-        supported.append(float(plant.extra["support_margin"]))
-    assert 0.02 < margins[0] <= 0.04   # half the width of a sole is 0.04 m
-    assert min(margins) < 0.005
-    at_the_toes = next(k for k, margin in enumerate(margins) if margin < 0.005)
-    assert 0.05 < supported[at_the_toes] < 0.105 + 1e-9  # half the length of a sole is 0.105 m
-    assert plant.extra["slip"].max() < 0.01
-    before = pin.centerOfMass(  # where the step began
-        ROBOT.model, ROBOT.model.createData(),
-        pin.integrate(ROBOT.model, plant.q, -1e-3 * plant.v))
-    np.testing.assert_allclose(plant.extra["com"], before, atol=1e-6)
+def plant(**keys):
+    robot = Robot.named("dual_arm")
+    q = robot.configuration(np.zeros(robot.n))
+    return robot, TorqueRobot(robot, Contacts(robot, ()), q, section=TorqueSection(
+        kind="torque", beyond_stop=1e3, fall=1e3, tilt=3.0, **keys))
+
+
+def driven(one, torque, seconds):
+    for _ in range(round(seconds / 0.001)):
+        one.act(torque)
+    return one
+
+
+def test_a_joint_stops_at_its_limit_unless_it_has_no_stop():
+    robot, with_stops = plant()
+    _, without = plant(stops=False)
+    torque = np.zeros(robot.n)
+    torque[2] = 20.0
+    limit = robot.upper[2]
+    assert driven(with_stops, torque, 2.0).q[2] < limit + 0.1
+    assert driven(without, torque, 2.0).q[2] > limit + 0.5
+
+
+def test_torques_follow_with_the_bandwidth_of_the_motors():
+    robot, slow = plant(bandwidth=5.0)
+    asked = np.zeros(robot.n)
+    asked[0] = 10.0
+    first = slow.data.ctrl[0]
+    driven(slow, asked, 1.0 / (2.0 * np.pi * 5.0))
+    assert slow.data.ctrl[0] - first == pytest.approx((10.0 - first) * (1.0 - np.exp(-1.0)),
+                                                      rel=0.05)
+
+
+def test_links_that_touch_are_pushed_apart_and_those_that_overlap_at_the_start_are_not():
+    _, touching = plant(self_collision=True)
+    _, passing = plant()
+    assert touching.model.npair > passing.model.npair == 0
+    assert touching.data.ncon == 0
+
+
+def recorded(**changes):
+    t = np.arange(0.0, 5.0, 0.01)
+    signals = {"t": t, "v": np.zeros((t.size, 2)), "q": np.zeros((t.size, 2)),
+               "com": np.tile([0.0, 0.0, 0.8], (t.size, 1)), "support_margin": np.full(t.size, 0.1),
+               "joint_lower": np.full(2, -1.0), "joint_upper": np.full(2, 1.0), **changes}
+    scenario = SimpleNamespace(control=SimpleNamespace(duration=5.0),
+                               plant=SimpleNamespace(pushes=()))
+
+    class Run(dict):
+        pass
+
+    run = Run(signals)
+    run.scenario, run.ticks, run.fault = scenario, t.size, None
+    return run
+
+
+def test_a_robot_stands_only_at_rest_upright_and_within_its_limits_until_the_end():
+    assert standing(recorded())
+    late = np.zeros((500, 2))
+    late[400] = 0.3
+    assert not standing(recorded(v=late))
+    assert standing(recorded(v=np.roll(late, -300, axis=0)))
+    assert not standing(recorded(q=np.full((500, 2), 1.1)))
+    assert not standing(recorded(support_margin=np.full(500, np.nan)))
+    sunk = recorded()["com"]
+    sunk[300:, 2] -= 0.1
+    assert not standing(recorded(com=sunk))
+    fallen = recorded()
+    fallen.fault = "the robot has fallen"
+    assert not standing(fallen)
+    short = recorded()
+    short.scenario.plant.pushes = (SimpleNamespace(at=2.9, duration=0.2),)
+    assert standing(short) is None

@@ -7,8 +7,6 @@ import scene
 
 from hierarchy import Hierarchy, Stack
 from hierarchy.tasks import JointLimits
-from scenarios.config import load
-from scenarios.loop.simulation import simulate
 from scenarios.loop.transition import Blend, Key
 from solvers import Resolution, Status, make
 
@@ -121,23 +119,3 @@ def test_a_former_stack_without_an_answer_is_left_out():
 
 
 # Closed loop. The first ticks are left out: the start is off the path, and the command jumps there.
-
-def steps(run, signal):
-    return np.abs(np.diff(run[signal][10:], axis=0)).max()
-
-
-@pytest.mark.slow
-def test_at_velocity_level_the_speed_no_longer_jumps():
-    jumping, smooth = (simulate(load("ellipse-velocity", ["control.duration=8.0", *more]))
-                       for more in ([], ["control.transition=blend",
-                                         "control.transition_time=0.1"]))
-    assert steps(jumping, "v") > 1.0
-    assert steps(smooth, "v") < 0.1
-    assert jumping.switches().size > 10
-    for run in (jumping, smooth):
-        assert run.fault is None
-        late = run["t"] > 2.0
-        assert np.median(np.linalg.norm(run["position_error"][late], axis=1)) < 1e-3
-    assert "transition" not in jumping
-    assert 0.0 <= smooth["transition"].min() < 0.1
-    assert smooth["transition"].max() == 1.0

@@ -82,13 +82,3 @@ def test_a_tick_without_an_answer_or_without_a_report_has_no_set():
     tick.resolution = make("hcod").solve(h)
     tick.resolution.status = Status.ITERATION_LIMIT
     assert sets(2, tick) == {"active_set": -1}
-
-
-@pytest.mark.slow
-def test_the_set_is_that_of_the_rows_at_their_side_in_every_tick():
-    run = simulate(load("ellipse-hqp", ["control.duration=1.0"]))
-    changed = np.flatnonzero(np.diff(run["active_set"])) + 1
-    assert (run["active_set"] >= 0).all()
-    acts = run["saturated"] != 0  # as judged from the commands, without the resolver
-    for k in np.flatnonzero((np.diff(acts.astype(int), axis=0) != 0).any(axis=1)) + 1:
-        assert k in changed

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from headless import chromium
 
-from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
 from scenarios.config import load
 from scenarios.draw.viewer.live import Live
@@ -33,26 +32,11 @@ def recording():
 # The frame that is drawn
 
 
-def test_a_run_that_goes_on_and_its_recording_show_the_same_frames():
-    live, seen = Live(LIMITED), {}
-    for k in range(600):
-        live.tick()
-        seen[k] = live.frame() if k % 20 == 0 else None
-    recorded = scene(live.recording(), rate=50.0)
-    for f, k in enumerate(recorded.ticks.tolist()):
-        if (now := seen.get(k)) is not None:
-            assert now.orders[now.order[0]] == recorded.orders[recorded.order[f]]
-            assert (now.active[0], now.linked[0]) == (recorded.active[f], recorded.linked[f])
-            assert (now.levels.saturated[0] == recorded.levels.saturated[f]).all()
-            fates = dict(zip(recorded.levels.names, recorded.levels.fate[f], strict=True))
-            assert fates.items() <= dict(
-                zip(now.levels.names, now.levels.fate[0], strict=True)).items()
-
-
 # A live run
 
 
-def test_a_live_run_that_nobody_touches_is_the_run_itself(recording):
+def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_its_settings(
+        recording):
     live = Live(LIMITED)
     ticks(live, 700)
     assert live.over
@@ -61,9 +45,6 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself(recording):
     assert "changed" not in found
     for name in ("t", "q", "v", "command", "order"):
         assert (found[name] == recording[name]).all(), name
-
-
-def test_a_live_run_that_starts_again_keeps_its_settings_and_nothing_of_its_motion(recording):
     live = Live(LIMITED)
     ticks(live, 10)
     live.drag(0, (0.0, 0.0, 0.1))
@@ -105,44 +86,6 @@ def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
     assert drawn.centres[-1, 0] == pytest.approx([0.1, 0.5, 0.2])
     assert drawn.levels.known[0]
     assert not drawn.levels.known[-1]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("key", "value", "read"), [
-    ("pointing.alpha_d", 35.0, lambda cell: np.degrees(cell.tasks.pointing.half_angle)),
-    ("avoidance.near", 0.1, lambda cell: cell.tasks.areas.near),
-    ("avoidance.end_effector", 0.2, lambda cell: cell.tasks.position.repulsion_within),
-    ("position.stiffness", 60.0, lambda cell: cell.tasks.position.stiffness),
-    ("damping.value", 2.0, lambda cell: cell.stack.reference.damping),
-], ids=lambda one: one if isinstance(one, str) else "")
-def test_a_setting_that_is_changed_holds_from_the_next_tick_on(key, value, read):
-    live = Live(LIMITED)
-    ticks(live, 20)
-    live.change({key: value})
-    ticks(live, 20)
-    assert read(live.controller.cell) == pytest.approx(value)
-    assert live.changes == [{"t": pytest.approx(0.02), "key": key, "value": value}]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("spoil", [
-    lambda live: live.change({"avoidance.near": 0.3}),
-    lambda live: live.change({"pointing.alpha_d": float("nan")}),
-    lambda live: live.change({"position.stiffness": -1.0}),
-    lambda live: live.switch("recursive"),
-    lambda live: live.switch("tmp"),
-    lambda live: live.drag(7, (0.0, 0.0, 0.0)),
-    lambda live: live.drag(0, (0.0, 0.0, float("inf"))),
-], ids=["far below near", "nan", "negative", "no bounds", "no such", "no obstacle", "infinite"])
-def test_what_cannot_be_is_refused_and_the_run_goes_on(spoil, recording):
-    live = Live(LIMITED)
-    ticks(live, 300)
-    with pytest.raises(HierarchyError):
-        spoil(live)
-    ticks(live, 300)
-    assert live.over
-    assert (live.recording()["q"] == recording["q"]).all()
-    assert live.changes == []
 
 
 # Pages, without a browser

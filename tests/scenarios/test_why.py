@@ -42,19 +42,13 @@ def test_a_level_that_gains_nothing_by_another_corner_sits_at_a_vertex():
     assert text.endswith("by another answer to the same data, 1 of the 2 apart")
 
 
-def test_a_side_that_moves_is_named_with_what_is_left_without_it():
+def test_what_moved_is_named_with_what_is_left_without_it():
     before, after = (tick(((-1.0, -1.0), (upper, 1.0)), ((1.0, 0.0), 3.0)) for upper in (1.0, 2.0))
     assert said(before, after) == [
         "side: upper side of row 0 in box moved by 1, from 1 to 2; without that the change is 0"]
-
-
-def test_a_target_that_moves_out_of_reach_is_named_and_the_level_that_is_missed():
     assert said(tick(WIDE, ((1.0, 0.0), 0.0)), tick(WIDE, ((1.0, 0.0), 3.0))) == [
         "side: target of row 0 in task moved by 3, from 0 to 3; without that the change is 0",
         "miss: task changed from met to missed by 2"]
-
-
-def test_a_reference_that_moves_is_named():
     (text,) = said(tick(WIDE, ((1.0, 0.0), 0.0)),
                    tick(WIDE, ((1.0, 0.0), 0.0), reference=(0.0, 0.5)))
     assert text == "reference: the reference moved; without that the change is 0"
@@ -100,20 +94,3 @@ def test_a_tick_that_the_run_does_not_have_is_an_error(folder, capsys):
     assert "tick 999: the run has ticks 0 to 49" in capsys.readouterr().err
     with pytest.raises(HierarchyError, match="the run has ticks"):
         jumps(simulate(load("ellipse-hqp").with_changes({"control.duration": 0.002})), tick=0)
-
-
-def test_large_changes_are_among_the_events_of_report_and_replay(folder, monkeypatch):
-    from scenarios.draw.replay.page import html
-    from scenarios.measure import jumps as module
-    from scenarios.measure.run_folder import load_run
-    from scenarios.measure.runs import Run
-    from scenarios.results.sections import events
-
-    recording = load_run(folder)
-    assert not list(module.happened(recording))
-    monkeypatch.setattr(module, "STEPS", {"rad/s^2": 1e-6})
-    one = next(module.happened(recording))
-    assert one.what.startswith("acceleration of ")
-    rows = events([Run(recording.scenario, "hqp", "hqp", recording)])
-    assert rows[0] == ("hqp", (one.what, one.why, "1", f"{one.t:.3f} s"))
-    assert f"{one.what}: {one.why}"[:60] in html({"hqp": recording}, "why")

@@ -7,7 +7,6 @@ import pytest
 import qpsolvers
 
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
-from hierarchy.tasks import Position
 from solvers import make
 from solvers.adapters.for_pink import solve_ik
 from solvers.adapters.from_pink import PinkTask
@@ -173,30 +172,6 @@ def test_of_two_tasks_in_conflict_the_first_is_served_exactly_and_in_pink_neithe
     assert np.abs(given - asked).max() > 0.01  # [m/s, rad/s]
 
 
-def test_constraints_of_pink_hold_before_all_tasks_and_without_costs(configuration):
-    import pink
-    from pink.tasks import JointCouplingTask
-
-    coupled = JointCouplingTask(["joint_1", "joint_5"], [3.0, -1.0], 100.0, configuration)
-    hand = frame_task(configuration, shift=(0.002, 0.0, 0.001), turn=0.0)
-    ours = solve_ik(configuration, [hand], DT, constraints=[coupled])
-    theirs = pink.solve_ik(configuration, [hand], DT, "proxqp", constraints=[coupled],
-                           eps_abs=1e-10)
-    J = coupled.compute_jacobian(configuration)
-    np.testing.assert_allclose(J @ ours, J @ theirs, atol=1e-6)
-    np.testing.assert_allclose(ours, theirs, atol=1e-4)
-
-
-def test_a_configuration_outside_its_limits_is_refused_as_in_pink(robot):
-    import pink
-
-    outside = pink.Configuration(robot.model, robot.model.createData(), np.full(7, 3.0))
-    with pytest.raises(pink.exceptions.NotWithinConfigurationLimits):
-        solve_ik(outside, [posture_task(Q)], DT)
-    back = solve_ik(outside, [posture_task(Q)], DT, limits=[], safety_break=False)
-    assert np.isfinite(back).all()
-
-
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):
     import inspect
 
@@ -267,14 +242,6 @@ def test_what_cannot_be_resolved_is_named(robot, configuration, call, said):
         call(configuration, robot)
 
 
-def test_rows_are_named_by_joint_or_by_axis_of_the_frame_and_those_that_cost_nothing_are_left_out(
-        configuration):
-    hand = frame_task(configuration, orientation=0.0)
-    h = pink_hierarchy(configuration, [hand, posture_task(Q, cost=0.1)], DT)
-    joints = [f"joint_{i}" for i in range(1, 8)]
-    assert [*h.named()] == [*joints, *(f"end_effector {axis}" for axis in "xyz"), *joints]
-
-
 def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, configuration):
     hand, posture = frame_task(configuration), posture_task(Q + 0.3)
     stack = Stack([PinkTask(hand, configuration, DT), PinkTask(posture, configuration, DT, "rest")],
@@ -288,34 +255,6 @@ def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, c
     np.testing.assert_allclose(h.lower, expected.lower)
     np.testing.assert_allclose(make("tpm").solve(h).x, solve_ik(configuration, [hand, posture], DT,
                                                                 limits=[]), atol=1e-9)
-
-
-@pytest.mark.parametrize("shift", [0.0, 0.01])
-def test_rows_of_a_frame_task_are_those_of_our_position_task(robot, configuration, shift):
-    from hierarchy.paths import Still
-
-    hand = frame_task(configuration, shift=(shift, 2 * shift, 0.0), turn=0.0, orientation=0.0)
-    goal = hand.transform_target_to_world.translation
-    ours = Position(robot.frame("end_effector"), Still(goal.tolist()), gain=hand.gain / DT)
-    rows, theirs = (Stack([task], "velocity").hierarchy(State.at(robot, Q))
-                    for task in (ours, PinkTask(hand, configuration, DT)))
-    assert theirs.m == 3  # rows that cost nothing ask for nothing
-    # pink's error is that of the target seen from the frame: in the frame's axes, and negative
-    to_frame = -configuration.get_transform_frame_to_world("end_effector").rotation.T
-    np.testing.assert_allclose(to_frame @ rows.lower, theirs.lower, atol=1e-9)
-    if not shift:  # away from the target its Jacobian has the derivative of the logarithm too
-        np.testing.assert_allclose(to_frame @ rows.A, theirs.A, atol=1e-9)
-
-
-def test_costs_may_change_but_not_which_rows_cost_something(robot, configuration):
-    hand = frame_task(configuration, orientation=0.0)
-    stack, state = Stack([PinkTask(hand, configuration, DT)], "velocity"), State.at(robot, Q)
-    before = stack.hierarchy(state).A.copy()
-    hand.set_position_cost(2.0)
-    np.testing.assert_allclose(stack.hierarchy(state).A, 2.0 * before)
-    hand.set_orientation_cost(1.0)
-    with pytest.raises(HierarchyError, match="6 of its rows cost something, 3 did"):
-        stack.hierarchy(state)
 
 
 # --- MuJoCo and mink ----------------------------------------------------------------------------
@@ -371,16 +310,6 @@ def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
     assert (np.abs(data.qpos) <= 2.0).all()
 
 
-def test_a_joint_beyond_its_range_comes_back_no_faster_than_allowed(arm):
-    from solvers.adapters import from_mujoco as adapter
-
-    model, data = arm
-    data.qpos[:] = [2.5, 1.99, 0.0, -2.001]
-    _, lower, upper = adapter.limit_level(model, data, 0.1, 1.0)
-    np.testing.assert_allclose(lower, [-1.0, -1.0, -1.0, 0.01])
-    np.testing.assert_allclose(upper, [-1.0, 0.1, 1.0, 1.0])
-
-
 def test_mistakes_with_mujoco_name_what_is_wrong(arm):
     from solvers.adapters import from_mujoco as adapter
 
@@ -391,42 +320,6 @@ def test_mistakes_with_mujoco_name_what_is_wrong(arm):
         adapter.jacobian(model, data, "tip", "sites")
     with pytest.raises(HierarchyError, match=r"target must be \(3,\) finite numbers"):
         adapter.position_level(model, data, "tip", [0.0, np.nan, 0.0], 1.0, "site")
-
-
-def mink_tasks(model, configuration):
-    import mink
-
-    hand = mink.FrameTask("tip", "site", position_cost=1.0, orientation_cost=0.3, gain=0.5)
-    here = configuration.get_transform_frame_to_world("tip", "site")
-    hand.set_target(mink.SE3.from_translation(np.array([0.0, 0.08, 0.05])) @ here)
-    posture = mink.PostureTask(model, cost=0.1)
-    posture.set_target(POSE + 0.2)
-    return hand, posture
-
-
-def test_levels_of_mink_are_strict(arm):
-    mink = pytest.importorskip("mink")
-    from solvers.adapters.from_mink import hierarchy
-
-    model, _ = arm
-    configuration = mink.Configuration(model, q=POSE)
-    hand, posture = mink_tasks(model, configuration)
-    hand.set_orientation_cost(0.0)
-    h = hierarchy(configuration, [hand, posture], DT)
-    assert h.names == ("limits", "FrameTask of tip", "PostureTask")
-    x = make("hcod").solve(h).x
-    np.testing.assert_allclose(h.violations(x)[:2], 0.0, atol=1e-9)
-    assert h.violations(mink.solve_ik(configuration, [hand, posture], DT, "daqp"))[1] > 1e-3
-
-
-def test_a_cost_of_mink_that_is_no_row_is_refused_by_name(arm):
-    mink = pytest.importorskip("mink")
-    from solvers.adapters.from_mink import hierarchy
-
-    nothing = mink.KineticEnergyRegularizationTask(0.0)
-    nothing.set_dt(DT)
-    with pytest.raises(HierarchyError, match="KineticEnergyRegularizationTask: its H is not pos"):
-        hierarchy(mink.Configuration(arm[0], q=POSE), [nothing], DT)
 
 
 # --- qpsolvers ----------------------------------------------------------------------------------

@@ -89,31 +89,6 @@ def some(resolver, name):
     return list(family(name))[:SLOW if resolver in HQP else PROBLEMS]
 
 
-@on_cases(STRICT)
-def test_lower_levels_leave_upper_levels_untouched(resolver, case):
-    h = build(case, True)
-    full = h.violations(resolver.solve(h).x)
-    for count in range(1, len(h.sizes)):
-        upper = Hierarchy.from_levels(list(h.levels())[:count], h.reference)
-        assert_close(resolver, full[:count], upper.violations(resolver.solve(upper).x))
-
-
-@on_cases(STRICT)
-def test_the_null_space_projector_is_symmetric_and_idempotent(resolver, case):
-    h = build(case, True)
-    zero = np.zeros(h.m)
-    P = np.array([resolver.solve(Hierarchy(h.A, zero, zero, h.sizes, unit, h.names)).x
-                  for unit in np.eye(h.n)])
-    assert_close(resolver, P, P.T)
-    assert_close(resolver, P @ P, P)
-    assert round(np.trace(P)) == h.n - np.linalg.matrix_rank(scaled(h.A), tol=1e-8)
-
-
-def scaled(A):
-    size = np.linalg.norm(A, axis=1, keepdims=True)
-    return A / np.where(size > 0, size, 1.0) if len(A) else np.zeros((1, A.shape[1]))
-
-
 @on_cases(RESOLVERS)
 def test_a_solve_is_repeatable_and_leaves_its_input_alone(resolver, case):
     h, same = build(case, True), build(case, True)
@@ -136,15 +111,6 @@ def test_damping_means_the_same_to_every_strict_resolver(resolver, case):
     for threshold in (0.1, 3.0):
         damped = dataclasses.replace(resolver, damping=0.05, threshold=threshold)
         assert_close(resolver, damped.solve(h).x, oracle.solve(h, 0.05, threshold))
-
-
-@every(STRICT)
-def test_the_unit_of_a_level_does_not_matter(resolver):
-    for scale in (1e-6, 1e6):
-        levels = generic()
-        expected = resolver.solve(Hierarchy.from_levels(levels)).x
-        levels[1] = (levels[1][0] * scale, levels[1][1] * scale)
-        assert_close(resolver, resolver.solve(Hierarchy.from_levels(levels)).x, expected)
 
 
 @every(RESOLVERS)
@@ -291,18 +257,6 @@ def test_no_memory_changes_the_answer_and_its_own_leaves_little_to_do(resolver):
     assert gap(resolver.solve(free, cold.memory).x, resolver.solve(free).x) <= 1e-12
 
 
-@every(HQP)
-def test_a_memory_of_programs_does_no_harm(resolver):
-    for h, x, _ in list(family("INEQ7"))[:3]:
-        res = resolver.solve(h, resolver.solve(moved(h)).memory)
-        if res.status is Status.SOLVED:
-            assert_close(resolver, res.x, x)
-    h = Hierarchy.from_levels(generic())
-    for levels in (generic()[:2], [(np.eye(2), [1.0, 2.0])]):
-        memory = resolver.solve(Hierarchy.from_levels(levels)).memory
-        assert_close(resolver, resolver.solve(h, memory).x, resolver.solve(h).x)
-
-
 @pytest.mark.parametrize("name", names())
 def test_what_is_no_hierarchy_and_what_is_no_memory_are_refused(name):
     h = Hierarchy.from_levels([BOX, ([[1.0, 0.0]], [1.0])])
@@ -314,13 +268,6 @@ def test_what_is_no_hierarchy_and_what_is_no_memory_are_refused(name):
             make(name).solve(h, memory)
     with pytest.raises(HierarchyError, match=r"give the memory of .* resolution, res\.memory"):
         make("hcod").solve(h, make("hcod").solve(h))
-
-
-@every(RESOLVERS)
-def test_resolvers_are_immutable_and_equal_by_their_settings(resolver):
-    assert dataclasses.replace(resolver) == resolver
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        resolver.damping = 1.0
 
 
 @every(EQUALITIES_ONLY + BOUNDS)

@@ -7,17 +7,13 @@ import copy
 import pickle
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import make
-from solvers.adapters.displacements import _names_of
-from solvers.adapters.displacements import packed as of_displacements
 from solvers.batch import Batch
-from solvers.factorization import Factorization
 
 HUGE = 2**63 - 1
 SIZES = [([HUGE, HUGE, 5], f"level 1: size {HUGE}"), ([2**62] * 4 + [3], "level 1: size 4611"),
@@ -176,41 +172,3 @@ def test_no_way_of_breaking_an_array_ends_the_process():
     assert said[-1] == "alive"
     assert "level 1: size 1000000000, expected a whole number of rows from 0 to 6" in said
     assert "lower has shape (6, 9), expected (9, 6)" in said
-
-
-def test_a_factorization_hands_out_copies():
-    factored = Factorization([np.eye(3)[:2], np.ones((1, 3))])
-    x = factored.solve(np.ones(3)).x
-    for array in (factored.rows, factored.basis, factored.coefficients):
-        array.shape = (array.size,)
-        array[:] = np.nan
-    np.testing.assert_array_equal(factored.solve(np.ones(3)).x, x)
-
-
-def seven_joints():
-    return [f"joint {i + 1}" for i in range(7)]
-
-
-def test_rows_of_a_foreign_task_must_fit_the_unknowns():
-    class Wide:
-        gain, cost = 1.0, 1.0
-
-        def compute_error(self, _):
-            return np.ones(3)
-
-        def compute_jacobian(self, _):
-            return np.ones((3, 2))
-
-    with pytest.raises(HierarchyError, match=r"Wide: \(3, 2\) rows for \(3,\) values and 7"):
-        of_displacements(None, seven_joints, 7, 0.01, [], [], [Wide()])
-    with pytest.raises(HierarchyError, match=r"limits: \(2, 90\) rows for \(2,\) values and 7"):
-        of_displacements(None, seven_joints, 7, 0.01,
-                         [("limits", np.ones((2, 90)), np.ones(2))], [], [])
-
-
-@pytest.mark.parametrize(("frame", "rows", "cost", "names"), [
-    ("tip", 3, None, ["tip x", "tip y", "tip z"]), ("tip", 2, None, ["row 0", "row 1"]),
-    ("tip", 6, [0, 0, 1.0, 2.0, 0, 0], ["tip z", "tip about x"]), ("", 3, 0.0, []),
-    ("", 3, 1.0, ["row 0", "row 1", "row 2"])])
-def test_rows_of_a_foreign_task_that_cost_something_have_names(frame, rows, cost, names):
-    assert _names_of(SimpleNamespace(frame=frame, cost=cost), None, np.ones(rows)) == names

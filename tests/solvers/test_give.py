@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.linalg import null_space
-from scipy.optimize import minimize
 
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
@@ -45,29 +43,6 @@ def test_a_level_gives_up_to_what_it_may_and_those_below_gain(resolver, seed):
     assert lower[first] < were[first] - 1e-3
 
 
-@each
-def test_its_answer_is_that_of_a_plain_convex_program(resolver):
-    """The last level as a program with constraints, by another method that knows no levels."""
-    h = problem(0, 0.2, half=4.0)
-    res = resolver.solve(h)
-    first, second, box = (slice(0, 2), slice(2, 5), slice(5, 8))
-    N = null_space(h.A[first])  # the first level is met
-    x0 = np.linalg.lstsq(h.A[first], h.lower[first], rcond=None)[0]
-    x0 = x0 + N @ np.linalg.lstsq(h.A[second] @ N, h.lower[second] - h.A[second] @ x0,
-                                  rcond=None)[0]
-    room = np.abs(h.A[second] @ x0 - h.lower[second]) + 0.2
-    rows = np.vstack([h.A[second], h.A[box]])
-    low = np.concatenate([h.lower[second] - room, h.lower[box]])
-    up = np.concatenate([h.upper[second] + room, h.upper[box]])
-    target = h.lower[8:]
-    found = minimize(lambda y: ((x0 + N @ y - target) ** 2).sum(), np.zeros(4), method="SLSQP",
-                     options={"ftol": 1e-11, "maxiter": 500}, constraints=[
-        {"type": "ineq", "fun": lambda y: up - rows @ (x0 + N @ y)},
-        {"type": "ineq", "fun": lambda y: rows @ (x0 + N @ y) - low}])
-    assert found.success  # here the box can be had too
-    np.testing.assert_allclose(res.x, x0 + N @ found.x, atol=1e-4)
-
-
 def test_a_give_of_zero_is_no_give_and_a_boundless_one_drops_the_level():
     hcod, strict = make("hcod"), problem(1, 0.0)
     plain = Hierarchy(strict.A, strict.lower, strict.upper, strict.sizes, strict.reference,
@@ -78,15 +53,6 @@ def test_a_give_of_zero_is_no_give_and_a_boundless_one_drops_the_level():
     without = Hierarchy(soft.A[kept], soft.lower[kept], soft.upper[kept],
                         np.delete(soft.sizes, 1), soft.reference, ("a", "b", "c"))
     np.testing.assert_allclose(hcod.solve(soft).x, hcod.solve(without).x, atol=1e-9)
-
-
-def test_several_levels_give_one_after_the_other():
-    h = problem(2, 0.0)
-    h.give = np.concatenate([[0.1, 0.0], np.full(3, 0.05), np.full(3, 0.02), np.zeros(6)])
-    assert h.giving == [0, 1, 2]
-    cold = make("hcod").solve(h)
-    assert cold.witnesses.shape == (3, 6)
-    assert certify(h, cold.x, witnesses=cold.witnesses).certified
 
 
 def hand_and_posture(reach):
@@ -111,15 +77,6 @@ def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, me
     assert np.array_equal(*cold.witnesses) == met
     for memory in (np.zeros(0), np.full(7, np.nan), hcod.solve(h.changed(give=None)).memory):
         np.testing.assert_allclose(hcod.solve(h, memory).x, cold.x, atol=1e-9)
-
-
-def test_without_an_answer_for_a_part_the_resolution_is_that_of_the_part():
-    h = problem(2, 0.1)
-    h.A[0, 0] = np.nan
-    res = make("hcod").solve(h)
-    assert res.status is Status.NUMERICAL_FAILURE
-    assert res.memory is None
-    np.testing.assert_array_equal(res.x, np.zeros(h.n))
 
 
 def test_generated_hierarchies_that_give_are_certified_by_hcod():

@@ -43,13 +43,6 @@ def test_one_call_gives_velocity_status_and_memory():
     np.testing.assert_allclose(J @ v, [0.1, 0.0, 0.0], atol=1e-10)
 
 
-def test_a_few_steps_reach_the_target_and_keep_the_order():
-    rest = Posture(tuple(Q + 0.3), gain=2.0)
-    q, _ = follow([hand([0.05, -0.03, 0.04]), rest], 220)
-    np.testing.assert_allclose(hand([0.05, -0.03, 0.04]).error(State.at(ROBOT, q)), 0.0, atol=1e-9)
-    assert 0.01 < np.linalg.norm(rest.error(State.at(ROBOT, q))) < np.linalg.norm(np.full(7, 0.3))
-
-
 def test_limits_of_the_robot_hold_whatever_is_asked():
     far = Posture(tuple(ROBOT.upper + 1.0), gain=50.0)
     step = solve_ik(ROBOT, Q, [far])
@@ -101,11 +94,6 @@ def test_wrong_arguments_are_named(call, said):
     assert said in str(error.value)
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.1])
-def test_the_largest_gain_that_does_not_make_an_error_grow_is_taken(dt):
-    assert solve_ik(ROBOT, Q, [hand([0.1, 0, 0], gain=2.0 / dt)], dt=dt).status is Status.SOLVED
-
-
 @pytest.mark.parametrize(("goal", "below", "settings"), [
     ([0.9, 0.0, 0.35], [Posture(tuple(Q), gain=2.0)], {}),
     ([0.0, 0.1, 5.0], [], {"limits": False}),
@@ -135,13 +123,6 @@ def test_limits_of_acceleration_continue_from_the_tick_before():
         assert np.abs(step.v - v).max() <= 0.1 + 1e-9
         q, v = q + step.v * 0.01, step.v
     assert np.linalg.norm(far.error(State.at(ROBOT, q))) < 1e-2
-
-
-def test_memory_has_the_velocity_of_the_tick_before():
-    limits = JointLimits(ROBOT, 10.0, 0.01)
-    first = solve_ik(ROBOT, Q, [hand([0.5, 0, 0])], limits=limits, v=np.zeros(7))
-    second = solve_ik(ROBOT, Q, [hand([0.5, 0, 0])], limits=limits, memory=first.memory)
-    assert np.abs(second.v).max() == pytest.approx(0.2)
 
 
 def test_joints_without_a_velocity_limit_are_named_once(tmp_path):
@@ -218,12 +199,3 @@ def test_hands_that_would_collide_stop_at_their_distance_and_say_so(apart, neare
         assert "nearest found, left is missed by 0.1, held back by" in found.verdict
         assert found.verdict.endswith("self-separation and right")
         assert between_the_arms(solve_ik(ARMS, ARMS.rest, tasks, until=1e-6).q) < 0.0
-
-
-def test_distances_that_are_kept_anyway_are_not_said_to_hold_a_target_back():
-    start = State.at(ARMS, ARMS.rest)
-    far = Position(ARMS.frame("left_hand"), Still(
-        start.position(ARMS.frame("left_hand")) + np.array([0.0, 2.0, 0.0])), name="left")
-    verdict = solve_ik(ARMS, ARMS.rest, [APART, far], until=1e-6).verdict
-    assert verdict.startswith("unreachable: nearest found, left is missed by")
-    assert "self-separation" not in verdict

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from sequences import sequence
 
-from benchmark.studies.recorded import recorded
 from hierarchy import Hierarchy
-from scenarios import load
 from scenarios.problems.reference import FAMILIES, family
 from solvers import make, problems
+from solvers.library.folder import _link
 
 if not sys.platform.startswith("linux"):
     pytest.skip("the C library is made on Linux", allow_module_level=True)
@@ -106,13 +105,123 @@ def test_the_sizes_that_the_library_states_are_enough(library, n, sizes):
         assert np.isfinite(left.answer).all()
 
 
+if not sys.platform.startswith("linux"):
+    pytest.skip("the C library is made on Linux", allow_module_level=True)
+
+every_resolver = pytest.mark.parametrize("name", c.NAMES)
+
+
+def box():
+    """Bounds, a task and a posture of three unknowns, in fresh arrays."""
+    return Hierarchy.from_levels([(np.eye(3), -np.ones(3), np.ones(3)), (np.ones((1, 3)), [5.0]),
+                                  (np.eye(3), np.zeros(3))])
+
+
+@pytest.mark.parametrize(("said", "told"), [("'in a.o:' 'no symbol x'", "no symbol x"), ("", "")])
+def test_the_last_line_of_a_linker_that_fails_is_told(tmp_path, monkeypatch, said, told):
+    compiler = tmp_path / "cc"
+    compiler.write_text(f"#!/bin/sh\nfor line in {said}; do echo \"$line\" >&2; done\nexit 1\n")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert _link(tmp_path, "native") == f"{compiler} failed: {told}"
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ellipse-limits", "humanoid-reach", "dual-arm"])
-def test_the_commands_of_a_scenario_come_out_of_c_to_the_last_bit(library, name):
-    scenario = load(name)
-    resolver, memory = scenario.make_resolver(), None
-    damped, before = {"damping": resolver.damping}, None
-    assert resolver == make(resolver.name, **damped)
-    for h in recorded(name, 200):
-        memory = memory or library.memory(h)
-        before = c.check_same(library, (resolver.name, damped, damped), h, memory, before).memory
+def test_spoilt_data_give_the_bits_and_statuses_of_python(library):
+    rng = np.random.default_rng(1)
+    worst = np.array([np.nan, np.inf, -np.inf, 1e308, -1e200, 5e-324, 0.0, 1e-300])
+    for seed in range(150):
+        h = problems.structured(seed) if seed % 2 else problems.generate(seed)
+        for array in (h.A.ravel(), h.lower, h.upper, h.reference):
+            if array.size and rng.random() < 0.5:
+                array[rng.integers(array.size)] = rng.choice(worst)
+        for name in c.NAMES:
+            for damped in ({}, *[{"damping": 0.1}] * (name != "merged")):
+                c.check_same(library, (name, damped, damped), h)
+        status, _ = library.solve("merged", h, c.settings_of(damping=0.1))
+        assert status == c.INVALID  # which C has without damping only
+
+
+@pytest.mark.slow
+@every_resolver
+@pytest.mark.parametrize("wrong", [
+    {"n": 0}, {"n": -3}, {"n": 2**40}, {"m": -1}, {"m": 6}, {"m": 2**62}, {"levels": -1},
+    {"levels": 2}, {"levels": 2**33}, {"A": None}, {"lower": None}, {"upper": None},
+    {"sizes": None}, {"sizes": (3, 2, 3)}, {"sizes": (9, -1, -1)},
+    {"sizes": (2**62, 2**62, 7 - 2**63)}], ids=str)
+def test_sizes_that_do_not_add_up_are_invalid(library, name, wrong):
+    h = box()
+    if isinstance(wrong.get("sizes"), tuple):
+        wrong = {"sizes": (c.ctypes.c_int64 * 3)(*wrong["sizes"])}
+    memory = library.memory(h)
+    assert library.call(name, c.problem_of(h, **wrong), memory) == c.INVALID
+    assert memory.untouched
+    assert (memory.work == c.CANARY).all()
+    assert (memory.values == c.CANARY).all()
+    assert (memory.answer == (c.CANARY if "n" in wrong else 0.0)).all()
+    if {"n", "m", "A", "sizes"} & set(wrong):
+        status, norms = library.violations(c.problem_of(h, **wrong), np.ones(3), 3)
+        assert (status, set(norms)) == (c.INVALID, {c.CANARY})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pointer", ["problem", "record", "x", "work", "values of the record"])
+def test_a_missing_pointer_is_invalid(library, pointer):
+    h, memory = box(), library.memory(box())
+    missing = {pointer: None}
+    if pointer == "values of the record":
+        memory.record.values, missing = None, {}
+    assert library.call("hcod", c.problem_of(h), memory, **missing) == c.INVALID
+    assert memory.untouched
+    assert library.violations(c.problem_of(h), None, 3)[0] == c.INVALID
+
+
+@pytest.mark.slow
+@every_resolver
+def test_a_record_of_garbage_does_no_harm(library, name):
+    for garbage in (np.nan, np.inf, 1e300, -1.0, 2.0):
+        h, memory = box(), library.memory(box())
+        for used in (3 * h.m + 3, h.n + len(h.sizes) + 3 * h.m + 3):
+            memory.values[:-1], memory.record.used, memory.record.warm = garbage, used, 1
+            status, left = library.solve(name, h, memory=memory)
+            assert np.isfinite(left.answer).all()
+            if status == c.SOLVED and name in ("hcod", "tpm"):
+                np.testing.assert_allclose(left.answer, make(name).solve(h).x, atol=1e-9)
+
+
+@pytest.mark.slow
+@every_resolver
+@pytest.mark.parametrize("missing", [{"missing": 1}, {"missing": 10_000}, {"missing_values": 1}],
+                         ids=str)
+def test_too_little_memory_is_a_status(library, name, missing):
+    h = family("HUM38")[0].h
+    status, left = library.solve(name, h, memory=library.memory(h, **missing))
+    assert status == c.TOO_SMALL
+    assert not left.answer.any()
+    assert (left.work == c.CANARY).all()
+
+
+@pytest.mark.slow
+def test_settings_without_a_value_are_those_of_python_and_out_of_range_are_invalid(library):
+    h = family("INEQ7")[0].h
+    assert (library.solve("hcod", h)[1].answer.tobytes()
+            == library.solve("hcod", h, c.settings_of())[1].answer.tobytes()
+            == make("hcod").solve(h).x.tobytes())
+    for wrong in ({"damping": -0.1}, {"damping": np.nan}, {"threshold": 0.0},
+                  {"rank_tolerance": 1.0}, {"rank_tolerance": np.nan}, {"tolerance": 0.0},
+                  {"tolerance": 0.1}, {"isotropic": -1.0}, {"largest": 0.0}, {"max_iterations": 0},
+                  {"optimal": 2}, {"miss": -1}, {"method": 4}):
+        assert library.solve("hcod", box(), c.settings_of(**wrong))[0] == c.INVALID, wrong
+    one, other = library.memory(h), library.memory(h)
+    library.call("hcod", c.problem_of(h), one)
+    library.call("hcod", c.problem_of(h, reference=None), other)  # it is zero
+    assert h.reference.any() or one.answer.tobytes() == other.answer.tobytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "levels", "status"), [
+    ("tpm", [(np.eye(2), [0.0, 0.0]), (np.ones((1, 2)), [0.0], [1.0])], c.REFUSED),
+    ("sns", [(np.eye(2)[[0, 1, 0]], [0.0, 0.0, 2.0], [1.0, 1.0, 3.0])], c.CONTRADICTION)])
+def test_the_row_that_is_refused_or_contradicts_another_is_named(library, name, levels, status):
+    found, left = library.solve(name, Hierarchy.from_levels(levels))
+    assert (found, left.record.row) == (status, 2)

@@ -24,7 +24,6 @@ from scenarios.cli.main import run_command
 from scenarios.problems.reference import family
 from solvers import make, problems
 from solvers.library import differs, entries, write
-from solvers.library.archive import archive
 from solvers.library.emission import RESOLVERS
 
 if not sys.platform.startswith("linux"):
@@ -89,14 +88,6 @@ def test_the_examples_of_one_call_compile_without_a_warning_and_run(folder, tmp_
     once = built(tmp_path / "once", EXAMPLES / name, folder, *ONCE[name],
                  compiler=compiler_of(name))
     assert said(once) == "status 0, x = 0.9 0.1\n"
-
-
-@needs_c
-@pytest.mark.slow
-def test_the_example_of_a_loop_keeps_its_bounds(folder, tmp_path):
-    loop = built(tmp_path / "loop", EXAMPLES / "loop.c", folder, "-std=c99", *STRICT)
-    assert re.match(r"6000 ticks, 0 braked, speeds at a bound [1-9]\d* times, error at most 0\.",
-                    said(loop))
 
 
 @pytest.fixture(scope="module")
@@ -168,32 +159,13 @@ def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, na
 
 @needs_c
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "words"), [("loop.c", "6000 ticks, 0 braked"),
+@pytest.mark.parametrize(("name", "words"), [("loop.c", "6000 ticks, 0 braked, speeds"),
                                              ("once.cpp", "status 0, x = 0.9 0.1")])
 def test_the_examples_pass_the_address_sanitizer(folder, tmp_path, name, words):
     program = built(tmp_path / "program", EXAMPLES / name, folder, "-g",
                     "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
                     compiler=compiler_of(name))
     assert said(program).startswith(words)
-
-
-@pytest.mark.slow
-def test_code_for_aarch64_is_made_here(tmp_path):
-    write(tmp_path, ("recursive",), "aarch64")
-    content = (tmp_path / "lib" / "libtask_hierarchy.a").read_bytes()
-    elf = content[content.index(b"\x7fELF"):]
-    assert int.from_bytes(elf[18:20], "little") == 183  # EM_AARCH64
-    assert not (tmp_path / "lib" / "libtask_hierarchy.so").exists()
-    assert "th_solve_sns" not in (tmp_path / "include" / "task_hierarchy.h").read_text()
-
-
-@pytest.mark.slow
-def test_header_and_library_state_the_same_version_and_digest(folder, library):
-    header = (folder / "include" / "task_hierarchy.h").read_text()
-    assert f'#define TH_VERSION "{library.text("th_version")}"' in header
-    assert f'#define TH_DIGEST "{library.text("th_digest")}"' in header
-    assert "@" not in header
-    assert "Apache License" in (folder / "share/doc/task_hierarchy/LICENSE").read_text()
 
 
 @pytest.mark.slow
@@ -213,7 +185,8 @@ def test_check_compares_the_kernels(folder, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding(tmp_path, capsys):
+def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and_for_arm(
+        tmp_path, capsys):
     out, here = tmp_path / "lib", os.uname().machine == "x86_64"
     line = ["library", "--out", str(out), "--resolvers", "recursive"]
     assert run_command([*line, "--target", "x86_64" if here else "native"]) == 0
@@ -226,6 +199,13 @@ def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding(tmp
         x = make("recursive").solve(h).x
         left = library.solve("recursive", h)[1]
         assert np.abs(left.answer - x).max() <= 1e-9 * (1.0 + np.abs(x).max())
+    (tmp_path / "arm").mkdir()
+    write(tmp_path / "arm", ("recursive",), "aarch64")
+    content = (tmp_path / "arm" / "lib" / "libtask_hierarchy.a").read_bytes()
+    elf = content[content.index(b"\x7fELF"):]
+    assert int.from_bytes(elf[18:20], "little") == 183  # EM_AARCH64
+    assert not (tmp_path / "arm" / "lib" / "libtask_hierarchy.so").exists()
+    assert "th_solve_sns" not in (tmp_path / "arm/include/task_hierarchy.h").read_text()
 
 
 @pytest.mark.parametrize(("options", "words"), [
@@ -237,16 +217,6 @@ def test_a_wrong_name_is_an_error_that_names_it(tmp_path, capsys, options, words
     assert not (tmp_path / "lib").exists()
 
 
-@pytest.mark.slow
-def test_kernels_that_are_not_compiled_are_an_error(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    monkeypatch.setattr("numba.config.DISABLE_JIT", 1)  # which is read when a process starts
-    assert run_command(["library", "--out", str(tmp_path / "lib")]) == 2
-    said = capsys.readouterr().err
-    assert "NUMBA_DISABLE_JIT is set" in said
-    assert "Traceback" not in said
-
-
 def test_every_resolver_that_the_command_names_has_a_function():
     assert tuple(entries.RESOLVERS) == RESOLVERS == c.NAMES
 
@@ -254,13 +224,3 @@ def test_every_resolver_that_the_command_names_has_a_function():
 def test_a_folder_without_a_library_is_an_error(tmp_path):
     with pytest.raises(HierarchyError, match=r"task_hierarchy\.h is missing"):
         differs(tmp_path)
-
-
-@pytest.mark.skipif(shutil.which("ar") is None, reason="no ar")
-@pytest.mark.parametrize("content", [b"odd", b"even"])
-def test_ar_reads_the_archive(tmp_path, content):
-    file = tmp_path / "one.a"
-    file.write_bytes(archive("one.o", content, ["first", "second"]))
-    assert said("ar", "t", file) == "one.o\n"
-    assert said("ar", "p", file, "one.o").encode() == content
-    assert "first in one.o\nsecond in one.o" in said("nm", "--print-armap", file)

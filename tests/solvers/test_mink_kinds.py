@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from benchmark.studies.pink_examples import exact, least_squares
+from hierarchy import HierarchyError
 from solvers import make
 from solvers.adapters import from_mink
 from solvers.adapters.for_mink import solve_ik
@@ -94,6 +95,10 @@ def test_kinetic_energy_below_a_hand_is_the_least_motion_that_moves_it(configura
     x = by_hand @ np.linalg.solve(J @ by_hand, -hand.gain * hand.compute_error(configuration) / DT)
     np.testing.assert_allclose(make("hcod").solve(h).x, x, atol=1e-9)
     assert h.names == ("FrameTask of left_tip", "KineticEnergyRegularizationTask")
+    nothing = mink.KineticEnergyRegularizationTask(0.0)
+    nothing.set_dt(DT)
+    with pytest.raises(HierarchyError, match="KineticEnergyRegularizationTask: its H is not pos"):
+        from_mink.hierarchy(configuration, [nothing], DT)
 
 
 def test_a_joint_that_cannot_come_back_in_time_is_no_solution_and_named(configuration):

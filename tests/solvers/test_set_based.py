@@ -4,10 +4,12 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, make
 from solvers.resolvers.set_based import SetBased
+from solvers.resolvers.settled import Settled
 
 SET_BASED = SetBased(inner=make("recursive"))
 INF = np.inf
@@ -107,14 +109,6 @@ def test_after_the_most_modes_everything_at_a_bound_is_frozen():
     assert short.iterations == 6
 
 
-def test_every_resolver_of_equalities_serves_as_the_inner_one():
-    sets, tasks, n = next(problems(1))
-    x, _ = by_the_paper(sets, tasks, n)
-    for name in ("tpm", "hcod", "recursive", "sns"):
-        found = SetBased(inner=make(name)).solve(as_rows(sets, tasks))
-        np.testing.assert_allclose(found.x, x, atol=1e-7 * (1 + np.abs(x).max()))
-
-
 def test_a_row_with_two_sides_is_refused_with_its_level_and_sides():
     h = Hierarchy.from_levels([([[1.0, 0.0], [0.0, 1.0]], [0.0, -1.0], [INF, 2.0])],
                               names=["walls"])
@@ -122,21 +116,66 @@ def test_a_row_with_two_sides_is_refused_with_its_level_and_sides():
         SET_BASED.solve(h)
 
 
-def test_in_closed_loop_the_tip_stops_at_the_wall_and_the_joint_at_its_limit():
-    """An arm of three joints that is sent beyond a wall; then it is called back."""
-    q, period, wall, limit = np.array([0.6, 0.9, 0.5]), 0.006, 1.5, 1.2
-    values, farthest = [], -INF
-    for k in range(900):
-        p, J = tip(q)
-        rate = 2.0 * (np.array([2.2, 1.6] if k < 600 else [0.6, 1.8]) - p)
-        edge = [0.0 if p[0] >= wall else INF, 0.0 if q[1] >= limit else INF]
-        h = Hierarchy.from_levels([(np.vstack([J[:1], np.eye(3)[1:2]]), np.full(2, -INF), edge),
-                                   (J, rate)])
-        q = q + period * SET_BASED.solve(h).x
-        values.append(tip(q)[0][0] - wall)
-        farthest = max(farthest, q[1] - limit)
-    assert np.max(values) < 0.01, "at most what one period carries the tip over the wall"
-    assert np.min(np.abs(values[300:600])) < 0.01, "it was at the wall"
-    assert np.abs(np.array(values[450:600])).max() < 0.01, "and stayed there while sent beyond"
-    assert values[-1] < -0.5, "and left it when called back"
-    assert farthest < 0.01
+PERIOD = 0.1
+
+
+def settled(*curved, inner="hcod", softness=1.0):
+    return Settled(inner=make(inner), period=PERIOD, softness=softness, curved=frozenset(curved))
+
+
+def nearly_singular(rng, smallest):
+    U, V = (np.linalg.qr(rng.normal(size=(n, n)))[0] for n in (3, 6))
+    return U @ np.diag([1.0, 0.5, smallest]) @ V[:3]
+
+
+@pytest.mark.parametrize("smallest", [0.3, 0.05, 1e-3, 1e-9, 0.0])
+@pytest.mark.parametrize("box", [np.inf, 0.6])
+def test_one_level_takes_the_minimum_that_scipy_finds(smallest, box):
+    rng = np.random.default_rng(4)
+    A, b = nearly_singular(rng, smallest), rng.normal(size=3)
+    alpha = 0.5 * PERIOD * np.linalg.norm(A)
+    h = Hierarchy.from_levels([(np.eye(6), np.full(6, -box), np.full(6, box)), (A, b)],
+                              names=["limits", "hand"])
+    x = settled("hand").solve(h).x
+
+    def cost(x):
+        return np.linalg.norm(b - A @ x) + alpha * x @ x / 2
+
+    theirs = min((minimize(cost, start, bounds=[(-box, box)] * 6, options={"ftol": 1e-14})
+                  for start in (x, np.zeros(6))), key=lambda one: one.fun)
+    assert cost(x) <= theirs.fun + 1e-5
+    assert (np.abs(x) <= box + 1e-9).all()
+
+
+@pytest.mark.parametrize("inner", ["hcod", "tpm", "sns"])
+def test_a_level_that_can_be_met_is_met_as_by_the_inner_resolver(inner):
+    rng = np.random.default_rng(5)
+    h = Hierarchy.from_levels([(np.eye(6), np.full(6, -9.0), np.full(6, 9.0)),
+                               (nearly_singular(rng, 0.4), 0.1 * rng.normal(size=3)),
+                               (np.eye(6), rng.normal(size=6))], names=["limits", "a", "b"])
+    np.testing.assert_array_equal(settled("a", inner=inner).solve(h).x, make(inner).solve(h).x)
+
+
+@pytest.mark.parametrize("inner", ["hcod", "tpm", "hqp"])
+def test_levels_below_do_not_move_what_a_level_settled_on(inner):
+    rng = np.random.default_rng(6)
+    A, b = nearly_singular(rng, 1e-4), rng.normal(size=3)
+    limits = np.eye(6), np.full(6, -9.0), np.full(6, 9.0)
+    alone = settled("a", inner=inner).solve(Hierarchy.from_levels(
+        [limits, (A, b)], names=["limits", "a"])).x
+    both = settled("a", inner=inner).solve(Hierarchy.from_levels(
+        [limits, (A, b), (np.eye(6), np.ones(6))], names=["limits", "a", "posture"])).x
+    np.testing.assert_allclose(A @ both, A @ alone, atol=1e-5)
+    assert np.linalg.norm(both - alone) > 1e-3
+
+
+def test_rows_of_its_resolution_are_those_of_the_hierarchy():
+    rng = np.random.default_rng(7)
+    h = Hierarchy.from_levels([(np.eye(6), np.full(6, -0.2), np.full(6, 0.2)),
+                               (nearly_singular(rng, 1e-6), rng.normal(size=3)),
+                               (np.eye(6), np.ones(6))], names=["limits", "a", "posture"])
+    found = settled("a").solve(h)
+    assert found.active.shape == found.holds_back.shape == (h.m,)
+    assert found.holds_back.max() <= 3
+    at = np.flatnonzero(found.active[:6])
+    np.testing.assert_allclose(np.abs(found.x[at]), 0.2, atol=1e-9)

@@ -11,23 +11,15 @@ from standing import (
     external_forces,
     feet,
     standing_stack,
-    stepping,
 )
 
 from hierarchy import Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
-from hierarchy.paths import Ellipse, Still
+from hierarchy.paths import Ellipse
 from hierarchy.tasks import (
-    BaseDynamics,
-    CentreOfMass,
     ContactForce,
-    ContactMotion,
-    Friction,
-    LeastForce,
-    Pose,
     Position,
     Posture,
-    Together,
     TorqueLimits,
 )
 from solvers import Status, certify, explain, make, problems
@@ -86,15 +78,6 @@ def test_hcod_is_certified_and_agrees_with_a_cascade_of_programs(shift, faces):
     assert np.abs(other.x - res.x).max() <= 1e-8 * (1.0 + np.abs(res.x).max())
 
 
-def test_explain_says_what_blocks_a_centre_of_mass_out_of_reach():
-    stack = standing_stack(STANDING, CONTACTS, (0.5, 0.0, 0.0))
-    h, res = solved(stack, STANDING)
-    lines = explain(h, res, rows=stack.row_names()).splitlines()
-    assert lines[:2] == ["physics is met.", "limits is met."]
-    assert lines[2].startswith("centre of mass is missed by")
-    assert "friction left_foot point" in lines[2]
-
-
 def test_torques_that_cannot_hold_the_weight_stay_within_limits_and_the_knees_are_named():
     """The body sinks: the stack says which torques hold the centre of mass back."""
     weak = 0.1
@@ -129,26 +112,6 @@ def test_an_arm_presses_on_a_table_while_its_tip_moves_along_it():
     np.testing.assert_allclose(contacts.torques(state, res.x), efforts, atol=1e-9)
 
 
-def test_a_foot_swings_as_a_pose_while_the_other_carries_all():
-    """The centre of mass is above the left foot: what a shift of weight leads to."""
-    left = feet().contacts[0]
-    contacts = Contacts(ROBOT, [left])
-    q = ROBOT.rest.copy()
-    state = State.at(ROBOT, q)
-    foot = ROBOT.frame("right_foot")
-    up = state.position(foot) + np.array([0.0, 0.0, 0.02])
-    stack = Stack([
-        Together([BaseDynamics(contacts), ContactMotion(contacts)], "physics"),
-        Together([TorqueLimits(ROBOT, contacts=contacts), Friction(contacts)], "limits"),
-        Pose(foot, Still(up), np.eye(3), name="swing foot"),
-        CentreOfMass(ROBOT, Still((0.0, 0.138, 0.76)), (0, 1)),
-        Posture(tuple(ROBOT.rest[7:])), LeastForce(contacts)], "torque", contacts=contacts)
-    h, res = solved(stack, state)
-    assert_physical(h, res.x, state, contacts)
-    lifted = stack["swing foot"].jacobian(state) @ contacts.accelerations(res.x)
-    np.testing.assert_allclose(lifted, [0.0, 0.0, 40.0 * 0.02, 0.0, 0.0, 0.0], atol=1e-8)
-
-
 IN_DOUBT = sorted((Path(__file__).parents[1] / "data/regressions/whole-body").glob("*.npz"))
 
 
@@ -163,26 +126,3 @@ def test_a_tick_whose_rows_are_parallel_up_to_the_rank_tolerance_is_settled(path
         assert one.status in settled
         assert certify(h, one.x).certified
         assert h.violations(one.x)[:2].max() < 1e-6, "physics and limits hold, to 1 uN"
-
-
-@pytest.mark.slow
-def test_a_step_in_place_ramps_its_torques_and_comes_down_where_it_went_up():
-    """The bound on torque steps is stated: 10 N m per tick of 4 ms, by a ramp of 0.2 s."""
-    worst, doubted = {}, 0
-    for ramp in (0.0, 0.2):
-        torques = []
-        for h, res, contacts, state in stepping(ramp):
-            doubted += res.status is Status.INACCURATE
-            force = contacts.forces(res.x, "right_foot")
-            torques.append(contacts.torques(state, res.x))
-            assert (np.abs(torques[-1]) <= ROBOT.effort_limit[6:] + 1e-3).all()
-            if 1.2 <= state.t <= 1.8:
-                assert np.abs(force).max() < 1e-9
-            assert h.violations(res.x)[2] < 1e-6, "the centre of mass never gives way"
-        steps = np.abs(np.diff(torques, axis=0)).max(axis=1)
-        worst[ramp] = steps.max()
-        height = state.position(ROBOT.frame("right_foot"))[2]
-        assert abs(height - STANDING.position(ROBOT.frame("right_foot"))[2]) < 1e-3
-        assert force[:, 2].sum() > 30.0, "it carries again"
-    assert worst[0.2] < 10.0 < 18.0 < worst[0.0]
-    assert doubted == 0
