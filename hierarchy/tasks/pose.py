@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
-from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import (
     Kinematics,
     drift_of_point,
@@ -20,7 +19,7 @@ from hierarchy.kinematics import (
     write_point_jacobian,
     write_rotation_jacobian,
 )
-from hierarchy.measured import Measured, Motion, measured, plain
+from hierarchy.measured import Measure, Measured, Motion, measured, plain
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
@@ -96,7 +95,7 @@ class Pose(PoseTask, Measured):
     world axes; the last three rows are those of the angular velocity.
     """
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
         frame = self.frame
         return _pose, (frame.joint, frame.offset, frame.rotation,
@@ -124,7 +123,7 @@ class FrameLog(PoseTask, Measured):
     columns = np.arange(6)
     exact = True
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
         return _frame_log, (self, state)
 
