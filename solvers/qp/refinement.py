@@ -150,7 +150,8 @@ class _Refinement(NamedTuple):
         over, excess = self.kept.excess(z), self.limits.excess(z)
         near = np.where(active != 0, active, self.kept.sides(z, EXACT))
         gradient = self.E.T @ (self.e - self.E @ z) - self.limits.A.T @ excess
-        multipliers, rest = _multipliers(near, self.kept.A, gradient)
+        multipliers, on = np.zeros(len(near)), near != 0  # of rows that may be dependent
+        multipliers[on], rest = _non_negative((near[on, None] * self.kept.A[on]).T, gradient)
         B, c = self._acting(broken)
         next_active = np.where(multipliers > 0.0, near, 0.0)
         next_active = np.where(abs(over) > scale, np.sign(over), next_active)
@@ -200,9 +201,10 @@ class _Refinement(NamedTuple):
 def _one_change(active: Array, broken: Array, next_active: Array, next_broken: Array
                 ) -> tuple[Array, Array]:
     """Return the sides with only the first row that is to change."""
-    if (next_active != active).any():
-        return _first_change(active, next_active), broken
-    return active, _first_change(broken, next_broken)
+    sides, new = np.concatenate([active, broken]), np.concatenate([next_active, next_broken])
+    first = int((sides != new).argmax())
+    sides[first] = new[first]
+    return sides[:len(active)], sides[len(active):]
 
 
 def _least(M: Array, r: Array, tolerance: float) -> tuple[Array, Array]:
@@ -234,24 +236,6 @@ def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:
     if not ACTIVE < rest < np.inf:  # 1 / rest is the length of y: no point, or none nearby
         return z
     return np.asarray(z + D @ (G.T @ u) * (off / (1.0 - g @ u)))
-
-
-def _first_change(old: Array, new: Array) -> Array:
-    """Return `old`, changed only in the first entry where `new` differs."""
-    changed = old.copy()
-    for i in np.flatnonzero(old != new)[:1]:
-        changed[i] = new[i]
-    return changed
-
-
-def _multipliers(side: Array, A: Array, gradient: Array) -> tuple[Array, float]:
-    """Return multipliers >= 0 of the active rows that best balance a gradient, and the residual.
-
-    Rows may be dependent: any multipliers with a zero residual prove the minimum.
-    """
-    found, on = np.zeros(len(side)), side != 0
-    found[on], rest = _non_negative((side[on, None] * A[on]).T, gradient)
-    return found, rest
 
 
 def below_largest(*arrays: Array) -> bool:

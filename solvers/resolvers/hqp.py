@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, final
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.linalg import norm
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.qp.backends import Backend, backend_of
+from solvers.qp.backends import backend_of
 from solvers.qp.programs import null_space_program, slack_program
 from solvers.qp.refinement import EXACT, Rows, below_largest, refined, split
 from solvers.resolver import Handles, Resolution, Resolver, number, one_of, register
@@ -22,22 +22,6 @@ _WIDER = (1.0, 100.0)  # multiples of `slack`, tried in turn
 
 
 @final
-class CascadeResolution(Resolution):
-    """A resolution that counts its programs; its memory (k, n) has the step of each of k levels.
-
-    `iterations` counts the programs that were solved; `corrected` of them had an answer that was
-    not accurate enough to be used as it was.
-    """
-
-    __slots__ = ("corrected",)
-
-    def __init__(self, x: Array, status: Status, programs: int, corrected: int,
-                 memory: Array) -> None:
-        super().__init__(x, status, programs, memory)
-        self.corrected = corrected
-
-
-@final
 @register
 @dataclass(frozen=True, kw_only=True)
 class Hqp(Resolver):
@@ -45,7 +29,8 @@ class Hqp(Resolver):
 
     What upper levels have settled leaves the programs, so that no backend can find it infeasible;
     no answer of a backend is used unchecked. docs/theory/hqp.md has the method and the
-    meaning of each status. The memory warm-starts backends that accept an initial guess.
+    meaning of each status. The memory (k, n), the step of each of k levels, warm-starts backends
+    that accept an initial guess; `iterations` counts programs.
 
     backend : proxqp, osqp, quadprog, daqp, piqp or clarabel.
     form : "null-space", the unknowns are coordinates of the freedom that upper levels leave;
@@ -89,7 +74,7 @@ class Hqp(Resolver):
         starts = memory if memory is not None and np.shape(memory) == shape else None
         with np.errstate(all="ignore"):
             try:
-                return _Cascade(self, h, backend_of(self.backend), starts).run()
+                return _Cascade(self, h, starts).run()
             except np.linalg.LinAlgError:  # an SVD of numbers whose squares overflow
                 return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
 
@@ -136,7 +121,6 @@ class _Level(NamedTuple):
         return _Level(rows, lower == upper, scale, norm(rows.A, axis=1), rows.A @ N)
 
 
-@dataclass
 class _Cascade:
     """One run of the cascade.
 
@@ -145,22 +129,11 @@ class _Cascade:
     kept : inequalities of the levels above that must still hold.
     """
 
-    settings: Hqp
-    h: Hierarchy
-    backend: Backend
-    starts: Array | None
-    programs: int = 0
-    corrected: int = 0
-    steps: list[Array] = field(default_factory=list)
-    x: Array = field(init=False)
-    N: Array = field(init=False)
-    F: Array = field(init=False)
-    kept: Rows = field(init=False)
-
-    def __post_init__(self) -> None:
-        n = self.h.n
-        self.x, self.N, self.F = np.zeros(n), np.eye(n), np.empty((0, n))
-        self.kept = Rows.none(n)
+    def __init__(self, settings: Hqp, h: Hierarchy, starts: Array | None) -> None:
+        self.settings, self.h, self.starts = settings, h, starts
+        self.backend, self.programs, self.steps = backend_of(settings.backend), 0, list[Array]()
+        self.x, self.N, self.F = np.zeros(h.n), np.eye(h.n), np.empty((0, h.n))
+        self.kept = Rows.none(h.n)
 
     def run(self) -> Resolution:
         status = Status.SOLVED
@@ -172,7 +145,7 @@ class _Cascade:
         except _StopError as stop:
             status = stop.status
         memory = np.array(self.steps).reshape(-1, self.h.n)
-        return CascadeResolution(self.x, status, self.programs, self.corrected, memory)
+        return Resolution(self.x, status, self.programs, memory)
 
     def _check_kept(self) -> None:
         """Stop, with x = 0, if a row that must still hold does not: its numbers overflowed."""
@@ -283,12 +256,8 @@ class _Cascade:
         for start in (z, np.zeros_like(z)):
             exact = refined(start, E, e, limits, kept, self.settings.rank_tolerance)
             if exact is not None:
-                self.corrected += bool(norm(exact[0] - z) > self._allowed())
                 return exact
         return None
-
-    def _allowed(self) -> float:
-        return float(_SHARE * self.backend.accuracy * (1.0 + norm(self.x)))
 
     def _least_squares(self, z: Array, E: Array, e: Array, own: Array, lam: float) -> Array:
         """Return z if its gradient proves it accurate enough, else the exact least squares."""
@@ -297,10 +266,9 @@ class _Cascade:
         else:
             smallest = float(np.linalg.svd(E @ own, compute_uv=False).min(initial=np.inf))
         z = own.T @ z  # the level cannot see the rest
-        if norm(own.T @ (E.T @ e) - own.T @ (E.T @ (E @ (own @ z)))) <= (
-                self._allowed() * smallest**2):
+        allowed = float(_SHARE * self.backend.accuracy * (1.0 + norm(self.x)))
+        if norm(own.T @ (E.T @ e) - own.T @ (E.T @ (E @ (own @ z)))) <= allowed * smallest**2:
             return np.asarray(own @ z)
-        self.corrected += 1
         return np.asarray(own @ np.linalg.lstsq(E @ own, e, rcond=None)[0])
 
     def _ask(self, goal: Rows, limits: Rows, kept: Rows, lam: float, last: bool
