@@ -32,12 +32,14 @@ from solvers.library.calls import (
     can_open,
     closed,
     given,
+    in_range,
     judged,
     judged_problem,
     opened,
+    record_size,
     violations,
+    work_size,
 )
-from solvers.library.sizes import in_range, record_size, work_size
 from solvers.status import (
     CONTRADICTION,
     INACCURATE,
