@@ -86,6 +86,10 @@ class Resolver(ABC):
     """Rows with lower < upper that the resolver accepts: none; bounds on single unknowns in a first
     level that has no other rows; or any. It rejects all others. "activations": rows that come with
     an activation, see solvers.resolvers.smooth."""
+    strict: ClassVar[bool] = True
+    """Whether priorities are respected exactly at any rank."""
+    accuracy: ClassVar[float] = 1e-9
+    """Expected error of x on a well-conditioned hierarchy, relative to 1 + |x|."""
     damps: ClassVar[str] = "each level"
     """What is damped in a stack of equalities. Strict resolvers with the same text find the same x.
     """
@@ -125,16 +129,6 @@ class Resolver(ABC):
         return " ".join([self.name, *(
             value for field in dataclasses.fields(self) if _CHOICES in field.metadata
             and (value := getattr(self, field.name)) != field.default)])
-
-    @property
-    def strict(self) -> bool:
-        """Whether priorities are respected exactly at any rank."""
-        return True
-
-    @property
-    def accuracy(self) -> float:
-        """Expected error of x on a well-conditioned hierarchy, relative to 1 + |x|."""
-        return 1e-9
 
     @cached_property
     def _settings(self) -> Array:
@@ -238,20 +232,14 @@ class Around(Resolver):
 
     inner: Resolver
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        set_frozen(self, strict=self.inner.strict, accuracy=self.inner.accuracy)
+
     @property
     def label(self) -> str:
         """The label of the inner resolver."""
         return self.inner.label
-
-    @property
-    def strict(self) -> bool:
-        """Whether the inner resolver is."""
-        return self.inner.strict
-
-    @property
-    def accuracy(self) -> float:
-        """The accuracy of the inner resolver."""
-        return self.inner.accuracy
 
 
 def refuse_inequality(resolver: Resolver, h: Hierarchy, row: int) -> None:

@@ -10,6 +10,7 @@ from numpy.linalg import norm
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.records import set_frozen
 from solvers.qp.backends import backend_of
 from solvers.qp.programs import null_space_program, slack_program
 from solvers.qp.refinement import EXACT, Rows, below_largest, refined, split
@@ -49,18 +50,13 @@ class Hqp(Resolver):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        backend_of(self.backend)
+        set_frozen(self, accuracy=backend_of(self.backend).accuracy)
 
     @property
     def label(self) -> str:
         """`hqp`, the backend, and the form if it is not the default."""
         form = " slack" if self.form == "slack" else ""
         return f"{self.name} {self.backend}{form}"
-
-    @property
-    def accuracy(self) -> float:
-        """Expected error of x, relative to 1 + |x|: that of the backend."""
-        return backend_of(self.backend).accuracy
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a program that fails ends the cascade with the x of the finished levels.

@@ -60,12 +60,8 @@ class Tpm(Resolver):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.form == "published":
-            set_frozen(self, handles="equalities", damps="each pivot", damps_with_bounds="")
-
-    @property
-    def strict(self) -> bool:
-        """True for the staircase form, which respects priorities exactly at any rank."""
-        return self.form == "staircase"
+            set_frozen(self, handles="equalities", damps="each pivot", damps_with_bounds="",
+                       strict=False)
 
     @property
     def label(self) -> str:
