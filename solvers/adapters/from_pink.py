@@ -51,7 +51,7 @@ class PinkTask(Task):
         if not 0.0 < self.period < np.inf:
             raise HierarchyError(f"task {self.name!r}: period {self.period} s must be positive "
                                  "and finite")
-        set_frozen(self, rows=len(self._residual()[1]))
+        set_frozen(self, rows=len(displacements.residual(self.task, self.configuration)[1]))
 
     @property
     def gain(self) -> float:  # type: ignore[override]
@@ -65,13 +65,11 @@ class PinkTask(Task):
 
     def error(self, state: State) -> Array:
         """Return minus pink's error, times the costs: (m,)."""
-        self._follow(state)
-        return self._residual()[1]
+        return self._residual(state)[1]
 
     def jacobian(self, state: State) -> Array:
         """Return pink's Jacobian, times the costs: (m, n)."""
-        self._follow(state)
-        return self._residual()[0]
+        return self._residual(state)[0]
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
@@ -81,30 +79,23 @@ class PinkTask(Task):
         own = slice(row, row + self.rows)
 
         def write() -> None:
-            self._follow(state)
-            A[own], r = self._rows()
+            J, r = self._residual(state)
+            if len(r) != self.rows:
+                raise HierarchyError(f"task {self.name!r}: {len(r)} of its rows cost something, "
+                                     f"{self.rows} did when it was created; create it again")
+            A[own] = J
             lower[own] = upper[own] = self.gain * r
             check_rows(f"task {self.name!r}", A[own], lower[own], upper[own])
 
         return write
-
-    def _rows(self) -> tuple[Array, Array]:
-        J, r = self._residual()
-        if len(r) != self.rows:
-            raise HierarchyError(f"task {self.name!r}: {len(r)} of its rows cost something, "
-                                 f"{self.rows} did when it was created; create it again")
-        return J, r
 
     def jacobian_derivative(self, state: State) -> Array:
         """Raise a HierarchyError: pink does not provide it."""
         raise HierarchyError(f"task {self.name!r}: pink does not support accelerations; use "
                              "it in a stack of level 'velocity'")
 
-    def _residual(self) -> tuple[Array, Array]:
-        return displacements.residual(self.task, self.configuration)
-
-    def _follow(self, state: State) -> None:
-        """Update pink's configuration to the joint angles of the state."""
+    def _residual(self, state: State) -> tuple[Array, Array]:
+        """Return the rows with pink's configuration at the joint angles of the state."""
         configuration, robot = self.configuration, state.robot
         theirs = tuple(configuration.model.names)[1:]
         if theirs != robot.joint_names or configuration.model.nq != robot.nq:
@@ -113,6 +104,7 @@ class PinkTask(Task):
                                  f"{', '.join(robot.joint_names)}")
         if not np.array_equal(configuration.q, state.q):
             configuration.update(state.q)
+        return displacements.residual(self.task, configuration)
 
 
 def hierarchy(configuration: Configuration,

@@ -232,9 +232,11 @@ class _Cascade:
             vouched |= found
             if not kept.lower.size and not limits.lower.size:
                 return self._least_squares(z, E, e, own, lam), np.empty(0)
-            exact = self._exact(z, E, e, self._seen(limits), self._seen(kept))
-            if exact is not None:
-                return exact
+            for start in (z, np.zeros_like(z)):  # at zero all rows held from above hold
+                exact = refined(start, E, e, self._seen(limits), self._seen(kept),
+                                self.settings.rank_tolerance)
+                if exact is not None:
+                    return exact
         raise _StopError(Status.INACCURATE if vouched else Status.BACKEND_FAILURE)
 
     def _target(self, goal: Rows, own: Array, lam: float, last: bool) -> tuple[Array, Array]:
@@ -245,15 +247,6 @@ class _Cascade:
         if lam:
             return np.vstack([goal.A @ N, lam * np.eye(p)]), np.pad(goal.lower, (0, p))
         return goal.A @ N @ own @ own.T, goal.lower
-
-    def _exact(self, z: Array, E: Array, e: Array, limits: Rows, kept: Rows
-               ) -> tuple[Array, Array] | None:
-        """Refine the backend's z; if that fails, zero, at which all rows held from above hold."""
-        for start in (z, np.zeros_like(z)):
-            exact = refined(start, E, e, limits, kept, self.settings.rank_tolerance)
-            if exact is not None:
-                return exact
-        return None
 
     def _least_squares(self, z: Array, E: Array, e: Array, own: Array, lam: float) -> Array:
         """Return z if its gradient proves it accurate enough, else the exact least squares."""
