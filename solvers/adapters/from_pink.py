@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Level, Task
 from solvers.adapters import displacements
+from solvers.adapters.displacements import Packed, Pull, Solve, Tasks
 
 if TYPE_CHECKING:
     from pink import Configuration
@@ -108,11 +109,10 @@ class PinkTask(Task):
 
 
 def hierarchy(configuration: Configuration,
-              tasks: Iterable[displacements.Task | Sequence[displacements.Task]], dt: float,
-              limits: Iterable[Limit] | None = None, barriers: Iterable[Barrier] | None = None,
+              tasks: Tasks, dt: float, limits: Iterable[Limit] | None = None,
+              barriers: Iterable[Barrier] | None = None,
               constraints: Iterable[displacements.Task] | None = None,
-              damping: float | None = None,
-              solve: displacements.Solve | None = None) -> Hierarchy:
+              damping: float | None = None, solve: Solve | None = None) -> Hierarchy:
     """Return the problem of `pink.build_ik` as levels: limits, constraints, then the tasks.
 
     The unknown is the velocity (n,); dt [s]. The order of `tasks` is their priority; an entry may
@@ -135,27 +135,28 @@ def hierarchy(configuration: Configuration,
                   solve).hierarchy()
 
 
-def packed(configuration: Configuration,
-           tasks: Iterable[displacements.Task | Sequence[displacements.Task]], dt: float,
-           limits: Iterable[Limit] | None, barriers: Iterable[Barrier] | None,
-           constraints: Iterable[displacements.Task] | None, damping: float | None,
-           solve: displacements.Solve | None) -> displacements.Packed:
+def packed(configuration: Configuration, tasks: Tasks, dt: float, limits: Iterable[Limit] | None,
+           barriers: Iterable[Barrier] | None, constraints: Iterable[displacements.Task] | None,
+           damping: float | None, solve: Solve | None) -> Packed:
     """Return the levels of `hierarchy`, which takes the same arguments, as they were packed."""
     given, n = list(barriers or ()), configuration.model.nv
     found = [(type(one).__name__, one.compute_qp_inequalities(configuration, dt))
              for one in (*(_limits_of_model(configuration) if limits is None else limits), *given)]
-    pull = None if damping is None else displacements.Pull(damping, np.zeros(n))
+    pull = None if damping is None else Pull(damping, np.zeros(n))
     for barrier in given:
-        if barrier.safe_displacement_gain and pull is None:
+        if not barrier.safe_displacement_gain:
+            continue
+        if pull is None:
             raise HierarchyError(f"{type(barrier).__name__}: safe_displacement_gain = "
                                  f"{barrier.safe_displacement_gain:g} weighs a displacement "
                                  "against the tasks; set it to 0")
-        if barrier.safe_displacement_gain and pull is not None:
-            H, c = barrier.compute_qp_objective(configuration)
-            pull = _pulled(pull, H, c, dt)
-    return displacements.packed(configuration, partial(_joints, configuration.model), n, dt,
-                                [(name, *pair) for name, pair in found if pair is not None],
-                                list(constraints or ()), tasks, pull, solve=solve)
+        H, c = barrier.compute_qp_objective(configuration)  # H = weight I, c = -weight dq_safe
+        weight = pull.weight + float(H[0, 0])
+        centre = pull.weight * pull.centre - c / dt
+        pull = Pull(weight, centre / weight if weight > 0.0 else pull.centre)
+    return Packed(configuration, partial(_joints, configuration.model), n, dt,
+                  [(name, *pair) for name, pair in found if pair is not None],
+                  list(constraints or ()), tasks, pull, solve=solve)
 
 
 def _joints(model: Any) -> list[str]:
@@ -163,13 +164,6 @@ def _joints(model: Any) -> list[str]:
     return [f"{name} {i + 1}" if joint.nv > 1 else str(name)
             for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True)
             for i in range(joint.nv)]
-
-
-def _pulled(pull: displacements.Pull, H: Array, c: Array, dt: float) -> displacements.Pull:
-    """Return a pull with that of a barrier's objective, H = weight I and c = -weight dq_safe."""
-    weight = pull.weight + float(H[0, 0])
-    centre = pull.weight * pull.centre - c / dt
-    return displacements.Pull(weight, centre / weight if weight > 0.0 else pull.centre)
 
 
 def _limits_of_model(configuration: Configuration) -> list[Limit]:

@@ -14,8 +14,7 @@ import pytest
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import make
-from solvers.adapters.displacements import _names_of
-from solvers.adapters.displacements import packed as of_displacements
+from solvers.adapters.displacements import Packed, _names_of
 from solvers.batch import Batch
 from solvers.factorization import Factorization
 
@@ -202,9 +201,9 @@ def test_rows_of_a_foreign_task_must_fit_the_unknowns():
             return np.ones((3, 2))
 
     with pytest.raises(HierarchyError, match=r"Wide: \(3, 2\) rows for \(3,\) values and 7"):
-        of_displacements(None, seven_joints, 7, 0.01, [], [], [Wide()])
+        Packed(None, seven_joints, 7, 0.01, [], [], [Wide()])
     with pytest.raises(HierarchyError, match=r"limits: \(2, 90\) rows for \(2,\) values and 7"):
-        of_displacements(None, seven_joints, 7, 0.01,
+        Packed(None, seven_joints, 7, 0.01,
                          [("limits", np.ones((2, 90)), np.ones(2))], [], [])
 
 
