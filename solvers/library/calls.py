@@ -84,15 +84,6 @@ class Call(NamedTuple):
 
 
 @compiled
-def judged(problem, settings, record, x, work, size):
-    """Return SOLVED if a call can be opened, else INVALID or TOO_SMALL with x and record reset."""
-    code = can_open(problem, settings, record, x, work, size)
-    if code != SOLVED:
-        _reset(problem, record, x)
-    return code
-
-
-@compiled
 def can_open(problem, settings, record, x, work, size):
     """Return SOLVED if a call can be opened, else INVALID or TOO_SMALL."""
     code = judged_problem(problem)
@@ -139,8 +130,8 @@ def _in_range(settings):
             and 0.0 <= s.regularisation < np.inf and -1 <= s.strict_levels < MOST_ITERATIONS)
 
 
-@inlined
-def _reset(problem, record, x):
+@compiled
+def reset(problem, record, x):
     """Write x = 0 and a record without content, as far as they are there."""
     if record != 0:
         state = integers_at(record, RECORD)
