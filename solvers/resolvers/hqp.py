@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, final
+from typing import ClassVar, final
 
 import numpy as np
 from numpy.linalg import norm
@@ -17,6 +17,7 @@ from solvers.qp.refinement import EXACT, Rows, below_largest, refined, split
 from solvers.resolver import Handles, Resolution, Resolver, number, one_of, register
 from solvers.status import Status
 
+Mask = NDArray[np.bool_]
 _SHARE = 0.01  # of the declared accuracy: allowed error of one level, which lower levels magnify
 _BROKEN = 1e-4  # excess of a row that must hold, relative to 1 + its side
 _WIDER = (1.0, 100.0)  # multiples of `slack`, tried in turn
@@ -100,23 +101,6 @@ class _StopError(Exception):
         self.status = status
 
 
-class _Level(NamedTuple):
-    """Rows of a level divided by their largest entry `scale`, their norms (m,), and M = A N."""
-
-    rows: Rows
-    equal: NDArray[np.bool_]
-    scale: float
-    norms: Array
-    M: Array
-
-    @staticmethod
-    def of(A: Array, lower: Array, upper: Array, N: Array) -> _Level:
-        """Scale the rows of a level; N (n, p) is the basis of the remaining freedom."""
-        scale = float(abs(A).max())
-        rows = Rows(A / scale, lower / scale, upper / scale)
-        return _Level(rows, lower == upper, scale, norm(rows.A, axis=1), rows.A @ N)
-
-
 class _Cascade:
     """One run of the cascade.
 
@@ -162,47 +146,49 @@ class _Cascade:
         if not self.N.shape[1] or not A.any():
             self.steps.append(np.zeros(self.h.n))
             return
-        level = _Level.of(A, lower, upper, self.N)
-        own, free = self._split(level, level.equal)
-        fixed = level.equal.copy()
-        fixed[~level.equal] = self._advance(level, own) != 0
-        if (fixed != level.equal).any():
-            own, free = self._split(level, fixed)
+        scale, equal = float(abs(A).max()), lower == upper
+        rows = Rows(A / scale, lower / scale, upper / scale)
+        own, free = self._split(rows.A[equal])
+        fixed = equal.copy()
+        fixed[~equal] = self._advance(rows, equal, own, scale) != 0
+        if (fixed != equal).any():
+            own, free = self._split(rows.A[fixed])
         self.F = np.vstack([self.F, (self.N @ own).T])
         self.N = self.N @ free
-        self.kept = self.kept.and_(level.rows.where(~fixed).normalised())
+        self.kept = self.kept.and_(rows.where(~fixed).normalised())
 
-    def _advance(self, level: _Level, own: Array) -> Array:
-        """Step to the minimum of a level; return the side on which each inequality is violated."""
-        limits = level.rows.where(~level.equal).from_(self.x)
+    def _advance(self, rows: Rows, equal: Mask, own: Array, scale: float) -> Array:
+        """Step to the minimum of a level; return the side on which each inequality is violated.
+
+        rows : divided by their largest entry, `scale`; `equal` (m,) tells the equalities.
+        """
+        limits = rows.where(~equal).from_(self.x)
         near = EXACT * (1.0 + norm(self.x)) * norm(limits.A, axis=1)
-        if not level.equal.any() and (abs(limits.excess(np.zeros(self.h.n))) <= near).all():
+        if not equal.any() and (abs(limits.excess(np.zeros(self.h.n))) <= near).all():
             self._step(np.zeros(self.N.shape[1]))
             return np.zeros(limits.lower.size)
-        goal = level.rows.where(level.equal).from_(self.x)
-        z, broken = self._minimise(goal, limits, own, self._lambda(level, own))
+        goal = rows.where(equal).from_(self.x)
+        z, broken = self._minimise(goal, limits, own, self._lambda(rows.A, equal, own, scale))
         self._step(z)
         return broken
 
     def _seen(self, rows: Rows) -> Rows:
         return rows.seen(self.N, self.settings.rank_tolerance)
 
-    def _split(self, level: _Level, chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
-        return split(level.M[chosen], level.norms[chosen], self.settings.rank_tolerance)
+    def _split(self, A: Array) -> tuple[Array, Array]:
+        return split(A @ self.N, norm(A, axis=1), self.settings.rank_tolerance)
 
-    def _lambda(self, level: _Level, own: Array) -> float:
+    def _lambda(self, A: Array, equal: Mask, own: Array, scale: float) -> float:
         """Return lambda of a level, in its scaled rows; bounds at the top have none."""
         s, first = self.settings, self.N.shape[1] == self.h.n
-        bounds = not level.equal.all() and (np.count_nonzero(level.rows.A, axis=1) <= 1).all()
+        bounds = not equal.all() and (np.count_nonzero(A, axis=1) <= 1).all()
         if not s.damping or (first and bounds):
             return 0.0
-        everything = np.ones_like(level.equal)
-        seen = own if level.equal.all() else self._split(level, everything)[0]
-        M = level.scale * level.M
-        full = seen.shape[1] == len(M)
-        smallest = np.linalg.svd(M, compute_uv=False)[-1] if full else 0.0
+        seen = own if equal.all() else self._split(A)[0]
+        full = seen.shape[1] == len(A)
+        smallest = np.linalg.svd(scale * (A @ self.N), compute_uv=False)[-1] if full else 0.0
         lam = s.damping * np.sqrt(max(0.0, 1.0 - (smallest / s.threshold) ** 2))
-        return float(lam) / level.scale
+        return float(lam) / scale
 
     def _nearest(self) -> Array:
         """Return the z whose x is nearest to the reference."""
