@@ -106,21 +106,22 @@ def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows, rank_toleran
     conditions; None if no step did. Rows are of order one; directions with singular values up to
     `rank_tolerance` do not move.
     """
-    program = _Refinement(E, e, limits, kept, rank_tolerance)
-    active, excess = kept.sides(z, ACTIVE), limits.excess(z)
-    broken = np.sign(excess) * (abs(excess) > ACTIVE)
+    program, k = _Refinement(E, e, limits, kept, rank_tolerance), len(kept.A)
+    excess = limits.excess(z)
+    sides = np.concatenate([kept.sides(z, ACTIVE), np.sign(excess) * (abs(excess) > ACTIVE)])
     for step in range(REFINEMENTS):
-        new = program.minimiser(z, active, broken)
+        new = program.minimiser(z, sides[:k], sides[k:])
         if not np.isfinite(new).all():
             return None
-        optimal, next_active, next_broken = program.judged(new, active, broken)
+        optimal, wanted = program.judged(new, sides[:k], sides[k:])
         if optimal:
-            return new, next_broken
-        if (next_active == active).all() and (next_broken == broken).all():
+            return new, wanted[k:]
+        changed = np.flatnonzero(wanted != sides)
+        if not len(changed):
             return None
         if step >= AT_ONCE:  # changing all rows at once has cycled
-            next_active, next_broken = _one_change(active, broken, next_active, next_broken)
-        active, broken = next_active, next_broken
+            changed = changed[:1]
+        sides[changed] = wanted[changed]
     return None
 
 
@@ -144,7 +145,7 @@ class _Refinement(NamedTuple):
         others = self.kept.where(~on).and_(self.limits.where(~out))
         return _moved_inside(new + free @ step_in, free @ unseen, others)
 
-    def judged(self, z: Array, active: Array, broken: Array) -> tuple[bool, Array, Array]:
+    def judged(self, z: Array, active: Array, broken: Array) -> tuple[bool, Array]:
         """Return whether z is optimal, and the sides that its rows and multipliers suggest."""
         scale = EXACT * (1.0 + norm(z))
         over, excess = self.kept.excess(z), self.limits.excess(z)
@@ -161,7 +162,7 @@ class _Refinement(NamedTuple):
         left_out = (next_broken != 0) & (next_broken != broken) & moves
         optimal = (self._within_reach(z) and (abs(over) <= scale).all() and not left_out.any()
                    and rest <= EXACT * (1.0 + norm(B.T @ c)) and self._balanced(z, near, excess))
-        return bool(optimal), next_active, next_broken
+        return bool(optimal), np.concatenate([next_active, next_broken])
 
     def _within_reach(self, z: Array) -> bool:
         """Whether rows that count as independent can require a z as long as this one."""
@@ -196,15 +197,6 @@ class _Refinement(NamedTuple):
         out = broken != 0
         return (np.vstack([self.E, self.limits.A[out]]),
                 np.concatenate([self.e, self.limits.at(broken)[out]]))
-
-
-def _one_change(active: Array, broken: Array, next_active: Array, next_broken: Array
-                ) -> tuple[Array, Array]:
-    """Return the sides with only the first row that is to change."""
-    sides, new = np.concatenate([active, broken]), np.concatenate([next_active, next_broken])
-    first = int((sides != new).argmax())
-    sides[first] = new[first]
-    return sides[:len(active)], sides[len(active):]
 
 
 def _least(M: Array, r: Array, tolerance: float) -> tuple[Array, Array]:
