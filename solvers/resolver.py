@@ -72,9 +72,13 @@ def one_of(*allowed: str) -> Any:
 
 @functools.cache
 def _checks(kind: type) -> list[tuple[str, Callable[..., None]]]:
-    """Return the settings that a class declares above, each with its check."""
-    return [(field.name, field.metadata[_CHECK]) for field in dataclasses.fields(kind)
-            if _CHECK in field.metadata]
+    """Return the settings that a class declares above, each with its check.
+
+    One that only gets another default in a subclass keeps the check.
+    """
+    return list({field.name: field.metadata[_CHECK] for base in reversed(kind.__mro__)
+                 for field in vars(base).get("__dataclass_fields__", {}).values()
+                 if _CHECK in field.metadata}.items())
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

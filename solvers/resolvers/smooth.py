@@ -64,8 +64,8 @@ class Smooth(Resolver):
     handles: ClassVar[Handles] = "activations"
     strict: ClassVar[bool] = False  # rows that act in part share directions with lower levels
     accuracy: ClassVar[float] = 1e-6  # errors grow with the square of the condition number
-    damping: float = number(1e-4)
-    threshold: float = number(1e-2, open_below=True)
+    damping: float = 1e-4
+    threshold: float = 1e-2
     eta: float = number(10.0, open_below=True)
 
     def can_resolve(self, required: Handles) -> bool:
