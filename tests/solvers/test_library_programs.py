@@ -25,7 +25,6 @@ from scenarios.problems.reference import family
 from solvers import make, problems
 from solvers.library import differs, entries, write
 from solvers.library.emission import RESOLVERS
-from solvers.library.folder import archive
 
 if not sys.platform.startswith("linux"):
     pytest.skip("the C library is made on Linux", allow_module_level=True)
