@@ -37,23 +37,19 @@ class _OfRobot(Section):
 
 
 def is_robot(text: str) -> bool:
-    """Whether the text names a robot; a name that is also a scenario's means the scenario."""
-    return not _is_scenario(text) and (
-        in_package(text) or is_file_name(text) or text in TABLES
-        or text in plugins.own("robots"))
+    """Whether the text names a robot; a name that is also a scenario's means the scenario.
 
-
-def _is_scenario(text: str) -> bool:
-    return text.endswith(".toml") or ".toml:" in text or is_shipped(text)
-
-
-def check_known(text: str) -> None:
-    """Raise a HierarchyError for what is neither a scenario nor a robot."""
+    Raises a HierarchyError for what is neither.
+    """
     if Path(text).is_dir() or Path(text).suffix == ".py":
         raise no_scenario(text, shipped())
-    if not (_is_scenario(text) or is_robot(text) or text in shipped_groups()):
+    if text.endswith(".toml") or ".toml:" in text or is_shipped(text) or text in shipped_groups():
+        return False
+    if not (in_package(text) or is_file_name(text) or text in TABLES
+            or text in plugins.own("robots")):
         raise UnknownNameError("scenario or robot", text, {*shipped(), *TABLES},
                                f"{elsewhere(text)} {WANTED}")
+    return True
 
 
 def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robot]:
