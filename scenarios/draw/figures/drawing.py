@@ -20,9 +20,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
+from hierarchy.problem import Array
 from scenarios.draw.figures.palette import looks
-
-Array = NDArray[np.float64]
 
 # Text, axes and desired curves. In an inline SVG it becomes the text colour of the page.
 INK = "#0b0c0d"
