@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -24,33 +24,24 @@ def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mappi
 
     Values far beyond those of the other runs are cut, and the panel states their range.
     """
-    drawn = {}
+    drawn, axes = {}, []
     for label, recording in recordings.items():
         if panel.fits(recording):
-            fig, (ax,) = drawing.figure()
+            drawn[label], (ax,) = drawing.figure()
             panel.draw(ax, recording, looks[label].colour)
-            drawn[label] = fig
-    if drawn:
-        _share_limits(list(drawn.values()), [recordings[label]["t"] for label in drawn])
-    return drawn
-
-
-def _share_limits(figures: Sequence[Figure], times: Sequence[Array]) -> None:
-    axes = [fig.axes[0] for fig in figures]
-    logarithmic = axes[0].get_yscale() == "log"
+            axes.append(ax)
     ranges = [ax.get_ylim() for ax in axes]
-    if logarithmic:
-        limits = min(low for low, _ in ranges), max(high for _, high in ranges)
-    else:
-        limits = drawing.shared_limits(ranges)
-    end = max(float(t[-1]) for t in times)
+    end = max((float(recordings[label]["t"][-1]) for label in drawn), default=0.0)
     for ax, (low, high) in zip(axes, ranges, strict=True):
+        limits = drawing.shared_limits(ranges) if ax.get_yscale() != "log" else (
+            min(least for least, _ in ranges), max(most for _, most in ranges))
         ax.set_ylim(limits)
         ax.set_xlim(0.0, end)
         ax.xaxis.set_major_locator(MaxNLocator(4))
         if high - low > 1.1 * (limits[1] - limits[0]):
             ax.text(0.98, 0.96, f"cut: {low:.2g} to {high:.2g}", color=ALERT, fontsize=8,
                     ha="right", va="top", transform=ax.transAxes)
+    return drawn
 
 
 def overlay(draw: Draw, recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
