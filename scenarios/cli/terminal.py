@@ -82,9 +82,8 @@ def print_samples(name: str, results: Results) -> None:
     from scenarios.measure.runs import Cell, Row
     from scenarios.results.columns import rows, verdict
 
-    shares = [Row(one.label, "", "", "", tuple(Cell(str(results.share(one, label)))
-                                               for label in results.labels))
-              for one in results.criteria()]
+    shares = [Row(what, "", "", "", tuple(Cell(str(share)) for share in by.values()))
+              for what, by in results.shares().items()]
     _print_rows([f"{name}: {results.samples} samples, paired", *verdict(results)],
                 "median [quartiles]", results.labels, [*shares, *rows(results)])
 

@@ -100,15 +100,14 @@ def _dashed(look: Look) -> Any:
 
 def shares(results: Results) -> Figure:
     """Draw the share of runs that meet each criterion under each resolver, with its interval."""
-    criteria, labels = results.criteria(), results.labels
+    criteria, labels = results.shares(), results.labels
     rows = len(criteria) * (len(labels) + 1)
     fig, (ax,) = drawing.figure(width=5.4, height=0.5 + 0.2 * rows)
     colours = drawing.colours(labels)
-    for i, criterion in enumerate(criteria):
+    for i, (criterion, by) in enumerate(criteria.items()):
         top = i * (len(labels) + 1)
-        ax.text(0.0, top - 0.62, criterion.label, fontweight="bold", va="center", fontsize=9)
-        for j, label in enumerate(labels):
-            share = results.share(criterion, label)
+        ax.text(0.0, top - 0.62, criterion, fontweight="bold", va="center", fontsize=9)
+        for j, (label, share) in enumerate(by.items()):
             y, colour = top + j + 0.15, colours[label]
             ax.hlines(y, 0.0, 1.0, color=drawing.INK, alpha=0.1, lw=5.0)
             ax.hlines(y, *share.interval, color=colour, lw=5.0, alpha=0.4)
