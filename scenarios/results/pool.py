@@ -76,11 +76,13 @@ class _Crew:
     def made(self, job: Any) -> Any:
         """Return what an idle process, or a new one, returns, None if it dies of the job twice."""
         for _ in range(_TRIES):
+            if self.stop.is_set():
+                break
             try:
                 process = self._idle.get_nowait()
             except Empty:
                 self.all.append(process := _started())
-            if self.stop.is_set():
+            if self.stop.is_set():  # since then, when all others were ended
                 _end(process)
                 break
             try:
