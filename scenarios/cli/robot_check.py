@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from math import isfinite
 from operator import itemgetter
 from pathlib import Path
@@ -79,10 +80,8 @@ def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
         "control_points": [{"joint": _carrier(robot, p.joint), "offset": _rounded(p.offset)}
                            for p in robot.control_points],
         "missing": list(_missing(robot)),
-        "coupled": [{"joint": one.joint, "other": one.other,
-                     "coefficients": list(one.coefficients)} for one in robot.coupled],
-        "loops": [{"name": one.name, "frames": list(one.frames), "rigid": one.rigid}
-                  for one in robot.loops],
+        "coupled": [asdict(one) for one in robot.coupled],
+        "loops": [asdict(one) for one in robot.loops],
         "starts": list(robot.starts), "may_touch": [list(pair) for pair in robot.apart]}
 
 
