@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from hierarchy.problem import Array
 from scenarios.draw.figures import drawing
-from scenarios.draw.figures.drawing import ALERT, INK, Array
+from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.draw.figures.palette import Look
 from scenarios.draw.figures.panels import Draw, Panel
 from scenarios.measure.metrics import Metric
