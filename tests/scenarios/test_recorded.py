@@ -39,8 +39,7 @@ def test_the_recorder_writes_what_is_stored(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     first = next(recorded.sequences(recorded.SEED))  # once: it takes seconds
     monkeypatch.setattr(recorded, "sequences", {recorded.SEED: [first]}.__getitem__)
-    monkeypatch.setattr("sys.argv", ["recorded", "--count", "10", "--out", str(tmp_path / "a.npz")])
-    recorded.main()
+    recorded.main(tmp_path / "a.npz", count=10)
     with np.load(tmp_path / "a.npz") as made, np.load(DATA / "DYN60.npz") as stored:
         assert set(made.files) == set(stored.files)
         for name in ("A0", "ub2", "x"):
