@@ -1,10 +1,9 @@
 """The recorded family DYN60: certified answers, sequences, and a recorder that repeats it."""
 
 import numpy as np
-import pytest
 
 from scenarios.problems import recorded
-from scenarios.problems.reference import DATA, family, fresh
+from scenarios.problems.reference import family
 from solvers import certify, make
 
 
@@ -31,20 +30,3 @@ def test_problems_of_a_sequence_know_the_tick_before_from_which_a_warm_start_goe
     resolver = make("hcod")
     after = resolver.solve(second.h, resolver.solve(second.before).memory)
     np.testing.assert_allclose(after.x, second.x, atol=1e-6)
-
-
-@pytest.mark.slow
-def test_the_recorder_writes_what_is_stored(tmp_path, monkeypatch):
-    pytest.importorskip("mujoco")
-    monkeypatch.chdir(tmp_path)
-    first = next(recorded.sequences(recorded.SEED))  # once: it takes seconds
-    monkeypatch.setattr(recorded, "sequences", {recorded.SEED: [first]}.__getitem__)
-    recorded.main(tmp_path / "a.npz", count=10)
-    with np.load(tmp_path / "a.npz") as made, np.load(DATA / "DYN60.npz") as stored:
-        assert set(made.files) == set(stored.files)
-        for name in ("A0", "ub2", "x"):
-            np.testing.assert_allclose(made[name], stored[name][:10], rtol=1e-6, atol=1e-4)
-    again = fresh("DYN60", recorded.SEED, 10)
-    assert again[0].before is None
-    assert again[9].before is again[8].h
-    np.testing.assert_allclose(again[9].x, family("DYN60")[9].x, atol=1e-4)
