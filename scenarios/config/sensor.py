@@ -35,7 +35,6 @@ from scenarios.config.sections import (
 
 FOOT = 0.31  # [m] height of the column that a robot without floor stands on
 Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), Unit("px")]
-WIDEST = 3.5  # [standard deviations] at which noise is clipped, so that it is bounded
 
 
 class AnySensor(PartSection):
@@ -125,13 +124,6 @@ class DepthErrors(Section):
         return DepthErrors(noise_floor=0.0, noise_growth=0.0, noise_from=0.0, rounding="step",
                            step=0.0, near=near, far=far, missing=0.0, missing_at_edges=0.0,
                            outliers=0.0, outlier_size=0)
-
-    def bound(self, depth: float) -> float:
-        """Return the largest error [m] of a reading at a depth [m] that is not an outlier."""
-        noise = WIDEST * (self.noise_floor + self.noise_growth * (depth - self.noise_from) ** 2)
-        if self.rounding == "step":
-            return noise + self.step / 2
-        return (depth + noise) / (1.0 - (depth + noise) * self.step / 2) - depth
 
     @property
     def random(self) -> bool:

@@ -21,6 +21,7 @@ from scenarios.config import ScenarioError
 from scenarios.config.sensor import CameraSection, DepthErrors, ImageSection
 from scenarios.draw.figures.depth import depth_figure
 from scenarios.measure.judging import depth_view
+from tests.helpers.camera_by_hand import bound, deproject
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
@@ -59,7 +60,7 @@ def one_by_one(image, pinhole, point, region, thin=inf, within=inf):
     depth = image[v, u].astype(float)
     own = pinhole.project(point)[2]
     counted = np.where(depth < own, np.minimum(depth + thin, own), depth)
-    off = point - pinhole.deproject(np.column_stack([u, v, counted]))
+    off = point - deproject(pinhole, np.column_stack([u, v, counted]))
     distance = np.linalg.norm(off, axis=1)
     if not (distance < region).any():
         return inf, np.zeros(3), np.zeros(3)
@@ -150,11 +151,11 @@ def test_the_distance_to_a_surface_that_is_seen_is_never_overestimated_beyond_it
         obstacles = ObstacleImage.empty(SIDE.height, SIDE.width)
         space.find_obstacles(scene.image(0, STATE)[0], STATE.placements, obstacles)
         estimate = space.measure(obstacles, STATE.placements).distance[0]
-        bound = overestimate(nearest, DepthErrors(**errors).bound(depth) if noisy else 0.0)
-        assert estimate - D <= bound, (i, estimate, D, bound)
+        most = overestimate(nearest, bound(DepthErrors(**errors), depth) if noisy else 0.0)
+        assert estimate - D <= most, (i, estimate, D, most)
         if not noisy and SIDE.project(place)[2] < depth:  # nothing is in its shadow
             assert estimate >= D - 1e-6
-        judged, worst = judged + 1, max(worst, (estimate - D) / bound)
+        judged, worst = judged + 1, max(worst, (estimate - D) / most)
         shapes.add(shape)
     assert judged > 40
     assert len(shapes) == 3
