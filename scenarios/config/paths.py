@@ -19,41 +19,28 @@ from hierarchy.paths import (
     circle,
     line,
 )
+from scenarios.config import sections as keys
 from scenarios.config.errors import naming
-from scenarios.config.sections import (
-    Angle,
-    Count,
-    Distance,
-    Finite,
-    OneOf,
-    Point,
-    Positive,
-    Section,
-    Span,
-    Time,
-    Unit,
-    Vector3,
-)
 
 
-class JitterSection(Section):
+class JitterSection(keys.Section):
     """A smooth random motion of a path."""
 
-    amplitude: Distance
+    amplitude: keys.Distance
     """Largest displacement in each axis."""
-    rate: Annotated[Positive, Unit("Hz")]
+    rate: Annotated[keys.Positive, keys.Unit("Hz")]
     """Highest frequency of the motion."""
-    seed: Count = 0
+    seed: keys.Count = 0
     """Seed of the motion; the same one gives the same motion."""
 
 
-class AnyPath(Section):
+class AnyPath(keys.Section):
     """What every path may have."""
 
     of: ClassVar[Callable[..., Path]]
     jitter: JitterSection | None = None
     """A random motion that is added to the path."""
-    out_of_reach: tuple[tuple[Time, Time], ...] | None = None
+    out_of_reach: tuple[tuple[keys.Time, keys.Time], ...] | None = None
     """Intervals in which the robot cannot be on the path, for metrics of its return."""
 
     def _wrong(self) -> Iterator[str]:
@@ -80,7 +67,7 @@ class StillSection(AnyPath):
 
     of: ClassVar[Callable[..., Path]] = Still
     kind: Literal["still"]
-    position: Point
+    position: keys.Point
     """Where the point is in the world."""
 
 
@@ -88,15 +75,15 @@ class EllipseSection(AnyPath):
     """p(t) = centre + cosine cos(s) + sine sin(s), with s = rate t + phase."""
 
     kind: Literal["ellipse"]
-    centre: Point
+    centre: keys.Point
     """Middle of the ellipse."""
-    cosine: Point
+    cosine: keys.Point
     """Half axis, from the centre to the point where s = 0."""
-    sine: Point
+    sine: keys.Point
     """Half axis, from the centre to the point where s is a quarter turn."""
-    rate: Annotated[Finite, Unit("rad/s")] = 1.0
+    rate: Annotated[keys.Finite, keys.Unit("rad/s")] = 1.0
     """How fast s grows."""
-    phase: Angle = 0.0
+    phase: keys.Angle = 0.0
     """s at the start."""
 
     def _steady(self) -> Path:
@@ -112,11 +99,11 @@ class WaypointsSection(AnyPath):
     """Straight lines between points, at rest at every point."""
 
     kind: Literal["waypoints"]
-    times: tuple[Time, ...]
+    times: tuple[keys.Time, ...]
     """Increasing times, one for each point."""
-    points: tuple[Point, ...]
+    points: tuple[keys.Point, ...]
     """The points."""
-    blend: Span | None = None
+    blend: keys.Span | None = None
     """With it the path does not stop: it rounds each point in a curve of this duration and is
     nearest to it half that time later, see hierarchy.paths.Blended."""
 
@@ -130,13 +117,13 @@ class LineSection(AnyPath):
 
     of: ClassVar[Callable[..., Path]] = staticmethod(line)
     kind: Literal["line"]
-    start: Point
+    start: keys.Point
     """First point."""
-    end: Point
+    end: keys.Point
     """Last point."""
-    duration: Span
+    duration: keys.Span
     """How long the motion takes."""
-    begin: Time = 0.0
+    begin: keys.Time = 0.0
     """When it begins."""
 
 
@@ -145,15 +132,15 @@ class CircleSection(AnyPath):
 
     of: ClassVar[Callable[..., Path]] = staticmethod(circle)
     kind: Literal["circle"]
-    centre: Point
+    centre: keys.Point
     """Middle of the circle."""
-    radius: Distance
+    radius: keys.Distance
     """Its radius."""
-    normal: Vector3 = (0.0, 0.0, 1.0)
+    normal: keys.Vector3 = (0.0, 0.0, 1.0)
     """The direction across its plane, of any length."""
-    rate: Annotated[Finite, Unit("rad/s")] = 1.0
+    rate: Annotated[keys.Finite, keys.Unit("rad/s")] = 1.0
     """How fast the angle grows."""
-    phase: Angle = 0.0
+    phase: keys.Angle = 0.0
     """Angle at the start."""
 
 
@@ -167,4 +154,4 @@ class RecordedSection(AnyPath):
 
 
 PathSection = Annotated[StillSection | LineSection | CircleSection | EllipseSection
-                        | WaypointsSection | RecordedSection, OneOf()]
+                        | WaypointsSection | RecordedSection, keys.OneOf()]
