@@ -12,15 +12,7 @@ import inspect
 from collections.abc import Callable
 from functools import cache
 from pkgutil import resolve_name
-from typing import (
-    TYPE_CHECKING,
-    Any,
-    ClassVar,
-    Self,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import TYPE_CHECKING, Any, ClassVar, Self, get_args, get_origin, get_type_hints
 
 from pydantic import ConfigDict, Field, create_model
 

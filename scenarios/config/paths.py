@@ -8,17 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from hierarchy.paths import (
-    Blended,
-    Ellipse,
-    Jittered,
-    Path,
-    Recorded,
-    Still,
-    Waypoints,
-    circle,
-    line,
-)
+from hierarchy import paths
 from scenarios.config import sections as keys
 from scenarios.config.errors import naming
 
@@ -37,7 +27,7 @@ class JitterSection(keys.Section):
 class AnyPath(keys.Section):
     """What every path may have."""
 
-    of: ClassVar[Callable[..., Path]]
+    of: ClassVar[Callable[..., paths.Path]]
     jitter: JitterSection | None = None
     """A random motion that is added to the path."""
     out_of_reach: tuple[tuple[keys.Time, keys.Time], ...] | None = None
@@ -48,14 +38,14 @@ class AnyPath(keys.Section):
         if any(b <= a for a, b in pairwise(times)):
             yield f"out_of_reach: times must increase, got {times}"
 
-    def make(self) -> Path:
+    def make(self) -> paths.Path:
         """Return the path; raises ScenarioError where the values are no path."""
         with naming(f"path of kind {getattr(self, 'kind', '')!r}"):
             path, jitter = self._steady(), self.jitter
-        return path if jitter is None else Jittered(path, jitter.amplitude, jitter.rate,
-                                                    jitter.seed)
+        return path if jitter is None else paths.Jittered(
+            path, jitter.amplitude, jitter.rate, jitter.seed)
 
-    def _steady(self) -> Path:
+    def _steady(self) -> paths.Path:
         """Return the path without jitter: what `of` makes of the keys of the kind, in order."""
         common = {"kind", *AnyPath.model_fields}
         return type(self).of(*(getattr(self, key) for key in type(self).model_fields
@@ -65,7 +55,7 @@ class AnyPath(keys.Section):
 class StillSection(AnyPath):
     """A point that does not move."""
 
-    of: ClassVar[Callable[..., Path]] = Still
+    of: ClassVar[Callable[..., paths.Path]] = paths.Still
     kind: Literal["still"]
     position: keys.Point
     """Where the point is in the world."""
@@ -86,13 +76,13 @@ class EllipseSection(AnyPath):
     phase: keys.Angle = 0.0
     """s at the start."""
 
-    def _steady(self) -> Path:
+    def _steady(self) -> paths.Path:
         if self.phase == 0.0:
-            return Ellipse(self.centre, self.cosine, self.sine, self.rate)
+            return paths.Ellipse(self.centre, self.cosine, self.sine, self.rate)
         cosine, sine = np.array(self.cosine), np.array(self.sine)
         c, s = np.cos(self.phase), np.sin(self.phase)  # the phase by the addition theorems
         turned = tuple((c * cosine + s * sine).tolist()), tuple((c * sine - s * cosine).tolist())
-        return Ellipse(self.centre, *turned, self.rate)
+        return paths.Ellipse(self.centre, *turned, self.rate)
 
 
 class WaypointsSection(AnyPath):
@@ -107,15 +97,15 @@ class WaypointsSection(AnyPath):
     """With it the path does not stop: it rounds each point in a curve of this duration and is
     nearest to it half that time later, see hierarchy.paths.Blended."""
 
-    def _steady(self) -> Path:
-        return (Waypoints(self.times, self.points) if self.blend is None
-                else Blended(self.times, self.points, self.blend))
+    def _steady(self) -> paths.Path:
+        return (paths.Waypoints(self.times, self.points) if self.blend is None
+                else paths.Blended(self.times, self.points, self.blend))
 
 
 class LineSection(AnyPath):
     """Straight from one point to another, at rest at both."""
 
-    of: ClassVar[Callable[..., Path]] = staticmethod(line)
+    of: ClassVar[Callable[..., paths.Path]] = staticmethod(paths.line)
     kind: Literal["line"]
     start: keys.Point
     """First point."""
@@ -130,7 +120,7 @@ class LineSection(AnyPath):
 class CircleSection(AnyPath):
     """A circle."""
 
-    of: ClassVar[Callable[..., Path]] = staticmethod(circle)
+    of: ClassVar[Callable[..., paths.Path]] = staticmethod(paths.circle)
     kind: Literal["circle"]
     centre: keys.Point
     """Middle of the circle."""
@@ -147,7 +137,7 @@ class CircleSection(AnyPath):
 class RecordedSection(AnyPath):
     """A recorded motion."""
 
-    of: ClassVar[Callable[..., Path]] = Recorded.from_csv
+    of: ClassVar[Callable[..., paths.Path]] = paths.Recorded.from_csv
     kind: Literal["recorded"]
     file: str
     """CSV with the columns t [s], x, y, z [m]; relative to the scenario's file."""
