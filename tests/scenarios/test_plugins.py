@@ -288,7 +288,7 @@ def test_what_goes_wrong_in_a_plugin_is_said_with_its_name():
     with pytest.raises(HierarchyError, match="task of kind 'broken': KeyError: 'a mistake of mine"):
         simulate(broken)
     missing = load("own.toml", {"tasks.1.frame": "thumb"})
-    with pytest.raises(HierarchyError, match="task of kind 'along': unknown frame 'thumb'"):
+    with pytest.raises(HierarchyError, match="kind 'along': frame: unknown frame 'thumb'"):
         simulate(missing)
 
 
