@@ -130,10 +130,12 @@ def _order(scenario: Scenario, tasks: Tasks) -> Order:
 
     def choose(body: float, end: float, cone_error: float) -> Allocation:
         if areas is not None:
-            return behind_first(allocate(body, end, cone_error, areas, always_point))
-        point = cone_error > 0.0 or always_point
-        return behind_first(Allocation((POSITION,) * (tasks.position is not None)
-                                       + (POINTING,) * point, repulsion=end <= tip))
+            chosen = allocate(body, end, cone_error, areas, always_point)
+        else:
+            point = cone_error > 0.0 or always_point
+            chosen = Allocation((POSITION,) * (tasks.position is not None) + (POINTING,) * point,
+                                repulsion=end <= tip)
+        return behind_first(chosen) if first else chosen
 
     distances = (inf,) if areas is None else (areas.near, areas.far, inf)
     return Order(choose, {choose(*at).order for at in product(distances, (0.0, inf), (1.0, nan))})

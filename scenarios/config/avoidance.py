@@ -11,32 +11,20 @@ from pydantic import BeforeValidator, Field
 from hierarchy.avoidance import Barrier, Obstacle, Repulsion
 from hierarchy.problem import Array
 from hierarchy.words import listed
+from scenarios.config import sections as keys
 from scenarios.config.paths import PathSection, WaypointsSection
-from scenarios.config.sections import (
-    Count,
-    Distance,
-    Length,
-    OneOf,
-    Point,
-    Positive,
-    Rate,
-    Rows3,
-    Section,
-    Speed,
-    Unit,
-)
 
 
-class RepulsionSection(Section):
+class RepulsionSection(keys.Section):
     """Magnitude of the repulsion over the distance, eq. (23); see hierarchy.avoidance.Repulsion."""
 
-    maximum: Positive
+    maximum: keys.Positive
     """Magnitude at distance zero, in [m/s^2] at acceleration level, [m/s] at velocity level."""
-    reach: Length
+    reach: keys.Length
     """Distance at which the magnitude is nearly zero, rho."""
-    shape: Positive
+    shape: keys.Positive
     """Steepness of the magnitude over the distance, gamma; it has no unit."""
-    scale: Positive = 2.0
+    scale: keys.Positive = 2.0
     """Factor of the distance; 2 is eq. (23), the authors' code has 3 (body), 1.5 (end effector)."""
 
     def make(self) -> Repulsion:
@@ -44,21 +32,21 @@ class RepulsionSection(Section):
         return Repulsion(self.maximum, self.reach, self.shape, self.scale)
 
 
-class ObstacleSection(Section):
+class ObstacleSection(keys.Section):
     """An obstacle: a shape at a place, or on a path."""
 
     tag: ClassVar[str] = "shape"
     shape: Literal["point", "sphere", "capsule", "box"] = "point"
     """What it is; a list [x, y, z] in place of the table is a point."""
-    centre: Point | None = None
+    centre: keys.Point | None = None
     """Its middle, for one that does not move."""
-    radius: Length | None = None
+    radius: keys.Length | None = None
     """Of a sphere or a capsule."""
-    half_length: Length | None = None
+    half_length: keys.Length | None = None
     """Of a capsule: half the segment along its z axis, without the round ends."""
-    half_lengths: tuple[Length, Length, Length] | None = None
+    half_lengths: tuple[keys.Length, keys.Length, keys.Length] | None = None
     """Of a box: half its sides along its x, y and z axes."""
-    rotation: Rows3 = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    rotation: keys.Rows3 = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
     """Rows of the matrix from its axes to the world's."""
     path: PathSection | None = None
     """Path of its middle, for one that moves."""
@@ -89,12 +77,12 @@ def as_table(obstacle: Any) -> Any:
 Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(as_table)], ...]
 
 
-class VariationSection(Section):
+class VariationSection(keys.Section):
     """Random variation of obstacle paths that have waypoints; other obstacles do not change."""
 
-    seed: Count
+    seed: keys.Count
     """Seed of the variation."""
-    spread: Distance = 0.05
+    spread: keys.Distance = 0.05
     """Largest displacement of a waypoint, in any direction; consecutive equal waypoints, at which
     an obstacle rests, move together."""
     timing: Annotated[float, Field(strict=True, ge=0.0, lt=1.0)] = 0.1
@@ -128,7 +116,7 @@ def _in_ball(random: np.random.Generator, count: int) -> Array:
     return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True) * radii)
 
 
-class _Avoiding(Section):
+class _Avoiding(keys.Section):
     obstacles: Obstacles
     """What is to be avoided: tables, or points [x, y, z]."""
     variation: VariationSection | None = None
@@ -158,11 +146,11 @@ class AvoidanceSection(_Avoiding):
     direction: Literal["nearest", "mean"] = "nearest"
     """"nearest": away from the nearest obstacle. "mean": along the mean (25)-(26) over the
     obstacles within `far` of a control point, and within `end_effector` of the end effector."""
-    near: Distance
+    near: keys.Distance
     """Distance of the body below which its avoidance comes before the position, eps_1."""
-    far: Distance
+    far: keys.Distance
     """Distance of the body below which it avoids at all, eps_2; at least `near`."""
-    end_effector: Distance
+    end_effector: keys.Distance
     """Distance of the end effector below which it is repelled, eps_ee."""
     body: RepulsionSection
     """Repulsion of the body."""
@@ -173,7 +161,7 @@ class AvoidanceSection(_Avoiding):
     place: Literal["stack", "null-space"] = "stack"
     """"null-space": the null-space term is the sum of the repulsion of all control points within
     `far`, as joint commands, and `near` has no effect, see hierarchy.tasks.CumulatedRepulsion."""
-    asked: Length | None = None
+    asked: keys.Length | None = None
     """Distance that metrics check for body and end effector, without effect on the run; by
     default `near`, for the body."""
 
@@ -203,18 +191,18 @@ class AvoidanceSection(_Avoiding):
         return {"body": self.near} if self.asked is None else {"body": self.asked, "ee": self.asked}
 
 
-class BarrierSection(Section):
+class BarrierSection(keys.Section):
     """How one-sided rows keep a distance, see hierarchy.avoidance.Barrier."""
 
-    distance: Distance = 0.03
+    distance: keys.Distance = 0.03
     """Clearance to keep."""
-    rate: Rate = 10.0
+    rate: keys.Rate = 10.0
     """Limit of the approach to the clearance: speed per distance that is left."""
-    influence: Length = 0.3
+    influence: keys.Length = 0.3
     """Distance beyond which there is no effect; above `distance`."""
-    recovery: Speed = 0.2
+    recovery: keys.Speed = 0.2
     """Speed of the retreat below the clearance, at most."""
-    limit: Annotated[Positive, Unit("m/s^2")] = 50.0
+    limit: Annotated[keys.Positive, keys.Unit("m/s^2")] = 50.0
     """Acceleration of the retreat, at most."""
 
     def barrier(self, distance: float) -> Barrier:
@@ -231,9 +219,9 @@ class SeparationSection(BarrierSection, _Avoiding):
     """
 
     kind: Literal["separation"]
-    self_collision: Distance | None = None
+    self_collision: keys.Distance | None = None
     """Clearance between links that are not neighbours; without it links may collide."""
-    buffer: Length | None = None
+    buffer: keys.Length | None = None
     """With control.stack = "smooth": width outside the clearance within which rows act."""
     obstacles: Obstacles = ()
 
@@ -258,4 +246,4 @@ class SeparationSection(BarrierSection, _Avoiding):
         return {"body": self.distance, "ee": self.distance}
 
 
-AvoidanceKind = Annotated[AvoidanceSection | SeparationSection, OneOf("repulsion")]
+AvoidanceKind = Annotated[AvoidanceSection | SeparationSection, keys.OneOf("repulsion")]

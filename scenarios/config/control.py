@@ -7,18 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from scenarios.config import sections as keys
 from scenarios.config.robot import ControlPointSection
-from scenarios.config.sections import (
-    Count,
-    Flag,
-    Length,
-    NotNegative,
-    Point,
-    Section,
-    Span,
-    Time,
-    Unit,
-)
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
 BlindPolicy = Literal["brake", "hold", "stop"]
@@ -26,7 +16,7 @@ MOST_TICKS = 10_000_000  # some kB each in memory
 StackKind = Literal["switched", "hierarchical", "set-based", "smooth"]
 
 
-class PolicySection(Section):
+class PolicySection(keys.Section):
     """The command sent in a tick with a problem, for each kind of problem.
 
     "brake": decelerate to rest. "hold": repeat the last good command for at most `patience`
@@ -54,16 +44,16 @@ class PolicySection(Section):
     """The command is not ready at the `deadline`."""
     inside: AnswerPolicy = "brake"
     """A point of the robot is on or inside an obstacle."""
-    patience: Count = 10
+    patience: keys.Count = 10
     """Ticks for which "hold" repeats a command."""
-    stale_after: Time = 0.02
+    stale_after: keys.Time = 0.02
     """Age from which a measurement is stale."""
-    deadline: Span | None = None
+    deadline: keys.Span | None = None
     """Time from the start of a tick until its command must be ready; without it there is no
     deadline."""
 
 
-class ControlSection(Section):
+class ControlSection(keys.Section):
     """How the tasks are resolved, and how often."""
 
     level: Literal["velocity", "acceleration", "torque"] = "acceleration"
@@ -78,12 +68,12 @@ class ControlSection(Section):
     tasks in the same order: inequalities are frozen at their bounds, see
     solvers.resolvers.set_based, or act gradually within a `buffer`, see solvers.resolvers.smooth,
     which needs `resolver` = "smooth"."""
-    strictness: Flag = False
+    strictness: keys.Flag = False
     """Whether every tick is also resolved without the levels below the position, to measure
     whether they move the end effector; this is not part of the measured times."""
-    period: Annotated[float, Field(strict=True, gt=0.0, le=1.0), Unit("s")] = 0.001
+    period: Annotated[float, Field(strict=True, gt=0.0, le=1.0), keys.Unit("s")] = 0.001
     """Time from tick to tick."""
-    duration: Span
+    duration: keys.Span
     """How long a run lasts."""
     jacobian_derivative: Literal["exact", "difference"] = "exact"
     """How dJ/dt is found: "exact", or by the "difference" of two ticks."""
@@ -93,7 +83,7 @@ class ControlSection(Section):
     """Settings of the resolver. A table in it with a resolver's name, such as
     `[control.options.tpm]`, applies to that resolver only, so that changing `resolver` is enough to
     swap it. Plain settings override those from such a table."""
-    damping: NotNegative = 1.0
+    damping: keys.NotNegative = 1.0
     """Damping, at velocity level, of tasks that cannot be met: near singularities and out of
     reach, where they come to rest. 0 for none. The damping of a resolver is in `options`."""
     metric: Literal["identity", "mass"] = "identity"
@@ -104,7 +94,7 @@ class ControlSection(Section):
     transition: Literal["none", "blend"] = "none"
     """"blend": when the order of the stack or the active control point changes, the command moves
     to that of the new stack within `transition_time`. "none": it changes at once."""
-    transition_time: Span = 0.02
+    transition_time: keys.Span = 0.02
     """How long "blend" takes."""
 
     def _wrong(self) -> Iterator[str]:
@@ -134,7 +124,7 @@ class ControlSection(Section):
         return {**(own if isinstance(own, dict) else {self.resolver: own}), **plain}
 
 
-class FaultSection(Section):
+class FaultSection(keys.Section):
     """An injected fault."""
 
     kind: Literal["nan_position", "nan_velocity", "nan_distance", "stale", "status", "overrun",
@@ -143,9 +133,9 @@ class FaultSection(Section):
     distance of `point` is NaN. "stale": measured joints and distances are frozen. "status": the
     resolver reports `status`. "overrun": the tick takes longer. "obstacle": a sphere appears.
     "no_frames": the camera takes no images. "dark_frames": its images have no readings."""
-    at: Time
+    at: keys.Time
     """When it begins."""
-    duration: Span
+    duration: keys.Span
     """How long it lasts."""
     joint: Annotated[int, Field(strict=True, ge=1)] | None = None
     """Number of a joint from 1; by default all."""
@@ -154,13 +144,13 @@ class FaultSection(Section):
     status: Literal["iteration_limit", "numerical_failure", "backend_failure",
                     "inaccurate"] | None = None
     """What the resolver reports."""
-    takes: Span | None = None
+    takes: keys.Span | None = None
     """Time that a tick takes longer."""
-    centre: Point | None = None
+    centre: keys.Point | None = None
     """Middle of the sphere."""
     place: ControlPointSection | None = None
     """Point of the body, in place of `centre`, where the sphere appears at that time."""
-    radius: Length | None = None
+    radius: keys.Length | None = None
     """Radius of the sphere."""
 
     def _wrong(self) -> Iterator[str]:

@@ -10,17 +10,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pkgutil import resolve_name
-from typing import (
-    TYPE_CHECKING,
-    Any,
-    ClassVar,
-    Self,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import TYPE_CHECKING, Any, ClassVar, Self, get_args, get_origin, get_type_hints
 
 from pydantic import ConfigDict, Field, create_model
 
@@ -127,11 +120,10 @@ def _made(key: str, annotation: Any, value: Any, robot: Robot) -> Any:
 
 def _parameters(maker: Maker) -> dict[str, inspect.Parameter]:
     """Return the parameters of a maker by name, with annotations that are not text."""
-    try:
-        hints = get_type_hints(inspect.getattr_static(maker, "__init__")
-                               if isinstance(maker, type) else maker)
-    except Exception:  # such as a name that is imported for type checkers only: it is user's code
-        hints = {}
+    hints: dict[str, Any] = {}
+    for source in (maker, inspect.getattr_static(maker, "__init__", None)):
+        with suppress(Exception):  # such as a name that only type checkers import: user's code
+            hints |= get_type_hints(source)  # a dataclass knows the modules of its bases
     return {name: parameter.replace(annotation=hints.get(name, Any))
             for name, parameter in inspect.signature(maker).parameters.items()
             if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)}

@@ -11,46 +11,33 @@ from pydantic import Field
 
 from hierarchy.plugins import Group, register
 from hierarchy.problem import Array
+from scenarios.config import sections as keys
 from scenarios.config.own import OwnSection, PartSection
-from scenarios.config.sections import (
-    Count,
-    Finite,
-    Flag,
-    Force,
-    Length,
-    NotNegative,
-    Positive,
-    Registered,
-    Section,
-    Span,
-    Time,
-    Unit,
-)
 
-Bandwidth = Annotated[Positive, Unit("rad/s")]
-Friction = Annotated[NotNegative, Unit("N m")]
-Damping = Annotated[NotNegative, Unit("N m s/rad")]
-Inertia = Annotated[NotNegative, Unit("kg m^2")]
+Bandwidth = Annotated[keys.Positive, keys.Unit("rad/s")]
+Friction = Annotated[keys.NotNegative, keys.Unit("N m")]
+Damping = Annotated[keys.NotNegative, keys.Unit("N m s/rad")]
+Inertia = Annotated[keys.NotNegative, keys.Unit("kg m^2")]
 _ROUNDING = 1e-9  # [s] of times
 
 
-class MeasurementSection(Section):
+class MeasurementSection(keys.Section):
     """Measurement of the joints; with all values zero it is exact."""
 
-    position_noise: Annotated[NotNegative, Unit("rad")] = 0.0
+    position_noise: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
     """Standard deviation of the normal noise of positions."""
-    velocity_noise: Annotated[NotNegative, Unit("rad/s")] = 0.0
+    velocity_noise: Annotated[keys.NotNegative, keys.Unit("rad/s")] = 0.0
     """The same of velocities."""
-    quantisation: Annotated[NotNegative, Unit("rad")] = 0.0
+    quantisation: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
     """Step of measured positions."""
-    delay: Time = 0.0
+    delay: keys.Time = 0.0
     """Age of what is measured, a whole number of periods."""
-    seed: Count = 0
+    seed: keys.Count = 0
     """Seed of the noise."""
     velocity: Literal["measured", "differenced"] = "measured"
     """"measured": by a sensor of its own. "differenced": the backward difference of measured
     positions after a low-pass filter."""
-    filter_time: Time = 0.0
+    filter_time: keys.Time = 0.0
     """Time constant of that filter; 0 for none."""
 
     def _wrong(self) -> Iterator[str]:
@@ -89,7 +76,7 @@ class KinematicSection(AnyPlant):
     kind: Literal["kinematic"] = "kinematic"
 
 
-class ServoSection(Section):
+class ServoSection(keys.Section):
     """The position servo of each joint of the physics plant.
 
     torque = k (reference - q) + c (its rate - v) + `gravity` times the gravity torque, within the
@@ -97,20 +84,20 @@ class ServoSection(Section):
     at the start, including the drive.
     """
 
-    rate: Annotated[float, Field(strict=True, ge=200.0, le=10000.0), Unit("Hz")] = 1000.0
+    rate: Annotated[float, Field(strict=True, ge=200.0, le=10000.0), keys.Unit("Hz")] = 1000.0
     """Steps of the servo per second (or slightly more, a whole number per period) on linearly
     interpolated references."""
     bandwidth: Bandwidth | tuple[Bandwidth, ...] = 80.0
     """How fast a joint follows, one value for all joints or one each."""
-    gravity: NotNegative = 1.0
+    gravity: keys.NotNegative = 1.0
     """Share of the gravity torque that is compensated."""
-    feedforward: Flag = True
+    feedforward: keys.Flag = True
     """Whether the rate of the reference counts."""
-    lead: Annotated[Positive, Unit("rad")] = 0.1
+    lead: Annotated[keys.Positive, keys.Unit("rad")] = 0.1
     """How far the reference may lead its joint, so that a blocked arm does not rush to catch up."""
 
 
-class JointsSection(Section):
+class JointsSection(keys.Section):
     """Joints of the physics plant: one value for all or one each. Plausible, not identified."""
 
     friction: Friction | tuple[Friction, ...] = 0.5
@@ -128,7 +115,7 @@ class PhysicsSection(AnyPlant):
     made_by: ClassVar[str] = "scenarios.cell.plants.physics:PhysicsArm"
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
     kind: Literal["mujoco"]
-    beyond_stop: Annotated[Positive, Unit("rad")] = 0.2
+    beyond_stop: Annotated[keys.Positive, keys.Unit("rad")] = 0.2
     """How far a joint may pass its position limit; beyond it the run ends with a fault."""
     servo: ServoSection = ServoSection()
     """The servo of each joint."""
@@ -136,18 +123,18 @@ class PhysicsSection(AnyPlant):
     """Friction and inertia of the joints."""
 
 
-class PushSection(Section):
+class PushSection(keys.Section):
     """A horizontal force on a body, at its centre of mass."""
 
     joint: str
     """Joint whose body is pushed."""
-    force: Force
+    force: keys.Force
     """Size of the force."""
-    direction: Annotated[Finite, Unit("deg")] = 0.0
+    direction: Annotated[keys.Finite, keys.Unit("deg")] = 0.0
     """From the world's x axis toward its y axis."""
-    at: Time = 0.0
+    at: keys.Time = 0.0
     """When the push begins."""
-    duration: Span = 0.1
+    duration: keys.Span = 0.1
     """How long it lasts."""
 
     @property
@@ -173,11 +160,11 @@ class TorqueSection(AnyPlant):
     made_by: ClassVar[str] = "scenarios.cell.plants.torque:TorqueRobot"
     levels: ClassVar[tuple[str, ...]] = ("torque",)
     kind: Literal["torque"]
-    height: Annotated[Finite, Unit("m")] = 0.0
+    height: Annotated[keys.Finite, keys.Unit("m")] = 0.0
     """Height of the floor."""
-    friction: Positive = 0.7
+    friction: keys.Positive = 0.7
     """Coefficient of friction of the floor."""
-    softness: Span = 0.005
+    softness: keys.Span = 0.005
     """Time constant of a contact."""
     joint_friction: Friction = 0.0
     """Coulomb friction of every joint."""
@@ -185,21 +172,21 @@ class TorqueSection(AnyPlant):
     """Inertia of the drive of every joint beyond the robot's own."""
     joint_damping: Damping = 0.0
     """Viscous friction of every joint."""
-    delay: Time = 0.0
+    delay: keys.Time = 0.0
     """Time by which torques arrive late, a whole number of periods."""
-    bandwidth: Annotated[Positive, Unit("Hz")] | None = None
+    bandwidth: Annotated[keys.Positive, keys.Unit("Hz")] | None = None
     """Bandwidth of the motors' torques; without it they follow at once."""
-    stops: Flag = True
+    stops: keys.Flag = True
     """Whether joints have a stop at their position limit."""
-    self_collision: Flag = False
+    self_collision: keys.Flag = False
     """Whether the robot's capsules touch one another, except neighbours and those that overlap at
     the start."""
-    fall: Length = 0.2
+    fall: keys.Length = 0.2
     """How far the centre of mass may sink below its start; beyond it the robot has fallen, which
     ends the run with a fault."""
-    tilt: Annotated[Positive, Unit("rad")] = 1.0
+    tilt: Annotated[keys.Positive, keys.Unit("rad")] = 1.0
     """How far the base may tilt from its start; beyond it the robot has fallen."""
-    beyond_stop: Annotated[Positive, Unit("rad")] = 0.2
+    beyond_stop: Annotated[keys.Positive, keys.Unit("rad")] = 0.2
     """How far a joint may pass its position limit; beyond it the run ends with a fault."""
     pushes: tuple[PushSection, ...] = ()
     """Forces that disturb the robot."""
@@ -211,4 +198,4 @@ class OwnPlant(AnyPlant, OwnSection):
     group: ClassVar[Group] = "plants"
 
 
-PlantKind = Annotated[AnyPlant, Registered("kinematic", "plants", OwnPlant)]
+PlantKind = Annotated[AnyPlant, keys.Registered("kinematic", "plants", OwnPlant)]

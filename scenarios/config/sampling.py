@@ -11,7 +11,6 @@ from scenarios.config.changes import matching, place
 from scenarios.config.distributions import Distribution, Value
 from scenarios.config.errors import ScenarioError
 from scenarios.config.scenario import Scenario
-from scenarios.config.validation import validated
 
 
 def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int, index: int,
@@ -44,12 +43,8 @@ def changed(scenario: Scenario, values: Mapping[str, Value], what: str) -> Scena
 
     Raises ScenarioError for invalid ones; the message starts with `what`.
     """
-    data = scenario.model_dump(mode="json")
-    for key, value in values.items():
-        table, last = place(data, key)
-        table[last] = value
     try:
-        return validated(Scenario, data, what)
+        return scenario.with_changes(values, what)
     except ScenarioError as error:
         drawn_values = ", ".join(f"{key} = {value}" for key, value in values.items())
         raise ScenarioError(f"{error}, with {drawn_values}") from error

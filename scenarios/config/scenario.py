@@ -242,11 +242,14 @@ class Scenario(Section):
         control = {**self.control.model_dump(), "resolver": name, "options": options}
         return validated(Scenario, {**self.model_dump(), "control": control}, f"resolver {spec!r}")
 
-    def with_changes(self, changes: Mapping[str, Any]) -> Scenario:
-        """Return this scenario with other values at dotted keys; raises ScenarioError."""
+    def with_changes(self, changes: Mapping[str, Any], what: str = "") -> Scenario:
+        """Return this scenario with other values at dotted keys.
+
+        Raises ScenarioError for invalid ones; the message starts with `what`, or the name.
+        """
         data = self.model_dump(mode="json")
         change_all(data, changes, self.tag_at)
-        return validated(Scenario, data, f"scenario {self.name!r}")
+        return validated(Scenario, data, what or f"scenario {self.name!r}")
 
     def __repr__(self) -> str:
         return (f"Scenario({self.name!r}, robot={self.robot.model!r}, "

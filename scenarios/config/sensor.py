@@ -15,27 +15,11 @@ from pydantic import Field
 
 from hierarchy.plugins import Group, register
 from hierarchy.problem import Array
+from scenarios.config import sections as keys
 from scenarios.config.own import OwnSection, PartSection
-from scenarios.config.sections import (
-    Count,
-    Distance,
-    Finite,
-    Flag,
-    Length,
-    NotNegative,
-    Point,
-    Positive,
-    Registered,
-    Rows3,
-    Section,
-    Share,
-    Time,
-    Unit,
-)
 
 FOOT = 0.31  # [m] height of the column that a robot without floor stands on
-Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), Unit("px")]
-WIDEST = 3.5  # [standard deviations] at which noise is clipped, so that it is bounded
+Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), keys.Unit("px")]
 
 
 class AnySensor(PartSection):
@@ -66,53 +50,53 @@ class ImageSection(AnySensor):
     """What sources of depth images have; see scenarios.cell.sensors.depth_sensor."""
 
     made_by: ClassVar[str] = "scenarios.cell.sensors.depth_sensor:depth_sensor"
-    latency: Time = 0.0
+    latency: keys.Time = 0.0
     """Time from taking a frame until it is available."""
-    stale_after: Time = 0.2
+    stale_after: keys.Time = 0.2
     """Time without a new frame after which the camera is blind and `control.policy.stale`
     applies."""
-    least_readings: Share = 0.1
+    least_readings: keys.Share = 0.1
     """Share of valid pixels below which a frame does not count."""
-    foot: Distance = FOOT  # type: ignore[misc]
+    foot: keys.Distance = FOOT  # type: ignore[misc]
     """Height of the column below the base that is removed from the image with the robot's
     capsules."""
-    margin: Distance = 0.05
+    margin: keys.Distance = 0.05
     """Width around the capsules within which pixels are removed with the robot."""
-    region: Length | None = None
+    region: keys.Length | None = None
     """Distance from a point within which obstacles are seen; by default the largest at which
     avoidance acts."""
-    thin: Distance | None = None
+    thin: keys.Distance | None = None
     """How far obstacles extend behind their surface; by default without bound."""
     support: Annotated[int, Field(strict=True, ge=1, le=9)] = 3
     """Pixels of the nine around one that must agree for it to count."""
-    band: Distance = 0.05
+    band: keys.Distance = 0.05
     """Difference in depth up to which pixels agree."""
 
 
-class DepthErrors(Section):
+class DepthErrors(keys.Section):
     """Errors of a depth reading z of a simulated camera; the defaults resemble a Kinect."""
 
-    noise_floor: Distance = 1.2e-3
+    noise_floor: keys.Distance = 1.2e-3
     """Standard deviation of the normal noise of z at `noise_from`, clipped at 3.5 times that."""
-    noise_growth: NotNegative = 1.9e-3
+    noise_growth: keys.NotNegative = 1.9e-3
     """Growth of that deviation with (z - noise_from)^2 [1/m]."""
-    noise_from: Distance = 0.4
+    noise_from: keys.Distance = 0.4
     """Depth from which noise grows."""
     rounding: Literal["disparity", "step"] = "disparity"
     """"step" rounds z to multiples of `step`, "disparity" 1 / z, as a triangulating camera does."""
-    step: NotNegative = 2.85e-3
+    step: keys.NotNegative = 2.85e-3
     """Step of the rounding, in [m], or [1/m] of a disparity; 0 for none."""
-    near: Distance = 0.5
+    near: keys.Distance = 0.5
     """Depth below which readings are missing."""
-    far: Annotated[float, Field(strict=True, gt=0.0), Unit("m")] = 5.0
+    far: Annotated[float, Field(strict=True, gt=0.0), keys.Unit("m")] = 5.0
     """Depth above which readings are missing."""
-    missing: Share = 0.002
+    missing: keys.Share = 0.002
     """Probability of a missing reading."""
-    missing_at_edges: Share = 0.3
+    missing_at_edges: keys.Share = 0.3
     """The same where a neighbour is 5 cm nearer or farther."""
-    outliers: Share = 0.02
+    outliers: keys.Share = 0.02
     """Probability that a frame has a square with a random depth before the true one."""
-    outlier_size: Count = 2
+    outlier_size: keys.Count = 2
     """Largest number of pixels from the middle of that square to its side."""
 
     def _wrong(self) -> Iterator[str]:
@@ -125,13 +109,6 @@ class DepthErrors(Section):
         return DepthErrors(noise_floor=0.0, noise_growth=0.0, noise_from=0.0, rounding="step",
                            step=0.0, near=near, far=far, missing=0.0, missing_at_edges=0.0,
                            outliers=0.0, outlier_size=0)
-
-    def bound(self, depth: float) -> float:
-        """Return the largest error [m] of a reading at a depth [m] that is not an outlier."""
-        noise = WIDEST * (self.noise_floor + self.noise_growth * (depth - self.noise_from) ** 2)
-        if self.rounding == "step":
-            return noise + self.step / 2
-        return (depth + noise) / (1.0 - (depth + noise) * self.step / 2) - depth
 
     @property
     def random(self) -> bool:
@@ -165,34 +142,34 @@ class CameraSection(DepthErrors, ImageSection):
     """Columns of the image."""
     height: Pixels = 480
     """Rows of the image."""
-    fx: Annotated[Positive, Unit("px")] = 525.0
+    fx: Annotated[keys.Positive, keys.Unit("px")] = 525.0
     """Focal length, horizontally."""
-    fy: Annotated[Positive, Unit("px")] = 525.0
+    fy: Annotated[keys.Positive, keys.Unit("px")] = 525.0
     """Focal length, vertically."""
-    cx: Annotated[Finite, Unit("px")] | None = None
+    cx: Annotated[keys.Finite, keys.Unit("px")] | None = None
     """Column of the optical axis, by default the middle."""
-    cy: Annotated[Finite, Unit("px")] | None = None
+    cy: Annotated[keys.Finite, keys.Unit("px")] | None = None
     """Row of the optical axis, by default the middle."""
-    position: Point = (0.0, 2.0, 0.7)
+    position: keys.Point = (0.0, 2.0, 0.7)
     """Where the camera is."""
-    look_at: Point = (0.0, 0.3, 0.1)
+    look_at: keys.Point = (0.0, 0.3, 0.1)
     """Point that it looks at."""
-    rotation: Rows3 | None = None
+    rotation: keys.Rows3 | None = None
     """In place of `look_at`: rows of a matrix whose columns are the camera's axes right, down and
     forward in the world."""
-    rate: Annotated[Positive, Unit("Hz")] = 30.0
+    rate: Annotated[keys.Positive, keys.Unit("Hz")] = 30.0
     """Frames per second."""
-    jitter: Time = 0.0
+    jitter: keys.Time = 0.0
     """Largest random shift of a frame; below 1 / rate."""
-    seed: Count = 0
+    seed: keys.Count = 0
     """Seed of errors and jitter."""
-    ideal: Flag = False
+    ideal: keys.Flag = False
     """Whether readings have no errors."""
-    far: Length = 5.0
+    far: keys.Length = 5.0
     """Depth above which readings are missing."""
-    point_radius: Distance = 0.02
+    point_radius: keys.Distance = 0.02
     """Radius of the balls that stand for obstacles that are points."""
-    backdrop: Distance = 4.0
+    backdrop: keys.Distance = 4.0
     """Depth of a wall behind everything, 0 for none, which may leave too few readings."""
 
 
@@ -216,4 +193,4 @@ class OwnSensor(AnySensor, OwnSection):
     foot: ClassVar[float] = FOOT
 
 
-SensorKind = Annotated[AnySensor, Registered("exact", "sensors", OwnSensor)]
+SensorKind = Annotated[AnySensor, keys.Registered("exact", "sensors", OwnSensor)]

@@ -16,31 +16,16 @@ from hierarchy.errors import brief
 from hierarchy.paths import Path, Shifted, Still
 from hierarchy.plugins import Group
 from hierarchy.problem import Array
+from scenarios.config import sections as keys
 from scenarios.config.errors import ScenarioError
 from scenarios.config.own import OwnSection, PartSection
 from scenarios.config.paths import PathSection
-from scenarios.config.sections import (
-    Flag,
-    Gain,
-    JointPosition,
-    JointValue,
-    Length,
-    NotNegative,
-    Point,
-    Positive,
-    Registered,
-    Section,
-    Stiffness,
-    TaskName,
-    Unit,
-    Vector3,
-)
 
 if TYPE_CHECKING:
     from hierarchy import Task
     from scenarios.config.references import References
 
-Acceleration = Annotated[Positive, Unit("rad/s^2")]
+Acceleration = Annotated[keys.Positive, keys.Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
 
 
@@ -86,11 +71,11 @@ class Made(PartSection):
 class TaskSection(Made):
     """What most tasks have: the gains of their error."""
 
-    stiffness: Stiffness = 40.0
+    stiffness: keys.Stiffness = 40.0
     """Gain of the error at acceleration level."""
-    damping: Gain = 20.0
+    damping: keys.Gain = 20.0
     """Gain of the error's rate at acceleration level."""
-    gain: Gain = 10.0
+    gain: keys.Gain = 10.0
     """Gain of the error at velocity level."""
 
 
@@ -99,9 +84,9 @@ class AlongSection(TaskSection):
 
     path: PathSection | None = None
     """Where the point is wanted over time."""
-    offset: Point = (0.0, 0.0, 0.0)
+    offset: keys.Point = (0.0, 0.0, 0.0)
     """Shift of the path, or of the initial position."""
-    from_start: Flag = False
+    from_start: keys.Flag = False
     """Whether the path is relative to the initial position."""
 
     def _wrong(self) -> Iterator[str]:
@@ -154,17 +139,17 @@ class PositionTask(AlongSection):
 class PointingTask(TaskSection):
     """The z axis of a frame on or in a cone (1 row)."""
 
-    axis: Vector3
+    axis: keys.Vector3
     """Axis of the cone in the world, of any length."""
-    alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0), Unit("deg")]
+    alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0), keys.Unit("deg")]
     """Opening of the cone: angle of the z axis from `axis`."""
     rows: Rows = "inequality"
     """"equality": on the cone. "inequality": within it."""
-    buffer: Annotated[Positive, Unit("deg")] | None = None
+    buffer: Annotated[keys.Positive, keys.Unit("deg")] | None = None
     """With control.stack = "smooth": width inside the cone within which an inequality acts."""
-    stiffness: Stiffness = 5.0
-    damping: Gain = 2.0
-    gain: Gain = 5.0
+    stiffness: keys.Stiffness = 5.0
+    damping: keys.Gain = 2.0
+    gain: keys.Gain = 5.0
     made_by: ClassVar[str] = "hierarchy.tasks:Pointing"
     frame: ClassVar[str | None]
 
@@ -189,14 +174,14 @@ class PostureTask(TaskSection):
 
     made_by: ClassVar[str] = "hierarchy.tasks:Posture"
     unit: ClassVar[str] = "rad"
-    target: tuple[JointPosition, ...] | None = None
+    target: tuple[keys.JointPosition, ...] | None = None
     """Values of all joints, or all coordinates, as in `start.q`; by default the
     start."""
-    joints: dict[str, JointValue] = Field(default_factory=dict)
+    joints: dict[str, keys.JointValue] = Field(default_factory=dict)
     """Values of joints by name that override `target`."""
-    stiffness: Stiffness = 10.0
-    damping: Gain = 5.0
-    gain: Gain = 1.0
+    stiffness: keys.Stiffness = 10.0
+    damping: keys.Gain = 5.0
+    gain: keys.Gain = 1.0
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the posture, by default that of the start."""
@@ -229,7 +214,7 @@ class PostureSection(PostureTask):
     """"null-space": the null-space term of eq. (14). "task": the last level."""
 
 
-class LimitsSection(Section):
+class LimitsSection(keys.Section):
     """The robot's joint limits, as the first level of the stack.
 
     Position and velocity limits are those of the robot.
@@ -242,30 +227,30 @@ class LimitsSection(Section):
     joint, regardless of the tasks, which works with every resolver. "either": in the stack if the
     resolver handles bounds, otherwise a guard. "bounds": in the stack, above all else, as far as
     they bound single unknowns: without torque limits and the limits of contact forces."""
-    margin: Annotated[NotNegative, Unit("rad")] = 0.0
+    margin: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
     """Distance by which the position limits shrink on both sides."""
-    horizon: Annotated[NotNegative, Unit("s")] | None = None
+    horizon: Annotated[keys.NotNegative, keys.Unit("s")] | None = None
     """Time in which the sides come to a limit, see docs/theory/joint-limits.md; by default 0.05 s
     at level "torque", and one tick elsewhere and if it is shorter than that."""
-    danger_reach: Length | None = None
+    danger_reach: keys.Length | None = None
     """Joints that would move a control point toward an obstacle nearer than this are slowed down,
     see hierarchy.tasks.DangerBounds."""
     torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None
     """Usable share of the effort limits; without it torques are not limited."""
-    torque_step: Annotated[Positive, Unit("N m")] | None = None
+    torque_step: Annotated[keys.Positive, keys.Unit("N m")] | None = None
     """At level "torque": change of a torque from one tick to the next, at most."""
-    base_speed: tuple[Positive, Positive] | None = None
+    base_speed: tuple[keys.Positive, keys.Positive] | None = None
     """Linear [m/s] and angular [rad/s] speed of a floating base; by default 2 m/s and 3 rad/s, and
     at level "torque", where only forces move it, none."""
-    base_acceleration: tuple[Positive, Positive] | None = None
+    base_acceleration: tuple[keys.Positive, keys.Positive] | None = None
     """Linear [m/s^2] and angular [rad/s^2] acceleration of a floating base; by default the largest
     `acceleration`, and at level "torque" none."""
 
 
-class DampingSection(Section):
+class DampingSection(keys.Section):
     """Null-space term a = -D v, eq. (15)."""
 
-    value: NotNegative
+    value: keys.NotNegative
     """D [1/s], or with weight = "mass" the factor of M(q)."""
     weight: Literal["identity", "mass"] = "identity"
     """"identity": D = value I. "mass": D = value M(q)."""
@@ -274,9 +259,9 @@ class DampingSection(Section):
 class Listed(Made):
     """A task of `[[tasks]]`."""
 
-    name: TaskName | None = None
+    name: keys.TaskName | None = None
     """Its name in messages, tables and figures; by default its kind."""
-    give: NotNegative = 0.0
+    give: keys.NotNegative = 0.0
     """Additional violation that each row may have, for the benefit of the tasks below, in the unit
     of the rows: [1/s] or [1/s^2] times that of the task, or [N] of forces."""
     kind: str
@@ -312,4 +297,4 @@ class OwnTask(Listed, OwnSection):
         return task
 
 
-ListedTask = Annotated[Listed, Registered(None, "tasks", OwnTask)]
+ListedTask = Annotated[Listed, keys.Registered(None, "tasks", OwnTask)]

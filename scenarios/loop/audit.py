@@ -21,7 +21,10 @@ from solvers.status import EQUAL, FREE
 Row = tuple[str, int, int]  # task, row of the task, side: 1 upper, -1 lower
 Signals = Mapping[str, ArrayLike]
 Audit = Callable[[int, Controller], Signals]
-"""Examines a tick that the controller has just answered; returns its values of signals by name."""
+"""Examines a tick that the controller has just answered; returns its values of signals by name.
+
+The first value of a signal decides its shape and type.
+"""
 
 
 @final

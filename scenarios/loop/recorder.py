@@ -61,7 +61,7 @@ class Recorder:
 
     `ticks` is the number of rows written so far; `facts` are those of the first controller.
     `audits` examine every tick that the controller has answered; in others their signals are NaN,
-    -1 or false.
+    -1 if they are integers, or false.
     """
 
     def __init__(self, controller: Controller, ticks: int, audits: Sequence[Audit] = ()) -> None:
@@ -147,7 +147,7 @@ class Recorder:
     def _rows_of(self, name: str, value: NDArray[Any]) -> NDArray[Any]:
         """Return the rows of an audit's signal, which begin when it is first given."""
         if name not in self._audited:
-            nothing = {"f": np.nan, "i": -1, "b": False}[value.dtype.kind]
+            nothing = {"f": np.nan, "i": -1}.get(value.dtype.kind, 0)
             self._audited[name] = np.full((len(self._log.t), *value.shape), nothing, value.dtype)
         return self._audited[name]
 

@@ -8,6 +8,7 @@ from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.config.sensor import CameraSection, DepthErrors
+from tests.helpers.camera_by_hand import bound, deproject
 
 ROBOT = Robot.named("kuka_lwr")
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
@@ -47,7 +48,7 @@ def depths(taken):
 def traced(obstacle, pinhole, u, v):
     """Depth by sphere tracing, from the distance function alone; 0 for a miss."""
     away, row = np.zeros(3), obstacle.packed()
-    ray = pinhole.deproject((u, v, 1.0)) - pinhole.position
+    ray = deproject(pinhole, (u, v, 1.0)) - pinhole.position
     share = 0.0
     for _ in range(2000):
         point = pinhole.position + share * ray
@@ -83,8 +84,8 @@ def test_noise_has_the_stated_size_and_a_bound(depth):
     sigma = 1.2e-3 + 1.9e-3 * (depth - 0.4) ** 2
     assert abs(off.mean()) < 0.05 * sigma
     assert off.std() == pytest.approx(sigma, rel=0.05)
-    bound = DepthErrors(**errors).bound(depth)
-    assert np.abs(off).max() - 1e-6 <= bound == pytest.approx(3.5 * sigma)
+    largest = bound(DepthErrors(**errors), depth)
+    assert np.abs(off).max() - 1e-6 <= largest == pytest.approx(3.5 * sigma)
 
 
 @pytest.mark.parametrize(("rounding", "step"), [("step", 0.01), ("disparity", 2.85e-3)])
@@ -95,7 +96,7 @@ def test_rounding_is_to_steps_of_the_depth_or_of_its_inverse(rounding, step):
     steps = seen[seen > 0] / step if rounding == "step" else 1.0 / seen[seen > 0] / step
     np.testing.assert_allclose(steps, np.rint(steps), atol=2e-3)
     assert len(np.unique(seen)) > 3
-    assert all(abs(a - z) <= DepthErrors(**errors).bound(z) + 1e-6
+    assert all(abs(a - z) <= bound(DepthErrors(**errors), z) + 1e-6
                for a, z in zip(seen[true > 0], true[true > 0], strict=True))
 
 

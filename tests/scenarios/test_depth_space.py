@@ -19,6 +19,7 @@ from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
 from scenarios.config import ScenarioError
 from scenarios.config.sensor import CameraSection, ImageSection
+from tests.helpers.camera_by_hand import deproject
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
@@ -57,7 +58,7 @@ def one_by_one(image, pinhole, point, region, thin=inf, within=inf):
     depth = image[v, u].astype(float)
     own = pinhole.project(point)[2]
     counted = np.where(depth < own, np.minimum(depth + thin, own), depth)
-    off = point - pinhole.deproject(np.column_stack([u, v, counted]))
+    off = point - deproject(pinhole, np.column_stack([u, v, counted]))
     distance = np.linalg.norm(off, axis=1)
     if not (distance < region).any():
         return inf, np.zeros(3), np.zeros(3)

@@ -54,6 +54,14 @@ def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path)
     assert measure(run)[metric].value < (0.1 if "look" in metric else 1e-3)  # deg, or m and rad
 
 
+@pytest.mark.parametrize("task", [
+    COUPLING, FRAME, LOOK, RELATIVE, {"kind": "manipulability", "frame": "end_effector",
+                                      "least": 0.05}], ids=lambda task: task["kind"])
+def test_a_task_is_made_of_its_keys(task, tmp_path):
+    made = build(scenario_of(tmp_path, {**task, "damping": 3.0})).stack[task["kind"]]
+    assert made.damping == 3.0
+
+
 @pytest.mark.slow
 def test_self_collision_is_a_task_of_the_list(tmp_path):
     apart = {"kind": "self-collision", "distance": 0.02, "name": "apart"}

@@ -114,10 +114,6 @@ class TorqueRobot:
                     f"(plant.tilt = {self._section.tilt:g}),")
         return self._stops.passed(self.q)
 
-    def forces(self) -> dict[str, Array]:
-        """Force (3,) [N] of the floor on each contact by name, world axes, in the last period."""
-        return dict(zip(self._touch.names, self._touch.force.copy(), strict=True))
-
     def accelerations(self, torques: Array) -> Array:
         """Accelerations (n,) that torques cause at the present state, in the robot's convention."""
         self.data.ctrl[:] = torques

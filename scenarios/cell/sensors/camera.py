@@ -18,9 +18,10 @@ from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.rendering import draw_scene
-from scenarios.config.sensor import WIDEST, CameraSection, DepthErrors
+from scenarios.config.sensor import CameraSection, DepthErrors
 
 Image = NDArray[np.float32]
+_WIDEST = 3.5      # [standard deviations] at which noise is clipped, so that it is bounded
 _EDGE = 0.05       # [m] depth difference between two pixels at an edge
 _UPRIGHT = 1e-6    # from 1, of a direction's vertical part: the image then has another x axis
 _ROUNDING = 1e-9   # [s] of times that are compared
@@ -68,14 +69,6 @@ class Pinhole:
         depth = seen[..., 2]
         return np.stack([self.fx * seen[..., 0] / depth + self.cx,
                          self.fy * seen[..., 1] / depth + self.cy, depth], axis=-1)
-
-    def deproject(self, pixels: ArrayLike) -> Array:
-        """Return the world points (..., 3) [m] of u, v [px] and depth [m] (..., 3)."""
-        u, v, depth = np.moveaxis(np.asarray(pixels, dtype=float), -1, 0)
-        seen = np.stack([(u - self.cx) / self.fx * depth, (v - self.cy) / self.fy * depth, depth],
-                        axis=-1)
-        return np.asarray(seen @ np.asarray(self.rotation, dtype=float).T
-                          + np.asarray(self.position))
 
 
 def looking_at(position: ArrayLike, target: ArrayLike) -> Array:
@@ -161,7 +154,7 @@ def expose(depth, normal, uniform, errors, reading):
             share = errors[8] if errors[8] > errors[7] and _at_edge(depth, v, u) else errors[7]
             if uniform[v, u] < share:
                 continue
-            chance = min(max(normal[v, u], -WIDEST), WIDEST)
+            chance = min(max(normal[v, u], -_WIDEST), _WIDEST)
             z += chance * (floor + growth * (z - start) * (z - start))
             if step > 0.0 and errors[3] > 0.0:
                 z = 1.0 / (step * np.rint(1.0 / (step * z)))

@@ -8,18 +8,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import (
-    ControlPoint,
-    Measurement,
-    Obstacles,
-    Pairs,
-    Repulsion,
-    measure_pairs,
-)
+from hierarchy.avoidance import Measurement, Obstacles, Pairs, Repulsion, measure_pairs
 from hierarchy.avoidance.control_points import pack_points
 from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.avoidance.repulsion import laws
 from hierarchy.problem import Array
+from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceKind, AvoidanceSection, ObstacleSection
 
@@ -78,9 +72,7 @@ class ExactDistances:
     def __init__(self, robot: Robot, obstacles: Obstacles, body: Repulsion | None = None,
                  tip: Repulsion | None = None,
                  mean_within: tuple[float, float] = (0.0, 0.0), pairs: bool = False) -> None:
-        end = robot.frame(robot.end_effector)
-        self.points = (*robot.control_points,
-                       ControlPoint(robot.end_effector, end.joint, end.offset))
+        self.points = sensed_points(robot)
         self.obstacles, self._mean_within = obstacles, np.array(mean_within)
         self._joints, self._offsets = pack_points(self.points)
         self._laws = packed_laws(body, tip)
