@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmark.machine import machine
 from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import Column, Table
+from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
 from scenarios.problems.reference import family
 from solvers import Resolver, make

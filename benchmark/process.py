@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from itertools import product
+from math import inf
 from pathlib import Path
-from threading import Timer
+from threading import Event, Thread
+from time import monotonic
 from typing import Any, final
 
 from benchmark.packages import Entrant, MissingError, python_of
 
 START_LIMIT = 180.0  # [s] for imports, including compilation of kernels
-CRASHED, HUNG, LEFT_OUT = "crashed", "time limit", "left out after crashes"
+CRASHED, HUNG, LEFT_OUT, SLOW = "crashed", "time limit", "left out after crashes", "too slow"
+_ROOT = Path(__file__).parents[1]  # from which every environment can import the benchmark
+_WAITING = 10.0  # times the limit that an answer may take where other work has the processor
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -30,25 +33,16 @@ class EndedError(MissingError):
         self.kind = kind
 
 
-@contextmanager
-def staged() -> Iterator[Path]:
-    """Give a folder from which environments without this project can import the benchmark."""
-    with tempfile.TemporaryDirectory() as temporary:
-        shutil.copytree(Path(__file__).parent, Path(temporary) / "benchmark",
-                        ignore=shutil.ignore_patterns("__pycache__", "studies", "reproduce"))
-        yield Path(temporary)
-
-
 @final
 class Process:
     """`benchmark.worker` for one entrant; MissingError where it cannot be had.
 
-    questions : MODULE:CLASS of what asks it. folder : of `staged`. about : what it says of itself.
+    questions : MODULE:CLASS of what asks it. about : what it says of itself.
     """
 
-    def __init__(self, entrant: Entrant, questions: str, folder: Path) -> None:
+    def __init__(self, entrant: Entrant, questions: str) -> None:
         self.entrant, self.questions = entrant, questions
-        self._folder, self._hung, self._fresh, self._starts = folder, False, False, 0
+        self._hung, self._fresh, self._starts = False, False, 0
         self._process: subprocess.Popen[str] | None = None
         self.about: dict[str, Any] = {}
         self._begin()
@@ -67,6 +61,8 @@ class Process:
     def ask(self, question: tuple[Any, ...], limit: float) -> Any:
         """Return the answer to (METHOD, ARGUMENTS...); EndedError if none comes in `limit` [s].
 
+        The limit is of processor time, so that other work on the machine ends nobody.
+
         The first question to a process may load and compile, and has more time; the next one after
         an end starts a new process.
         """
@@ -74,15 +70,16 @@ class Process:
             self._begin()
         assert self._process is not None
         assert self._process.stdin is not None
+        wait, more = _WAITING * limit, START_LIMIT if self._starts == 1 else 2.0 * limit
         if self._fresh:
-            limit += START_LIMIT if self._starts == 1 else 2.0 * limit
+            limit, wait = limit + more, wait + more
         self._fresh = False
         try:
             self._process.stdin.write(json.dumps(question) + "\n")
             self._process.stdin.flush()
         except OSError:  # it has ended; why, the log says
             pass
-        return self._next(limit)
+        return self._next(limit, wait)
 
     def _begin(self) -> None:
         entrant = self.entrant
@@ -97,34 +94,40 @@ class Process:
                 [python, "-m", "benchmark.worker", self.questions, entrant.adapter,
                  json.dumps(dict(entrant.options)), entrant.package.name, core],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True,
-                cwd=self._folder, env=own)
+                cwd=_ROOT, env=own)
         except OSError as error:
             self._log.close()
             raise MissingError(f"{python}: {error.strerror}") from error
         self._starts, self._fresh = self._starts + 1, True
-        self.about = self._next(START_LIMIT)
+        self.about = self._next(START_LIMIT, START_LIMIT)
 
-    def _next(self, limit: float) -> Any:
-        """Return the next line; raises EndedError if there is none within the limit [s]."""
+    def _next(self, limit: float, wait: float) -> Any:
+        """Return the next line; raises EndedError if there is none within the limits [s]."""
         assert self._process is not None
         assert self._process.stdout is not None
         self._hung = False
-        timer = Timer(limit, self._kill)
-        timer.start()
+        done = Event()
+        Thread(target=self._watch, args=(self._process, done, limit, wait)).start()
         try:
             line = self._process.stdout.readline()
         finally:
-            timer.cancel()
+            done.set()
         if line.endswith("\n"):
             return json.loads(line)
         kind, why = HUNG if self._hung else CRASHED, self._last_words()
         self.__exit__()
         raise EndedError(kind, why)
 
-    def _kill(self) -> None:
-        self._hung = True
-        assert self._process is not None
-        self._process.kill()
+    def _watch(self, process: subprocess.Popen[str], done: Event, limit: float, wait: float
+               ) -> None:
+        """End a process that works for `limit` [s], or for which `wait` [s] pass, before `done`."""
+        begin, until, left = _busy(process.pid), monotonic() + wait, limit
+        while not done.wait(left):
+            left = min(begin + limit - _busy(process.pid), until - monotonic())
+            if left <= 0.0:
+                self._hung = True
+                process.kill()
+                return
 
     def _last_words(self) -> str:
         assert self._process is not None
@@ -132,6 +135,16 @@ class Process:
         self._log.seek(0)
         lines = self._log.read().strip().splitlines()
         return f"ended with code {code}" + (f": {lines[-1]}" if lines else "")
+
+
+def _busy(process: int) -> float:
+    """Return the processor time of a process [s]; the time that has passed if it is not known."""
+    file = Path(f"/proc/{process}/stat")
+    try:
+        ticks = file.read_text().rpartition(")")[2].split()[11:13]
+    except OSError:
+        return monotonic()
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
 
 
 @final
@@ -145,41 +158,35 @@ class Field(ExitStack):
         super().__init__()
         self.running: dict[str, Process] = {}
         self.missing: dict[str, str] = {}
-        folder = self.enter_context(staged())
         for one in entrants:
             try:
-                self.running[one.label] = self.enter_context(Process(one, questions, folder))
+                self.running[one.label] = self.enter_context(Process(one, questions))
             except MissingError as error:
                 self.missing[one.label] = str(error)
 
-    def ask(self, question: tuple[Any, ...], limit: float, labels: Iterable[str] | None = None
-            ) -> dict[str, Any]:
-        """Return the answers to a question; whose process ends within `limit` [s] is missing."""
-        found = {}
-        for label in tuple(self.running if labels is None else labels):
-            try:
-                found[label] = self.running[label].ask(question, limit)
-            except MissingError as error:
-                self.missing[label] = str(error)
-                del self.running[label]
-        return found
-
     def answers(self, questions: Iterable[tuple[Any, ...]], limit: float, most: int,
-                labels: Iterable[str] | None = None) -> dict[str, list[dict[str, Any]]]:
+                labels: Iterable[str] | None = None, patience: float = inf
+                ) -> dict[str, list[dict[str, Any]]]:
         """Return the answers to questions, or how and why a process ended without one.
 
-        An entrant whose process has ended `most` times is not asked the rest.
+        An entrant whose process has ended `most` times is not asked the rest, nor is one whose
+        answers say that they took more than `patience` [s] of processor time together.
         """
         found: dict[str, list[dict[str, Any]]] = {
             label: [] for label in (self.running if labels is None else labels)}
-        ends = dict.fromkeys(found, 0)
+        ends, spent = dict.fromkeys(found, 0), dict.fromkeys(found, 0.0)
         for question, (label, answers) in product(questions, found.items()):
             if ends[label] >= most:
                 answers.append({"ended": LEFT_OUT})
                 continue
+            if spent[label] > patience:
+                answers.append({"refused": SLOW})
+                continue
             try:
-                answers.append(self.running[label].ask(question, limit))
+                answers.append(self.running[label].ask(question, limit) or {})
+                spent[label] += answers[-1].get("busy_s", 0.0)
             except EndedError as end:
                 ends[label] += 1
+                spent[label] += limit
                 answers.append({"ended": end.kind, "why": str(end)})
         return found

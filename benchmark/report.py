@@ -12,8 +12,8 @@ from typing import final
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from benchmark.machine import machine
 from benchmark.tables import Column, Row, Table, text, write_rows
+from benchmark.timing import machine
 from scenarios.draw.figures import drawing
 from scenarios.files import make_folder, slug, write_json, write_text
 from scenarios.templates import filled, resource

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from zipfile import ZipFile
 
 from benchmark.report import Report, Section
+from benchmark.solve.questions import resident
 from benchmark.store import Row
 from benchmark.tables import Column, Table, digits
 
@@ -211,19 +212,12 @@ def memory(folder: Path) -> list[Cost]:
             Cost("growth over the last 15 runs", after[-1] - after[4], "MB")]
 
 
-def resident() -> float:
-    """Return the resident memory [MB] of this process; 0 if it is unknown."""
-    file = Path("/proc/self/statm")
-    pages = int(file.read_text().split()[1]) if file.is_file() else 0
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1024.0**2 if pages else 0.0
-
-
 def resident_after(job: Any) -> float:
-    """Return the resident memory [MB] of this process after a run of a sweep."""
+    """Return the most memory [MB] that this process has had after a run of a sweep."""
     from scenarios.results.run import outcome
 
     outcome(job)
-    return resident()
+    return resident() / 1024.0
 
 
 class _Done(NamedTuple):

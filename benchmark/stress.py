@@ -108,8 +108,9 @@ def problem(resolver: Resolver, kind: str, seed: int) -> Hierarchy:
     return problems.bounded(h, seed) if inside else h
 
 
-def tally(name: str, seeds: range, kind: str = RECIPE) -> Tally:
-    """Judge the resolver called `name` on the problems of these seeds."""
+def tally(job: tuple[str, range, str]) -> Tally:
+    """Judge a resolver, by name, on the problems of some seeds and a kind."""
+    name, seeds, kind = job
     resolver, found = make(name), Tally()
     for seed in seeds:
         h = problem(resolver, kind, seed)
@@ -119,10 +120,6 @@ def tally(name: str, seeds: range, kind: str = RECIPE) -> Tally:
         if what in FAILURES:
             found.failing.append((seed, what))
     return found
-
-
-def _tally(job: tuple[str, range, str]) -> Tally:
-    return tally(*job)
 
 
 def run(count: int, name: str, first: int = 0, processes: int | None = None, kind: str = RECIPE
@@ -135,16 +132,13 @@ def run(count: int, name: str, first: int = 0, processes: int | None = None, kin
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by the processes when they start
     kinds = KINDS if kind == ALL else (kind,)
     each, found = -(-count // len(kinds)), {one: Tally() for one in kinds}
-    jobs = [(name, seeds, one) for one in kinds for seeds in _chunks(first, each)]
+    jobs = [(name, range(i, min(i + _CHUNK, first + each)), one) for one in kinds
+            for i in range(first, first + each, _CHUNK)]
     with bar("problems") as told:
-        for (_, seeds, one), part in ended(_tally, jobs, processes):
+        for (_, seeds, one), part in ended(tally, jobs, processes):
             found[one].add(part or Tally(Counter({CRASHED: len(seeds)}), lost=[seeds]))
             told(name, sum(some.counts.total() for some in found.values()), each * len(kinds))
     return found
-
-
-def _chunks(first: int, count: int) -> list[range]:
-    return [range(i, min(i + _CHUNK, first + count)) for i in range(first, first + count, _CHUNK)]
 
 
 def report(name: str, found: Mapping[str, Tally], out: Path) -> Report:

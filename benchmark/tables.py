@@ -17,47 +17,27 @@ Row = Mapping[str, Any]
 NONE = "–"
 
 
-def digits(value: Any) -> str:
-    """Return a number with three digits, or all digits before the decimal point."""
-    if _absent(value):
-        return NONE
-    return f"{value:.0f}" if value >= 100.0 else f"{value:.1f}" if value >= 10.0 else f"{value:.2f}"
+def _known(form: Callable[[Any], str]) -> Callable[[Any], str]:
+    """Return a form of values that writes what is not known as a dash."""
+    return lambda value: (NONE if value is None or (isinstance(value, float) and isnan(value))
+                          else form(value))
 
 
-def short(value: Any) -> str:
-    """Return a number with one decimal, or all digits before the decimal point."""
-    return whole(value) if _absent(value) or value >= 10.0 else f"{value:.1f}"
-
-
-def power(value: Any) -> str:
-    """Return a size as 1e-09."""
-    return NONE if _absent(value) else f"{value:.0e}"
-
-
-def whole(value: Any) -> str:
-    """Return a number without decimals."""
-    return NONE if _absent(value) else f"{value:.0f}"
-
-
-def text(value: Any) -> str:
-    """Return words, in a column whose lines are broken."""
-    return NONE if value is None else str(value)
-
-
-def percent(value: Any) -> str:
-    """Return a share in percent; 100 only if it is all."""
-    if _absent(value):
-        return NONE
-    return f"{100.0 * value:.0f}%" if value in (0.0, 1.0) else f"{min(100.0 * value, 99.9):.1f}%"
-
-
-def yes(value: Any) -> str:
-    """Return yes or no."""
-    return NONE if value is None else "yes" if value else "no"
-
-
-def _absent(value: Any) -> bool:
-    return value is None or (isinstance(value, float) and isnan(value))
+text = _known(str)
+"""Words, in a column whose lines are broken."""
+whole = _known("{:.0f}".format)
+"""A number without decimals."""
+power = _known("{:.0e}".format)
+"""A size, as 1e-09."""
+short = _known(lambda value: f"{value:.{int(value < 10.0)}f}")
+"""A number with one decimal, or all digits before the decimal point."""
+digits = _known(lambda value: f"{value:.{2 - (value >= 10.0) - (value >= 100.0)}f}")
+"""A number with three digits, or all digits before the decimal point."""
+yes = _known(lambda value: "yes" if value else "no")
+"""Yes or no."""
+percent = _known(lambda value: f"{100.0 * value:.0f}%" if value in (0.0, 1.0) else
+                 f"{min(100.0 * value, 99.9):.1f}%")
+"""A share in percent; 100 only if it is all."""
 
 
 class Column(NamedTuple):

@@ -7,14 +7,16 @@ from time import perf_counter
 
 import numpy as np
 
-from benchmark.machine import one_core
-from benchmark.plain import PlainTick
 from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import TIMES, Column, Table, whole
-from benchmark.timing import times_of
+from benchmark.timing import one_core, times_of
+from hierarchy import HierarchyError, State
+from hierarchy.allocation import allocate
+from hierarchy.avoidance import ControlPoint
 from hierarchy.problem import Array
-from scenarios.cell.build import build
+from hierarchy.robot import Frame
+from scenarios.cell.build import Cell, build
 from scenarios.config import Scenario, load
 from scenarios.loop.simulation import simulate
 from scenarios.recording.recording import Recording
@@ -90,3 +92,100 @@ def _plain(scenario: Scenario, path: Recording) -> Array:
                 raise AssertionError(f"tick {k}: compiled and plain commands differ by "
                                      f"{np.abs(found - a).max()}")
     return times[LEAD_IN:]
+
+
+class PlainTick:
+    """The tick of `ellipse` in plain numpy, which the compiled tick replaces.
+
+    It has the same kinematics call, tasks, order and TPM (plain QR, damped pivots), so the commands
+    must agree. `log` collects the signals of a recording.
+    """
+
+    def __init__(self, scenario: Scenario, cell: Cell) -> None:
+        if not (cell.sensor and cell.tasks.areas and cell.tasks.position and cell.tasks.pointing):
+            raise HierarchyError("the plain tick needs all tasks of `ellipse`")
+        self.cell, self.areas = cell, cell.tasks.areas
+        self.position, self.pointing = cell.tasks.position, cell.tasks.pointing
+        self.period = scenario.control.period
+        self.obstacles = cell.sensor.obstacles.centres
+        self.frame = cell.tasks.position.frame
+        self.log: list[tuple[object, ...]] = []
+
+    def step(self, t: float, q: Array, v: Array) -> Array:
+        """Sense, allocate, stack, resolve, integrate, record; return the acceleration."""
+        cell, state = self.cell, self.cell.state
+        state.move(t, q, v)
+        points = [_position(state, point) for point in cell.robot.control_points]
+        gaps = [np.linalg.norm(point - self.obstacles, axis=1) for point in points]
+        nearest = [float(gap.min()) for gap in gaps]
+        k = int(np.argmin(nearest))
+        p, J, dJ = _position(state, self.frame), *_jacobians(state, self.frame)
+        end_gaps = np.linalg.norm(p - self.obstacles, axis=1)
+        z_e = state.rotation(self.frame)[:, 2]
+        z_d = self.pointing.z_d
+        cone = float(self.pointing.cos_alpha_d - z_d @ z_e)
+        order, repulsion = allocate(nearest[k], float(end_gaps.min()), cone, self.areas)
+
+        rows = {}
+        p_d, dp_d, ddp_d = self.position.path(t)
+        target = ddp_d + 20.0 * (dp_d - J @ v) + 40.0 * (p_d - p) - dJ @ v
+        if repulsion:
+            j = int(np.argmin(end_gaps))
+            target = target + _magnitude(end_gaps[j], 5.0, 0.1, 10.0, 1.5) * (
+                p - self.obstacles[j]) / end_gaps[j]
+        rows["position"] = J, target
+        if "pointing" in order:
+            w = state.J[3:] @ v
+            arm = np.cross(z_e, z_d)
+            J_rp = arm @ state.J[3:]
+            drift = (np.cross(np.cross(w, z_e), z_d) @ state.J[3:] + arm @ state.dJ[3:]) @ v
+            rows["pointing"] = J_rp[None], np.array([5.0 * cone - 2.0 * J_rp @ v - drift])
+        if "avoidance" in order:
+            j = int(np.argmin(gaps[k]))
+            r = (points[k] - self.obstacles[j]) / nearest[k]
+            J_c, dJ_c = _jacobians(state, cell.robot.control_points[k])
+            magnitude = _magnitude(nearest[k], 0.15, 0.15, 2.0, 3.0)
+            rows["avoidance"] = (r @ J_c)[None], np.array([magnitude - r @ dJ_c @ v])
+        a = _published_tpm([rows[name] for name in order], -5.0 * v)
+
+        q = q + v * self.period + a * self.period**2 / 2
+        self.log.append((t, q, v + a * self.period, a, p, p_d, cone, nearest, order))
+        return a
+
+
+def _position(state: State, point: Frame | ControlPoint) -> Array:
+    row = state.placements[point.joint]
+    return np.asarray(row[9:] + row[:9].reshape(3, 3).T @ point.offset)
+
+
+def _jacobians(state: State, point: Frame | ControlPoint) -> tuple[Array, Array]:
+    p, mask = _position(state, point), state.supports[point.joint]
+    J = (state.J[:3] + np.cross(state.J[3:].T, p).T) * mask
+    dJ = (state.dJ[:3] + np.cross(state.dJ[3:].T, p).T
+          + np.cross(state.J[3:].T, J @ state.v).T) * mask
+    return J, dJ
+
+
+def _magnitude(distance: float, maximum: float, reach: float, shape: float, scale: float) -> float:
+    return float(maximum / (1.0 + np.exp((distance * scale / reach - 1.0) * shape)))
+
+
+def _published_tpm(levels: list[tuple[Array, Array]], reference: Array) -> Array:
+    J = np.vstack([J for J, _ in levels])
+    b = np.concatenate([b for _, b in levels])
+    _, R = np.linalg.qr(J.T)
+    F, first = R.copy(), 0
+    for J_i, _ in levels:
+        rows = slice(first, first + len(J_i))
+        F[rows] = _damped_inverse(R[rows, rows]) @ F[rows]
+        F[:first] -= F[:first, rows] @ F[rows]
+        first = rows.stop
+    return np.asarray(np.linalg.pinv(J) @ (F.T @ b - J @ reference) + reference)
+
+
+def _damped_inverse(R: Array) -> Array:
+    smallest = np.linalg.svd(R, compute_uv=False)[-1]
+    if smallest >= 0.1:
+        return np.asarray(np.linalg.inv(R))
+    damping = (1.0 - (smallest / 0.1) ** 2) * 0.05**2
+    return np.asarray(R.T @ np.linalg.inv(R @ R.T + damping * np.eye(len(R))))

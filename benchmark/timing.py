@@ -1,20 +1,44 @@
-"""Calls timed in turns, so that noise of the machine affects all equally."""
+"""The machine, one core of it, and calls timed in turns, so that its noise affects all equally."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import metadata
 from math import nan
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from benchmark.machine import one_core
 from benchmark.worker import Repeats, timed
 from hierarchy.problem import Array
+from scenarios.measure.run_folder import versions
 
 FOR_P999 = 1000  # times needed for a 99.9th percentile
 TURN = Repeats(least=1, turn=1_000_000)
+_PACKAGES = "scipy", "quadprog", "daqp", "piqp", "clarabel"  # besides those of a run
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Pin this process to one of its cores, if the system can, and restore them afterwards."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def machine() -> dict[str, str]:
+    """Return processor, cores and versions by name, without personal data."""
+    known = {one.metadata["Name"]: one.version for one in metadata.distributions()}
+    return {**versions(), **{name: known.get(name, "not installed") for name in _PACKAGES}}
 
 
 def times_of(nanoseconds: Sequence[float] | Array, prefix: str = "") -> dict[str, float]:
@@ -45,6 +69,6 @@ def take_turns(calls: Sequence[tuple[Mapping[str, Any], Callable[[], Any]]], sec
         while not times[0] or perf_counter() < end:
             for own, (_, call) in zip(times, calls, strict=True):
                 call()
-                own += timed(call, TURN)
+                own += timed(call, TURN)[0]
     return [{**about, "solves": len(own), **times_of(own)}
             for own, (about, _) in zip(times, calls, strict=True)]

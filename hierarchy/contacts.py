@@ -10,8 +10,6 @@ which torques an x takes. Source: L. Sentis, O. Khatib, "Synthesis of Whole-Body
 Hierarchical Control of Behavioral Primitives", International Journal of Humanoid Robotics (2005).
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -5,8 +5,6 @@ on body j has the columns J_v + J_w x p of the joints that support j. Its time d
 dJ_v + dJ_w x p + J_w x dp/dt. `placements` rows are rotation (by columns) and translation.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -84,36 +82,6 @@ def write_point_jacobian(J, placements, supports, joint, offset, A, row):
             A[row + 2, c] = 0.0
 
 
-@compiled
-def write_point_jacobian_derivative(kinematics, joint, offset, out):
-    """Write d/dt dp/dq of a point into out (3, n), exact or as a backward difference."""
-    v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
-    if period > 0.0:
-        before = np.empty((3, out.shape[1]))
-        write_point_jacobian(J, placements, supports, joint, offset, out, 0)
-        write_point_jacobian(previous_J, previous_placements, supports, joint, offset, before, 0)
-        subtract_over_period(out, before, period)
-        return
-    x = point_at(placements, joint, offset, 0)
-    y = point_at(placements, joint, offset, 1)
-    z = point_at(placements, joint, offset, 2)
-    dx, dy, dz = 0.0, 0.0, 0.0
-    for c in range(out.shape[1]):
-        if supports[joint, c]:
-            dx += (J[0, c] + J[4, c] * z - J[5, c] * y) * v[c]
-            dy += (J[1, c] + J[5, c] * x - J[3, c] * z) * v[c]
-            dz += (J[2, c] + J[3, c] * y - J[4, c] * x) * v[c]
-    for c in range(out.shape[1]):
-        if supports[joint, c]:
-            out[0, c] = dJ[0, c] + dJ[4, c] * z - dJ[5, c] * y + J[4, c] * dz - J[5, c] * dy
-            out[1, c] = dJ[1, c] + dJ[5, c] * x - dJ[3, c] * z + J[5, c] * dx - J[3, c] * dz
-            out[2, c] = dJ[2, c] + dJ[3, c] * y - dJ[4, c] * x + J[3, c] * dy - J[4, c] * dx
-        else:
-            out[0, c] = 0.0
-            out[1, c] = 0.0
-            out[2, c] = 0.0
-
-
 @inlined
 def velocity_of_point(J, supports, joint, v, x, y, z):
     """Velocity of the material point at x, y, z, and the angular velocity of its body."""
@@ -150,6 +118,13 @@ def drift_of_point(kinematics, joint, ox, oy, oz):
 
 
 @inlined
+def moving_point(kinematics, joint, o):
+    """Velocity and drift of the point at offset o, and the angular velocity of its body."""
+    vx, vy, vz, ax, ay, az, wx, wy, wz = drift_of_point(kinematics, joint, o[0], o[1], o[2])
+    return (vx, vy, vz), (ax, ay, az), (wx, wy, wz)
+
+
+@inlined
 def add_row(J, supports, joint, point, r, A, row):
     """Add r^T J_c (n,) of the material point at `point` of a body to A[row]."""
     (x, y, z), (rx, ry, rz) = point, r
@@ -178,14 +153,6 @@ def write_identity(A, row, count):
         A[row + i, base + i] = 1.0
 
 
-@compiled
-def subtract_over_period(now, before, period):
-    """Replace `now` by the backward difference (now - before) / period."""
-    for i in range(now.shape[0]):
-        for c in range(now.shape[1]):
-            now[i, c] = (now[i, c] - before[i, c]) / period
-
-
 @inlined
 def row_times(A, row, v):
     """A[row] v."""
@@ -200,3 +167,39 @@ def write_equality(lower, upper, row, value):
     """Make a row an equality."""
     lower[row] = value
     upper[row] = value
+
+
+@inlined
+def triple(a, i):
+    """Three entries of an array, from i on, as a tuple."""
+    return a[i], a[i + 1], a[i + 2]
+
+
+@inlined
+def dot(a, b):
+    """a . b of tuples."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def crossed(a, b):
+    """a x b of tuples."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined
+def less(a, b):
+    """a - b of tuples."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inlined
+def plus(a, b):
+    """a + b of tuples."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined
+def times(factor, a):
+    """A multiple of a tuple."""
+    return factor * a[0], factor * a[1], factor * a[2]

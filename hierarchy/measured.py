@@ -4,8 +4,6 @@ What a task measures is apart from what is asked of it: one kernel, here, makes 
 of all such tasks, for their gains and at each level.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from abc import abstractmethod
@@ -22,10 +20,9 @@ from hierarchy.kinematics import Kinematics
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Task, derivative
 
 _NONE, _EXACT, _DIFFERENCE = 0, 1, 2  # the derivative of the Jacobian
-_STEP = 2.0**-10  # [s] of the differences that give the derivative of a Jacobian
 
 
 class Motion(NamedTuple):
@@ -99,27 +96,23 @@ class Measured(Task):
         return self._measured(state)[0]
 
     def jacobian_derivative(self, state: State) -> Array:
-        """Time derivative of the Jacobian at a state: (m, n), exact to rounding.
+        """Time derivative of the Jacobian at a state: (m, n), by differences: to some 1e-9.
 
-        With `State.period` it is a backward difference.
+        With `State.period` it is a backward difference, unless the task is `exact`.
         """
+        if state.period == 0.0 or self.exact:
+            return derivative(self, state)
         now = state.kinematics
-        if state.period > 0.0:
-            before = now._replace(J=now.previous_J, placements=now.previous_placements)
-            return np.asarray((self.jacobian(state) - self._measured(state, before)[0])
-                              / state.period)
-        coarse, fine = (
-            (self._measured(state, _moved(now, h))[0] - self._measured(state, _moved(now, -h))[0])
-            / (2.0 * h) for h in (_STEP, _STEP / 2.0))
-        return np.asarray((4.0 * fine - coarse) / 3.0)
+        before = now._replace(J=now.previous_J, placements=now.previous_placements)
+        return np.asarray((self.jacobian(state) - self._measured(state, before)[0]) / state.period)
 
     def desired_velocity(self, state: State) -> Array:
         """Feedforward dp_d/dt: (m,)."""
-        return np.asarray(self._goal(state)[1])
+        return np.asarray(self._measured(state)[2][1])
 
     def desired_acceleration(self, state: State) -> Array:
         """Feedforward d2p_d/dt2: (m,)."""
-        return np.asarray(self._goal(state)[2])
+        return np.asarray(self._measured(state)[2][2])
 
     def reference_velocity(self, state: State) -> Array:
         """Closed loop and push (m,)."""
@@ -155,8 +148,9 @@ class Measured(Task):
                       _EXACT if self.exact or state.period == 0.0 else _DIFFERENCE)
         return _Asked(self.goal(state), settings, derivative, motion, np.zeros((m, state.n)))
 
-    def _measured(self, state: State, kinematics: Kinematics | None = None) -> tuple[Array, Motion]:
-        """The Jacobian (m, n) and the rest of what is measured."""
+    def _measured(self, state: State, kinematics: Kinematics | None = None
+                  ) -> tuple[Array, Motion, Array]:
+        """The Jacobian (m, n), the rest of what is measured, and the goal of each row (3, m)."""
         task = cast("Measured", self.on(state.robot))
         function, reads = task.measure(state)
         m = task.dimension
@@ -167,16 +161,7 @@ class Measured(Task):
             move_goal(state.t)
         # Called, not bound: to bind takes 0.5 ms.
         function(kinematics or state.kinematics, reads, asked, J, *sides, 0)
-        return J, Motion(*motion[:4])
-
-    def _goal(self, state: State) -> Array:
-        """p_d, dp_d/dt and d2p_d/dt2 (3, m), zero where no path leads."""
-        task = cast("Measured", self.on(state.robot))
-        goal = task.goal(state)
-        move_goal = task.follow(state, goal)
-        if move_goal is not None:
-            move_goal(state.t)
-        return np.hstack([goal, np.zeros((3, 1))])[:, task.columns]
+        return J, Motion(*motion[:4]), np.hstack([asked.goal, np.zeros((3, 1))])[:, task.columns]
 
 
 def measured(function: Kernel) -> Kernel:
@@ -185,12 +170,25 @@ def measured(function: Kernel) -> Kernel:
     function(kinematics, reads, goal, J, motion) writes J (m, n), zero before, and `Motion`; see
     `Kinematics`. `goal` (3, 3) is p_d, dp_d/dt and d2p_d/dt2 of the path now.
     """
-    # A copy of the kernel below with this function, so that both are compiled into one.
-    about = {**globals(), "_measure": inlined(function), "__name__": function.__module__}
-    rows = FunctionType(_rows.__code__, about, function.__name__)
+    return compiled(_copy_of_rows(function, _measure=inlined(function)))
+
+
+def plain(function: Kernel) -> Kernel:
+    """Do the same without compiling, for a function of numpy that writes all that it has each time.
+
+    What it reads may be any objects.
+    """
+    return _copy_of_rows(function, _measure=function, clear=lambda *_: None,
+                         close=getattr(close, "py_func", close))
+
+
+def _copy_of_rows(function: Kernel, **known: Any) -> Kernel:
+    """Return a copy of the kernel below with this function, so that both are compiled into one."""
+    rows = FunctionType(_rows.__code__, {**globals(), **known, "__name__": function.__module__},
+                        function.__name__)
     rows.__module__, rows.__qualname__ = function.__module__, function.__qualname__
     rows.__doc__ = function.__doc__
-    return compiled(rows)
+    return rows
 
 
 _measure: Any = None  # what a copy of `_rows` calls
@@ -239,15 +237,3 @@ def close(motion, goal, settings, derivative, lower, upper, row, i):
              + settings[0, i] * motion.error[i] - motion.drift[i])
     lower[row] = b + motion.push[i]
     upper[row] = lower[row] + settings[3, i]
-
-
-def _moved(kinematics: Kinematics, step: float) -> Kinematics:
-    """Return Jacobian and placements moved along their derivatives by `step` [s]."""
-    v, J, dJ, placements, supports = kinematics[:5]
-    motion = (supports * v) @ J.T  # of each body: velocity at the world's origin, turning
-    rates = np.empty_like(placements)
-    for k in range(4):  # three axes, and the origin
-        rates[:, 3 * k:3 * k + 3] = np.cross(motion[:, 3:], placements[:, 3 * k:3 * k + 3])
-    rates[:, 9:] += motion[:, :3]
-    return kinematics._replace(J=np.asfortranarray(J + step * dJ),
-                               placements=placements + step * rates)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from operator import attrgetter
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,20 +33,14 @@ from hierarchy.records import set_frozen
 _ROUNDING = 1e-10  # of a violation, relative to 1 + |a| |x|
 _ARRAYS = ("A", "lower", "upper", "reference", "metric", "give")  # what can be set
 
-_Kind = TypeVar("_Kind")
 
+def _handed_out(kept: Callable[[Hierarchy], Any]) -> Any:
+    """Return an array that is handed out as a view: numpy lets its holder change its shape."""
+    def view(h: Hierarchy) -> Any:
+        array = kept(h)
+        return None if array is None else array.view()
 
-class _HandedOut(Generic[_Kind]):
-    """An array that a hierarchy hands out as a view: numpy lets its holder change its shape."""
-
-    def __init__(self, kept: Callable[[Any], Any]) -> None:
-        self._kept = kept
-
-    def __get__(self, h: Hierarchy | None, owner: type) -> _Kind:
-        if h is None:
-            return self  # type: ignore[return-value]
-        array: Any = self._kept(h)
-        return None if array is None else array.view()  # type: ignore[return-value]
+    return property(view)
 
 
 @lru_cache(maxsize=256)
@@ -55,6 +49,13 @@ def _layout(sizes: bytes) -> tuple[Sizes, Sizes]:
     kept = np.frombuffer(sizes, np.int64)
     offsets = np.frombuffer(np.append(0, kept.cumsum()).tobytes(), np.int64)
     return kept.view(), offsets.view()  # whose `base` is another array
+
+
+@lru_cache(maxsize=256)
+def _giving(give: bytes, sizes: bytes) -> tuple[int, ...]:
+    """Return the levels with a row that gives, from the bytes of both."""
+    rows = np.flatnonzero(np.frombuffer(give) > 0.0)
+    return tuple(np.unique(np.searchsorted(_layout(sizes)[1], rows, side="right") - 1).tolist())
 
 
 class Hierarchy:
@@ -78,13 +79,14 @@ class Hierarchy:
     __slots__ = ("_give", "_metric", "_reference", "m", "n", "named", "names", "plain", "rows",
                  "start")
 
-    A = _HandedOut[Array](lambda h: h.rows[0])
-    lower = _HandedOut[Array](lambda h: h.rows[1])
-    upper = _HandedOut[Array](lambda h: h.rows[2])
-    sizes = _HandedOut[Sizes](lambda h: _layout(h.rows[3].tobytes())[0])
-    offsets = _HandedOut[Sizes](lambda h: _layout(h.rows[3].tobytes())[1])
-    reference = _HandedOut[Array](attrgetter("_reference"))
-    metric, give = (_HandedOut[Array | None](attrgetter(name)) for name in ("_metric", "_give"))
+    A: Array = _handed_out(lambda h: h.rows[0])
+    lower: Array = _handed_out(lambda h: h.rows[1])
+    upper: Array = _handed_out(lambda h: h.rows[2])
+    sizes: Sizes = _handed_out(lambda h: _layout(h.rows[3].tobytes())[0])
+    offsets: Sizes = _handed_out(lambda h: _layout(h.rows[3].tobytes())[1])
+    reference: Array = _handed_out(attrgetter("_reference"))
+    metric: Array | None = _handed_out(attrgetter("_metric"))
+    give: Array | None = _handed_out(attrgetter("_give"))
 
     n: int
     m: int
@@ -232,21 +234,25 @@ class Hierarchy:
     def giving(self) -> list[int]:
         """The levels with a row that gives."""
         give = self._give
-        if give is None:
-            return []
-        rows = np.flatnonzero(give > 0.0)
-        return sorted(set((np.searchsorted(self.offsets, rows, side="right") - 1).tolist()))
+        return [] if give is None else list(_giving(give.tobytes(), self.rows[3].tobytes()))
 
     def _bounds(self) -> Iterator[tuple[int, int]]:
         """Yield the first row of each level and the one after its last."""
         return pairwise(self.offsets.tolist())
 
-    def upper_part(self, count: int) -> Hierarchy:
-        """Return the first `count` levels, as views, none of which gives."""
-        m = self.offsets[count]
-        return self.changed(A=self.A[:m], lower=self.lower[:m], upper=self.upper[:m],
-                            sizes=self.sizes[:count], names=self.names[:count], give=None,
-                            named=None)
+    def upper_part(self, count: int, sides: tuple[Array, Array] | None = None) -> Hierarchy:
+        """Return the first `count` levels, as views, none of which gives.
+
+        sides : lower and upper (m,), in place of those of all levels.
+        """
+        A, lower, upper, sizes = self.rows
+        lower, upper = sides or (lower, upper)
+        m = int(_layout(sizes.tobytes())[1][count])
+        part = object.__new__(Hierarchy)
+        set_frozen(part, rows=(A[:m], lower[:m], upper[:m], sizes[:count]), start=self.start, m=m,
+                   n=self.n, names=self.names[:count], named=None, plain=self._metric is None,
+                   _reference=self._reference, _metric=self._metric, _give=None)
+        return part
 
     def relaxed(self, level: int, x: ArrayLike) -> Hierarchy:
         """Return the hierarchy whose level is relaxed by its violations at x and by its `give`.

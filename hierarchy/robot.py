@@ -19,17 +19,21 @@ from numpy.typing import ArrayLike
 
 from hierarchy import plugins
 from hierarchy.avoidance.control_points import ControlPoint
-from hierarchy.avoidance.self_collision import Capsule
 from hierarchy.errors import RobotError, UnknownNameError, expect, file_path, finite_numbers
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
-from hierarchy.robots.found import Coupled, Found, Loop, is_floating
-from hierarchy.robots.frames import ambiguous, frames_called, in_words
+from hierarchy.robots.found import (
+    Found,
+    ambiguous,
+    frames_called,
+    in_words,
+    is_floating,
+    points_along_chain,
+)
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.joints import coordinates_of, normalise, parts_of, set_joint, values_of
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
-from hierarchy.robots.points import points_along_chain
 from hierarchy.robots.table import Base, Table
 
 ROBOTS = TABLES
@@ -83,9 +87,7 @@ class Robot:
     """
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
-                 control_points: tuple[ControlPoint, ...] = (),
-                 capsules: tuple[Capsule, ...] = (), rest: Array | None = None,
-                 missing: tuple[str, ...] = ()) -> None:
+                 found: Found | None = None) -> None:
         expect("Robot: model", model, pin.Model, "Robot.load makes a robot of a name or a file")
         expect("Robot: name", name, str, "give a text")
         self.model, self.name = model, name
@@ -111,16 +113,15 @@ class Robot:
         inertias = list(model.inertias)
         self.masses = np.array([0.0, *(float(inertia.mass) for inertia in inertias[1:])])
         self.centres = np.array([np.zeros(3), *(inertia.lever for inertia in inertias[1:])])
-        self.end_effector = end_effector or self.frame_names[-1]
+        found = found or Found(model, self.frame_names[-1], control_points=())
+        self.end_effector = end_effector or found.end_effector
         self.frame(self.end_effector, "end_effector frame")
-        self.control_points, self.capsules = control_points, capsules
-        self.rest = np.array(pin.neutral(model)) if rest is None else rest
-        self.missing = missing
-        self.coupled: tuple[Coupled, ...] = ()
-        self.loops: tuple[Loop, ...] = ()
-        self.starts: Mapping[str, Array] = {}
-        self.apart: tuple[tuple[str, str], ...] = ()
-        self.table: Table | None = None
+        self.control_points = (points_along_chain(model, self.end_effector)
+                               if found.control_points is None else found.control_points)
+        self.rest = np.array(pin.neutral(model)) if found.rest is None else found.rest
+        self.capsules, self.missing, self.coupled = found.capsules, found.missing, found.coupled
+        self.loops, self.starts, self.apart = found.loops, found.starts, found.apart
+        self.table = found.table
 
     @classmethod
     def named(cls, name: str, base: Base | None = None) -> Robot:
@@ -131,9 +132,8 @@ class Robot:
         expect("Robot.named: name", name, str, "give a name of ROBOTS")
         if name not in TABLES:
             return cls._of_plugin(name, base)
-        robot = cls._of(from_table(TABLES[name], base), name)
-        robot.table = TABLES[name]
-        return robot
+        found = from_table(TABLES[name], base)
+        return cls(found.model, name, found=found)
 
     @classmethod
     def _of_plugin(cls, name: str, base: Base | None) -> Robot:
@@ -149,8 +149,8 @@ class Robot:
         if isinstance(made, str | Path):
             made = cls.from_file(made, base=base)
         elif isinstance(made, Table):
-            table, made = made, cls._of(from_table(made, base), name)
-            made.table = table
+            table = from_table(made, base)
+            made = cls(table.model, name, found=table)
         expect(f"robot {name!r} of a plugin", made, cls, "return a Robot, a table or a file")
         robot: Robot = made
         robot.name = name
@@ -163,7 +163,7 @@ class Robot:
                   root: str | Sequence[str] = ()) -> Robot:
         """Read a URDF or MJCF file (its root element says which); RobotError if it cannot.
 
-        `end_effector` names a frame; without it one is proposed, see `hierarchy.robots.points`.
+        `end_effector` names a frame; without it one is proposed, see `hierarchy.robots.found`.
         `base` None is that of the file: floating if its first joint is free, else fixed. Capsules
         are proposed from the collision geometry, unless `shapes` is False, and control points along
         the chain to the end effector. `locked` joints are fixed at a value [rad or m], see
@@ -174,7 +174,7 @@ class Robot:
         path = file_path("Robot.from_file: path", path)
         roots = [root] if isinstance(root, str) else root
         found = read_file(path, base, shapes, locked or {}, roots)
-        return cls._of(found, Path(path).stem, end_effector)
+        return cls(found.model, Path(path).stem, end_effector, found)
 
     @classmethod
     def load(cls, model: str | Path, end_effector: str | None = None, base: Base | None = None,
@@ -205,14 +205,14 @@ class Robot:
         return robot
 
     @classmethod
-    def _of(cls, found: Found, name: str, end_effector: str | None = None) -> Robot:
-        robot = cls(found.model, name, end_effector or found.end_effector,
-                    found.control_points or (), found.capsules, found.rest, found.missing)
-        robot.coupled, robot.loops = found.coupled, found.loops
-        robot.starts, robot.apart = found.starts, found.apart
-        if found.control_points is None:
-            robot.control_points = points_along_chain(found.model, robot.end_effector)
-        return robot
+    def of_text(cls, text: str, name: str) -> Robot:
+        """Build a robot of `robot.model.saveToString()`; a damaged text raises RobotError."""
+        model = pin.Model()
+        try:
+            model.loadFromString(text)
+        except (RuntimeError, MemoryError, ValueError) as error:
+            raise RobotError(f"robot {name!r}: its model cannot be read: {error}") from error
+        return cls(model, name)
 
     @property
     def frame_names(self) -> list[str]:
@@ -417,6 +417,8 @@ def _units(joint: Any) -> tuple[str, ...]:
     kind = joint.shortname().removeprefix("JointModel")
     if kind == "Planar":
         return ("m", "m", "rad")
+    if kind == "Composite":
+        return tuple(unit for inner in joint.extract().joints for unit in _units(inner))
     slides = kind.startswith(("FreeFlyer", "Translation", "P"))
     return tuple("m" if slides and i < 3 else "rad" for i in range(joint.nv))
 

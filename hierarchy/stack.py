@@ -202,7 +202,7 @@ class Stack:
 
 
 @compiled
-def _crossed(lower, upper):  # type: ignore[no-untyped-def]
+def _crossed(lower, upper):
     """Return the first row whose lower side is above its upper one, or -1."""
     for i in range(len(lower)):
         if lower[i] > upper[i]:

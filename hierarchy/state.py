@@ -1,7 +1,5 @@
 """State of a robot at one time: everything that a task may read."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -85,10 +83,8 @@ class State:
         self._model, self._data = robot.model, robot.model.createData()
         self._compute = partial(pin.computeJointJacobiansTimeVariation, self._model, self._data,
                                 self.q, self.v)
-        self._copy = _copy_if_finite
-        if robot.nq != robot.n:
-            units = np.array([[part.q, part.size] for part in robot.parts if part.size > 1])
-            self._copy = partial(_copy_if_unit, units)
+        units = [[part.q, part.size] for part in robot.parts if part.size > 1]
+        self._copy = partial(_copy_if_sound, np.array(units, dtype=np.int64).reshape(-1, 2))
         self._further: tuple[Callable[[], object], ...] = ()
         self._compute()
         self.J, self.dJ = _columns(self._data.J, 6), _columns(self._data.dJ, 6)
@@ -171,6 +167,11 @@ class State:
         self._from_now_on(partial(pin.dccrba, model, data, self.q, self.v))
         return Momentum(_columns(data.Ag, 6), _columns(data.dAg, 6))
 
+    @cached_property
+    def beside(self) -> State:
+        """Another state of the robot, to move for differences."""
+        return State(self.robot)
+
     def _from_now_on(self, *computations: Callable[[], object]) -> None:
         self._further += computations
         for compute in computations:
@@ -182,11 +183,6 @@ class State:
     def mass_matrix(self) -> Array:
         """Joint-space inertia matrix M(q) (n, n) [kg m^2]."""
         return np.ascontiguousarray(pin.crba(self._model, self._data, self.q))
-
-    def mass_matrix_derivative(self) -> Array:
-        """Time derivative of M(q) (n, n) [kg m^2/s]."""
-        C = pin.computeCoriolisMatrix(self._model, self._data, self.q, self.v)
-        return np.ascontiguousarray(C + C.T)
 
     def bias_effort(self) -> Array:
         """Joint efforts h(q, v) (n,) [N m or N] of gravity, Coriolis and centrifugal forces."""
@@ -215,8 +211,12 @@ class State:
 
 
 @compiled
-def _copy_if_finite(q, v, to_q, to_v):
-    """Return 1, or 0 if an entry is not finite, or _MISFIT for arrays of other shapes."""
+def _copy_if_sound(units, q, v, to_q, to_v):
+    """Return 1; 0 if an entry is not finite, or a span of `units` has not nearly the length one.
+
+    Or _MISFIT for arrays of other shapes. Spans are (start, size). The copy of one has length one,
+    and the same bits where q has it to rounding.
+    """
     if q.shape != to_q.shape or v.shape != to_v.shape:
         return _MISFIT
     for i in range(len(q)):
@@ -225,31 +225,18 @@ def _copy_if_finite(q, v, to_q, to_v):
     for i in range(len(v)):
         if not np.isfinite(v[i]):
             return 0
+    for k in range(len(units)):
+        if not abs(_square(q, units[k, 0], units[k, 1]) - 1.0) <= _OFF:
+            return 0
     for i in range(len(q)):
         to_q[i] = q[i]
     for i in range(len(v)):
         to_v[i] = v[i]
-    return 1
-
-
-@compiled
-def _copy_if_unit(units, q, v, to_q, to_v):
-    """As `_copy_if_finite`, 0 also if a span of `units` (start, size) is not nearly of length one.
-
-    The copy has length one, and the same bits where q has it to rounding.
-    """
-    if q.shape != to_q.shape:
-        return _MISFIT
     for k in range(len(units)):
-        if not abs(_square(q, units[k, 0], units[k, 1]) - 1.0) <= _OFF:
-            return 0
-    copied = _copy_if_finite(q, v, to_q, to_v)
-    if copied == 1:
-        for k in range(len(units)):
-            square = _square(q, units[k, 0], units[k, 1])
-            for i in range(units[k, 0], units[k, 0] + units[k, 1]):
-                to_q[i] /= np.sqrt(square) if abs(square - 1.0) > _EXACT else 1.0
-    return copied
+        square = _square(q, units[k, 0], units[k, 1])
+        for i in range(units[k, 0], units[k, 0] + units[k, 1]):
+            to_q[i] /= np.sqrt(square) if abs(square - 1.0) > _EXACT else 1.0
+    return 1
 
 
 @inlined

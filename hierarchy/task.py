@@ -11,6 +11,8 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 
 from hierarchy.avoidance.barrier import Barrier
+from hierarchy.avoidance.control_points import pack_points
+from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, brief, expect
 from hierarchy.gate import check_rows
@@ -215,6 +217,11 @@ def check_parts(task: Task) -> None:
                 raise HierarchyError(f"task {task.name!r}: {part.name} is the name {value!r}; "
                                      f"give {remedy.replace('NAME', repr(value))}")
             expect(f"task {task.name!r}: {part.name}", value, kind, f"give {remedy}")
+        if named == "Barrier" and task.kind != "inequality":
+            raise HierarchyError(f"task {task.name!r}: its rows are inequalities")
+    if any(part.type == "Sequence[ControlPoint]" for part in parts) and not len(
+            pack_points(task.points)[0]):  # type: ignore[attr-defined]
+        raise HierarchyError(f"task {task.name!r}: needs at least one control point")
 
 
 def _of_state(method: Callable[..., Any]) -> Callable[..., Any]:
@@ -226,6 +233,22 @@ def _of_state(method: Callable[..., Any]) -> Callable[..., Any]:
         return method(self, state, *rest, **named)
 
     return checked
+
+
+def seen_by(task: Task, state: State) -> Measurement:
+    """Return what a state has measured; raise a HierarchyError, naming the task, for nothing."""
+    if state.measurement is None:
+        raise HierarchyError(f"task {task.name!r}: the state carries no measurement")
+    return state.measurement
+
+
+def in_turn(*functions: Callable[[], object]) -> Callable[[], object]:
+    """Return a function that calls some, or the only one."""
+    def call() -> None:
+        for function in functions:
+            function()
+
+    return call if len(functions) > 1 else functions[0]
 
 
 def writer_in_stack(task: Task, state: State, level: Level, A: Array, lower: Array, upper: Array,
@@ -259,35 +282,44 @@ class Written(Task):
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
 
-    def rows(self, state: State, level: Level) -> tuple[Array, Array, Array]:
-        """The rows at a state: A (m, n), lower and upper (m,)."""
-        A = np.zeros((self.dimension, state.n))
+    def rows(self, state: State, level: Level = "velocity") -> tuple[Array, Array, Array]:
+        """The rows at a state: A (m, n), lower and upper (m,); of forces, see `ForceTask`."""
+        columns = state.n
+        if self.of_forces:
+            level = "acceleration" if self.contacts is None else "torque"
+            columns = columns if self.contacts is None else self.contacts.unknowns
+        A = np.zeros((self.dimension, columns))
         lower, upper = np.zeros((2, self.dimension))
         self.writer(state, level, A, lower, upper, 0)()
         return A, lower, upper
 
     def jacobian(self, state: State) -> Array:
-        """The rows over the velocities (m, n)."""
-        return self.rows(state, "velocity")[0]
+        """The rows over the unknowns (m, n)."""
+        return self.rows(state)[0]
 
     def jacobian_derivative(self, state: State) -> Array:
         """Their exact time derivative (m, n), by differences: to some 1e-9."""
-        coarse, fine = ((self.jacobian(_moved(state, h)) - self.jacobian(_moved(state, -h)))
-                        / (2.0 * h) for h in (_STEP, _STEP / 2.0))
-        return np.asarray((4.0 * fine - coarse) / 3.0)
+        return derivative(self, state)
 
     def reference_velocity(self, state: State) -> Array:
         """The least velocity of the task (m,)."""
-        return self.rows(state, "velocity")[1]
+        return self.rows(state)[1]
 
     def reference_acceleration(self, state: State) -> Array:
         """The least acceleration of the task (m,)."""
         return self.rows(state, "acceleration")[1] + self.jacobian_derivative(state) @ state.v
 
 
+def derivative(task: Task, state: State) -> Array:
+    """Return the time derivative of a Jacobian (m, n) by differences along the velocity."""
+    coarse, fine = ((task.jacobian(_moved(state, h)) - task.jacobian(_moved(state, -h)))
+                    / (2.0 * h) for h in (_STEP, _STEP / 2.0))
+    return np.asarray((4.0 * fine - coarse) / 3.0)
+
+
 def _moved(state: State, step: float) -> State:
-    """Return a state moved by `step` [s] along its velocity; what it has measured stays."""
-    robot = state.robot
-    moved = State.at(robot, robot.integrate(state.q, state.v * step), state.v, state.t)
-    moved.measurement = state.measurement
-    return moved
+    """Return the state beside one, moved by `step` [s] along its velocity; it has seen the same."""
+    beside = state.beside
+    beside.move(state.t + step, state.robot.integrate(state.q, state.v * step), state.v)
+    beside.measurement = state.measurement
+    return beside

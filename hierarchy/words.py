@@ -19,6 +19,11 @@ def some(names: Sequence[str], most: int = 12) -> str:
     return ", ".join(names[:most]) + more
 
 
+def each(*told: tuple[str, Sequence[str]]) -> list[str]:
+    """Return "what: names" for each what that has names."""
+    return [f"{what}: {some(names)}" for what, names in told if names]
+
+
 def counted(count: int, what: str) -> str:
     """Return a number of things: "1 column", "2 columns"."""
     return f"{count} {what}{'' if count == 1 else 's'}"

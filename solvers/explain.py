@@ -14,7 +14,6 @@ from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.status import EQUAL
 
 _NAMED, _SMALL = 3, 0.1  # missed rows that are named, and the share of the largest that counts
-_CALLED = {"rows": "names", "units": "units"}
 _AXES = ("x", "y", "z")
 _SINGULAR = 1e-3  # share of |A| |w| below which A^T w counts as nothing
 _MATTERS = 1e-6  # smallest share of a level's pull for which a level above is named
@@ -33,39 +32,35 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     reports the state of each row, and if names or units are not m.
     """
     expect("explain: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
+    number("explain: tolerance", tolerance, 0.0)
     if rows is None and h.named is not None:
         rows = h.named()
-    named = rows is not None
-    if rows is None:
-        rows = [f"row {i}" for size in h.sizes for i in range(size)]
-    number("explain: tolerance", tolerance, 0.0)
+    names = [f"row {i}" for size in h.sizes for i in range(size)] if rows is None else rows
     units = [""] * h.m if units is None else units
-    for what, given in (("rows", rows), ("units", units)):
+    for what, called, given in (("rows", "names", names), ("units", "units", units)):
         if isinstance(given, str) or not isinstance(given, Sequence):
             raise HierarchyError(f"explain: {what}: expected a list of names, got {brief(given)}")
         if len(given) != h.m:
-            raise HierarchyError(f"explain: {len(given)} {_CALLED[what]} for {h.m} rows")
+            raise HierarchyError(f"explain: {len(given)} {called} for {h.m} rows")
     if not isinstance(resolution, ActiveSetResolution):
         raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
                              "which rows are active")
-    if crossed := _crossed(h, rows):
-        return crossed
-    lines = [_level(h, resolution, k, tolerance, rows, named) for k in range(len(h.sizes))]
-    for level, witness in zip(h.giving, _witnesses(resolution), strict=False):
-        lines[level] = _giving(h, resolution, level, witness, tolerance, (rows, units))
+    for i in np.flatnonzero(~(h.lower <= h.upper)).tolist():  # NaN too
+        return (f"{h.names[_level_of(h, i)]} {names[i]}: no value lies between lower "
+                f"{h.lower[i]:g} and upper {h.upper[i]:g}")
+    lines = [_level(h, resolution, k, tolerance, names, rows is not None)
+             for k in range(len(h.sizes))]
+    if resolution.witnesses is not None:
+        for level, witness in zip(h.giving, resolution.witnesses, strict=False):
+            lines[level] = _giving(h, resolution, level, witness, tolerance, names, units)
     if resolution.unfinished is not None:
         lines.append(f"The iteration limit was reached at {h.names[resolution.unfinished]!r}: it "
                      "and the levels below may not be optimal.")
     return "\n".join(lines)
 
 
-def _crossed(h: Hierarchy, names: Sequence[str]) -> str:
-    """Name the first row whose sides cross, or are no numbers; such a hierarchy has no answer."""
-    for i in np.flatnonzero(~(h.lower <= h.upper))[:1].tolist():
-        level = int((h.offsets[1:] <= i).sum())
-        return (f"{h.names[level]} {names[i]}: no value lies between lower {h.lower[i]:g} and "
-                f"upper {h.upper[i]:g}")
-    return ""
+def _level_of(h: Hierarchy, row: int) -> int:
+    return int((h.offsets[1:] <= row).sum())
 
 
 def is_missed(h: Hierarchy, x: Array, k: int, tolerance: float) -> bool:
@@ -97,37 +92,24 @@ def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: flo
     return f"{h.names[k]} is missed by {missed:.3g}{at}: held back by {by}."
 
 
-def _witnesses(resolution: Resolution) -> Array:
-    return np.empty((0, 0)) if resolution.witnesses is None else resolution.witnesses
-
-
 def _giving(h: Hierarchy, resolution: ActiveSetResolution, k: int, witness: Array,
-            tolerance: float, words: tuple[Sequence[str], Sequence[str]]) -> str:
+            tolerance: float, names: Sequence[str], units: Sequence[str]) -> str:
     """Say by how much a level that gives is missed, and for which levels beyond its least."""
     assert h.give is not None
-    rows = np.arange(h.offsets[k], h.offsets[k + 1])
-    w, least = h.slacks(resolution.x)[rows], h.slacks(witness)[rows]
     if not is_missed(h, resolution.x, k, tolerance):
         return f"{h.names[k]} is met."
-    size = _least_miss(h, resolution.x, k, tolerance)
-    missed, needed = float(np.linalg.norm(w)), float(np.linalg.norm(least))
-    more = np.abs(w) - np.abs(least)
-    given = [_given(h, resolution, i, by, words)
-             for i, by in zip(rows.tolist(), more.tolist(), strict=True) if by > size]
+    rows, whom = np.arange(h.offsets[k], h.offsets[k + 1]), (*h.names, "the reference")
+    w, least = h.slacks(resolution.x)[rows], h.slacks(witness)[rows]
+    size, needed = _least_miss(h, resolution.x, k, tolerance), float(np.linalg.norm(least))
+    given = []
+    for i, more in zip(rows.tolist(), (np.abs(w) - np.abs(least)).tolist(), strict=True):
+        if more > size:
+            unit, level = units[i] and f" {units[i]}", int(resolution.holds_back[i])
+            given.append(f"{names[i]} gives {more:.3g} of {h.give[i]:.3g}{unit} for "
+                         f"{'the levels below' if level < 0 else whom[level]}")
     at_least = f", of which {needed:.3g} cannot be avoided" if needed > size else ""
     gives = f": {listed(given)}" if given else ""
-    return f"{h.names[k]} is missed by {missed:.3g}{at_least}{gives}."
-
-
-def _given(h: Hierarchy, resolution: ActiveSetResolution, i: int, by: float,
-           words: tuple[Sequence[str], Sequence[str]]) -> str:
-    """Say how much row i gives, and if that is all it may, the level that would use more."""
-    assert h.give is not None
-    (name, unit), level = (of[i] for of in words), int(resolution.holds_back[i])
-    whom = ("the levels below" if level < 0 else
-            h.names[level] if level < len(h.names) else "the reference")
-    unit = f" {unit}" if unit else ""
-    return f"{name} gives {by:.3g} of {h.give[i]:.3g}{unit} for {whom}"
+    return f"{h.names[k]} is missed by {float(np.linalg.norm(w)):.3g}{at_least}{gives}."
 
 
 def most_missed(h: Hierarchy, x: Array, k: int, names: Sequence[str]) -> list[str]:
@@ -162,23 +144,14 @@ def nowhere(h: Hierarchy, k: int, names: Sequence[str], x: Array) -> str:
 def held_back_by(h: Hierarchy, resolution: ActiveSetResolution, k: int,
                  rows: Sequence[str]) -> list[str]:
     """Return what holds level k back: rows at a side, by their names, and levels of equalities."""
-    w = h.slacks(resolution.x)[h.offsets[k]:h.offsets[k + 1]]
-    return _inequalities(h, resolution, k, rows) + _equalities(h, resolution, k, w)
-
-
-def _inequalities(h: Hierarchy, resolution: ActiveSetResolution, k: int,
-                  names: Sequence[str]) -> list[str]:
-    """Name the inequality rows above level k that hold it back."""
-    holding = np.flatnonzero(resolution.holds_back == k)
-    return [_row(h, resolution, i, names[i]) for i in holding.tolist() if i < h.offsets[k]]
-
-
-def _row(h: Hierarchy, resolution: ActiveSetResolution, i: int, name: str) -> str:
-    level = int((h.offsets[1:] <= i).sum())
-    of_level = f"{h.names[level]} {name}" if h.sizes[level] > 1 else h.names[level]
-    if h.give is not None and h.give[i] > 0.0:
-        return f"{of_level} (gives no more)"
-    return f"{of_level} at its {'upper' if resolution.active[i] > 0 else 'lower'} side"
+    said = []
+    for i in np.flatnonzero(resolution.holds_back[:h.offsets[k]] == k).tolist():
+        level = _level_of(h, i)
+        row = f"{h.names[level]} {rows[i]}" if h.sizes[level] > 1 else h.names[level]
+        side = f" at its {'upper' if resolution.active[i] > 0 else 'lower'} side"
+        gives = h.give is not None and h.give[i] > 0.0
+        said.append(row + (" (gives no more)" if gives else side))
+    return said + _equalities(h, resolution, k)
 
 
 def _said_once(blocking: Sequence[str], levels: Sequence[str]) -> list[str]:
@@ -189,11 +162,11 @@ def _said_once(blocking: Sequence[str], levels: Sequence[str]) -> list[str]:
             for name, level, before in zip(blocking, of, ["", *of], strict=False)]
 
 
-def _equalities(h: Hierarchy, resolution: ActiveSetResolution, k: int, w: Array) -> list[str]:
+def _equalities(h: Hierarchy, resolution: ActiveSetResolution, k: int) -> list[str]:
     """Name the levels above whose equality rows carry part of level k's pull."""
-    first = h.offsets[k]
+    first, last = h.offsets[k:k + 2]
     acting = np.flatnonzero(resolution.active[:first] != 0)
-    pull = h.A[first:h.offsets[k + 1]].T @ w
+    pull = h.A[first:last].T @ h.slacks(resolution.x)[first:last]
     if not len(acting) or not pull.any():
         return []
     forces = np.linalg.lstsq(h.A[acting].T, -pull, rcond=1e-10)[0]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import accumulate, pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -26,10 +25,9 @@ def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy, leve
     answer is a witness if it meets the level; otherwise it is resolved again. Without an answer for
     one of them the resolution is that of the part. `memory` is that of all these solves.
     """
-    (A, lower, upper, _), offsets, give = h.rows, h.offsets, h.give
-    lower, upper = lower.copy(), upper.copy()
-    whole = h.changed(lower=lower, upper=upper, give=None)
-    part = whole.upper_part(levels[-1] + 1)
+    (A, lower, upper, sizes), offsets, give = h.rows, h.offsets, h.give
+    sides = lower, upper = lower.copy(), upper.copy()
+    part, whole = (h.upper_part(count, sides) for count in (levels[-1] + 1, len(sizes)))
     before, after = _split(memory, 1 + len(levels)), list[Array | None]()
     found, witnesses, inaccurate = None, [], False
     for level in levels:
@@ -57,11 +55,10 @@ def _joined(memories: list[Array | None]) -> Array | None:
 
     None if the last is none.
     """
-    last = memories[-1]
-    if last is None or last.ndim != 1:
-        return last
-    lengths = [0.0 if memory is None else float(memory.size) for memory in memories]
-    return np.concatenate([*(memory for memory in memories if memory is not None), lengths])
+    if memories[-1] is None or memories[-1].ndim != 1:
+        return memories[-1]
+    flat = [_NONE if memory is None else memory for memory in memories]
+    return np.concatenate([*flat, [memory.size for memory in flat]])
 
 
 def _split(memory: Array | None, count: int) -> list[Array | None]:
@@ -69,7 +66,12 @@ def _split(memory: Array | None, count: int) -> list[Array | None]:
     alone: list[Array | None] = [*[None] * (count - 1), memory]
     if memory is None or memory.ndim != 1 or memory.size < count:
         return alone
-    ends = list(accumulate(memory[-count:].tolist(), initial=0.0))
-    if min(memory[-count:]) < 0.0 or ends[-1] != memory.size - count:
-        return alone
-    return [memory[int(i):int(j)] if j > i else None for i, j in pairwise(ends)]
+    parts, at = list[Array | None](), 0
+    for length in memory[-count:].tolist():
+        if not 0.0 <= length <= memory.size:
+            return alone
+        parts.append(memory[at:(at := at + int(length))])
+    return parts if at == memory.size - count else alone
+
+
+_NONE = np.empty(0)

@@ -20,8 +20,8 @@ from hierarchy.robot import Robot
 from hierarchy.stack import Stack
 from hierarchy.state import State
 from hierarchy.task import Task, check_period
+from hierarchy.tasks.joint_limits import StepLimits
 from hierarchy.tasks.mechanism import MECHANISM, Mechanism, above, bends, model_rows
-from hierarchy.tasks.step_limits import StepLimits
 from hierarchy.words import listed
 from solvers.reaching import Reached, reach
 from solvers.resolver import Resolution, Resolver, make
@@ -80,8 +80,8 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     tasks : tasks of `hierarchy.tasks`, plugins or your own, at velocity level.
     dt : period [s] for which the velocity will be held; that of all tasks which have one.
     limits : above all tasks, below the robot's mechanism: True for the position and velocity limits
-        of the robot, approached with a gain of 0.25 / dt (`hierarchy.tasks.step_limits`), False for
-        none, or a task such as `JointLimits`, which also limits accelerations, from v on.
+        of the robot, approached with a gain of 0.25 / dt (`StepLimits`), False for none, or a task
+        such as `JointLimits`, which also limits accelerations, from v on.
     resolver : a name of `solvers.names()`, or a resolver; with limits it must take bounds.
     memory : that of the last call with the same tasks, to start from; it has the last v too.
     v : (n,) velocity of the tick before, for limits of accelerations; None for that of `memory`.

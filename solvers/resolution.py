@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, final
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,20 +28,21 @@ class Resolution:
         None.
     """
 
-    __slots__ = ("iterations", "memory", "status", "witnesses", "x")
+    __slots__ = ("_states", "iterations", "memory", "status", "witnesses", "x")
 
     def __init__(self, x: Array, status: Status = Status.SOLVED, iterations: int = 1,
-                 memory: Array | None = None) -> None:
+                 memory: Array | None = None, active: NDArray[Any] | None = None) -> None:
         self.x = x
         self.status = status
         self.iterations = iterations
         self.memory = memory
         self.witnesses: Array | None = None
+        self._states = active
 
     @property
     def active(self) -> NDArray[np.int8] | None:
         """State of each row (m,), values of `solvers.status.Row`; None if it is not reported."""
-        return None
+        return None if self._states is None else self._states.astype(np.int8)
 
     def verified(self, h: Hierarchy, rank_tolerance: float = 1e-8) -> bool:
         """Whether x and the active rows prove each other on the data of h; `th_verify` in C.
@@ -68,3 +71,35 @@ class Resolution:
         rows = [("status", self.status), ("x", numbers(self.x)), ("iterations", self.iterations),
                 ("memory", "none" if self.memory is None else f"{self.memory.size} numbers")]
         return html_table(type(self).__name__, (), rows)
+
+
+@final
+class SaturatedResolution(Resolution):
+    """A resolution within bounds; its record (n + L + ..) starts with saturation and scaling.
+
+    Attributes in addition to those of `Resolution`; n unknowns, L levels
+    ----------
+    saturated : (n,) int8, +1 for an unknown at its upper bound, -1 at its lower bound, 2 where the
+        two bounds are equal, 0 where it is free.
+    scaling : (L,) share of its target that each level reaches, 0 to 1; 1 for bounds that do not
+        contradict each other. Each resolver documents how it computes the share.
+    """
+
+    __slots__ = ("_levels", "_record")
+
+    def __init__(self, x: Array, status: Status, iterations: int, record: Array, levels: int,
+                 memory: Array | None = None) -> None:
+        self.x, self.status, self.iterations, self.memory = x, status, iterations, memory
+        self.witnesses = self._states = None
+        self._record, self._levels = record, levels
+
+    @property
+    def saturated(self) -> NDArray[np.int8]:
+        """Which unknowns are at a bound: (n,)."""
+        return self._record[:len(self.x)].astype(np.int8)
+
+    @property
+    def scaling(self) -> Array:
+        """Share of its target that each level reaches: (L,)."""
+        n = len(self.x)
+        return self._record[n:n + self._levels].copy()

@@ -22,14 +22,40 @@ from solvers.metric import in_metric
 from solvers.resolution import Resolution as Resolution
 from solvers.status import TOO_SMALL
 from solvers.status import Status as Status
-from solvers.workspace import WORKSPACE
+from solvers.workspace import WORKSPACE, entry
 
 Handles = Literal["equalities", "bounds", "inequalities", "activations"]
 _KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities", "activations")
+_CHECK, _KIND, _CHOICES = "check", "kind", "choices"  # what a field says of a setting
 _RESOLVED: dict[str, str] = {
     "equalities": "equalities only",
     "bounds": "equalities, and bounds on single unknowns in a first level of their own",
     "activations": "equalities, and rows that come with an activation"}
+
+
+def number(default: Any = dataclasses.MISSING, low: float = 0.0, high: float = math.inf, *,
+           open_below: bool = False) -> Any:
+    """Return a field: a setting >= low, or > low if it is open below, and < high."""
+    def check(value: Any) -> str:
+        known = isinstance(value, (int, float)) and not isinstance(value, bool)
+        good = known and low <= value < high and not (open_below and value == low)
+        return "" if good else f"a number {'>' if open_below else '>='} {low:g} and < {high:g}"
+
+    return dataclasses.field(default=default, metadata={_CHECK: check, _KIND: float})
+
+
+def whole_number(default: int | None, least: int) -> Any:
+    """Return a field: a setting that is a whole number >= least."""
+    def check(value: Any) -> str:
+        good = isinstance(value, int) and not isinstance(value, bool) and least <= value < 2**31
+        return "" if good else f"a whole number >= {least}"
+
+    return dataclasses.field(default=default, metadata={_CHECK: check, _KIND: int})
+
+
+def one_of(*allowed: str) -> Any:
+    """Return a field: a setting that is one of these, the first by default."""
+    return dataclasses.field(default=allowed[0], metadata={_CHOICES: allowed})
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -51,9 +77,9 @@ class Resolver(ABC):
     HierarchyError : a setting is not a number or is out of range.
     """
 
-    damping: float = 0.0
-    threshold: float = 0.1
-    rank_tolerance: float = 1e-8
+    damping: float = number(0.0)
+    threshold: float = number(0.1, open_below=True)
+    rank_tolerance: float = number(1e-8, high=1.0)
 
     name: ClassVar[str]
     handles: ClassVar[Handles] = "equalities"
@@ -73,9 +99,15 @@ class Resolver(ABC):
             cls.solve = _with_checks(solve)  # type: ignore[assignment,method-assign]
 
     def __post_init__(self) -> None:
-        self._number("damping", 0.0, math.inf)
-        self._number("threshold", 0.0, math.inf, open_below=True)
-        self._number("rank_tolerance", 0.0, 1.0)
+        for field in dataclasses.fields(self):
+            value, said = getattr(self, field.name), field.metadata
+            if _CHOICES in said and value not in said[_CHOICES]:
+                raise UnknownNameError(f"{field.name} of {self.name}", value, said[_CHOICES])
+            if _CHECK in said and (value is not None or field.default is not None):
+                if expected := said[_CHECK](value):
+                    raise HierarchyError(f"{self.name}: {field.name} = {value!r}, expected "
+                                         f"{expected}")
+                set_frozen(self, **{field.name: said[_KIND](value)})
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but what is worked out again when it is needed, such as compiled code."""
@@ -89,8 +121,10 @@ class Resolver(ABC):
 
     @property
     def label(self) -> str:
-        """Name for tables and figures, with the settings that change the method."""
-        return self.name
+        """Name for tables and figures, with the choices that are not the default."""
+        return " ".join([self.name, *(
+            value for field in dataclasses.fields(self) if _CHOICES in field.metadata
+            and (value := getattr(self, field.name)) != field.default)])
 
     @property
     def strict(self) -> bool:
@@ -104,8 +138,14 @@ class Resolver(ABC):
 
     @cached_property
     def _settings(self) -> Array:
-        """The settings in one array, in the order of the kernels' `Settings`."""
-        return np.array([self.damping, self.threshold, self.rank_tolerance])
+        """All settings in one array, as declared: that is their order in the kernels.
+
+        A choice is the number of what is chosen, and None stands for infinity.
+        """
+        values = [(field.metadata.get(_CHOICES), getattr(self, field.name))
+                  for field in dataclasses.fields(self)]
+        return np.array([math.inf if value is None else allowed.index(value) if allowed else value
+                         for allowed, value in values], dtype=float)
 
     @abstractmethod
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
@@ -118,24 +158,6 @@ class Resolver(ABC):
         ------
         HierarchyError : the resolver cannot handle a row. A numerical outcome is a status.
         """
-
-    def _number(self, setting: str, low: float, high: float, open_below: bool = False) -> None:
-        value = getattr(self, setting)
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not low <= value < high or (open_below and value == low):
-            raise HierarchyError(f"{self.name}: {setting} = {value!r}, expected a number "
-                                 f"{'>' if open_below else '>='} {low:g} and < {high:g}")
-        set_frozen(self, **{setting: float(value)})
-
-    def _whole_number(self, setting: str, least: int) -> None:
-        value = getattr(self, setting)
-        if not isinstance(value, int) or isinstance(value, bool) or not least <= value < 2**31:
-            raise HierarchyError(f"{self.name}: {setting} = {value!r}, expected a whole number >= "
-                                 f"{least}")
-
-    def _one_of(self, setting: str, allowed: tuple[str, ...]) -> None:
-        if getattr(self, setting) not in allowed:
-            raise UnknownNameError(f"{setting} of {self.name}", getattr(self, setting), allowed)
 
     def _otherwise(self, h: Hierarchy, x: Array, code: int,
                    memory: Array | None = None) -> Resolution:
@@ -194,6 +216,42 @@ def _with_checks(solve: Solve) -> Solve:
             raise
 
     return checked
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Direct(Resolver):
+    """A resolver of equalities by one kernel, which needs no memory."""
+
+    kernel: ClassVar[Callable[..., int]]
+
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        """Resolve h; a direct method that ignores `memory`."""
+        x = h.start()
+        A, lower, upper, sizes = h.rows
+        code = entry(self.kernel)(A, lower, upper, sizes, x, self._settings, WORKSPACE.array)
+        return self._otherwise(h, x, code) if code else Resolution(x)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Around(Resolver):
+    """A resolver that answers through another, `inner`, and is called and judged as that one."""
+
+    inner: Resolver
+
+    @property
+    def label(self) -> str:
+        """The label of the inner resolver."""
+        return self.inner.label
+
+    @property
+    def strict(self) -> bool:
+        """Whether the inner resolver is."""
+        return self.inner.strict
+
+    @property
+    def accuracy(self) -> float:
+        """The accuracy of the inner resolver."""
+        return self.inner.accuracy
 
 
 def refuse_inequality(resolver: Resolver, h: Hierarchy, row: int) -> None:

@@ -36,20 +36,6 @@ _REMEDIES = {
 }
 
 
-class Code(IntEnum):
-    """Return code of a kernel: a `Status` or a request to its caller; -(i + 1) rejects row i."""
-
-    SOLVED = 0
-    ITERATION_LIMIT = 1
-    NUMERICAL_FAILURE = 2
-    BACKEND_FAILURE = 3
-    INACCURATE = 4
-    UNPROVED = 7       # no active set was verified: another kernel takes over
-    TOO_SMALL = 8      # the work space is too small; nothing was computed
-    NO_LIMITS = 9      # all rows are equalities: the staircase solves them
-    CONTRADICTION = 10  # two bounds on one unknown contradict each other
-
-
 class Row(IntEnum):
     """State of a row: active at its upper or lower side, an equality, or inactive."""
 
@@ -59,7 +45,11 @@ class Row(IntEnum):
     EQUAL = 2
 
 
-# numba cannot store enum members in an array of floats, so kernels use plain integers.
-(SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, BACKEND_FAILURE, INACCURATE, UNPROVED, TOO_SMALL,
- NO_LIMITS, CONTRADICTION) = (int(code) for code in Code)
-FREE, UPPER, LOWER, EQUAL = (int(row) for row in Row)
+# numba cannot store enum members in an array of floats, so kernels use plain integers. A kernel
+# returns a `Status`, a request to its caller, or -(i + 1), which rejects row i.
+SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, BACKEND_FAILURE, INACCURATE = map(int, Status)
+UNPROVED = 7        # no active set was verified: another kernel takes over
+TOO_SMALL = 8       # the work space is too small; nothing was computed
+NO_LIMITS = 9       # all rows are equalities: the staircase solves them
+CONTRADICTION = 10  # two bounds on one unknown contradict each other
+FREE, UPPER, LOWER, EQUAL = map(int, Row)

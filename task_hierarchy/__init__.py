@@ -86,4 +86,6 @@ def __dir__() -> list[str]:
 if _INSIDE.is_dir():
     sys.path.insert(0, str(_INSIDE))
 if _wrong := foreign():
+    if Path(sys.argv[0]).stem == "hierarchy":  # the command, which imports its entry from here
+        sys.exit(f"hierarchy: error: {_wrong}")
     raise ImportError(_wrong)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmark.packages import Entrant
-from benchmark.process import START_LIMIT, EndedError, Field
+from benchmark.process import EndedError, Field
 from benchmark.store import Row
 from benchmark.tables import Column
 from benchmark.timing import times_of
@@ -25,7 +25,7 @@ Ask = Callable[[tuple[Any, ...], float], Any]  # as `Process.ask`
 class Turns(NamedTuple):
     """Numbers of ticks: before the first turn, of a turn, and at its start for cold caches.
 
-    seconds : [s] of turns after which an entrant has no more.
+    seconds : [s] of processor time after which an entrant has no more turns.
     """
 
     ticks: int
@@ -34,10 +34,10 @@ class Turns(NamedTuple):
     rehearsed: int
     seconds: float = np.inf
 
-    def parts(self) -> list[tuple[int, int]]:
-        """Return ticks of each turn, and how many of them do not count."""
-        return [(self.warm_up, self.warm_up)] + [
-            (self.rehearsed + min(self.each, self.ticks - first), self.rehearsed)
+    def questions(self) -> list[tuple[str, int, int]]:
+        """Return the turns: of how many ticks, and how many of them do not count."""
+        return [("turn", self.warm_up, self.warm_up)] + [
+            ("turn", self.rehearsed + min(self.each, self.ticks - first), self.rehearsed)
             for first in range(0, self.ticks, self.each)]
 
 
@@ -49,23 +49,19 @@ def measure(entrants: Sequence[Entrant], questions: str, scene: tuple[Any, ...],
     log, and may ask for more.
     """
     rows: list[Row] = []
+    asked = [("open", *scene), *turns.questions()]
     with Field(entrants, questions) as field:
-        replies: dict[str, list[Row]] = {
-            label: [] for label in field.ask(("open", *scene), START_LIMIT)}
-        for part in turns.parts():
-            some = [label for label, own in replies.items() if label in field.running and (
-                len(own) < 2 or sum(reply["seconds"] for reply in own) <= turns.seconds)]
-            for label, reply in field.ask(("turn", *part), TURN_LIMIT, some).items():
-                replies[label].append(reply)
-        for one in entrants:
-            if (process := field.running.get(one.label)) is None:
+        for label, replies in field.answers(asked, TURN_LIMIT, 1, patience=turns.seconds).items():
+            process, ends = field.running[label], [one for one in replies if "ended" in one]
+            if ends:
+                field.missing[label] = ends[0]["why"]
                 continue
-            own = replies[one.label]
+            own = [one for one in replies if "log" in one]
             try:
-                rows.append({"entrant": one.label, **process.about, "kind": one.limits,
+                rows.append({"entrant": label, **process.about, "kind": process.entrant.limits,
                              "why": own[-1]["why"], **judge(joined(own), process.ask)})
             except EndedError as end:
-                field.missing[one.label] = str(end)
+                field.missing[label] = str(end)
     return rows, field.missing
 
 

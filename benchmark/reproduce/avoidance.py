@@ -33,13 +33,13 @@ class Repulsion:
         self.errors, self.jumps = list[float](), 0
         self._before: tuple[int, Array] | None = None
 
-    def look(self, tick: int, controller: Controller) -> None:
+    def __call__(self, tick: int, controller: Controller) -> Mapping[str, Any]:
         """Examine a tick."""
         seen, state = controller.cell.sensor.measurement, controller.cell.state  # type: ignore[union-attr]
         k = seen.active
         if k < 0 or seen.distance[k] > _FAR:
             self._before = None
-            return
+            return {}
         n = np.array(seen.direction[k])
         if self._before is not None and self._before[0] == k:
             self.jumps += int(n @ self._before[1] < _TURN)
@@ -49,9 +49,6 @@ class Repulsion:
             self.errors.append(float(
                 n @ acceleration(state, point.joint, seen.points[k], controller.sent)
                 - seen.magnitude[k]))
-
-    def signals(self, recording: Recording) -> Mapping[str, Any]:
-        """Return nothing: the recording is that of the run."""
         return {}
 
 

@@ -6,14 +6,15 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import dropwhile, takewhile
 from pathlib import Path
 from textwrap import fill
 from typing import Any
 
-from benchmark.reproduce import claims, fronts, protocol
+from benchmark.reproduce import fronts, protocol
 from benchmark.reproduce.fronts import Point
-from benchmark.reproduce.protocol import PROTOCOL, Rows
+from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
 from benchmark.reproduce.verdicts import Found, judged, shown
 from hierarchy.errors import HierarchyError
 from scenarios.measure.statistics import probability
@@ -54,20 +55,14 @@ def block(name: str, stored: Stored, output: Callable[[str], str]) -> str:
     if name in ITEMS:
         return "\n".join(fill(f"- {text}", _WIDTH, subsequent_indent="  ")
                          for text in _items(ITEMS[name], rows, output))
-    if name == "untested":
-        return "\n".join(claims.untested(PROTOCOL))
-    what, _, of = name.partition("-")
-    known = {"asked": ("letter",), "found": FAMILIES, "front": fronts.FRONTS, "faults": ("",)}
-    if of not in known[what]:
-        raise KeyError(name)
-    if what == "asked":
-        return "\n".join(claims.asked(PROTOCOL))
-    if what == "front":
-        return "\n".join(fronts.table(stored.points, of))
-    if rows is None:
-        return _NOTHING
-    return "\n".join(claims.faults(PROTOCOL, rows) if what == "faults" else
-                     claims.found(PROTOCOL, rows, of))
+    known: dict[str, Callable[[], list[str]]] = {
+        "asked-letter": _asked, "untested": _untested,
+        **{f"front-{one}": partial(fronts.table, stored.points, one) for one in fronts.FRONTS}}
+    if name in known:
+        return "\n".join(known[name]())
+    of_rows: dict[str, Callable[[Rows], list[str]]] = {
+        "faults": _faults, **{f"found-{one}": partial(_found, family=one) for one in FAMILIES}}
+    return "\n".join(of_rows[name](rows)) if rows is not None else _NOTHING
 
 
 def _items(given: Mapping[str, Any], rows: Rows | None, output: Callable[[str], str]) -> list[str]:
@@ -79,7 +74,7 @@ def _items(given: Mapping[str, Any], rows: Rows | None, output: Callable[[str], 
     if rows is None:
         return [_NOTHING]
     known = {one.claim.name: said(one, rows) for one in every(rows)}
-    known["progress"] = claims.progress(PROTOCOL, rows)
+    known["progress"] = _progress(rows)
     return [_CLAIM.sub(lambda named: known[named["name"]], text) for text in texts]
 
 
@@ -107,3 +102,73 @@ def cell(output: str, asked: Mapping[str, str]) -> str:
     if not found:
         raise HierarchyError(f"the output has no row {asked['row']!r} below {asked['table']!r}")
     return min(found, key=len)[int(asked["place"]) - 1]
+
+
+def _asked() -> list[str]:
+    """Return a table of the quotations: what decides them."""
+    lines = ["| section, quotation | decided by | smallest effect |", "|---|---|---|"]
+    before = ""
+    for one in PROTOCOL.claims:
+        if one.family == "letter":
+            said = f"{one.section}: “{one.quotation}”"
+            lines.append(f"| {'the same' if said == before else said} | {_decider(one)} | "
+                         f"{_least(one)} |")
+            before = said
+    return lines
+
+
+def _untested() -> list[str]:
+    """Return the letter's claims that runs do not decide, with the reason."""
+    parts = [(*said.removesuffix(")").rsplit(" (", 1), why)
+             for said, why in PROTOCOL.untested.items()]
+    return [f"- {section}: “{quotation}”: {why}." for quotation, section, why in parts]
+
+
+def _found(rows: Rows, family: str) -> list[str]:
+    """Return a table of what was found about the claims of a family; of our own, what decides."""
+    own = family == "own"
+    head = ["claim", *(["decided by, smallest effect"] if own else []), "effect [95 % interval]",
+            ", ".join(rows.layouts), "Holm's p", "verdict"]
+    lines = [f"| {' | '.join(head)} |",
+             "|---" * len(head) + "|"]
+    for one in judged(PROTOCOL, rows, family):
+        each = ", ".join(shown(one.claim, rows, effect).partition(" [")[0]
+                         for effect in one.layouts)
+        by = f" | {_decider(one.claim)}, {_least(one.claim)}" if own else ""
+        lines.append(f"| {one.claim.text}{by} | {shown(one.claim, rows, one.effect)} | {each} | "
+                     f"{probability(one.p).removeprefix('p = ')} | {one.decided} |")
+    return lines
+
+
+def _progress(rows: Rows) -> str:
+    """Return how much of the protocol has been run."""
+    arms = f"starts on each of {len(rows.layouts)} arms, without and with noise."
+    if len(rows.seeds) == len(PROTOCOL.seeds) and rows.starts == PROTOCOL.starts:
+        return f"{len(rows.seeds)} seeds, {rows.starts} {arms}"
+    return (f"Run so far: {len(rows.seeds)} of {len(PROTOCOL.seeds)} seeds, {rows.starts} of "
+            f"{PROTOCOL.starts} {arms} *Undecided* can change with more.")
+
+
+def _faults(rows: Rows) -> list[str]:
+    """Return how much of the protocol has been run, and which columns have runs with a fault."""
+    total = rows.blocks.size
+    said = [f"`{column}` {total - int(rows.ended(column).sum())} of {total} "
+            f"({'; '.join(reason.partition(':')[0] for reason in reasons)})"
+            for column, reasons in rows.reasons[0].items()]
+    return [f"{_progress(rows)} Runs that ended in a fault: {', '.join(said) or 'none'}."]
+
+
+def _decider(claim: Claim) -> str:
+    if not claim.metric:
+        return f"share of runs of `{claim.of}` that reach their end"
+    if claim.rival:
+        word = "below" if claim.below else "above"
+        return f"`{claim.metric}` of `{claim.of}` {word} that of `{claim.rival}`"
+    bound = f"at least {claim.least:g}" if claim.most == float("inf") else f"at most {claim.most:g}"
+    return f"`{claim.metric}` of `{claim.of}` {bound}"
+
+
+def _least(claim: Claim) -> str:
+    if not claim.rival:
+        return f"{100 * PROTOCOL.share:g} % of starts"
+    return f"{claim.matters:g}{' %' if claim.percent else ' (SI)' if claim.matters < 1 else ''}"

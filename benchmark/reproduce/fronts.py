@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -59,15 +59,15 @@ class Front:
 class Point:
     """Settings of a method on the front of its training, and what came of them.
 
-    training, test : median of each metric over scenes, infinite where half of them fail; kept :
-    test scenes that did not fail, of so many `scenes`.
+    training, test : median of each metric over scenes, None where half of them fail; kept : test
+    scenes that did not fail, of so many `scenes`.
     """
 
     front: str
     method: str
     settings: dict[str, float]
-    training: list[float]
-    test: list[float]
+    training: list[float | None]
+    test: list[float | None]
     kept: int
     scenes: int
     units: list[str]
@@ -77,32 +77,26 @@ GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="ut
 FRONTS = {name: Front(**given) for name, given in GIVEN["front"].items()}
 
 
-def run(names: Sequence[str], out: Path, workers: Workers, progress: Progress | None = None
-        ) -> Iterator[list[Point]]:
-    """Tune and test the methods of each front; yield its points. Runs that `out` has are kept."""
-    for name in names:
-        front, found = FRONTS[name], list[Point]()
-        for label, given in front.method.items():
-            method = Method(**given)
-            trials = method.trials(GIVEN["trials"], GIVEN["seed"])
-            training = _scores(front, method, trials, (GIVEN["seed"], GIVEN["training"]),
-                               (out / name, workers, progress))
-            best = [k for k in range(len(trials)) if not dominated(training[0], k)]
-            chosen = [trials[k] for k in best]
-            tested = _scores(front, method, chosen, (GIVEN["seed"] + 1, GIVEN["test"]),
-                             (out / name, workers, progress))
-            found += [Point(name, label, trials[k], training[0][k].tolist(),
-                            tested[0][i].tolist(), tested[1][i], GIVEN["test"], tested[2])
-                      for i, k in enumerate(best)]
-        yield found
+def run(out: Path, workers: Workers, progress: Progress | None = None) -> list[Point]:
+    """Tune and test the methods of each front; return the points. Runs that `out` has are kept."""
+    found = []
+    for name, label in ((name, label) for name, front in FRONTS.items() for label in front.method):
+        method, where = Method(**FRONTS[name].method[label]), (out / name, workers, progress)
+        trials = method.trials(GIVEN["trials"], GIVEN["seed"])
+        training, *_ = _scores(name, method, trials, (GIVEN["seed"], GIVEN["training"]), where)
+        best = [k for k in range(len(trials)) if not dominated(training, k)]
+        test, kept, units = _scores(name, method, [trials[k] for k in best],
+                                    (GIVEN["seed"] + 1, GIVEN["test"]), where)
+        found += [Point(name, label, trials[k], _plain(training[k]), _plain(test[i]), kept[i],
+                        GIVEN["test"], units) for i, k in enumerate(best)]
+    return found
 
 
-def _scores(front: Front, method: Method, trials: Sequence[Mapping[str, float]],
+def _scores(name: str, method: Method, trials: Sequence[Mapping[str, float]],
             scenes: tuple[int, int], where: tuple[Path, Workers, Progress | None]
             ) -> tuple[Array, list[int], list[str]]:
     """Return the medians (trials, metrics), scenes kept by each trial, and units."""
-    seed, count = scenes
-    runs = []
+    front, (seed, count), runs = FRONTS[name], scenes, []
     for settings in trials:
         scenario = load(front.scenario, GIVEN["plant"].get(front.plant, {})).with_resolver(
             method.resolver).with_changes({**method.set, **settings})
@@ -133,21 +127,18 @@ def dominated(scores: Array, k: int) -> bool:
 
 
 def write(points: Sequence[Point], path: Path) -> None:
-    """Write points as JSON; infinite values are null."""
+    """Write points as JSON."""
     make_folder(path.parent)
-    write_json(path, [{**asdict(one), "training": _plain(one.training), "test": _plain(one.test)}
-                      for one in points])
+    write_json(path, [asdict(one) for one in points])
 
 
-def _plain(values: Sequence[float]) -> list[float | None]:
-    return [value if np.isfinite(value) else None for value in values]
+def _plain(values: Array) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
 
 
 def read(path: Path) -> list[Point]:
     """Return the points of a file."""
-    return [Point(**{**one, **{key: [np.inf if x is None else x for x in one[key]]
-                               for key in ("training", "test")}})
-            for one in json.loads(path.read_text(encoding="utf-8"))]
+    return [Point(**one) for one in json.loads(path.read_text(encoding="utf-8"))]
 
 
 def table(points: Sequence[Point], name: str) -> list[str]:
@@ -161,11 +152,11 @@ def table(points: Sequence[Point], name: str) -> list[str]:
     own = [one for one in points if one.front == name]
     for method in dict.fromkeys(one.method for one in own):
         tried = [one for one in own if one.method == method]
-        failed = [one.kept for one in tried if not np.isfinite(one.test).all()]
-        for one in (one for one in tried if np.isfinite(one.test).all()):
+        failed = [one.kept for one in tried if None in one.test]
+        for one in (one for one in tried if None not in one.test):
             settings = ", ".join(f"{'.'.join(key.split('.')[-2:])} = {x:g}"
                                  for key, x in one.settings.items())
-            cells = [shown(x, unit) for x, unit in zip(one.test, one.units, strict=True)]
+            cells = [shown(x or 0.0, unit) for x, unit in zip(one.test, one.units, strict=True)]
             lines.append(f"| {method} | {settings or '–'} | {one.kept} of {one.scenes} | "
                          f"{' | '.join(cells)} |")
         if failed:
@@ -184,13 +175,13 @@ def figure(points: Sequence[Point]) -> Figure:
     for ax, name in zip(fig.subplots(1, len(names), squeeze=False)[0], names, strict=True):
         for method in dict.fromkeys(one.method for one in points if one.front == name):
             own = [one.test for one in points if (one.front, one.method) == (name, method)
-                   and np.isfinite(one.test).all()]
+                   and None not in one.test]
             if own:
                 x, y, z = np.array(own).T[:3]
                 ax.scatter(x, y, s=20.0 + 40.0 * np.log1p(z), label=method, alpha=0.7,
                            color=style[method].colour)
         first, second, third = FRONTS[name].minimised[:3]
-        shares = [np.isfinite(one.test).all() for one in points if one.front == name]
+        shares = [None not in one.test for one in points if one.front == name]
         ax.set(title=f"{name}: {sum(shares)} of {len(shares)} settings did not fail", xlabel=first,
                ylabel=second)
         ax.title.set_fontsize(9)

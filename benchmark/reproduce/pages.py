@@ -22,11 +22,10 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
 from itertools import dropwhile, takewhile
 from pathlib import Path
 
-from benchmark.reproduce.blocks import Stored, block
+from benchmark.reproduce.blocks import Stored, block, cell
 from hierarchy.errors import HierarchyError
 from scenarios.files import make_folder, slug, write_text
 
@@ -34,13 +33,10 @@ ROOT = Path(__file__).parents[2]
 OUTPUT = "docs/results/output"
 _COLUMNS = "100"  # of the terminal that a command writes to
 _CODE = ("hierarchy", "solvers", "scenarios", "benchmark")
-_MADE = re.compile(r"(<!-- reproduce: (?P<name>[\w-]+) -->\n).*?(<!-- end of \w[\w-]* -->)",
-                   re.DOTALL)
-_OUTPUT = re.compile(r"(?P<mark>^<!-- (?P<kind>measured|kept): (?:(?P<form>table|text) of )?"
-                     r"(?P<command>[^|\n]*?)"
-                     r"(?: \| (?P<first>[^\n]+?) \.\. (?P<last>[^\n]+?))? -->\n)"
-                     r"(?P<text>.*?)(?P<end><!-- end of measurement -->)", re.DOTALL | re.MULTILINE)
-_MEDIAN = re.compile(r"(?P<name>\S+(?: \S+)*?)\s+(?P<median>\d[\d.]*)\s")
+_MARK = re.compile(r"(?P<mark>^<!-- (?P<kind>reproduce|measured|kept): "
+                   r"(?:(?P<form>table|text) of )?(?P<name>[^|\n]*?)"
+                   r"(?: \| (?P<first>[^\n]+?) \.\. (?P<last>[^\n]+?))? -->\n)"
+                   r"(?P<text>.*?)(?P<end><!-- end of [\w-]+ -->)", re.DOTALL | re.MULTILINE)
 
 
 class CommandError(RuntimeError):
@@ -50,13 +46,13 @@ class CommandError(RuntimeError):
 def marked(root: Path) -> list[str]:
     """Return the pages of a checkout that have marks, by their paths in it."""
     found = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
-    return [path.relative_to(root).as_posix() for path in found if path.is_file() and any(
-        mark.search(path.read_text("utf-8")) for mark in (_OUTPUT, _MADE))]
+    return [path.relative_to(root).as_posix() for path in found if path.is_file() and _MARK.search(
+        path.read_text("utf-8"))]
 
 
 def commands(text: str) -> list[str]:
     """Return the commands of a page, each once."""
-    return list(dict.fromkeys(found["command"] for found in _OUTPUT.finditer(text)
+    return list(dict.fromkeys(found["name"] for found in _MARK.finditer(text)
                               if found["kind"] == "measured"))
 
 
@@ -87,7 +83,7 @@ def _printed(command: str, root: Path, out: Path) -> str:
     if done.returncode:
         raise CommandError(f"{command}: exit code {done.returncode}\n{done.stdout}")
     lines = [line.rstrip() for line in done.stdout.splitlines()
-             if not line.startswith("Numbers: ")]
+             if not line.startswith(("Numbers: ", "Page: "))]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -126,25 +122,25 @@ def filled(text: str, root: Path, page: str, stored: Stored) -> str:
             raise HierarchyError(f"{page}: no output of {command!r} is stored; run "
                                  f"`hierarchy reproduce {page}`") from None
 
-    def made(match: re.Match[str]) -> str:
-        try:
-            return f"{match[1]}{block(match['name'], stored, output).rstrip()}\n{match[3]}"
-        except KeyError as error:
-            raise HierarchyError(f"{page}: block {match['name']!r}: there is no block or "
-                                 f"claim {error}") from None
-
-    def shown(found: re.Match[str]) -> str:
-        said = output(found["command"])
+    def made(found: re.Match[str]) -> str:
+        name = found["name"]
+        if found["kind"] == "reproduce":
+            try:
+                return f"{found['mark']}{block(name, stored, output).rstrip()}\n{found['end']}"
+            except KeyError as error:
+                raise HierarchyError(f"{page}: block {name!r}: there is no block or claim {error}"
+                                     ) from None
+        said = output(name)
         if found["form"] == "table":
-            return f"{found['mark']}{_with_medians(found['text'], medians(said))}{found['end']}"
+            return f"{found['mark']}{_with_medians(found['text'], said)}{found['end']}"
         part = _part(said.splitlines(), found["first"], found["last"])
         if not part:
-            raise HierarchyError(f"{page}: no line of the output of {found['command']!r} starts "
-                                 f"with {found['first']!r}")
+            raise HierarchyError(f"{page}: no line of the output of {name!r} starts with "
+                                 f"{found['first']!r}")
         inside = part if found["form"] == "text" else ["```", *part, "```"]
         return "\n".join([found["mark"].rstrip(), *inside, found["end"]])
 
-    return _OUTPUT.sub(shown, _MADE.sub(made, text))
+    return _MARK.sub(made, text)
 
 
 def _part(lines: list[str], first: str | None, last: str | None) -> list[str]:
@@ -155,38 +151,30 @@ def _part(lines: list[str], first: str | None, last: str | None) -> list[str]:
     return "\n".join(lines).rstrip().splitlines()
 
 
-def medians(output: str) -> dict[tuple[str, str], float]:
-    """Return the medians [us] that `hierarchy bench resolvers` printed, by family and name.
+def _with_medians(table: str, said: str) -> str:
+    """Return a table of a page with new medians [us] in the columns named after families.
 
-    A family is a line of its own; the rows of its table begin with a name and the median.
+    `said` has a table for each family, below its name, whose rows begin with a name and the median.
     """
-    found, family, before = {}, "", ""
-    for line in output.splitlines():
-        if line.split()[:1] == ["median"]:
-            family = before
-        elif (row := _MEDIAN.match(line)) and family:
-            found[family, row["name"]] = float(row["median"])
-        before = line
-    return found
-
-
-def _with_medians(table: str, found: Mapping[tuple[str, str], float]) -> str:
-    """Return a table of a page with new medians [us] in the columns named after families."""
-    families = {family for family, _ in found}
     head, rule, *rows = [line for line in table.splitlines() if line]
-    columns = [heading.strip().split(" ")[0] for heading in _cells(head)]
+    families = [heading.strip().split(" ")[0] for heading in _cells(head)]
     made = [head, rule]
     for row in rows:
         cells = _cells(row)
         name = re.sub(r'[`,"]|form = ', "", cells[0]).strip()
-        name = {"hqp": "hqp proxqp"}.get(name, name)
-        for c, family in enumerate(columns):
-            if family in families:
-                median = found.get((family, name))
-                cells[c] = (" – " if median is None else
-                            f" {median:.0f} " if median >= 10.0 else f" {median:.1f} ")
+        for c, family in enumerate(families):
+            if family and family in said.splitlines():
+                cells[c] = f" {_median(said, family, {'hqp': 'hqp proxqp'}.get(name, name))} "
         made.append(f"|{'|'.join(cells)}|")
     return "\n".join(made) + "\n"
+
+
+def _median(said: str, family: str, name: str) -> str:
+    try:
+        median = float(cell(said, {"table": family, "row": name, "place": "1"}))
+    except HierarchyError:
+        return "–"
+    return f"{median:.0f}" if median >= 10.0 else f"{median:.1f}"
 
 
 def _cells(row: str) -> list[str]:

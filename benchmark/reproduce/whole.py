@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter
 
 from benchmark.reproduce import fronts, pages, protocol
 from benchmark.reproduce.blocks import POINTS, ROWS, Stored, every, said
-from benchmark.reproduce.fronts import FRONTS
 from benchmark.reproduce.protocol import PROTOCOL, Rows
 from hierarchy.errors import HierarchyError, UnknownNameError
 from scenarios.cli.options import INTERRUPTED
@@ -45,11 +44,7 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
             if not quick:
                 protocol.write(rows, root / ROWS)
                 lacking = pages.fill(root, Stored.read(root))[1]
-        if TUNED in runs and not quick:
-            tuned(out / TUNED, Workers(workers), root)
-            lacking = pages.fill(root, Stored.read(root))[1]
-        for command, printed in () if quick else outputs(asked, root, out / "output"):
-            write_text(pages.file_of(command, root), printed)
+        for _ in () if quick else _others(runs, asked, out, workers, root):
             lacking = pages.fill(root, Stored.read(root))[1]
     except OSError as error:
         why = (f"{error.filename or 'a file'} cannot be written: {reason(error)}"
@@ -65,12 +60,18 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
     return _lacking(lacking)
 
 
-def tuned(out: Path, workers: Workers, root: Path, names: Sequence[str] = tuple(FRONTS)) -> None:
-    """Tune and test the methods of fronts; store the points, and draw them."""
-    with bar("runs") as progress:
-        points = [one for some in fronts.run(names, out, workers, progress) for one in some]
-    fronts.write(points, root / POINTS)
-    fronts.figure(points).savefig(root / PICTURE, dpi=120)
+def _others(runs: list[str], asked: list[str], out: Path, workers: int | None, root: Path
+            ) -> Iterator[None]:
+    """Make and store fronts and their figure, then outputs of commands; yield after each."""
+    if TUNED in runs:
+        with bar("runs") as progress:
+            points = fronts.run(out / TUNED, Workers(workers), progress)
+        fronts.write(points, root / POINTS)
+        fronts.figure(points).savefig(root / PICTURE, dpi=120)
+        yield
+    for command, printed in outputs(asked, root, out / "output"):
+        write_text(pages.file_of(command, root), printed)
+        yield
 
 
 def chosen(names: list[str], root: Path) -> tuple[list[str], list[str]]:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmark.process import CRASHED, HUNG
+from benchmark.process import CRASHED, HUNG, SLOW
 from benchmark.store import Row
 from benchmark.timing import times_of
 from hierarchy.problem import Array, Hierarchy
@@ -130,11 +130,11 @@ def _sizes(h: Hierarchy, proof: Proof | None) -> Array:
 def summary(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> Row:
     """Sum up the rows of one entrant.
 
-    asked, right (share), wrong, modest, failed, ended, answered : problems by verdict. absolute,
-    relative, moved : largest of those called solved. Times, also warm and inside. iterations,
-    warm_iterations : medians. warm_right : share. same : whether all second solves gave the same
-    bits. memory [KiB]. rough : along sequences, the largest step of x beside that of the proved
-    answers. NaN : unknown.
+    asked, right (share), wrong, modest, failed, ended, answered : problems by verdict. slow : not
+    asked because others took too long. absolute, relative, moved : largest of those called solved.
+    Times, also warm and inside. iterations, warm_iterations : medians. warm_right : share. same :
+    whether all second solves gave the same bits. memory [KiB]. rough : along sequences, the largest
+    step of x beside that of the proved answers. NaN : unknown.
 
     steps : of each sequence, by family, the largest step of the proved answers.
     """
@@ -148,6 +148,7 @@ def summary(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> Ro
         "asked": asked, "right": counts[SOLVED] / asked if asked else np.nan,
         "wrong": counts[WRONG], "modest": counts[MODEST], "failed": counts[FAILED],
         "ended": sum(counts[verdict] for verdict in ENDED), "answered": len(claimed),
+        "slow": sum(row.get("refused") == SLOW for row in rows),
         **{key: _over(np.max, (row[key] for row in claimed))
            for key in ("absolute", "relative", "moved")},
         "iterations": _over(np.median, (row.get("iterations") for row in rows)),

@@ -10,7 +10,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmark.machine import machine
 from benchmark.packages import Entrant
 from benchmark.process import CRASHED, HUNG, Field
 from benchmark.report import Report
@@ -18,6 +17,7 @@ from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
 from benchmark.store import Row, Store
+from benchmark.timing import machine
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from scenarios.problems.answers import export, file_of, save
@@ -26,11 +26,13 @@ from solvers.problems.files import Collection, read
 from solvers.proof import prove
 
 QUESTIONS = "benchmark.solve.questions:Questions"
-LIMIT = 10.0     # [s] for one problem with all its repetitions
+LIMIT = 10.0     # [s] of processor time for one problem with all its repetitions
+PATIENCE = 15.0  # [s] of processor time for a file, after which an entrant is not asked the rest
 BORDERS = tuple(10.0**-k for k in range(12, 4, -1))  # angles and lengths as proof.UNCLEAR
 MOST_ENDS = 5    # crashes and hangs of an entrant on a file, after which the rest is left out
 CHECKED = ("EQ7", "EQ7sing", "INEQ7", "tied_box", "contacts", "mixed_units", "one_unknown")
 _CHECKS = 4  # problems of each of them
+_ALIKE = 7   # digits of x / (1 + |x|) in which candidates for a proof count as one
 _BREAKS = {RAISED: "raises", CRASHED: "ends its process", HUNG: "takes longer than --limit"}
 
 
@@ -80,7 +82,8 @@ def asked(field: Field, file: Path, limit: float = LIMIT, labels: Sequence[str] 
     questions = [("problem", str(file.resolve()), p) for p in range(len(one.problems))]
     return {label: [{"entrant": label, "version": field.running[label].about["version"], **same,
                      "problem": p, **row} for p, row in enumerate(answers)]
-            for label, answers in field.answers(questions, limit, MOST_ENDS, labels).items()}
+            for label, answers in field.answers(questions, limit, MOST_ENDS, labels,
+                                                 PATIENCE).items()}
 
 
 def improve(file: Path, found: Iterable[list[Row]]) -> None:
@@ -90,8 +93,9 @@ def improve(file: Path, found: Iterable[list[Row]]) -> None:
     for p, (h, proof) in enumerate(zip(one.problems, proofs, strict=False)):
         if rows and proof.proved < min(proof.posed, len(h.sizes) + 1):
             xs = [np.array(row["x"]) for row in rows[p] if row.get("x") is not None]
-            proofs[p] = max(proof, prove(h, [x for x in xs if miss_of(h, proof, x).level < 0]),
-                            key=lambda one: one.judged)
+            alike = {np.round(x / (1.0 + np.linalg.norm(x)), _ALIKE).tobytes(): x for x in xs
+                     if miss_of(h, proof, x).level < 0}
+            proofs[p] = max(proof, prove(h, alike.values()), key=lambda one: one.judged)
     if any(new is not old for new, old in zip(proofs, one.answers or (), strict=False)):
         save(replace(one, answers=tuple(proofs)), file.parent)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from time import process_time
 from typing import Any, final
 
 import numpy as np
@@ -32,15 +33,16 @@ class Questions:
     def problem(self, file: str, p: int) -> dict[str, Any]:
         """Return the raw row of a problem of a file; a new file is read, and solved once untimed.
 
-        The row has the memory where the file begins.
+        The row has the memory where the file begins, and the processor time that it took [s].
         """
+        begin = process_time()
         if file != self._file:
             with np.load(file, allow_pickle=False) as kept:
                 sequence = bool(json.loads(kept["head.json"])["sequence"])
             self.take(read_problems(Path(file)), sequence=sequence)
             self._rehearse(self.problems[p])
             self._file, self._ready = file, {"start_kib": resident()}
-        return {**self._ready, **self.asked(p)}
+        return {**self._ready, **self.asked(p), "busy_s": process_time() - begin}
 
     def asked(self, p: int) -> dict[str, Any]:
         """Return the answers to a problem that was taken, and what was measured."""
@@ -84,10 +86,9 @@ class Questions:
         """Solve from a cold start, time it, repeat it, and solve without the last level."""
         solver = self.solver
         prepared = solver.prepare(problem)
-        raw = solver.solve(prepared)
+        times, raw = timed(lambda: solver.solve(prepared), self.repeats)
         first = solver.read(raw)
-        said = {**plain(first),
-                "cold_ns": timed(lambda: solver.solve(prepared), self.repeats),
+        said = {**plain(first), "cold_ns": times[1:] or times,
                 "cold_inside_ns": solver.inside(prepared, None, self.repeats)}
         again = solver.read(solver.solve(solver.prepare(problem)))
         said["same"] = bool(np.array_equal(first.x, again.x, equal_nan=True))
@@ -100,9 +101,9 @@ class Questions:
     def _warm(self, problem: Problem, before: Any) -> tuple[dict[str, Any], Any]:
         """Solve from an earlier answer and time it."""
         solver, prepared = self.solver, self.solver.prepare(problem)
-        raw = solver.solve_from(prepared, before)
+        times, raw = timed(lambda: solver.solve_from(prepared, before), self.repeats)
         said = {f"warm_{key}": value for key, value in plain(solver.read(raw)).items()}
-        return {**said, "warm_ns": timed(lambda: solver.solve_from(prepared, before), self.repeats),
+        return {**said, "warm_ns": times[1:] or times,
                 "warm_inside_ns": solver.inside(prepared, before, self.repeats)}, raw
 
 

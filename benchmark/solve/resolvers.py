@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from benchmark import figures
-from benchmark.machine import machine, one_core
 from benchmark.packages import Entrant
 from benchmark.report import Report, Section
 from benchmark.solve.entrants import ENTRANTS, HIERARCHICAL, NUMPY
@@ -23,6 +22,7 @@ from benchmark.solve.questions import Questions
 from benchmark.solve.views import mark
 from benchmark.store import Row
 from benchmark.tables import TIMES, Column, Table, percent, power, whole
+from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
 from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Hierarchy

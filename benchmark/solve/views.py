@@ -27,7 +27,8 @@ from solvers.problems.files import Collection
 NOTES = f"""\
 right: share of the problems asked that are solved, and called so: every level missed by no more \
 than {RIGHT:g} |a| (1 + |x|). wrong: called solved, but missed by more. modest: right, but not \
-called so. failed: neither. ended: raised, crashed, or took too long. miss: largest of those \
+called so. failed: neither. ended: raised, crashed, or took too long. slow: not asked, since those \
+before in the family took too long. miss: largest of those \
 called solved, in the rows' unit, and relative to |a| (1 + |x|). moved: how far the last level \
 moved one above, relative likewise. same: the same bits twice. rough: largest step between two \
 ticks, beside that of the proved answers. MB: growth of the process. Times in microseconds, of one \
@@ -41,7 +42,8 @@ _RATIOS = np.geomspace(1.0, 1e4, 200)  # of times, in the performance profile
 _THRESHOLDS = np.geomspace(1e-9, 1e-3, 13)
 _LABEL, _FAMILY = 23, 19  # width of the entrants' column and of a family's three
 _ANSWERS = (Column("asked", "asked", whole), Column("right", "right", percent),
-            *(Column(key, key, whole) for key in ("wrong", "modest", "failed", "ended")))
+            *(Column(key, key, whole) for key in ("wrong", "modest", "failed", "ended",
+                                                 "slow")))
 _QUALITY = (Column("miss", "absolute", power), Column("relative", "relative", power),
             Column("moved", "moved", power), Column("same", "same", yes), Column("rough", "rough"),
             Column("MB", "memory_mb", whole))

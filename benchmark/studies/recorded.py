@@ -14,17 +14,13 @@ import typer
 
 from hierarchy.problem import Array, Hierarchy
 from scenarios import load
-from scenarios.loop.simulation import simulate
-from scenarios.problems.recorded import Window
+from scenarios.problems.recorded import window
 from solvers import make
 
 
 def recorded(name: str, ticks: int) -> list[Hierarchy]:
     """Return the problems of the first ticks of a scenario, which all have one shape."""
-    scenario, window = load(name), Window(0)
-    simulate(scenario.with_changes({"control.duration": ticks * scenario.control.period}),
-             audits=[window])
-    return window.problems
+    return window(load(name), 0, ticks)
 
 
 def answers(problems: Sequence[Hierarchy]) -> list[Array]:

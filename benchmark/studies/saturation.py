@@ -16,13 +16,13 @@ from typing import final
 import numpy as np
 import typer
 
-from benchmark.machine import machine, one_core
 from benchmark.packages import OWN, Entrant
 from benchmark.report import Report, Section
 from benchmark.solve.judge import RIGHT, by, summary
 from benchmark.solve.resolvers import asked
 from benchmark.store import Row
 from benchmark.tables import Column, Table, percent, power, whole
+from benchmark.timing import machine, one_core
 from hierarchy.problem import Hierarchy
 from scenarios.problems.reference import Problem
 from solvers import certify, make, names

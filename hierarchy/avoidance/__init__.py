@@ -2,12 +2,10 @@
 
 from hierarchy.avoidance.barrier import Barrier
 from hierarchy.avoidance.control_points import ControlPoint
-from hierarchy.avoidance.measurement import Measurement, SurveillanceAreas, measure_exactly
+from hierarchy.avoidance.measurement import Measurement, Pairs, SurveillanceAreas, measure_pairs
 from hierarchy.avoidance.obstacles import Obstacle, Obstacles
-from hierarchy.avoidance.pairs import Pairs, measure_pairs
 from hierarchy.avoidance.repulsion import Repulsion
 from hierarchy.avoidance.self_collision import Capsule, pairs_of_chain
 
 __all__ = ["Barrier", "Capsule", "ControlPoint", "Measurement", "Obstacle", "Obstacles", "Pairs",
-           "Repulsion", "SurveillanceAreas", "measure_exactly", "measure_pairs",
-           "pairs_of_chain"]
+           "Repulsion", "SurveillanceAreas", "measure_pairs", "pairs_of_chain"]

@@ -1,7 +1,5 @@
 """Obstacles: points, spheres, capsules and boxes, at rest or moving on a path."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -13,11 +11,12 @@ from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, UnknownNameError, expect_each
 from hierarchy.gate import check_rotation
-from hierarchy.jit import compiled
+from hierarchy.jit import compiled, inlined
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 
 # One obstacle is one row of the packed table: shape, size, centre, rotation.
+# The number of a shape is also how many sizes it has.
 SHAPES = {"point": 0, "sphere": 1, "capsule": 2, "box": 3}
 _WIDTH = 1 + 3 + 3 + 9
 _CENTRE = slice(4, 7)
@@ -43,7 +42,7 @@ class Obstacle:
     def __post_init__(self) -> None:
         if self.shape not in SHAPES:
             raise UnknownNameError("obstacle shape", self.shape, SHAPES)
-        expected = {"point": 0, "sphere": 1, "capsule": 2, "box": 3}[self.shape]
+        expected = SHAPES[self.shape]
         if len(self.size) != expected or any(not 0.0 < s < inf for s in self.size):
             raise HierarchyError(f"{self.name}: a {self.shape} takes {expected} positive "
                                  f"size(s), got {list(self.size)}")
@@ -98,6 +97,15 @@ class Obstacles:
         return self.table[:, _CENTRE]
 
 
+@inlined
+def _in_axes(obstacle, x, y, z):
+    """A point in the axes of an obstacle, as a tuple."""
+    ox, oy, oz = x - obstacle[4], y - obstacle[5], z - obstacle[6]
+    return (obstacle[7] * ox + obstacle[10] * oy + obstacle[13] * oz,
+            obstacle[8] * ox + obstacle[11] * oy + obstacle[14] * oz,
+            obstacle[9] * ox + obstacle[12] * oy + obstacle[15] * oz)
+
+
 @compiled
 def distance_to_obstacle(obstacle, x, y, z, away):
     """Signed distance of a point to one obstacle; writes the unit vector away from it to `away`.
@@ -105,11 +113,7 @@ def distance_to_obstacle(obstacle, x, y, z, away):
     The distance is negative inside. Where the direction is undefined (on a point, at a centre or
     on an axis), `away` (3,) is the obstacle's z axis.
     """
-    # Point in the obstacle's axes.
-    ox, oy, oz = x - obstacle[4], y - obstacle[5], z - obstacle[6]
-    px = obstacle[7] * ox + obstacle[10] * oy + obstacle[13] * oz
-    py = obstacle[8] * ox + obstacle[11] * oy + obstacle[14] * oz
-    pz = obstacle[9] * ox + obstacle[12] * oy + obstacle[15] * oz
+    px, py, pz = _in_axes(obstacle, x, y, z)
     shape = int(obstacle[0])
     if shape == 3:
         D, ux, uy, uz = _off_box(obstacle[1], obstacle[2], obstacle[3], px, py, pz)
@@ -139,15 +143,13 @@ def turning_off_obstacle(obstacle, x, y, z, D, straight):
     shape = int(obstacle[0])
     if shape < 2:
         return D + obstacle[1]
-    ox, oy, oz = x - obstacle[4], y - obstacle[5], z - obstacle[6]
+    p = _in_axes(obstacle, x, y, z)
     if shape == 2:
-        along = obstacle[9] * ox + obstacle[12] * oy + obstacle[15] * oz
-        _copy_axis(obstacle, 2 if abs(along) < obstacle[2] else -1, straight)
+        _copy_axis(obstacle, 2 if abs(p[2]) < obstacle[2] else -1, straight)
         return D + obstacle[1]
     beyond, axis = 0, -1
     for i in range(3):  # outside one pair of faces: flat; two: an edge; three: a corner
-        along = obstacle[7 + i] * ox + obstacle[10 + i] * oy + obstacle[13 + i] * oz
-        if abs(along) > obstacle[1 + i]:
+        if abs(p[i]) > obstacle[1 + i]:
             beyond += 1
         else:
             axis = i

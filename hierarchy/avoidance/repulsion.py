@@ -1,7 +1,5 @@
 """Magnitude of the repulsive vector, eq. (23), in a form for which (24) holds."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Capsules fixed to the links of a robot, and the distances between them."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -12,9 +10,9 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, expect_each, number
+from hierarchy.errors import expect_each, finite_numbers, number
 from hierarchy.jit import compiled, inlined
-from hierarchy.kinematics import place
+from hierarchy.kinematics import dot, less, place, plus, times, triple
 from hierarchy.problem import Array
 
 Vector = tuple[float, float, float]
@@ -39,10 +37,7 @@ class Capsule:
     def __post_init__(self) -> None:
         number(f"capsule {self.name!r}: radius [m]", self.radius, 0.0)
         for name in ("start", "end"):
-            point = np.asarray(getattr(self, name), dtype=float)
-            if point.shape != (3,) or not np.isfinite(point).all():
-                raise HierarchyError(f"capsule {self.name!r}: {name} {getattr(self, name)} must be "
-                                     "three finite numbers [m]")
+            finite_numbers(f"capsule {self.name!r}: {name} [m]", getattr(self, name), 3)
 
 
 def pairs_of_chain(capsules: Sequence[Capsule]) -> tuple[tuple[int, int], ...]:
@@ -95,29 +90,23 @@ def measure_capsules(placements: Array, joints: NDArray[np.int64], capsules: Arr
 def _measure(placements, joints, capsules, pairs, seen):
     for m in range(pairs.shape[0]):
         i, j = pairs[m, 0], pairs[m, 1]
-        D, rx, ry, rz, s, t = nearest_of_capsules(placements[joints[i]], capsules[i],
-                                                  placements[joints[j]], capsules[j])
-        seen[m, 0], seen[m, 1], seen[m, 2], seen[m, 3] = D, rx, ry, rz
-        seen[m, 4], seen[m, 5] = s, t
+        seen[m, 0], r, seen[m, 4], seen[m, 5] = nearest_of_capsules(
+            placements[joints[i]], capsules[i], placements[joints[j]], capsules[j])
+        seen[m, 1], seen[m, 2], seen[m, 3] = r
 
 
 @inlined
 def nearest_of_capsules(T_a, a, T_b, b):
     """Distance, direction from b to a, and positions s, t on the axes; see `measure_capsules`."""
-    ux, uy, uz = turned(T_a, a)
-    wx, wy, wz = turned(T_b, b)
-    ax, ay, az = place(T_a, a[0], a[1], a[2])
-    bx, by, bz = place(T_b, b[0], b[1], b[2])
-    x, y, z = ax - bx, ay - by, az - bz
-    s, t = nearest_shares(dot(ux, uy, uz, ux, uy, uz), dot(ux, uy, uz, wx, wy, wz),
-                          dot(wx, wy, wz, wx, wy, wz), dot(ux, uy, uz, x, y, z),
-                          dot(wx, wy, wz, x, y, z))
-    x, y, z = x + s * ux - t * wx, y + s * uy - t * wy, z + s * uz - t * wz
+    u, w = turned(T_a, a), turned(T_b, b)
+    apart = less(place(T_a, a[0], a[1], a[2]), place(T_b, b[0], b[1], b[2]))
+    s, t = nearest_shares(dot(u, u), dot(u, w), dot(w, w), dot(u, apart), dot(w, apart))
+    x, y, z = less(plus(apart, times(s, u)), times(t, w))
     length = sqrt(x * x + y * y + z * z)
     D = length - a[6] - b[6]
     if length < ON_AXIS:
-        return D, 0.0, 0.0, 1.0, s, t
-    return D, x / length, y / length, z / length, s, t
+        return D, (0.0, 0.0, 1.0), s, t
+    return D, (x / length, y / length, z / length), s, t
 
 
 @inlined
@@ -155,16 +144,11 @@ def bend_of_nearest(length, r, v, a_axis, b_axis):
     points can slide (0 < s < 1) the distance is the minimum over s and t, and its second derivative
     follows from a Schur complement: less than that of fixed points.
     """
-    (rx, ry, rz), (vx, vy, vz) = r, v
-    (ux, uy, uz), (dux, duy, duz), s = a_axis
-    (wx, wy, wz), (dwx, dwy, dwz), t = b_axis
-    along = dot(rx, ry, rz, vx, vy, vz)
-    bend = (dot(vx, vy, vz, vx, vy, vz) - along * along) / length
-    H_ss = dot(ux, uy, uz, ux, uy, uz) / length
-    H_tt = dot(wx, wy, wz, wx, wy, wz) / length
-    H_st = -dot(ux, uy, uz, wx, wy, wz) / length
-    g_s = dot(vx, vy, vz, ux, uy, uz) / length + dot(rx, ry, rz, dux, duy, duz)
-    g_t = -dot(vx, vy, vz, wx, wy, wz) / length - dot(rx, ry, rz, dwx, dwy, dwz)
+    (u, du, s), (w, dw, t) = a_axis, b_axis
+    along = dot(r, v)
+    bend = (dot(v, v) - along * along) / length
+    H_ss, H_tt, H_st = dot(u, u) / length, dot(w, w) / length, -dot(u, w) / length
+    g_s, g_t = dot(v, u) / length + dot(r, du), -dot(v, w) / length - dot(r, dw)
     if 0.0 < s < 1.0 and 0.0 < t < 1.0:
         determinant = H_ss * H_tt - H_st * H_st
         if determinant > _PARALLEL * H_ss * H_tt:
@@ -184,9 +168,9 @@ def turned(T, capsule):
 
 
 @inlined
-def dot(ax, ay, az, bx, by, bz):
-    """Scalar product of two vectors."""
-    return ax * bx + ay * by + az * bz
+def on_axis(capsule, share):
+    """The point of a capsule's axis at a share of its length, in the body."""
+    return plus(triple(capsule, 0), times(share, triple(capsule, 3)))
 
 
 @inlined

@@ -1,8 +1,8 @@
 """How kernels are compiled, cached and called: the only place that knows the inside of numba."""
 
-from hierarchy.jit.binding import bind
 from hierarchy.jit.caching import cache_folder
 from hierarchy.jit.compiling import compiled, inlined, unlocked
+from hierarchy.jit.dispatching import bind
 from hierarchy.jit.lanes import add_multiple as add_multiple
 from hierarchy.jit.lanes import inner_product as inner_product
 from hierarchy.jit.saying import announce_compilation

@@ -68,5 +68,3 @@ def _entry(made: Any, digest: str) -> Entry | None:
 def _externals(module: Any) -> tuple[str, ...]:
     return tuple(sorted(one.name for one in (*module.functions, *module.global_variables)
                         if one.is_declaration and not one.name.startswith("llvm.")))
-
-

@@ -6,7 +6,7 @@ import gc
 import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any, Literal
 
 import numpy as np
@@ -79,7 +79,8 @@ class Loop:
         self.log = log = Log(self.period, ticks, record)
         stop = Once(safe_stop)
         dog = Watchdog(self.watchdog or np.inf, stop, self.clock)
-        with _quiet(self.pause_gc, self.priority, log.notes), dog if self.watchdog else _nothing():
+        watched = dog if self.watchdog else nullcontext()
+        with _quiet(self.pause_gc, self.priority, log.notes), watched:
             try:
                 log.ended = self._run(step, safe_stop, send, ticks, dog)
             except BaseException as error:
@@ -193,11 +194,6 @@ def _raise_priority(priority: int | None, notes: list[str]) -> tuple[int, Any] |
         notes.append(f"SCHED_FIFO at priority {priority} was not given: {error}")
         return None
     return before
-
-
-@contextmanager
-def _nothing() -> Iterator[None]:
-    yield
 
 
 def _require(condition: bool, text: str) -> None:

@@ -79,6 +79,8 @@ def _skeleton(words: Iterator[str]) -> list[_Joint]:
 
 def _positions(joints: list[_Joint], values: Array) -> dict[str, Array]:
     """Return where each joint is, from its channels in the order of the file [deg]."""
+    from scipy.spatial.transform import Rotation
+
     frames, first = len(values), 0
     turns, places = list[Array](), list[Array]()
     for joint in joints:
@@ -88,7 +90,8 @@ def _positions(joints: list[_Joint], values: Array) -> dict[str, Array]:
             if channel.endswith("position"):
                 place[:, axis] += value
             else:
-                turn = turn @ _turned(axis, np.radians(value))
+                about = Rotation.from_euler(channel[0], value[:, None], degrees=True)
+                turn = turn @ about.as_matrix()
             first += 1
         if joint.parent >= 0:
             place = places[joint.parent] + np.einsum("fij,fj->fi", turns[joint.parent], place)
@@ -96,13 +99,3 @@ def _positions(joints: list[_Joint], values: Array) -> dict[str, Array]:
         turns.append(turn)
         places.append(place)
     return {joint.name: place for joint, place in zip(joints, places, strict=True)}
-
-
-def _turned(axis: int, angle: Array) -> Array:
-    """Rotations (F, 3, 3) about one axis by angles (F,) [rad]."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    R = np.tile(np.eye(3), (len(angle), 1, 1))
-    R[:, i, i] = R[:, j, j] = np.cos(angle)
-    R[:, j, i] = np.sin(angle)
-    R[:, i, j] = -R[:, j, i]
-    return R

@@ -1,7 +1,5 @@
 """Paths in space as functions of time: position, velocity and acceleration."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from abc import ABC, abstractmethod

@@ -20,10 +20,17 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import RobotError
-from hierarchy.robots import mjcf, urdf, urdf_model, urdf_remarks
-from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits, remarks
+from hierarchy.robots import mjcf, urdf, urdf_remarks
+from hierarchy.robots.found import (
+    Coupled,
+    Found,
+    is_floating,
+    neutral_within_limits,
+    proposed_end_effector,
+    remarks,
+)
+from hierarchy.robots.from_table import ROOT
 from hierarchy.robots.joints import without
-from hierarchy.robots.points import proposed_end_effector
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
 from hierarchy.words import some
@@ -55,7 +62,7 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
                locked: Mapping[str, ArrayLike]) -> Found:
     with _printed() as lines:
         try:
-            model = urdf_model.model_of(root, base)
+            model = model_of(root, base)
             said = tuple(urdf_remarks.not_read(lines()))
         except Exception as error:  # the parsers raise many types; all mean an invalid file
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
@@ -173,3 +180,40 @@ def _held_by(model: Any, capsules: tuple[Any, ...]) -> tuple[tuple[Any, ...], tu
             "scenario may list it as an obstacle",) if of_world else ()
     return tuple(c for c in capsules if 0 <= c.joint < model.njoints and c.name not in of_world
                  and (c.radius > 0.0 or not np.array_equal(c.start, c.end))), said
+
+
+def model_of(root: Element, base: Base | None) -> Any:
+    """Build the model of a URDF, whose planar joints move in the plane normal to their axis.
+
+    A floating first joint is the free base; `base` "fixed" fixes it where the file has it, and
+    "floating" adds one to a URDF without.
+    """
+    text = ElementTree.tostring(root, encoding="unicode")
+    model = pin.buildModelFromXML(text)
+    if base == "floating" and not is_floating(model):
+        if ROOT in list(model.names):
+            raise RobotError(f"joint {ROOT!r} has the name that a floating base is given")
+        model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+    elif base == "fixed" and is_floating(model):
+        model = pin.buildReducedModel(model, [1], pin.neutral(model))
+    for joint in root.findall("joint"):
+        if joint.get("type") == "planar" and joint.get("name") in list(model.names):
+            axis = joint.find("axis")
+            xyz = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
+            _turn(model, model.getJointId(joint.get("name")), np.array(xyz.split(), dtype=float))
+    return model
+
+
+def _turn(model: Any, joint: int, axis: Any) -> None:
+    """Turn z of a joint onto `axis` (3,), and leave in place what it carries."""
+    z = np.array([0.0, 0.0, 1.0])
+    turn = pin.SE3(pin.Quaternion.FromTwoVectors(z, axis), np.zeros(3))
+    back = turn.inverse()
+    model.jointPlacements[joint] = model.jointPlacements[joint] * turn
+    model.inertias[joint] = back.act(model.inertias[joint])
+    for child in range(1, model.njoints):
+        if model.parents[child] == joint:
+            model.jointPlacements[child] = back * model.jointPlacements[child]
+    for frame in model.frames:
+        if frame.parentJoint == joint:
+            frame.placement = back * frame.placement

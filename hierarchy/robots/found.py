@@ -1,9 +1,12 @@
-"""What a reader of a file or a table finds about a robot."""
+"""What a file or a table says of a robot, and what is proposed where it does not."""
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,8 +14,8 @@ import numpy as np
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.self_collision import Capsule
 from hierarchy.problem import Array
-from hierarchy.robots.frames import ambiguous
-from hierarchy.words import some
+from hierarchy.robots.table import Table
+from hierarchy.words import listed, some
 
 _HUGE = 1e300  # a limit of pinocchio beyond this is none
 
@@ -53,6 +56,7 @@ class Found:
     `missing` are sentences. `control_points` is None if they are to be proposed. `coupled` joints
     follow others, `loops` are closed chains; `starts` are configurations (nq,) that the file names,
     and `apart` pairs of bodies, by the joints that move them, whose distance it does not watch.
+    `table` is the table that the model was made from, or None.
     """
 
     model: Any
@@ -65,6 +69,7 @@ class Found:
     loops: tuple[Loop, ...] = ()
     starts: Mapping[str, Array] = field(default_factory=dict)
     apart: tuple[tuple[str, str], ...] = ()
+    table: Table | None = None
 
 
 def is_floating(model: Any) -> bool:
@@ -100,3 +105,94 @@ def neutral_within_limits(model: Any, neutral: Array) -> Array:
                 q[i] = (lower + upper) / 2 if np.isfinite([lower, upper]).all() else (
                     min(max(q[i], lower), upper))
     return q
+
+
+_SAME_PLACE = 1e-9
+_KINDS = {"BODY": "link", "JOINT": "joint", "FIXED_JOINT": "fixed joint"}
+
+
+def frames_called(model: Any, name: str) -> list[Any]:
+    """Return the frames with a name that stand at different places, one for each place."""
+    found: list[Any] = []
+    for frame in model.frames:
+        if frame.name == name and not any(
+                one.parentJoint == frame.parentJoint
+                and one.placement.isApprox(frame.placement, _SAME_PLACE) for one in found):
+            found.append(frame)
+    return found
+
+
+def ambiguous(model: Any) -> list[str]:
+    """Return the names that frames at different places share, such as a joint and a link."""
+    counts = Counter(str(frame.name) for frame in model.frames)
+    return [name for name, count in counts.items()
+            if count > 1 and len(frames_called(model, name)) > 1]
+
+
+def in_words(model: Any, frames: list[Any]) -> str:
+    """Say what frames are and where: "a link on the body of joint 'wrist' and ..."."""
+    return listed([f"a {_KINDS.get(frame.type.name, 'frame')} "
+                   + (f"on the body of joint {model.names[frame.parentJoint]!r}"
+                      if frame.parentJoint > 0 else "fixed to the world") for frame in frames])
+
+
+COUNT = 8            # number of proposed control points
+FIRST_MOVED_BY = 3   # they start at the origin of this joint of the chain, counted from 1
+_NAMED_SO = re.compile(r"(^|[_\W])(tcp|tool\d*|eef?|end_?effector|gripper|flange)($|[_\W])",
+                       re.IGNORECASE)
+
+
+def proposed_end_effector(model: Any) -> str:
+    """Return the last frame with a common name of a tool, or the last that most joints move.
+
+    Common names are tcp, tool, ee, eef, end_effector, gripper and flange, between underscores;
+    frames that no joint moves do not count, nor do the frames of joints and names at two places.
+    """
+    unclear = set(ambiguous(model))
+    frames = [frame for frame in model.frames if frame.name not in unclear]
+    joints = set(model.names)
+    named = [frame.name for frame in frames if frame.parentJoint > 0
+             and frame.name not in joints and _NAMED_SO.search(frame.name)]
+    links = [name for name in named if not name.endswith("joint")]
+    carried = [len(model.supports[frame.parentJoint]) for frame in frames]
+    farthest = [frame.name for frame, count in zip(frames, carried, strict=True)
+                if count == max(carried)]
+    return str((links or named or farthest)[-1])
+
+
+def points_along_chain(model: Any, end_effector: str, count: int = COUNT,
+                       first: int = FIRST_MOVED_BY) -> tuple[ControlPoint, ...]:
+    """Return points spread evenly over the chain that carries the end effector.
+
+    The chain is the line through the origins of its joints, from joint number `first` of those that
+    carry it (a floating base does not count) to the end effector, which is omitted because sensors
+    measure it anyway. A point between two origins is fixed to the joint before it.
+    """
+    frame = next(one for one in model.frames if one.name == end_effector)
+    chain = [joint for joint in model.supports[frame.parentJoint].tolist()
+             if joint > 0 and model.joints[joint].nv == 1]
+    chain = chain[min(first, len(chain)) - 1:]
+    ends = [np.array(_between(model, a, b)) for a, b in pairwise(chain)]
+    ends.append(np.array(frame.placement.translation))
+    lengths = np.array([np.linalg.norm(end) for end in ends])
+    starts = np.concatenate([[0.0], np.cumsum(lengths)])
+    if not chain or starts[-1] < 1e-3:
+        return ()
+    points = []
+    for k in range(1, count + 1):
+        at = k * starts[-1] / (count + 1)
+        i = min(int(np.searchsorted(starts, at, side="right")) - 1, len(chain) - 1)
+        offset = ends[i] * ((at - starts[i]) / lengths[i])
+        points.append(ControlPoint(f"{model.names[chain[i]]} {np.round(offset, 3).tolist()}",
+                                   chain[i], offset))
+    return tuple(points)
+
+
+def _between(model: Any, joint: int, below: int) -> Array:
+    """Origin of joint `below` in the frame of `joint`, with the joints between them at zero."""
+    placement = model.jointPlacements[below]
+    parent = model.parents[below]
+    while parent != joint:
+        placement = model.jointPlacements[parent] * placement
+        parent = model.parents[parent]
+    return np.asarray(placement.translation)

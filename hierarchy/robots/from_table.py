@@ -10,8 +10,8 @@ import pinocchio as pin
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.self_collision import Vector
 from hierarchy.problem import Array
-from hierarchy.robots.capsules import link_capsules
 from hierarchy.robots.found import Found
+from hierarchy.robots.shapes import link_capsules
 from hierarchy.robots.table import Base, DHTable, Link, Table, TreeTable
 
 END_EFFECTOR = "end_effector"
@@ -39,7 +39,7 @@ def _from_chain(table: DHTable, base: Base) -> Found:
         model.addJointFrame(joint, -1)
     model.addFrame(pin.Frame(END_EFFECTOR, joint, placement, pin.FrameType.OP_FRAME))
     return Found(model, END_EFFECTOR, link_capsules(table, base=first),
-                 _points(model, table.control_points))
+                 _points(model, table.control_points), table=table)
 
 
 def _from_tree(table: TreeTable, base: Base) -> Found:
@@ -61,7 +61,7 @@ def _from_tree(table: TreeTable, base: Base) -> Found:
         model.addFrame(pin.Frame(frame.name, _index(model, frame.joint, root), placement,
                                  pin.FrameType.OP_FRAME))
     return Found(model, table.end_effector, link_capsules(table, base=root),
-                 _points(model, table.control_points), _rest(model, table, base))
+                 _points(model, table.control_points), _rest(model, table, base), table=table)
 
 
 def _empty(name: str, base: Base) -> Any:

@@ -7,6 +7,7 @@ from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, PackagePath, distribution
 from pathlib import Path
+from typing import Any
 
 from hierarchy import plugins
 from hierarchy.errors import RobotError, UnknownNameError, nearest
@@ -44,11 +45,10 @@ def elsewhere(name: str) -> str:
 def _installed() -> dict[str, list[str]]:
     """Return the names of the robots in each package of robots that is installed."""
     found: dict[str, list[str]] = {}
-    with suppress(PackageNotFoundError):
-        found["example_robot_data"] = list(_example_files())
-    with suppress(ImportError):
-        found["robot_descriptions"] = list(
-            import_module("robot_descriptions._descriptions").DESCRIPTIONS)
+    for package, names in (("example_robot_data", _example_files), ("robot_descriptions",
+                                                                    _descriptions)):
+        with suppress(PackageNotFoundError, ImportError):
+            found[package] = list(names())
     return found
 
 
@@ -59,48 +59,42 @@ def _example_files() -> dict[str, PackagePath]:
             if file.name.endswith(".urdf")}
 
 
+def _descriptions() -> dict[str, Any]:
+    """Return the modules of robot_descriptions by name; raises ImportError."""
+    known: dict[str, Any] = import_module("robot_descriptions._descriptions").DESCRIPTIONS
+    return known
+
+
 def file_of(model: str) -> Path:
     """Return the URDF or MJCF file of "example_robot_data:NAME" or "robot_descriptions:NAME".
 
-    Raises RobotError if the package is not installed or its file is not available, and
-    UnknownNameError for an unknown name.
+    Names are those of the URDF files of the one, without the suffix, and of the modules of the
+    other, with or without "_description"; these download files. Raises RobotError if the package is
+    not installed or its file is not available, and UnknownNameError for an unknown name.
     """
     package, _, name = model.partition(":")
-    finder = {"example_robot_data": _in_example_robot_data,
-              "robot_descriptions": _in_robot_descriptions}
-    if package not in finder:
+    if package not in PACKAGES:
         raise UnknownNameError("package of robots", package, PACKAGES)
-    return finder[package](name)
-
-
-def _in_example_robot_data(name: str) -> Path:
-    """Names are those of its URDF files, without the suffix."""
+    of_files = package == "example_robot_data"
     try:
-        found = _example_files()
-    except PackageNotFoundError as error:
-        raise RobotError(f"robot 'example_robot_data:{name}' needs the package "
-                         f"example-robot-data: {_REMEDY}") from error
-    if name not in found:
-        raise UnknownNameError("robot of example_robot_data", name, found)
-    return Path(str(found[name].locate())).resolve()
+        known = _example_files() if of_files else _descriptions()
+    except (PackageNotFoundError, ImportError) as error:
+        raise RobotError(f"robot {model!r} needs the package {package.replace('_', '-')}: "
+                         f"{_REMEDY}") from error
+    called = name if of_files or name in known else f"{name}_description"
+    if called not in known:
+        raise UnknownNameError(f"robot of {package}", name, known)
+    return Path(str(known[name].locate())).resolve() if of_files else _downloaded(called, model)
 
 
-def _in_robot_descriptions(name: str) -> Path:
-    """Names are those of its modules, with or without "_description"; they download files."""
-    try:
-        known = import_module("robot_descriptions._descriptions").DESCRIPTIONS
-    except ImportError as error:
-        raise RobotError(f"robot 'robot_descriptions:{name}' needs the package "
-                         f"robot-descriptions: {_REMEDY}") from error
-    module = name if name in known else f"{name}_description"
-    if module not in known:
-        raise UnknownNameError("robot of robot_descriptions", name, known)
+def _downloaded(module: str, model: str) -> Path:
+    """Return the file of a module of robot_descriptions."""
     try:
         description = import_module(f"robot_descriptions.{module}")
     except Exception as error:  # it clones a repository: git and the network fail in many ways
-        raise RobotError(f"robot 'robot_descriptions:{name}' could not be downloaded: "
+        raise RobotError(f"robot {model!r} could not be downloaded: "
                          f"{type(error).__name__}: {str(error).strip()[:200]}") from error
     for key in ("URDF_PATH", "MJCF_PATH"):
         if hasattr(description, key):
             return Path(getattr(description, key))
-    raise RobotError(f"robot 'robot_descriptions:{name}' has neither a URDF nor an MJCF file")
+    raise RobotError(f"robot {model!r} has neither a URDF nor an MJCF file")

@@ -1,24 +1,31 @@
-"""Obstacle avoidance by a control point of the body: 3-D (28), or relaxed to one row (29)."""
-
-# mypy: disable-error-code="no-untyped-def"
+"""Obstacle avoidance: of the nearest control point, 3-D (28) or one row (29), or of all at once."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.errors import HierarchyError
+from hierarchy.jit import bind, compiled
 from hierarchy.jit.sources import Kernel
-from hierarchy.kinematics import add_row, drift_of_point, place, write_point_jacobian
+from hierarchy.kinematics import (
+    add_row,
+    dot,
+    moving_point,
+    place,
+    triple,
+    write_identity,
+    write_point_jacobian,
+)
 from hierarchy.measured import Measured, measured
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.state import State
+from hierarchy.task import Level, Task, in_turn, seen_by
+from hierarchy.tasks.posture import JointTask
 
 
 @measured
@@ -27,20 +34,17 @@ def _avoidance(kinematics, reads, goal, J, motion):
     k = max(seen.active[0], 0)
     joint, offset, r, magnitude = joints[k], offsets[k], seen.direction[k], seen.magnitude[k]
     columns, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(kinematics, joint, offset[0], offset[1],
-                                                     offset[2])
+    velocity, drift, _ = moving_point(kinematics, joint, offset)
     if len(motion.error) == 3:  # (28)
         write_point_jacobian(columns, placements, supports, joint, offset, J, 0)
-        motion.rate[0], motion.rate[1], motion.rate[2] = vx, vy, vz
-        motion.drift[0], motion.drift[1], motion.drift[2] = ax, ay, az
         for i in range(3):
             motion.error[i] = magnitude * r[i]
+            motion.rate[i], motion.drift[i] = velocity[i], drift[i]
         return
     point = place(placements[joint], offset[0], offset[1], offset[2])
-    add_row(columns, supports, joint, point, (r[0], r[1], r[2]), J, 0)
-    motion.error[0] = magnitude
-    motion.rate[0] = r[0] * vx + r[1] * vy + r[2] * vz
-    motion.drift[0] = r[0] * ax + r[1] * ay + r[2] * az  # (29)
+    add_row(columns, supports, joint, point, triple(r, 0), J, 0)
+    motion.error[0], motion.rate[0] = magnitude, dot(r, velocity)
+    motion.drift[0] = dot(r, drift)  # (29)
 
 
 @dataclass(frozen=True)
@@ -61,17 +65,11 @@ class Avoidance(Measured):
     rows: Literal[1, 3] = 1
     name: str = "avoidance"
     stiffness = gain = 1.0  # the error is the command at both levels
-    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    offsets: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.rows not in (1, 3):
             raise HierarchyError(f"task {self.name!r}: rows must be 1 or 3, got {self.rows}")
-        if not self.points:
-            raise HierarchyError(f"task {self.name!r}: needs at least one control point")
-        joints, offsets = pack_points(self.points)
-        set_frozen(self, joints=joints, offsets=offsets)
 
     @property
     def dimension(self) -> int:
@@ -80,6 +78,73 @@ class Avoidance(Measured):
 
     def measure(self, state: State) -> tuple[Kernel, Any]:
         """See `Measured.measure`; the error is the repulsion [m/s^2 or m/s]."""
-        if state.measurement is None:
-            raise HierarchyError(f"task {self.name!r}: the state carries no measurement")
-        return _avoidance, (self.joints, self.offsets, state.measurement.arrays)
+        return _avoidance, (*pack_points(self.points), seen_by(self, state).arrays)
+
+
+@dataclass(frozen=True)
+class CumulatedRepulsion(JointTask):
+    """Push every control point within a distance away, as the null-space reference of a stack.
+
+    Each control point nearer than `within` asks for the joint command of its own avoidance task
+    (29), J_n^T (r - dJ_n/dt v) / max(|J_n|^2, lever^2), and the commands are added up; `base` is
+    the null-space term to which they are added. No point is certain to get what it asks for: the
+    commands add up in any direction, and the tasks of the stack take what they need first.
+
+    joints : number of joints n. points : the control points in the order of the measurement.
+    within : distance [m]. lever : length of J_n [m] below which it no longer enlarges the command.
+
+    Source: reference [5] of the letter, as the letter's introduction describes it; there the
+    commands are velocities. At velocity level r is a velocity, without dJ_n/dt v.
+    """
+
+    joints: int
+    points: Sequence[ControlPoint]
+    within: float
+    base: Task | None = None
+    lever: float = 0.05
+    name: str = "cumulated repulsion"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.lever > 0.0:
+            raise HierarchyError(f"task {self.name!r}: lever {self.lever} m must be positive")
+        if self.base is not None and self.base.dimension != self.joints:
+            raise HierarchyError(f"task {self.name!r}: {self.base.name!r} has "
+                                 f"{self.base.dimension} rows, expected {self.joints}")
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        self.check_size(state)
+        below = bind(write_identity, A, row, self.joints) if self.base is None else (
+            self.base.writer(state, level, A, lower, upper, row))
+        sides = lower[row:row + self.joints]
+        parameters = (*pack_points(self.points), self.within, self.lever, level == "acceleration",
+                      np.empty((1, state.n)))
+        add = bind(_add, state.kinematics, parameters, seen_by(self, state).arrays, lower, upper,
+                   row)
+        return in_turn(lambda: sides.fill(0.0), below, add)
+
+
+@compiled
+def _add(kinematics, parameters, seen, lower, upper, row):
+    """Add each point's command to the n equalities from `row` on."""
+    bodies, offsets, within, lever, acceleration, scratch = parameters
+    n = scratch.shape[1]
+    for k in range(len(bodies)):
+        if not seen.distance[k] <= within:
+            continue
+        body, offset, r, asked = bodies[k], offsets[k], seen.direction[k], seen.magnitude[k]
+        if acceleration:
+            _, drift, _ = moving_point(kinematics, body, offset)
+            asked -= dot(r, drift)
+        point = place(kinematics.placements[body], offset[0], offset[1], offset[2])
+        scratch[0, :] = 0.0
+        add_row(kinematics.J, kinematics.supports, body, point, triple(r, 0), scratch, 0)
+        square = 0.0
+        for c in range(n):
+            square += scratch[0, c] * scratch[0, c]
+        for c in range(n):
+            lower[row + c] += scratch[0, c] * asked / max(square, lever * lever)
+    for c in range(n):
+        upper[row + c] = lower[row + c]

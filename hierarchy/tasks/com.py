@@ -1,11 +1,10 @@
-"""Task that moves the centre of mass of the whole robot along a path."""
-
-# mypy: disable-error-code="no-untyped-def"
+"""The whole robot: its centre of mass along a path, its linear and angular momentum."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +12,10 @@ from numpy.typing import NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import compiled, inlined
 from hierarchy.jit.sources import Kernel
-from hierarchy.kinematics import drift_of_point, place, row_times
+from hierarchy.kinematics import moving_point, place, row_times
 from hierarchy.measured import Measured, measured
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
 
@@ -38,7 +36,6 @@ class CentreOfMass(Measured):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "centre of mass"
-    shares: Array = field(init=False, repr=False, compare=False)  # of the mass, one per body
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -47,15 +44,18 @@ class CentreOfMass(Measured):
                 set(axes)):
             raise HierarchyError(f"task {self.name!r}: axes {list(axes)} must be some of 0, 1, 2, "
                                  "in this order")
-        mass = float(self.robot.masses.sum())
-        if not mass > 0.0:
+        if not self.robot.masses.sum() > 0.0:
             raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has no masses")
-        set_frozen(self, shares=self.robot.masses / mass)
 
     @property
     def dimension(self) -> int:
         """One row per axis."""
         return len(self.axes)
+
+    @property
+    def shares(self) -> Array:
+        """The share of the mass that each body has."""
+        return self.robot.masses / float(self.robot.masses.sum())
 
     def position(self, state: State) -> Array:
         """World position of the centre of mass (3,) [m]."""
@@ -109,16 +109,82 @@ def _centre_of_mass(kinematics, reads, goal, J, motion):
     p, drift = np.zeros(3), np.zeros(3)
     for joint in range(1, len(shares)):
         if shares[joint] > 0.0:
-            cx, cy, cz = centres[joint, 0], centres[joint, 1], centres[joint, 2]
-            x, y, z = place(kinematics.placements[joint], cx, cy, cz)
-            p[0] += shares[joint] * x
-            p[1] += shares[joint] * y
-            p[2] += shares[joint] * z
-            _, _, _, ax, ay, az, _, _, _ = drift_of_point(kinematics, joint, cx, cy, cz)
-            drift[0] += shares[joint] * ax
-            drift[1] += shares[joint] * ay
-            drift[2] += shares[joint] * az
+            o = centres[joint]
+            at = place(kinematics.placements[joint], o[0], o[1], o[2])
+            _, bend, _ = moving_point(kinematics, joint, o)
+            for i in range(3):
+                p[i] += shares[joint] * at[i]
+                drift[i] += shares[joint] * bend[i]
     for i in range(len(axes)):
         motion.error[i] = goal[0, axes[i]] - p[axes[i]]
         motion.rate[i] = row_times(J, i, kinematics.v)
         motion.drift[i] = drift[axes[i]]
+
+
+_ROWS = {"both": (0, 6), "linear": (0, 3), "angular": (3, 6)}
+
+
+@dataclass(frozen=True)
+class Momentum(Measured):
+    """Bring the momentum of the whole robot to `target`, about its centre of mass.
+
+    `part` is "linear" (m = 3) [kg m/s], "angular" (m = 3) [kg m^2/s] or "both" (m = 6), linear
+    first, world axes. At velocity level A v is the target, at the others its derivative is
+    damping (target - A v), with `damping` [1/s]. The derivative of A is always exact.
+
+    Raises HierarchyError for another part, or a target of another length. Source: D. Orin,
+    A. Goswami, S.-H. Lee, "Centroidal dynamics of a humanoid robot", Autonomous Robots (2013).
+    """
+
+    part: Literal["both", "linear", "angular"] = "both"
+    target: Sequence[float] | None = None
+    damping: float = 10.0
+    name: str = "momentum"
+    exact = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.part, str) or self.part not in _ROWS:
+            raise HierarchyError(f"task {self.name!r}: part {self.part!r} is not one of "
+                                 f"{', '.join(_ROWS)}")
+        if self.target is not None and (len(self.target) != self.dimension
+                                        or not np.isfinite(self.target).all()):
+            raise HierarchyError(f"task {self.name!r}: target {self.target!r} is not "
+                                 f"{self.dimension} finite numbers")
+
+    @property
+    def dimension(self) -> int:
+        """Three rows, or six."""
+        return len(self.columns)
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Linear and angular momentum along the axes."""
+        names = [f"{kind} {axis}" for kind in ("linear", "angular") for axis in "xyz"]
+        return tuple(names[i] for i in self.columns)
+
+    def measure(self, state: State) -> tuple[Kernel, Any]:
+        """See `Measured.measure`; a momentum has no position, so there is no error."""
+        return _momentum, (*state.momentum, self.columns)
+
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """The components."""
+        return np.arange(*_ROWS[self.part])
+
+    def goal(self, state: State) -> Array:
+        """The target in the place of a velocity (3, 6)."""
+        goal = np.zeros((3, 6))
+        goal[1, self.columns] = 0.0 if self.target is None else self.target
+        return goal
+
+
+@measured
+def _momentum(kinematics, reads, goal, J, motion):
+    of_robot, rates, rows = reads
+    v = kinematics.v
+    for i in range(len(rows)):
+        for c in range(len(v)):
+            J[i, c] = of_robot[rows[i], c]
+        motion.rate[i] = row_times(J, i, v)
+        motion.drift[i] = row_times(rates, rows[i], v)

@@ -14,15 +14,14 @@ from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Task
-from hierarchy.tasks.along import Along
+from hierarchy.task import Level, Task, Written
 from hierarchy.tasks.pose import Pose
-from hierarchy.tasks.position import Position
+from hierarchy.tasks.position import Along, Position
 from hierarchy.tasks.together import Together
 
 
 @dataclass(frozen=True)
-class ContactMotion(Task):
+class ContactMotion(Written):
     """Keep contacts at rest: J_c a + dJ_c/dt v = -damping v_c + stiffness e [m/s^2, rad/s^2].
 
     Three rows for a point, those of `Position`, one of them along the normal for a point that
@@ -85,14 +84,6 @@ class ContactMotion(Task):
     def error(self, state: State) -> Array:
         """Distance of each contact from its anchor (m,) [m, rad]; zero without anchors."""
         return np.zeros(self.dimension) if self.anchors is None else self._tasks.error(state)
-
-    def jacobian(self, state: State) -> Array:
-        """Linear, and for surfaces angular, Jacobians of the contacts' frames (m, n)."""
-        return self._tasks.jacobian(state)
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Their time derivatives (m, n)."""
-        return self._tasks.jacobian_derivative(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:

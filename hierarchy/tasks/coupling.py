@@ -1,7 +1,5 @@
 """Couplings of joints: gears, mimic joints, fingers that close together."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
@@ -54,13 +52,6 @@ class _Coupling(Measured):
     def measure(self, state: State) -> tuple[Kernel, Any]:
         """See `Measured.measure`; the error is to the nearest full turn of a continuous joint."""
         return _coupling, (state.q, self.terms)
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Their second derivatives, times the velocities of the joints (m, n)."""
-        found = np.zeros((self.dimension, state.n))
-        for row, at, of, continuous, c in zip(*self.terms[:5], strict=True):
-            found[row, of] = _polynomial(c, _position(state.q, at, continuous))[2] * state.v[of]
-        return found
 
 
 @dataclass(frozen=True)

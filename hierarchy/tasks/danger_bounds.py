@@ -23,28 +23,23 @@ avoidance", ICRA 2012, reference [10] of the letter; there f is g, which leaves 
 velocity at contact.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.avoidance.repulsion import Repulsion, repulsion
 from hierarchy.errors import HierarchyError, expect
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import point_at
+from hierarchy.kinematics import place
 from hierarchy.limits import clipped
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Level, Written
+from hierarchy.task import Level, Written, in_turn, seen_by
 from hierarchy.tasks.joint_limits import JointLimits
 
 
@@ -72,16 +67,11 @@ class DangerBounds(Written):
     shape: float = 6.0
     lever: float = 1e-9
     name: str = "danger bounds"
-    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    offsets: Array = field(init=False, repr=False, compare=False)
-    danger: Repulsion = field(init=False, repr=False, compare=False)
     kind = "inequality"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         expect(f"task {self.name!r}: limits", self.limits, JointLimits, "give a JointLimits task")
-        if not self.points:
-            raise HierarchyError(f"task {self.name!r}: needs at least one control point")
         if self.limits.robot.base == "floating":
             raise HierarchyError(f"task {self.name!r}: robot {self.limits.robot.name!r} has a "
                                  "floating base, whose speed no joint bounds")
@@ -91,11 +81,9 @@ class DangerBounds(Written):
             raise HierarchyError(f"task {self.name!r}: joint {self.limits.robot.velocity_names[i]} "
                                  "has no velocity limit to scale")
         try:
-            danger = Repulsion(1.0, self.reach, self.shape)
+            Repulsion(1.0, self.reach, self.shape)
         except HierarchyError as error:
             raise HierarchyError(f"task {self.name!r}: {error}") from error
-        joints, offsets = pack_points(self.points)
-        set_frozen(self, danger=danger, joints=joints, offsets=offsets)
 
     @property
     def dimension(self) -> int:
@@ -120,49 +108,30 @@ class DangerBounds(Written):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`; the rows have two sides."""
-        write_limits = self.limits.writer(state, level, A, lower, upper, row)
-        tighten = self._tighten(state, level, lower, upper, row)
-
-        def write() -> None:
-            write_limits()
-            tighten()
-
-        return write
+        return in_turn(self.limits.writer(state, level, A, lower, upper, row),
+                       self._tighten(state, level, lower, upper, row))
 
     def _tighten(self, state: State, level: Level, lower: Array, upper: Array,
                  row: int) -> Callable[[], object]:
-        parameters = _Parameters(self.joints, self.offsets, self.reach, self.shape, self.lever,
-                                 self.limits.limits.packed[2],
-                                 max(self.limits.period, self.limits.horizon),
-                                 level == "acceleration")
+        parameters = (*pack_points(self.points), self.reach, self.shape, self.lever,
+                      self.limits.limits.packed[2], max(self.limits.period, self.limits.horizon),
+                      level == "acceleration")
         return bind(_tighten, state.kinematics, parameters, self._seen(state).arrays, lower, upper,
                     row)
 
     def _seen(self, state: State) -> Measurement:
-        seen = state.measurement
-        if seen is None:
-            raise HierarchyError(f"task {self.name!r}: the state carries no measurement")
+        seen = seen_by(self, state)
         if len(self.points) > len(seen.distance):
             raise HierarchyError(f"task {self.name!r}: {len(self.points)} control points, and "
                                  f"distances of {len(seen.distance)}")
         return seen
 
 
-class _Parameters(NamedTuple):
-    joints: NDArray[np.int64]
-    offsets: Array
-    reach: float
-    shape: float
-    lever: float
-    V: Array  # velocity limits
-    T: float  # period, or horizon
-    acceleration: bool
-
-
 @compiled
 def _tighten(kinematics, parameters, seen, lower, upper, row):
     """Tighten the bounds of a box of n joints that starts at `row`."""
     v, J, _, placements, supports, _, _, _ = kinematics
+    # V are the velocity limits, T the period, or the horizon.
     joints, offsets, reach, shape, lever, V, T, acceleration = parameters
     n = len(v)
     danger = np.zeros((2, n))  # of moving backward, and forward
@@ -170,9 +139,7 @@ def _tighten(kinematics, parameters, seen, lower, upper, row):
     for k in range(len(joints)):
         joint, r = joints[k], seen.direction[k]
         f = min(repulsion(max(seen.distance[k], 0.0), 1.0, reach, shape, 2.0) / contact, 1.0)
-        x = point_at(placements, joint, offsets[k], 0)
-        y = point_at(placements, joint, offsets[k], 1)
-        z = point_at(placements, joint, offsets[k], 2)
+        x, y, z = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
         for c in range(n):
             if supports[joint, c]:
                 away = (r[0] * (J[0, c] + J[4, c] * z - J[5, c] * y)

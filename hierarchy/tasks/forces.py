@@ -1,24 +1,26 @@
-"""What tasks over accelerations and contact forces have in common."""
-
-# mypy: disable-error-code="no-untyped-def"
+"""Rows over contact forces: what they have in common, a force that is given, the least ones."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError
+from hierarchy.contacts import Contacts, Points
+from hierarchy.errors import HierarchyError, finite_numbers
 from hierarchy.jit import bind, compiled
+from hierarchy.kinematics import place, write_equality
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Written
+
+WRENCH = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
 
-class ForceTask(Task):
+class ForceTask(Written):
     """m rows over x = (a, f), the unknowns of `contacts`, at level "torque". Abstract.
 
     Such rows have no task variable and no gains: they say what x must satisfy. A new one needs
@@ -29,30 +31,10 @@ class ForceTask(Task):
     scale = 3.0  # N
     contacts: Contacts
 
-    @abstractmethod
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
-        """See `Task.writer`."""
-
-    def rows(self, state: State) -> tuple[Array, Array, Array]:
-        """The rows at a state: A (m, n + 3 p), lower and upper (m,)."""
-        A = np.zeros((self.dimension, self.contacts.unknowns))
-        lower, upper = np.empty(self.dimension), np.empty(self.dimension)
-        self.writer(state, "torque", A, lower, upper, 0)()
-        return A, lower, upper
-
     def error(self, state: State) -> Array:
         """The residual at x = 0 (m,), in the unit of the rows."""
         _, lower, upper = self.rows(state)
         return np.asarray(np.clip(0.0, lower, upper))
-
-    def jacobian(self, state: State) -> Array:
-        """The rows A (m, n + 3 p)."""
-        return self.rows(state)[0]
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Zero (m, n + 3 p); no row uses it."""
-        return np.zeros((self.dimension, self.contacts.unknowns))
 
 
 class FixedRows(ForceTask):
@@ -93,3 +75,105 @@ def _copy(rows, low, up, A, lower, upper, row):
         for c in range(rows.shape[1]):
             A[row + i, c] = rows[i, c]
         lower[row + i], upper[row + i] = low[i], up[i]
+
+
+@dataclass(frozen=True)
+class ContactForce(ForceTask):
+    """Let the surroundings push on one contact with `target`, the sum over its points.
+
+    `target` has 1 number for the normal force [N], 3 for the force in world axes [N], or 6 for the
+    wrench: the force, and the moment about the origin of the contact's frame [N m], world axes. The
+    force is that on the robot: a hand that presses with 20 N has the normal force 20. One row per
+    number. Raises UnknownNameError for an unknown contact, and HierarchyError for another number of
+    numbers or one that is not finite.
+    """
+
+    contacts: Contacts
+    contact: str
+    target: Sequence[float]
+    name: str = "contact force"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.contacts[self.contact]
+        if len(finite_numbers(f"task {self.name!r}: target", self.target)) not in (1, 3, 6):
+            raise HierarchyError(f"task {self.name!r}: target {self.target!r} is not 1, 3 or 6 "
+                                 "numbers")
+
+    @property
+    def dimension(self) -> int:
+        """One row per number of the target."""
+        return len(self.target)
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Force and moment along the axes, or the normal force."""
+        if self.dimension == 1:
+            return ("normal force",)
+        return WRENCH[:self.dimension]
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        contact, block = self.contacts[self.contact], self.contacts.blocks[self.contact]
+        first, joints, offsets = (block.start - state.n) // 3, *self.contacts.points
+        of_contact = slice(first, first + len(contact.points))
+        directions = np.vstack([contact.axes[2:] if self.dimension == 1 else np.eye(3)])
+        parameters = (Points(joints[of_contact], offsets[of_contact]), directions,
+                      contact.frame.offset, np.array(self.target, dtype=float), block.start)
+        return bind(_write, state.placements, parameters, A, lower, upper, row)
+
+
+@compiled
+def _write(placements, parameters, A, lower, upper, row):
+    # The directions (1 or 3, 3) are those of the rows of the force, the origin is of the moment.
+    points, directions, origin, target, column = parameters
+    T = placements[points.joints[0]]
+    ox, oy, oz = place(T, origin[0], origin[1], origin[2])
+    for i in range(len(target)):
+        for c in range(A.shape[1]):
+            A[row + i, c] = 0.0
+        write_equality(lower, upper, row + i, target[i])
+    for k in range(len(points.joints)):
+        f, o = column + 3 * k, points.offsets[k]
+        for i in range(directions.shape[0]):
+            for c in range(3):
+                A[row + i, f + c] = directions[i, c]
+        if len(target) == 6:
+            x, y, z = place(T, o[0], o[1], o[2])
+            _write_moment(x - ox, y - oy, z - oz, A, row + 3, f)
+
+
+@compiled
+def _write_moment(x, y, z, A, row, column):
+    """Write the moment r x f of a force at r = (x, y, z)."""
+    A[row, column + 1], A[row, column + 2] = -z, y
+    A[row + 1, column], A[row + 1, column + 2] = z, -x
+    A[row + 2, column], A[row + 2, column + 1] = -y, x
+
+
+@dataclass(frozen=True)
+class LeastForce(FixedRows):
+    """Let the contact forces be as small as the levels above allow: f = 0 (m = 3 p) [N].
+
+    As a last level it shares the load among the contact points, which the motion leaves open.
+    """
+
+    contacts: Contacts
+    name: str = "least force"
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Contact, point and axis of each row."""
+        return tuple(f"{contact.name} point {k + 1} {axis}" for contact in self.contacts.contacts
+                     for k in range(len(contact.points)) for axis in "xyz")
+
+    @property
+    def forces(self) -> Array:
+        """The identity (3 p, 3 p)."""
+        return np.eye(3 * len(self.contacts.points.joints))
+
+    @property
+    def sides(self) -> tuple[Array, Array]:
+        """Zero (3 p,), twice."""
+        return np.zeros(self.dimension), np.zeros(self.dimension)

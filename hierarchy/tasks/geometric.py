@@ -1,10 +1,7 @@
 """Common parts of tasks of several frames: their Jacobians and motion, in numpy and in kernels."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
-from abc import abstractmethod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,90 +9,38 @@ from numpy.typing import NDArray
 
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import (
-    axis_at,
-    drift_of_point,
+    Kinematics,
+    moving_point,
     point_at,
     velocity_of_point,
     write_point_jacobian,
-    write_point_jacobian_derivative,
     write_rotation_jacobian,
 )
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
-from hierarchy.state import State
-from hierarchy.task import Task
-
-
-class View(NamedTuple):
-    """The kinematics that a Jacobian is made of: those of this tick or of the one before."""
-
-    J: Array
-    placements: Array
-    supports: NDArray[np.bool_]
-
-    def frame(self, frame: Frame) -> Placed:
-        """Return a frame as it is placed, with its Jacobians."""
-        row = self.placements[frame.joint]
-        body = row[:9].reshape(3, 3).T
-        linear, angular = np.empty((2, 3, self.J.shape[1]))
-        write_point_jacobian(self.J, self.placements, self.supports, frame.joint, frame.offset,
-                             linear, 0)
-        write_rotation_jacobian(self.J, self.supports, frame.joint, angular, 0)
-        return Placed(row[9:] + body @ frame.offset, body @ frame.rotation, linear, angular)
 
 
 class Placed(NamedTuple):
-    """Position p (3,) [m], rotation R (3, 3), linear and angular Jacobian (3, n), world axes."""
+    """A frame in world axes: position p (3,) [m], rotation R (3, 3), Jacobian and its derivative.
+
+    The Jacobian is (6, n), linear part first, and its derivative is exact.
+    """
 
     p: Array
     R: Array
     J: Array
-    W: Array
-
-
-class Rates(NamedTuple):
-    """Velocity v and angular velocity w (3,), and time derivatives of the Jacobians (3, n)."""
-
-    v: Array
-    w: Array
     dJ: Array  # noqa: N815
-    dW: Array  # noqa: N815
 
-
-class Geometric(Task):
-    """A task whose derivative is exact or, with `State.period`, a backward difference. Abstract."""
-
-    @abstractmethod
-    def rows(self, view: View) -> Array:
-        """Jacobian (m, n) of a view."""
-
-    @abstractmethod
-    def rows_derivative(self, state: State) -> Array:
-        """Exact time derivative of the Jacobian (m, n)."""
-
-    def jacobian(self, state: State) -> Array:
-        """Jacobian (m, n)."""
-        return self.rows(view_of(state))
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Its time derivative (m, n) [1/s]."""
-        if state.period == 0.0:
-            return self.rows_derivative(state)
-        before = View(state.previous_J, state.previous_placements, state.supports)
-        return (self.jacobian(state) - self.rows(before)) / state.period
-
-
-def view_of(state: State) -> View:
-    """Return the kinematics of this tick."""
-    return View(state.J, state.placements, state.supports)
-
-
-def rates_of(state: State, frame: Frame, placed: Placed) -> Rates:
-    """Return the motion of a frame; exact derivatives, for a state without differences."""
-    dJ, dW = np.empty((2, 3, state.n))
-    write_point_jacobian_derivative(state.kinematics, frame.joint, frame.offset, dJ)
-    write_rotation_jacobian(state.dJ, state.supports, frame.joint, dW, 0)
-    return Rates(placed.J @ state.v, placed.W @ state.v, dJ, dW)
+    @classmethod
+    def of(cls, kinematics: Kinematics, frame: Frame) -> Placed:
+        """Return a frame as it is placed and moves."""
+        T, moves = kinematics.placements[frame.joint], kinematics.supports[frame.joint]
+        body = T[:9].reshape(3, 3).T
+        p = T[9:] + body @ frame.offset
+        J, dJ = kinematics.J * moves, kinematics.dJ * moves
+        J[:3] -= cross(p) @ J[3:]
+        dJ[:3] -= cross(p) @ dJ[3:] + cross(J[:3] @ kinematics.v) @ J[3:]
+        return cls(p, body @ frame.rotation, J, dJ)
 
 
 def cross(a: NDArray[Any]) -> NDArray[Any]:
@@ -117,21 +62,20 @@ class Spot(NamedTuple):
 
 
 @inlined
-def crossed(a, b):
-    """a x b of tuples."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+def column(A, c):
+    """Column c of three rows, as a tuple."""
+    return A[0, c], A[1, c], A[2, c]
 
 
-@inlined
-def less(a, b):
-    """a - b of tuples."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@inlined
-def plus(a, b):
-    """a + b of tuples."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+@compiled
+def times_transposed(A, B):
+    """A B^T (3, 3) of two matrices (3, 3)."""
+    product = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                product[i, j] += A[i, k] * B[j, k]
+    return product
 
 
 @inlined
@@ -153,21 +97,21 @@ def position_of(placements, spot):
 @compiled
 def rotation_of(placements, joint, rotation):
     """World rotation (3, 3) of a spot."""
-    R = np.empty((3, 3))
-    for k in range(3):
-        for i in range(3):
-            R[i, k] = axis_at(placements, joint, rotation[:, k], i)
+    R, T = np.empty((3, 3)), placements[joint]
+    for i in range(3):
+        for k in range(3):
+            R[i, k] = (T[i] * rotation[0, k] + T[3 + i] * rotation[1, k]
+                       + T[6 + i] * rotation[2, k])
     return R
 
 
 @inlined
 def motion_of(kinematics, spot):
     """Velocity, angular velocity, and their drifts dJ/dt v and dW/dt v, of a spot; exact ones."""
-    vx, vy, vz, ax, ay, az, wx, wy, wz = drift_of_point(
-        kinematics, spot.joint, spot.offset[0], spot.offset[1], spot.offset[2])
+    v, a, w = moving_point(kinematics, spot.joint, spot.offset)
     _, _, _, bx, by, bz = velocity_of_point(kinematics.dJ, kinematics.supports, spot.joint,
                                             kinematics.v, 0.0, 0.0, 0.0)
-    return (vx, vy, vz), (wx, wy, wz), (ax, ay, az), (bx, by, bz)
+    return v, w, a, (bx, by, bz)
 
 
 @inlined

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Task, Written
 from hierarchy.tasks.coupling import FollowedJoints
 from hierarchy.tasks.relative import RelativePose
 from hierarchy.tasks.together import Together
@@ -77,12 +77,12 @@ class _Parts(NamedTuple):
 
 @final
 @dataclass(frozen=True)
-class ClosedChains(Task):
+class ClosedChains(Written):
     """The rows of `whole` that are independent of each other.
 
     A chain in a plane closes out of it by itself, but for the rounding of its file. So of all rows,
     each kind of them at a common scale, only singular directions count whose singular value is more
-    than 1e-3 of the largest; the other rows are zero. Error and Jacobians are those of `whole`.
+    than 1e-3 of the largest; the other rows are zero. Error and Jacobian are those of `whole`.
     """
 
     whole: Together
@@ -105,10 +105,6 @@ class ClosedChains(Task):
     def jacobian(self, state: State) -> Array:
         """The derivatives of what is to be closed (m, n)."""
         return self.whole.jacobian(state)
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Their time derivative (m, n)."""
-        return self.whole.jacobian_derivative(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:

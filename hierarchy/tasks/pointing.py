@@ -1,6 +1,4 @@
-"""Relaxed pointing: an axis of a frame on a cone, or inside it (eqs. 16-21)."""
-
-# mypy: disable-error-code="no-untyped-def"
+"""An axis of a frame: on a cone or inside it (eqs. 16-21), or toward a point of the world."""
 
 from __future__ import annotations
 
@@ -14,13 +12,32 @@ import numpy as np
 from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.jit import bind, compiled
 from hierarchy.jit.sources import Kernel
-from hierarchy.kinematics import axis_at, velocity_of_point
+from hierarchy.kinematics import (
+    axis_at,
+    crossed,
+    dot,
+    less,
+    row_times,
+    times,
+    triple,
+    velocity_of_point,
+)
 from hierarchy.measured import Measured, measured
+from hierarchy.paths.path import check_point
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Kind
+from hierarchy.tasks.geometric import (
+    Spot,
+    column,
+    jacobians_of,
+    motion_of,
+    position_of,
+    rotation_of,
+    turned_back,
+)
 
 
 @compiled
@@ -68,6 +85,7 @@ class Pointing(Measured):
     damping: float = 2.0
     gain: float = 5.0
     name: str = "pointing"
+    dimension = 1
     z_d: Array = field(init=False, repr=False, compare=False)
     z_e: Array = field(init=False, repr=False, compare=False)
     cos_alpha_d: float = field(init=False, repr=False, compare=False)
@@ -82,11 +100,6 @@ class Pointing(Measured):
         set_frozen(self, z_d=axis / length, cos_alpha_d=cos(self.half_angle),
                    z_e=np.ascontiguousarray(self.frame.rotation[:, 2]))
 
-    @property
-    def dimension(self) -> int:
-        """One row."""
-        return 1
-
     def cone_error(self, state: State) -> float:
         """The error cos(alpha_d) - cos(alpha), positive outside the cone."""
         return float(_cone_error(state.placements, self.frame.joint, self.z_e, self.z_d,
@@ -100,3 +113,73 @@ class Pointing(Measured):
     def measure(self, state: State) -> tuple[Kernel, Any]:
         """See `Measured.measure`."""
         return _pointing, (self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d)
+
+
+_NEAR = 1e-6    # [m] from the target, where no direction leads to it
+_BEHIND = 1e-6  # 1 + u_z of a target straight behind, where every way round is as long
+_ASIDE = (1e-3, 0.0, -(1.0 - 1e-6) ** 0.5)
+
+
+@dataclass(frozen=True)
+class LookAt(Measured):
+    """Turn and move `frame` so that its z axis points at `target` (3,) [m] of the world (m = 2).
+
+    With the unit vector u to the target in the frame's axes, the rows are 2 u_x / (1 + u_z) and
+    2 u_y / (1 + u_z), of length 2 tan(angle / 2): the stereographic projection, which is regular on
+    the axis, where the cosine of `Pointing` has no gradient, and everywhere but straight behind. At
+    velocity level the angle falls by gain sin(angle).
+    """
+
+    frame: Frame
+    target: tuple[float, float, float]
+    stiffness: float = 20.0
+    damping: float = 10.0
+    gain: float = 5.0
+    name: str = "look-at"
+    dimension = 2
+    row_names = ("x", "y")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_point(f"task {self.name!r}: target", self.target)
+
+    def measure(self, state: State) -> tuple[Kernel, Any]:
+        """See `Measured.measure`: the error is -2 (u_x, u_y) / (1 + u_z)."""
+        return _look_at, (Spot.of(self.frame), np.array(self.target, dtype=float))
+
+
+@compiled
+def _sight(placements, frame, point):
+    """The target in the frame's axes y, its distance r, the vector d to it in world axes, and R."""
+    d = less(triple(point, 0), position_of(placements, frame))
+    R = rotation_of(placements, frame.joint, frame.rotation)
+    y = turned_back(R, d)
+    r = max(np.sqrt(dot(y, y)), _NEAR)
+    if not y[2] > (_BEHIND - 1.0) * r:
+        y = times(r, _ASIDE)
+    return y, r, d, R
+
+
+@measured
+def _look_at(kinematics, reads, goal, J, motion):
+    """The error is -2 y / D, D = r + y_z, and the target moves by R^T (-J + [d]x W) in the axes."""
+    frame, point = reads
+    y, r, d, R = _sight(kinematics.placements, frame, point)
+    D = r + y[2]
+    linear, angular = jacobians_of(kinematics.J, kinematics.placements, kinematics.supports, frame)
+    for c in range(J.shape[1]):
+        s = turned_back(R, less(crossed(d, column(angular, c)), column(linear, c)))
+        dD = dot(y, s) / r + s[2]
+        for i in range(2):
+            J[i, c] = 2.0 * (s[i] - y[i] * dD / D) / D
+    v, w, a, b = motion_of(kinematics, frame)
+    seen = less(crossed(d, w), v)  # of the target, as it moves for the frame
+    s = turned_back(R, seen)
+    ds = turned_back(R, less(less(less(crossed(d, b), a), crossed(v, w)), crossed(w, seen)))
+    dr = dot(y, s) / r
+    dD, ddD = dr + s[2], (dot(s, s) + dot(y, ds) - dr * dr) / r + ds[2]
+    for i in range(2):
+        motion.error[i] = -2.0 * y[i] / D
+        motion.rate[i] = row_times(J, i, kinematics.v)
+        turned = 2.0 * s[i] * dD + y[i] * (ddD - 2.0 * dD * dD / D)
+        motion.drift[i] = 2.0 * (ds[i] - turned / D) / D

@@ -1,19 +1,23 @@
-"""Position of a frame along a path, with the repulsion of the end effector of eq. (30)."""
-
-# mypy: disable-error-code="no-untyped-def"
+"""Position of a frame along a path, in all directions or some, with the repulsion of eq. (30)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from hierarchy.avoidance.measurement import Measurement
+from hierarchy.errors import HierarchyError, expect
 from hierarchy.jit.sources import Kernel
-from hierarchy.kinematics import drift_of_point, point_at, write_point_jacobian
+from hierarchy.kinematics import moving_point, point_at, write_point_jacobian
 from hierarchy.measured import Measured, measured
 from hierarchy.paths import Path
+from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
+from hierarchy.task import Level, Written
 
 _NOTHING_SEEN = Measurement(0).arrays
 
@@ -23,11 +27,10 @@ def _position(kinematics, reads, goal, J, motion):
     joint, offset, seen, repulsion_within = reads
     placements = kinematics.placements
     write_point_jacobian(kinematics.J, placements, kinematics.supports, joint, offset, J, 0)
-    motion.rate[0], motion.rate[1], motion.rate[2], ax, ay, az, _, _, _ = drift_of_point(
-        kinematics, joint, offset[0], offset[1], offset[2])
-    motion.drift[0], motion.drift[1], motion.drift[2] = ax, ay, az
+    velocity, drift, _ = moving_point(kinematics, joint, offset)
     last = len(seen.distance) - 1
     for i in range(3):
+        motion.rate[i], motion.drift[i] = velocity[i], drift[i]
         motion.error[i] = goal[0, i] - point_at(placements, joint, offset, i)
         if seen.distance[last] <= repulsion_within:
             motion.push[i] = seen.magnitude[last] * seen.direction[last, i]  # (30)
@@ -49,18 +52,58 @@ class Position(Measured):
     gain: float = 10.0
     repulsion_within: float = -1.0
     name: str = "position"
-
-    @property
-    def dimension(self) -> int:
-        """Three rows."""
-        return 3
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """The axes of the world."""
-        return ("x", "y", "z")
+    dimension = 3
+    row_names = ("x", "y", "z")
 
     def measure(self, state: State) -> tuple[Kernel, Any]:
         """See `Measured.measure`."""
         seen = _NOTHING_SEEN if state.measurement is None else state.measurement.arrays
         return _position, (self.frame.joint, self.frame.offset, seen, self.repulsion_within)
+
+
+@dataclass(frozen=True)
+class Along(Written):
+    """The rows of a position task along `directions` (m, 3) of the world, m = 1, 2 or 3 [m].
+
+    A hand that slides on a table is moved along two of them and pushes along the third. The gains
+    are those of `task`. Raises HierarchyError unless the directions are of length one and
+    orthogonal.
+    """
+
+    task: Position
+    directions: Sequence[Sequence[float]]
+    name: str = "along"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        expect(f"task {self.name!r}: task", self.task, Position, "give a position task")
+        try:
+            D = np.array(self.directions, dtype=float)
+        except (TypeError, ValueError):
+            D = np.empty(0)
+        if D.ndim != 2 or D.shape[1:] != (3,) or not np.allclose(D @ D.T, np.eye(len(D))):
+            raise HierarchyError(f"task {self.name!r}: directions {self.directions!r} are not of "
+                                 "length one and orthogonal, (m, 3)")
+
+    @property
+    def dimension(self) -> int:
+        """One row per direction."""
+        return len(self.directions)
+
+    def error(self, state: State) -> Array:
+        """Distance to the path along the directions (m,) [m]."""
+        return np.asarray(self.directions) @ self.task.error(state)
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        rows, b, above = np.zeros((3, A.shape[1])), np.zeros(3), np.zeros(3)
+        write_rows = self.task.writer(state, level, rows, b, above, 0)
+        own, D = slice(row, row + self.dimension), np.array(self.directions, dtype=float)
+
+        def write() -> None:
+            write_rows()
+            A[own] = D @ rows
+            lower[own] = upper[own] = D @ b
+
+        return write

@@ -1,7 +1,5 @@
 """Tasks of the joints themselves: a target posture, and damping of the motion (eq. 15)."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -20,10 +18,10 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Written
 
 
-class JointTask(Task):
+class JointTask(Written):
     """A task with the identity as Jacobian: a last level or the null-space reference of a stack."""
 
     joints: int
@@ -34,13 +32,15 @@ class JointTask(Task):
         """One row per joint."""
         return self.joints
 
-    def jacobian(self, state: State) -> Array:
-        """The identity (n, n)."""
-        return np.eye(self.joints)
+    def error(self, state: State) -> Array:
+        """Zero (n,): there is no target position."""
+        return np.zeros(self.joints)
 
-    def jacobian_derivative(self, state: State) -> Array:
-        """Zero (n, n)."""
-        return np.zeros((self.joints, self.joints))
+    def check_size(self, state: State) -> None:
+        """Raise a HierarchyError unless a state has as many velocities as there are joints."""
+        if self.joints != state.n:
+            raise HierarchyError(f"task {self.name!r}: {self.joints} joints, the robot has "
+                                 f"{state.n} velocities")
 
 
 @dataclass(frozen=True)
@@ -100,10 +100,6 @@ class Posture(Measured):
         robot = self.robot
         return super().row_names if robot is None else tuple(robot.velocity_names[robot.actuated:])
 
-    def jacobian_derivative(self, state: State) -> Array:
-        """Zero (m, n)."""
-        return np.zeros((state.n - state.robot.actuated, state.n))
-
     def measure(self, state: State) -> tuple[Kernel, Any]:
         """See `Measured.measure`."""
         robot, m = state.robot, self.dimension
@@ -162,22 +158,10 @@ class JointDamping(JointTask):
                                  f"{self.weight!r}")
         expect(f"task {self.name!r}: joints", self.joints, int, "give robot.n")
 
-    def error(self, state: State) -> Array:
-        """Zero (n,), because there is no target position."""
-        return np.zeros(self.joints)
-
-    def reference_acceleration(self, state: State) -> Array:
-        """-D v (n,) [rad/s^2]."""
-        if self.weight == "mass":
-            return np.asarray(-self.damping * (state.mass_matrix() @ state.v))
-        return np.asarray(-self.damping * state.v)
-
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        if self.joints != state.n:
-            raise HierarchyError(f"task {self.name!r}: {self.joints} joints, the robot has "
-                                 f"{state.n} velocities")
+        self.check_size(state)
         if self.weight == "identity" or level == "velocity":
             damping = self.damping if level == "acceleration" else 0.0
             return bind(_brake, state.v, damping, A, lower, upper, row)
@@ -185,7 +169,7 @@ class JointDamping(JointTask):
 
         def write() -> None:
             write_rows()
-            lower[rows] = upper[rows] = self.reference_acceleration(state)
+            lower[rows] = upper[rows] = -self.damping * (state.mass_matrix() @ state.v)
 
         return write
 

@@ -1,7 +1,5 @@
 """Pose of a frame in another frame: two hands that hold one thing, a loop that is closed."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -14,19 +12,18 @@ from hierarchy.errors import finite_numbers
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
 from hierarchy.jit.sources import Kernel
-from hierarchy.kinematics import row_times
+from hierarchy.kinematics import crossed, less, plus, row_times
 from hierarchy.measured import Measured, measured
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.tasks.geometric import (
     Spot,
-    crossed,
+    column,
     jacobians_of,
-    less,
     motion_of,
-    plus,
     position_of,
     rotation_of,
+    times_transposed,
     turned_back,
 )
 from hierarchy.tasks.pose import rotation_vector
@@ -79,27 +76,14 @@ def _write_jacobian(kinematics, frame, to, R, d, J):
     linear, angular = jacobians_of(columns, placements, supports, frame)
     linear_to, angular_to = jacobians_of(columns, placements, supports, to)
     for c in range(J.shape[1]):
-        w = (angular_to[0, c], angular_to[1, c], angular_to[2, c])
-        apart = (linear[0, c] - linear_to[0, c], linear[1, c] - linear_to[1, c],
-                 linear[2, c] - linear_to[2, c])
+        w = column(angular_to, c)
+        apart = less(column(linear, c), column(linear_to, c))
         moved = turned_back(R, plus(apart, crossed(d, w)))
-        turned = turned_back(R, less((angular[0, c], angular[1, c], angular[2, c]), w))
+        turned = turned_back(R, less(column(angular, c), w))
         for i in range(3):
             J[i, c] = moved[i]
             if J.shape[0] == 6:
                 J[3 + i, c] = turned[i]
-
-
-@compiled
-def _turn(rotation, there, R):
-    """R_d (R^T R_f)^T = R_d R_f^T R."""
-    turn = np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                for m in range(3):
-                    turn[i, j] += rotation[i, k] * there[m, k] * R[m, j]
-    return turn
 
 
 @compiled
@@ -131,6 +115,7 @@ def _relative(kinematics, reads, goal, J, motion):
         motion.error[i] = position[i] - here[i]
     if len(motion.error) == 6:
         there = rotation_of(placements, frame.joint, frame.rotation)
-        motion.error[3:] = rotation_vector(_turn(rotation, there, R))
+        motion.error[3:] = rotation_vector(times_transposed(
+            times_transposed(rotation, there), R.T))  # R_d (R^T R_f)^T
     for i in range(len(motion.rate)):
         motion.rate[i] = row_times(J, i, kinematics.v)

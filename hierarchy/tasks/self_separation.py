@@ -13,13 +13,10 @@ kink, and bend falls without bound; `barrier.limit` then limits the row, and d m
 `limit` at acceleration level.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,20 +31,16 @@ from hierarchy.avoidance.self_collision import (
     ON_AXIS,
     Capsule,
     bend_of_nearest,
-    dot,
     measure_capsules,
     nearest_of_capsules,
+    on_axis,
     pack_capsules,
     pairs_of_chain,
     turned,
 )
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect_each
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import (
-    add_row,
-    drift_of_point,
-    place,
-)
+from hierarchy.kinematics import add_row, crossed, dot, less, moving_point, place, times
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.state import State
@@ -70,13 +63,11 @@ class SelfSeparation(Written):
     pairs: Sequence[tuple[int, int]] | None = None
     name: str = "self-separation"
     kind: Kind = "inequality"
-    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    table: Array = field(init=False, repr=False, compare=False)
     indices: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    settings: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        expect_each("capsules", self.capsules, Capsule, "see robot.capsules")
         pairs = pairs_of_chain(self.capsules) if self.pairs is None else self.pairs
         count = len(self.capsules)
         if not pairs:
@@ -85,11 +76,7 @@ class SelfSeparation(Written):
             if not (0 <= i < count and 0 <= j < count and i != j):
                 raise HierarchyError(f"task {self.name!r}: pair ({i}, {j}) is no pair among "
                                      f"{count} capsules")
-        if self.kind != "inequality":
-            raise HierarchyError(f"task {self.name!r}: its rows are inequalities")
-        joints, table = pack_capsules(self.capsules)
-        set_frozen(self, joints=joints, table=table, indices=np.array(pairs, dtype=np.int64),
-                   settings=self.barrier.packed())
+        set_frozen(self, indices=np.array(pairs, dtype=np.int64))
 
     @property
     def dimension(self) -> int:
@@ -104,7 +91,7 @@ class SelfSeparation(Written):
 
     def distances(self, state: State) -> Array:
         """Distances d (m,) [m], negative where capsules overlap."""
-        return self._seen(state)[:, 0]
+        return measure_capsules(state.placements, *pack_capsules(self.capsules), self.indices)[:, 0]
 
     def error(self, state: State) -> Array:
         """distance - d (m,) [m], positive where two capsules are too close."""
@@ -113,20 +100,9 @@ class SelfSeparation(Written):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        parameters = _Parameters(self.joints, self.table, self.indices, self.settings,
-                                 level == "acceleration")
+        parameters = (*pack_capsules(self.capsules), self.indices, self.barrier.packed(),
+                      level == "acceleration")
         return bind(_write, state.kinematics, parameters, A, lower, upper, row)
-
-    def _seen(self, state: State) -> Array:
-        return measure_capsules(state.placements, self.joints, self.table, self.indices)
-
-
-class _Parameters(NamedTuple):
-    joints: NDArray[np.int64]
-    capsules: Array
-    pairs: NDArray[np.int64]
-    settings: Array
-    acceleration: bool
 
 
 @compiled
@@ -138,13 +114,12 @@ def _write(kinematics, parameters, A, lower, upper, row):
         a, b = capsules[i], capsules[j]
         T_a, T_b = placements[joints[i]], placements[joints[j]]
         seen = nearest_of_capsules(T_a, a, T_b, b)
-        D, rx, ry, rz, s, t = seen
-        for c in range(A.shape[1]):
-            A[row, c] = 0.0
-        point = place(T_a, a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
-        add_row(J, supports, joints[i], point, (rx, ry, rz), A, row)
-        point = place(T_b, b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
-        add_row(J, supports, joints[j], point, (-rx, -ry, -rz), A, row)
+        D, r, s, t = seen
+        A[row, :] = 0.0
+        x, y, z = on_axis(a, s)
+        add_row(J, supports, joints[i], place(T_a, x, y, z), r, A, row)
+        x, y, z = on_axis(b, t)
+        add_row(J, supports, joints[j], place(T_b, x, y, z), times(-1.0, r), A, row)
         drop_rounding(A, row)
         lower[row], upper[row] = -np.inf, np.inf
         if D <= settings[2]:
@@ -159,21 +134,14 @@ def _write(kinematics, parameters, A, lower, upper, row):
 @compiled
 def _motion(kinematics, joints, capsules, i, j, seen):
     """dd/dt, r^T (dJ_a/dt - dJ_b/dt) v and bend of one pair."""
-    D, rx, ry, rz, s, t = seen
+    D, r, s, t = seen
     a, b = capsules[i], capsules[j]
-    ax, ay, az, fx, fy, fz, ox, oy, oz = drift_of_point(
-        kinematics, joints[i], a[0] + s * a[3], a[1] + s * a[4], a[2] + s * a[5])
-    bx, by, bz, gx, gy, gz, px, py, pz = drift_of_point(
-        kinematics, joints[j], b[0] + t * b[3], b[1] + t * b[4], b[2] + t * b[5])
-    vx, vy, vz = ax - bx, ay - by, az - bz
-    rate = dot(rx, ry, rz, vx, vy, vz)
-    drift = dot(rx, ry, rz, fx - gx, fy - gy, fz - gz)
-    length = D + a[6] + b[6]
+    v_a, drift_a, w_a = moving_point(kinematics, joints[i], on_axis(a, s))
+    v_b, drift_b, w_b = moving_point(kinematics, joints[j], on_axis(b, t))
+    v, length = less(v_a, v_b), D + a[6] + b[6]
+    rate, drift = dot(r, v), dot(r, less(drift_a, drift_b))
     if length < ON_AXIS:
         return rate, drift, 0.0
-    ux, uy, uz = turned(kinematics.placements[joints[i]], a)
-    wx, wy, wz = turned(kinematics.placements[joints[j]], b)
-    a_axis = (ux, uy, uz), (oy * uz - oz * uy, oz * ux - ox * uz, ox * uy - oy * ux), s
-    b_axis = (wx, wy, wz), (py * wz - pz * wy, pz * wx - px * wz, px * wy - py * wx), t
-    bend = bend_of_nearest(length, (rx, ry, rz), (vx, vy, vz), a_axis, b_axis)
-    return rate, drift, bend
+    u, w = turned(kinematics.placements[joints[i]], a), turned(kinematics.placements[joints[j]], b)
+    return rate, drift, bend_of_nearest(length, r, v, (u, crossed(w_a, u), s),
+                                        (w, crossed(w_b, w), t))

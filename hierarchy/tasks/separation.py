@@ -14,16 +14,12 @@ can satisfy. The radius is taken as at least d_min. The derivative of J_c is exa
 difference, as in the state.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.avoidance.barrier import (
     Barrier,
@@ -32,16 +28,11 @@ from hierarchy.avoidance.barrier import (
     least_rate,
 )
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
-from hierarchy.avoidance.pairs import Pairs
+from hierarchy.avoidance.measurement import Pairs
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import (
-    add_row,
-    drift_of_point,
-    place,
-)
+from hierarchy.kinematics import add_row, dot, less, moving_point, place, triple
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Kind, Level, Written
 
@@ -64,23 +55,11 @@ class Separation(Written):
     obstacles: int | None = None
     name: str = "separation"
     kind: Kind = "inequality"
-    joints: NDArray[np.int64] = field(init=False, repr=False, compare=False)
-    offsets: Array = field(init=False, repr=False, compare=False)
-    settings: Array = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.points:
-            raise HierarchyError(f"task {self.name!r}: needs at least one point")
-        if self.kind != "inequality":
-            raise HierarchyError(f"task {self.name!r}: its rows are inequalities")
-        joints, offsets = pack_points(self.points)
-        set_frozen(self, joints=joints, offsets=offsets, settings=self.barrier.packed())
 
     @property
     def dimension(self) -> int:
         """One row per pair, or per point."""
-        return len(self.joints) * (1 if self.obstacles is None else self.obstacles)
+        return len(self.points) * (1 if self.obstacles is None else self.obstacles)
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -102,8 +81,8 @@ class Separation(Written):
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
-        parameters = _Parameters(self.joints, self.offsets, self.settings, self.obstacles is None,
-                                 level == "acceleration")
+        parameters = (*pack_points(self.points), self.barrier.packed(), self.obstacles is None,
+                      level == "acceleration")
         return bind(_write, state.kinematics, parameters, self._seen(state).table, A, lower, upper,
                     row)
 
@@ -119,23 +98,12 @@ class Separation(Written):
         if seen is None:
             raise HierarchyError(f"task {self.name!r}: the state carries no measurement of pairs")
         points, obstacles, _ = seen.table.shape
-        if self.obstacles is None:
-            fits = points == len(self.joints) and obstacles > 0
-        else:
-            fits = points == len(self.joints) and obstacles == self.obstacles
-        if not fits:
+        fits = obstacles > 0 if self.obstacles is None else obstacles == self.obstacles
+        if points != len(self.points) or not fits:
             raise HierarchyError(
                 f"task {self.name!r}: {points} points are measured against {obstacles} obstacles, "
-                f"expected {len(self.joints)} against {self.obstacles or 'one at least'}")
+                f"expected {len(self.points)} against {self.obstacles or 'one at least'}")
         return seen
-
-
-class _Parameters(NamedTuple):
-    joints: NDArray[np.int64]
-    offsets: Array
-    settings: Array
-    nearest: bool  # one row per point
-    acceleration: bool
 
 
 @compiled
@@ -146,8 +114,7 @@ def _write(kinematics, parameters, pairs, A, lower, upper, row):
     for k in range(joints.size):
         joint = joints[k]
         point = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
-        vx, vy, vz, ax, ay, az, _, _, _ = drift_of_point(
-            kinematics, joint, offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        velocity, drift, _ = moving_point(kinematics, joint, offsets[k])
         first, end = 0, pairs.shape[1]
         if nearest:
             for j in range(1, end):
@@ -156,23 +123,19 @@ def _write(kinematics, parameters, pairs, A, lower, upper, row):
             end = first + 1
         for j in range(first, end):
             pair = pairs[k, j]
-            rx, ry, rz = pair[1], pair[2], pair[3]
-            for c in range(A.shape[1]):
-                A[row, c] = 0.0
-            add_row(J, supports, joint, point, (rx, ry, rz), A, row)
+            r = triple(pair, 1)
+            A[row, :] = 0.0
+            add_row(J, supports, joint, point, r, A, row)
             drop_rounding(A, row)
             lower[row], upper[row] = -np.inf, np.inf
-            if pair[0] <= influence:
-                h = pair[0] - distance
-                if acceleration:
-                    wx, wy, wz = vx - pair[4], vy - pair[5], vz - pair[6]
-                    rate = rx * wx + ry * wy + rz * wz
-                    straight = pair[10] * wx + pair[11] * wy + pair[12] * wz
-                    across = wx * wx + wy * wy + wz * wz - rate * rate - straight * straight
-                    bend = max(across, 0.0) / max(pair[13], distance, _SHARPEST)
-                    lower[row] = (least_acceleration(h, rate, bend, settings)
-                                  + rx * (pair[7] - ax) + ry * (pair[8] - ay) + rz * (pair[9] - az))
-                else:
-                    lower[row] = (least_rate(h, settings)
-                                  + rx * pair[4] + ry * pair[5] + rz * pair[6])
+            h = pair[0] - distance
+            if pair[0] <= influence and acceleration:
+                w = less(velocity, triple(pair, 4))
+                rate, straight = dot(r, w), dot(triple(pair, 10), w)
+                across = dot(w, w) - rate * rate - straight * straight
+                bend = max(across, 0.0) / max(pair[13], distance, _SHARPEST)
+                lower[row] = (least_acceleration(h, rate, bend, settings)
+                              + dot(r, less(triple(pair, 7), drift)))
+            elif pair[0] <= influence:
+                lower[row] = least_rate(h, settings) + dot(r, triple(pair, 4))
             row += 1

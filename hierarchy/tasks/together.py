@@ -1,22 +1,23 @@
-"""Several tasks as one level of a stack."""
+"""Tasks that are made of others: several as one level, and the rows of a set-based one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, expect_each
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task, writer_in_stack
+from hierarchy.task import Kind, Level, Task, Written, in_turn, writer_in_stack
 
 
 @dataclass(frozen=True)
-class Together(Task):
+class Together(Written):
     """The rows of several tasks as one level: m is the sum of theirs.
 
     What cannot all be met is missed by the smallest sum of squares over all rows, so the rows
@@ -70,14 +71,6 @@ class Together(Task):
         """The errors of the tasks (m,)."""
         return np.concatenate([task.error(state) for task in self.tasks])
 
-    def jacobian(self, state: State) -> Array:
-        """The rows of the tasks (m, n), or (m, n + 3 p) with contact forces."""
-        return self._stacked([task.jacobian(state) for task in self.tasks])
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Their time derivatives, of the same shape."""
-        return self._stacked([task.jacobian_derivative(state) for task in self.tasks])
-
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
         """See `Task.writer`."""
@@ -85,13 +78,70 @@ class Together(Task):
         for task in self.tasks:
             writers.append(writer_in_stack(task, state, level, A, lower, upper, row))
             row += task.dimension
+        return in_turn(*writers)
+
+
+@dataclass(frozen=True)
+class TangentCone(Written):
+    """Keep an inequality task in its set by its rate alone, at velocity level.
+
+    A row of `task` whose error is negative, strictly inside, has no bounds; one on the bound or
+    beyond it asks that the task does not get worse, J v >= dp_d/dt. These are the extended tangent
+    cones that `in_T_RC` of the source tests, as rows; `solvers.resolvers.set_based` resolves them
+    as the source does. `task` has rows with a lower bound only, and an error that is positive where
+    it is violated, as `Pointing`, `Separation` and `SelfSeparation` have.
+
+    Raises HierarchyError if `task` is an equality, and from its writer at acceleration level: there
+    a task reaches its bound with a rate that no acceleration can take away at once.
+
+    Source: Moe, Antonelli, Teel, Pettersen, Schrimpf, "Set-Based Tasks within the
+    Singularity-Robust Multiple Task-Priority Inverse Kinematics Framework", Frontiers in Robotics
+    and AI 3:16 (2016).
+    """
+
+    task: Task
+    name: str = field(init=False, repr=False, compare=False)
+    kind: Kind = field(init=False, repr=False, compare=False, default="inequality")
+
+    def __post_init__(self) -> None:
+        if self.task.kind != "inequality":
+            raise HierarchyError(f"task {self.task.name!r}: a set-based task has inequalities, got "
+                                 f"kind = {self.task.kind!r}")
+        set_frozen(self, name=self.task.name)
+
+    @property
+    def dimension(self) -> int:
+        """One row per row of `task`."""
+        return self.task.dimension
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The names of the rows of `task`."""
+        return self.task.row_names
+
+    def error(self, state: State) -> Array:
+        """The error of `task` (m,)."""
+        return self.task.error(state)
+
+    def desired_velocity(self, state: State) -> Array:
+        """The rate (m,) at which the bound of `task` moves."""
+        return self.task.desired_velocity(state)
+
+    def reference_velocity(self, state: State) -> Array:
+        """The least rate (m,): that of the bound, -inf inside."""
+        return np.where(self.error(state) >= 0.0, self.desired_velocity(state), -np.inf)
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        if level != "velocity":
+            raise HierarchyError(f"task {self.name!r}: set-based tasks are defined at velocity "
+                                 f"level, got level = {level!r}")
+        write_rows = self.task.writer(state, level, A, lower, upper, row)
+        rows = slice(row, row + self.dimension)
 
         def write() -> None:
-            for write_rows in writers:
-                write_rows()
+            write_rows()
+            lower[rows], upper[rows] = self.reference_velocity(state), np.inf
 
         return write
-
-    def _stacked(self, rows: list[Array]) -> Array:
-        columns = max(part.shape[1] for part in rows)
-        return np.vstack([np.pad(part, ((0, 0), (0, columns - part.shape[1]))) for part in rows])

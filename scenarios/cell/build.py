@@ -1,27 +1,53 @@
-"""Build the parts of the control loop from a scenario."""
+"""Build the parts of the control loop from a scenario, and the stack of `control.stack`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import product
+from math import cos, inf, nan, radians
 
 import numpy as np
 
 from hierarchy import Robot, Stack, State, Task
 from hierarchy.activation import Activation
-from hierarchy.avoidance import Obstacles, SurveillanceAreas
+from hierarchy.allocation import POINTING, POSITION, Allocation, allocate
+from hierarchy.avoidance import Measurement, Obstacles
 from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
-from hierarchy.tasks import JointLimits, Pointing, Position
+from hierarchy.tasks import Pointing, Separation
+from hierarchy.tasks.self_separation import SelfSeparation
+from hierarchy.tasks.together import TangentCone
 from scenarios.cell.plants import Plant
 from scenarios.cell.plants.plant import plant_of
 from scenarios.cell.robot import placed
 from scenarios.cell.sensors import Sensor
 from scenarios.cell.sensors.sensor import sensor_of
-from scenarios.cell.stacked import Order, stacked
-from scenarios.cell.tasks import tasks_of
-from scenarios.config import Scenario
+from scenarios.cell.tasks import Tasks, tasks_of
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.avoidance import AvoidanceSection
 from scenarios.config.references import References
+from solvers import Resolver
+from solvers.resolvers.merged import Merged
+from solvers.resolvers.set_based import SetBased
+from solvers.resolvers.settled import Settled
+from solvers.resolvers.smooth import Activated, Smooth
+
+
+@dataclass(frozen=True)
+class Order:
+    """The selection and order of the tasks in the stack of a tick; `possible` has every order."""
+
+    choose: Callable[[float, float, float], Allocation]
+    possible: Collection[tuple[str, ...]]
+
+    def __call__(self, seen: Measurement | None, cone_error: float) -> Allocation:
+        """Return the order for measured distances and the cone error cos(alpha_d) - cos(alpha)."""
+        if seen is None:
+            return self.choose(inf, inf, cone_error)
+        return self.choose(seen.minimal_distance, seen.end_effector_distance, cone_error)
 
 
 @dataclass(frozen=True)
@@ -29,10 +55,8 @@ class Cell:
     """Everything the control loop needs: robot, start, tasks and sensor.
 
     `start` is q (nq,) and v (n,). `order` selects the tasks in the stack from the measurement and
-    the cone error. `position`, `pointing`, `limits` are the tasks of these names or None, `listed`
-    those of `[[tasks]]`; `areas` are those of Algorithm 1. `activation` is that of the stack's rows
-    with control.stack = "smooth", else None.
-    `contacts` are those at level "torque", else None.
+    the cone error. `activation` is that of the stack's rows with control.stack = "smooth", else
+    None. `contacts` are those at level "torque", else None.
     """
 
     scenario: Scenario
@@ -40,14 +64,10 @@ class Cell:
     start: tuple[Array, Array]
     state: State
     plant: Plant
-    stack: Stack
     sensor: Sensor | None
-    areas: SurveillanceAreas | None
-    position: Position | None
-    pointing: Pointing | None
-    limits: JointLimits | None
+    tasks: Tasks
+    stack: Stack
     order: Order
-    listed: tuple[Task, ...] = ()
     activation: Activation | None = None
     contacts: Contacts | None = None
 
@@ -56,8 +76,8 @@ class Cell:
         """Largest velocities (n,) [rad/s or m/s], infinite for a base that has none in use."""
         limit = self.robot.velocity_limit.copy()
         limit[:self.robot.actuated] = np.inf
-        if self.limits is not None:
-            limit[self.limits.first:] = self.limits.limits.velocity
+        if self.tasks.limits is not None:
+            limit[self.tasks.limits.first:] = self.tasks.limits.limits.velocity
         return limit
 
     @property
@@ -78,12 +98,97 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     at = References(State.at(kept.robot, *kept.start), kept.contacts) if kept else placed(scenario)
     sensor = sensor_of(scenario, at.start, (kept.scenario, kept.sensor) if kept else None)
     plant = kept.plant if kept else plant_of(
-        scenario, at.start, sensor.obstacles if sensor else Obstacles(), at.contacts_or_none)
+        scenario, at.start, sensor.obstacles if sensor else Obstacles(), at.contacts)
     tasks = tasks_of(scenario, at)
     differences = scenario.control.jacobian_derivative == "difference"
     state = kept.state if kept else State(at.robot,
                                           scenario.control.period if differences else None)
-    stack, order, activation = stacked(scenario, tasks, state, at.contacts_or_none)
-    return Cell(scenario, at.robot, (at.start.q, at.start.v), state, plant, stack, sensor,
-                tasks.areas, tasks.position, tasks.pointing, tasks.limits, order, tasks.listed,
-                activation, at.contacts_or_none)
+    rows, activation = _rows(scenario, tasks.all, state)
+    stack = Stack(rows, scenario.control.level, tasks.reference, at.contacts,
+                  "mass" if scenario.control.metric == "mass" else None, tasks.give)
+    return Cell(scenario, at.robot, (at.start.q, at.start.v), state, plant, sensor, tasks, stack,
+                _order(scenario, tasks), activation, at.contacts)
+
+
+def _order(scenario: Scenario, tasks: Tasks) -> Order:
+    """Return all tasks in every tick, or Algorithm 1 below those that are always at the top.
+
+    Without areas only the cone is switched, and the position has the repulsion of (30) within the
+    distance `tip` [m]. A cone that is an equality is always in the stack.
+    """
+    if scenario.control.stack != "switched":
+        fixed = Allocation(tuple(task.name for task in tasks.all), repulsion=False)
+        return Order(lambda body, end, cone_error: fixed, [fixed.order])
+    areas, section = tasks.areas, scenario.avoidance
+    first = tuple(task.name for task in tasks.always)
+    always_point = bool(scenario.pointing and scenario.pointing.rows == "equality")
+    tip = section.end_effector if isinstance(section, AvoidanceSection) else -inf
+
+    @cache
+    def behind_first(chosen: Allocation) -> Allocation:
+        return Allocation((*first, *chosen.order), chosen.repulsion)
+
+    def choose(body: float, end: float, cone_error: float) -> Allocation:
+        if areas is not None:
+            return behind_first(allocate(body, end, cone_error, areas, always_point))
+        point = cone_error > 0.0 or always_point
+        return behind_first(Allocation((POSITION,) * (tasks.position is not None)
+                                       + (POINTING,) * point, repulsion=end <= tip))
+
+    distances = (inf,) if areas is None else (areas.near, areas.far, inf)
+    return Order(choose, {choose(*at).order for at in product(distances, (0.0, inf), (1.0, nan))})
+
+
+def _rows(scenario: Scenario, tasks: Sequence[Task],
+          state: State) -> tuple[Sequence[Task], Activation | None]:
+    """Return the tasks with the rows of their stack, and their activations if it has any."""
+    if scenario.control.stack == "set-based":
+        return [TangentCone(task) if task.kind == "inequality" else task for task in tasks], None
+    if scenario.control.stack != "smooth":
+        return tasks, None
+    widened = {task.name: _widened(task, scenario) for task in tasks if task.kind == "inequality"}
+    found = [widened[task.name][0] if task.name in widened else task for task in tasks]
+    buffers = {name: width for name, (_, width) in widened.items()}
+    return found, Activation(state, found, buffers)
+
+
+def stack_resolver(scenario: Scenario, stack: Stack, activation: Activation | None) -> Resolver:
+    """Return the scenario's resolver, as its stack uses it; stack, activation as in a Cell.
+
+    Raises ScenarioError if the stack has activations and the resolver does not take them.
+    """
+    resolver = scenario.make_resolver()
+    if isinstance(resolver, Merged):
+        scales = {name: stack[name].scale for name in stack.names}
+        resolver = replace(resolver, scales=scales | dict(resolver.scales))
+    if scenario.control.stack == "set-based":
+        return SetBased(inner=resolver)
+    if activation is None:
+        return _settled(resolver, scenario, stack)
+    if not isinstance(resolver, Smooth):
+        raise ScenarioError('control.stack = "smooth" needs control.resolver = "smooth", got '
+                            f'"{resolver.name}"')
+    return Activated(inner=resolver, activation=activation)
+
+
+def _settled(resolver: Resolver, scenario: Scenario, stack: Stack) -> Resolver:
+    """Return a resolver that lets tasks out of reach come to rest, where x is a velocity."""
+    control = scenario.control
+    if control.level != "velocity" or control.damping == 0.0:
+        return resolver
+    curved = frozenset(name for name in stack.names if not stack[name].straight)
+    return Settled(inner=resolver, period=control.period, softness=control.damping, curved=curved)
+
+
+def _widened(task: Task, scenario: Scenario) -> tuple[Task, float]:
+    """Return a task that aims at the far end of its buffer, and the buffer in its unit."""
+    if isinstance(task, Pointing):
+        sections = {section.title: section for section in (scenario.pointing, *scenario.tasks)
+                    if section is not None}
+        inner = task.half_angle - radians(getattr(sections[task.name], "buffer", None) or 0.0)
+        return replace(task, half_angle=inner), cos(inner) - task.cos_alpha_d
+    if not isinstance(task, Separation | SelfSeparation):
+        raise ScenarioError(f"task {task.name!r}: control.stack = \"smooth\" has no buffer for it")
+    width = float(getattr(scenario.avoidance, "buffer", None) or 0.0)
+    barrier = replace(task.barrier, distance=task.barrier.distance + width)
+    return replace(task, barrier=barrier), width

@@ -20,7 +20,6 @@ from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import row_times, write_point_jacobian
 from hierarchy.measured import measured
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.task import Level
 from hierarchy.tasks import Avoidance
 
@@ -40,14 +39,14 @@ class PublishedAvoidance(Avoidance):
         if len(self.points) != 8:
             raise HierarchyError(f"avoidance.jacobian = 'published' needs the letter's eight "
                                  f"control points, the robot has {len(self.points)}")
-        # Each point's Jacobian is taken at the mirrored place on its link [m].
-        from_shoulder = [(0.0, i / 4 * 0.2, 0.0) for i in range(_UPPER_ARM_POINTS)]
-        from_elbow = [(0.0, -i / 4 * 0.39, 0.0) for i in range(4)]
-        set_frozen(self, offsets=np.array([*from_shoulder, *from_elbow]))
 
     def measure(self, state: State) -> tuple[Kernel, Any]:
         """See `Measured.measure`: J_c or r^T J_c with the errors, and the repulsion."""
-        return _published, super().measure(state)[1]
+        # Each point's Jacobian is taken at the mirrored place on its link [m].
+        from_shoulder = [(0.0, i / 4 * 0.2, 0.0) for i in range(_UPPER_ARM_POINTS)]
+        from_elbow = [(0.0, -i / 4 * 0.39, 0.0) for i in range(4)]
+        joints, _, seen = super().measure(state)[1]
+        return _published, (joints, np.array([*from_shoulder, *from_elbow]), seen)
 
     def jacobian_derivative(self, state: State) -> Array:
         """Backward difference of the wrong Jacobian (rows, n), the direction held."""

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from hierarchy import HierarchyError, Robot, Task
+from hierarchy import Robot, Task
 from hierarchy.avoidance import SurveillanceAreas
 from hierarchy.contacts import Contacts
 from hierarchy.task import check_period
@@ -57,13 +56,22 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
 
     Raises ScenarioError if it asks for nothing, or for what its robot cannot do.
     """
-    _check_there_are_any(scenario, at.robot)
+    asked = scenario.position or scenario.pointing or scenario.avoidance or scenario.tasks
+    if not (asked or at.robot.coupled or at.robot.loops):
+        raise ScenarioError(f"scenario {scenario.name!r}: the stack is empty: give at least one of "
+                            "[position], [pointing], [avoidance], [[tasks]]")
     limits, first = _first(scenario, at)
     areas, avoiding = _avoidance(scenario, at)
-    position, pointing = _position(scenario, at), _pointing(scenario, at)
-    listed = [_made(section, at, f"tasks.{i}") for i, section in enumerate(scenario.tasks)
-              if section.kind != "collision"]
-    posture = None if scenario.posture is None else _made(scenario.posture, at)
+    section = scenario.avoidance
+    near: dict[str, Any] = {"repulsion_within": section.end_effector} if isinstance(
+        section, AvoidanceSection) else {}
+    # Algorithm 1 adds the cone's surface to the stack while it is violated: an equality.
+    surface: dict[str, Any] = {"kind": "equality"} if scenario.control.stack == "switched" else {}
+    position: Position | None = _made(scenario.position, at, **near)
+    pointing: Pointing | None = _made(scenario.pointing, at, **surface)
+    posture = _made(scenario.posture, at)
+    listed = [_made(task, at, f"tasks.{i}") for i, task in enumerate(scenario.tasks)
+              if task.kind != "collision"]
     last = posture if scenario.posture and scenario.posture.role == "task" else None
     tasks = _in_order(scenario, [*first, *avoiding, *(
         task for task in (position, pointing, *listed, last) if task)])
@@ -75,21 +83,12 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
                  {task.title: task.give for task in scenario.tasks if task.give})
 
 
-def _check_there_are_any(scenario: Scenario, robot: Robot) -> None:
-    asked = scenario.position or scenario.pointing or scenario.avoidance or scenario.tasks
-    if not (asked or robot.coupled or robot.loops):
-        raise ScenarioError(f"scenario {scenario.name!r}: the stack is empty: give at least one of "
-                            "[position], [pointing], [avoidance], [[tasks]]")
-
-
 def _first(scenario: Scenario, at: References) -> tuple[JointLimits | None, list[Task]]:
     """Return the joint limits, and all tasks at the top: mechanism, physics, limits."""
-    try:
+    with naming("limits"):
         limits, first = _limits(scenario, at.robot)
-    except HierarchyError as error:
-        raise ScenarioError(f"limits: {error}") from error
     bounded = scenario.limits is not None and scenario.limits.place == "bounds"
-    if at.contacts_or_none is not None:
+    if at.contacts is not None:
         physics = _physics(scenario, at.contacts)
         first = [*first, *physics] if bounded else [*physics, *first]
     return limits, above(model_rows(at.robot, scenario.control.period), first,
@@ -150,26 +149,6 @@ def _separation(section: SeparationSection, at: References, exact: bool) -> list
     return tasks
 
 
-def _position(scenario: Scenario, at: References) -> Position | None:
-    if scenario.position is None:
-        return None
-    task = _made(scenario.position, at)
-    assert isinstance(task, Position)
-    avoidance = scenario.avoidance
-    if isinstance(avoidance, AvoidanceSection):
-        return replace(task, repulsion_within=avoidance.end_effector)
-    return task
-
-
-def _pointing(scenario: Scenario, at: References) -> Pointing | None:
-    if scenario.pointing is None:
-        return None
-    task = _made(scenario.pointing, at)
-    assert isinstance(task, Pointing)
-    # Algorithm 1 adds the cone's surface to the stack while it is violated: an equality.
-    return replace(task, kind="equality") if scenario.control.stack == "switched" else task
-
-
 def _reference(scenario: Scenario, at: References, posture: Task | None) -> Task | None:
     """Return the null-space task: [damping] or a posture, and the body's repulsion if placed so."""
     base = posture if scenario.damping is None else JointDamping(
@@ -180,10 +159,12 @@ def _reference(scenario: Scenario, at: References, posture: Task | None) -> Task
     return CumulatedRepulsion(at.robot.n, points, avoidance.far, base)
 
 
-def _made(section: Made, at: References, key: str = "") -> Task:
+def _made(section: Made | None, at: References, key: str = "", /, **more: Any) -> Any:
     """Make a task; raises ScenarioError, naming its key, where it does not fit the robot."""
+    if section is None:
+        return None
     with naming(key or section.title):
-        return section.make(at)
+        return section.make(at, **more)
 
 
 def _in_order(scenario: Scenario, tasks: list[Task]) -> list[Task]:

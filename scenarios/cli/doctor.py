@@ -123,7 +123,9 @@ def _kernels() -> Iterator[Finding]:
     size = sum(_size(Path(parent, name)) for parent, _, names in os.walk(folder)
                for name in names) / 1e6
     can = os.access(next(path for path in (folder, *folder.parents) if path.exists()), os.W_OK)
-    yield Finding(part, "cache", f"{_home(folder)}, {size:.0f} MB", can,
+    home = Path.home()
+    said = f"~/{folder.relative_to(home)}" if folder.is_relative_to(home) else str(folder)
+    yield Finding(part, "cache", f"{said}, {size:.0f} MB", can,
                   "" if can else "not writable; set NUMBA_CACHE_DIR to a writable folder")
 
 
@@ -191,8 +193,3 @@ def _version(package: str) -> str | None:
         return version(package)
     except PackageNotFoundError:
         return None
-
-
-def _home(path: Path) -> str:
-    home = Path.home()
-    return f"~/{path.relative_to(home)}" if path.is_relative_to(home) else str(path)

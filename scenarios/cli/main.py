@@ -9,6 +9,7 @@ SIGTERM or SIGHUP.
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
@@ -16,30 +17,21 @@ from typing import Annotated
 import typer
 
 import scenarios.cli.runs
-import scenarios.cli.shown  # noqa: F401, both add their commands
-from scenarios.cli import benchmarks
-from scenarios.cli.options import (
-    INTERRUPTED,
-    AsJson,
-    Changes,
-    Plugins,
-    app,
-    complete_scenarios,
-    listed_in,
-    loaded,
-    output,
-)
+import scenarios.cli.shown  # both add their commands
+from scenarios.cli import options as opt
+from scenarios.cli.options import app
 from scenarios.cli.problems import problems
-from scenarios.cli.terminal import exit_code, first_line, print_json, print_list, shown
+from scenarios.cli.terminal import exit_code, first_line, print_json, print_list, print_lists, shown
 
 app.add_typer(problems, name="problems")
+_ROOT = Path(scenarios.__file__).parents[1]  # of a checkout, if `benchmark/` is beside this package
 
 
 def run_command(arguments: list[str]) -> int:
     """Run a command line and return its exit code; errors become one line on stderr."""
     try:
         code = app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False)
-        return int(code or 0) if code != INTERRUPTED else interrupted()
+        return int(code or 0) if code != opt.INTERRUPTED else interrupted()
     except typer.TyperException as error:
         return _wrong(f"{error.format_message()}{_given(error, arguments)}")
     except (KeyboardInterrupt, typer.Abort):
@@ -73,7 +65,7 @@ def root(version: Annotated[bool, typer.Option(
 
 
 @app.command("list")
-def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
+def list_(plugin: opt.Plugins = None, as_json: opt.AsJson = False) -> None:
     """List scenarios, groups, sweeps, resolvers, tasks and robots."""
     import solvers
     from hierarchy import plugins
@@ -96,15 +88,12 @@ def list_(plugin: Plugins = None, as_json: AsJson = False) -> None:
         if own := plugins.own(group):
             entries.setdefault(group, {}).update({
                 name: f"{first_line(thing)} (plugin)" for name, thing in own.items()})
-    if as_json:
-        return print_json(entries)
-    for what, named in entries.items():
-        print_list(what, named)
+    print_lists(entries, as_json)
 
 
 @app.command()
-def library(out: Annotated[Path, output("Folder of the library: new or empty, or an existing one "
-                                        "with --check.")],
+def library(out: Annotated[Path, opt.output("Folder of the library: new or empty, or an existing "
+                                            "one with --check.")],
             resolvers: Annotated[str, typer.Option(
                 "--resolvers", metavar="NAMES", help="Of hcod, tpm, recursive, sns, merged.")
                 ] = "hcod,tpm,recursive,sns",
@@ -114,7 +103,7 @@ def library(out: Annotated[Path, output("Folder of the library: new or empty, or
             check: Annotated[bool, typer.Option(
                 "--check", help="Write nothing: compare the kernels of the library in the folder "
                                 "with those installed.")] = False,
-            as_json: AsJson = False) -> int:
+            as_json: opt.AsJson = False) -> int:
     """Write the resolvers as a C library.
 
     The same kernels, without Python.
@@ -134,7 +123,7 @@ def library(out: Annotated[Path, output("Folder of the library: new or empty, or
         return exit_code(f"{shown(out)}: {difference}" if difference else None)
     folder = claim(out)
     with whole(folder) as partial:
-        made = write(partial, listed_in(resolvers), target)
+        made = write(partial, opt.listed_in(resolvers), target)
     if as_json:
         print_json({"folder": shown(folder), **asdict(made)})
         return 0
@@ -147,8 +136,9 @@ def library(out: Annotated[Path, output("Folder of the library: new or empty, or
 
 @app.command()
 def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file or name.",
-                                              autocompletion=complete_scenarios)],
-          changes: Changes = None, plugin: Plugins = None, as_json: AsJson = False) -> None:
+                                              autocompletion=opt.complete_scenarios)],
+          changes: opt.Changes = None, plugin: opt.Plugins = None,
+          as_json: opt.AsJson = False) -> None:
     """Validate and summarize a scenario or robot file.
 
     Builds it and, for a scenario, runs the first tick.
@@ -159,19 +149,20 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
     robot_check.check_known(file)
     if robot_check.is_robot(file):
         robot = robot_check.look_at(file, changes or [])
-        return print_json(robot_check.as_plain_data(*robot)) if as_json else print(
-            robot_check.say(*robot))
-    scenario = loaded(file, changes)
-    found = first_tick(scenario)
-    return print_json(scenario_check.as_plain_data(scenario, found)) if as_json else print(
-        scenario_check.say(scenario, found))
+        data, text = robot_check.as_plain_data(*robot), robot_check.say(*robot)
+    else:
+        scenario = opt.loaded(file, changes)
+        found = first_tick(scenario)
+        data, text = scenario_check.as_plain_data(scenario, found), scenario_check.say(
+            scenario, found)
+    print_json(data) if as_json else print(text)
 
 
 @app.command("help")
 def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
         metavar="KEY", help="A key of a scenario file, such as avoidance.obstacles.path, or a "
                             "command. Default: all sections and commands.")] = None,
-          plugin: Plugins = None) -> None:
+          plugin: opt.Plugins = None) -> None:
     """Say what a key of a scenario file means."""
     from hierarchy.errors import UnknownNameError
     from scenarios.config import Scenario
@@ -198,7 +189,7 @@ def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
 
 
 @app.command()
-def doctor(as_json: AsJson = False) -> int:
+def doctor(as_json: opt.AsJson = False) -> int:
     """Check the installation and run a self-test."""
     from scenarios.cli.doctor import doctor_command
 
@@ -221,7 +212,7 @@ def _with_its_file(text: str, arguments: list[str]) -> str:
 def interrupted() -> int:
     """Say that the command was interrupted, and return its exit code."""
     print("hierarchy: interrupted", file=sys.stderr)
-    return INTERRUPTED
+    return opt.INTERRUPTED
 
 
 def _wrong(text: str) -> int:
@@ -229,4 +220,26 @@ def _wrong(text: str) -> int:
     return 2
 
 
-benchmarks.register(app)
+def _add_benchmarks() -> None:
+    """Add `bench` and `reproduce`; without a checkout they say what they need."""
+    if (_ROOT / "benchmark" / "commands.py").is_file():
+        if str(_ROOT) not in sys.path:
+            sys.path.insert(0, str(_ROOT))  # before another's package of the same name
+        commands = import_module("benchmark.commands")
+        app.add_typer(commands.bench, name="bench")
+        app.command()(commands.reproduce)
+        return
+    for name, what in (("bench", "Measure speed, accuracy and strictness (in a checkout)."),
+                       ("reproduce", "Regenerate the numbers in the documents (in a checkout).")):
+        app.command(name, help=what, context_settings={
+            "allow_extra_args": True, "ignore_unknown_options": True})(_absent)
+
+
+def _absent(context: typer.Context) -> None:
+    from hierarchy.errors import HierarchyError
+
+    raise HierarchyError(f"`hierarchy {context.info_name}` is not part of the installed package; "
+                         "it runs where a checkout of the project is installed: `pip install -e .`")
+
+
+_add_benchmarks()

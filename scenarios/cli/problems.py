@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from scenarios.cli.options import AsJson, output
-from scenarios.cli.terminal import print_json, print_list, shown
+from scenarios.cli.terminal import print_files, print_json, print_lists, shown
 
 if TYPE_CHECKING:
     from solvers.problems.files import Collection
@@ -39,10 +39,7 @@ def list_(as_json: AsJson = False) -> None:
     groups: dict[str, dict[str, str]] = {}
     for one in FAMILIES.values():
         groups.setdefault(one.group, {})[one.name] = one.what
-    if as_json:
-        return print_json(groups)
-    for group, entries in groups.items():
-        print_list(group, entries)
+    print_lists(groups, as_json)
 
 
 @problems.command()
@@ -50,7 +47,11 @@ def show(problem: Annotated[str, typer.Argument(metavar="FAMILY_OR_FILE",
                                                 help="Name of a family, or a file.")],
          seed: Seed = 0, count: Count = None, as_json: AsJson = False) -> None:
     """Describe a family or a file: sizes, rows, answers."""
-    said = _about(_named(problem, seed, count))
+    from scenarios.problems.families import family
+    from solvers.problems.files import read
+
+    said = _about(read(problem) if problem.endswith(".npz") else
+                  family(problem).half(seed, count))
     if as_json:
         return print_json(said)
     width = max(map(len, said))
@@ -80,9 +81,7 @@ def export(family: Annotated[list[str], typer.Argument(
     for one in chosen:
         with bar("problems") as told:
             files.append(write(one, seed, count, answers, out, partial(told, one.name)))
-    if as_json:
-        return print_json({"files": [shown(file) for file in files]})
-    print(*map(shown, files), sep="\n")
+    print_files(files, as_json)
 
 
 @problems.command()
@@ -101,18 +100,10 @@ def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of p
         print_json({**_about(collection), "wrong": wrong})
     else:
         known = len(collection.answers or ())
-        print(f"{shown(file)}: {len(collection.problems)} problems, {known} answers",
-              *(f"problem {p}: {why}" for p, why in wrong.items()), sep="\n")
-    for p in wrong if as_json else ():
-        print(f"problem {p}: {wrong[p]}", file=sys.stderr)
+        print(f"{shown(file)}: {len(collection.problems)} problems, {known} answers")
+    for p, why in wrong.items():
+        print(f"problem {p}: {why}", file=sys.stderr if as_json else sys.stdout)
     return int(bool(wrong))
-
-
-def _named(name: str, seed: int, count: int | None) -> Collection:
-    from scenarios.problems.families import family
-    from solvers.problems.files import read
-
-    return read(name) if name.endswith(".npz") else family(name).half(seed, count)
 
 
 def _about(collection: Collection) -> dict[str, Any]:
@@ -126,8 +117,9 @@ def _about(collection: Collection) -> dict[str, Any]:
             "half": head.half + (f", seed {head.seed}" if head.seed else ""),
             "problems": len(found),
             "sequence": f"ticks of {1e3 * head.period:g} ms" if head.sequence else "no",
-            "unknowns": _range([h.n for h in found]), "rows": _range([h.m for h in found]),
-            "levels": _range([len(h.sizes) for h in found]),
+            **{what: str(min(of)) if len(set(of)) == 1 else f"{min(of)} to {max(of)}"
+               for what, of in (("unknowns", [h.n for h in found]), ("rows", [h.m for h in found]),
+                                ("levels", [len(h.sizes) for h in found]))},
             "usual sizes": usual + (", and others" if len(sizes) > 2 else ""),
             "equalities": f"{100.0 * equal / max(rows, 1):.0f} % of the rows",
             "sha256": collection.digest}
@@ -139,7 +131,3 @@ def _about(collection: Collection) -> dict[str, Any]:
                  "largest shift, turn": f"{max(one.shift for one in answers):.1e}, "
                                         f"{max(one.turn for one in answers):.1e}"}
     return said
-
-
-def _range(values: list[int]) -> str:
-    return str(values[0]) if len(set(values)) == 1 else f"{min(values)} to {max(values)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from math import isfinite
 from operator import itemgetter
@@ -9,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from hierarchy import Robot, State, plugins
 from hierarchy.errors import UnknownNameError
@@ -100,14 +100,18 @@ def say(section: RobotSection, robot: Robot) -> str:
                    else "proposed from the collision geometry"))
     points = "as listed" if section.control_points is not None else listed
     end = "as given" if section.end_effector else listed
-    lines = [f"{robot.name}: {_source(section.model)}",
+    source = (f"{section.model} ({file_of(section.model)})" if in_package(section.model) else
+              "a table of this package" if section.model in TABLES else section.model)
+    moving, joint = 0, robot.frame(robot.end_effector).joint
+    while joint > (robot.base == "floating"):
+        moving, joint = moving + 1, robot.parents[joint]
+    lines = [f"{robot.name}: {source}",
              f"  base            {robot.base}, {robot.n} velocities, {robot.nq} positions",
              f"  mass            {found['mass_kg']:.3g} kg of moving links",
              f"  joints          {len(found['joints'])} actuated",
              *_joint_table(found["joints"]),
              f"  frames          {some(found['frames'])}",
-             f"  end effector    {robot.end_effector}, {end}; "
-             f"{_moved_by(robot)} joints move it",
+             f"  end effector    {robot.end_effector}, {end}; {moving} joints move it",
              *([f"  lowest frames   {some(feet)}; [[contacts]] may be there"]
                if (feet := found["lowest_frames"]) else []),
              f"  capsules        {capsules}",
@@ -121,73 +125,61 @@ def say(section: RobotSection, robot: Robot) -> str:
     if robot.apart:
         pairs = some([f"{one or 'base'} to {other or 'base'}" for one, other in robot.apart])
         lines.append(f"  may touch       {pairs}")
-    lines += _suspicious(found["joints"])
+    lines += [f"Warning: joint {joint['name']} may turn from {joint['lower']:g} to "
+              f"{joint['upper']:g} rad. Are these degrees?" for joint in found["joints"]
+              if joint["unit"] == "rad" and None not in (joint["lower"], joint["upper"])
+              and joint["upper"] - joint["lower"] > _TURNS]
     return "\n".join([*lines, "", "For a scenario file:", "", paste(section, robot)])
 
 
 def paste(section: RobotSection, robot: Robot) -> str:
     """Return the [robot] section for this robot, with all proposed values."""
-    lines = ["[robot]", f"model = {_quoted(section.model)}", f"base = {_quoted(robot.base)}",
-             f"end_effector = {_quoted(robot.end_effector)}"]
-    if section.root:
-        lines.append(f"root = {_quoted(section.root)}" if isinstance(section.root, str)
-                     else f"root = [{', '.join(map(_quoted, section.root))}]")
+    values = {"model": section.model, "base": robot.base, "end_effector": robot.end_effector,
+              **({"root": section.root} if section.root else {})}
+    lines = ["[robot]", *(f"{key} = {_toml(value)}" for key, value in values.items())]
     if section.locked:
-        locked = ", ".join(f"{_quoted(name)} = {value}" for name, value in section.locked.items())
-        lines.append(f"locked = {{ {locked} }}")
-    if robot.table is not None:
-        return "\n".join(lines)
-    found = as_plain_data(section, robot)
-    for key in ("control_points", "capsules"):
-        rows = ["    { " + ", ".join(f"{k} = {_quoted(v) if isinstance(v, str) else v}"
-                                     for k, v in row.items() if v is not None) + " },"
-                for row in found[key]]
+        lines.append(f"locked = {_inline({_toml(k): v for k, v in section.locked.items()})}")
+    found = {} if robot.table is not None else as_plain_data(section, robot)
+    for key in ("control_points", "capsules") if found else ():
+        rows = [f"    {_inline(row)}," for row in found[key]]
         lines += [f"{key} = [", *rows, "]"] if rows else []
     return "\n".join(lines)
 
 
-def _source(model: str) -> str:
-    return f"{model} ({file_of(model)})" if in_package(model) else (
-        "a table of this package" if model in TABLES else model)
+def _inline(row: dict[str, Any]) -> str:
+    """Return an inline table of TOML, without values that are None."""
+    return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in row.items() if v is not None) + " }"
+
+
+def _toml(value: Any) -> str:
+    """Return a string, a number or an array, which TOML writes as JSON does."""
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:
     """Return the names and limits of the actuated joints."""
-    lower, upper = robot.position_limits()
-    names = robot.velocity_names
-    units = robot.velocity_units
-    return [{"name": names[i], "unit": units[i], "lower": _or_none(lower[i]),
-             "upper": _or_none(upper[i]), "velocity": _or_none(robot.velocity_limit[i]),
-             "effort": _or_none(robot.effort_limit[i])} for i in range(robot.actuated, robot.n)]
+    limits = dict(zip(("lower", "upper", "velocity", "effort"), (
+        *robot.position_limits(), robot.velocity_limit, robot.effort_limit), strict=True))
+    return [{"name": robot.velocity_names[i], "unit": robot.velocity_units[i],
+             **{key: float(of[i]) if isfinite(of[i]) else None for key, of in limits.items()}}
+            for i in range(robot.actuated, robot.n)]
 
 
 def _joint_table(joints: list[dict[str, Any]]) -> list[str]:
-    if not joints:
-        return []
-    width = max(len(joint["name"]) for joint in joints)
-    rows = [("", "lower", "upper", "velocity", "effort", ""), *(
-        (joint["name"], *(_shown(joint[key]) for key in ("lower", "upper", "velocity", "effort")),
-         _UNITS[joint["unit"]]) for joint in joints)]
+    width = max((len(joint["name"]) for joint in joints), default=0)
+    keys = "lower", "upper", "velocity", "effort"
+    rows = [("", *keys, ""), *((joint["name"], *(
+        "none" if joint[key] is None else f"{joint[key]:.4g}" for key in keys),
+        _UNITS[joint["unit"]]) for joint in joints)] if joints else []
     return [f"    {name:{width}}  {'  '.join(f'{cell:>8}' for cell in cells)}  {units}".rstrip()
             for name, *cells, units in rows]
 
 
-def _suspicious(joints: list[dict[str, Any]]) -> list[str]:
-    """Return warnings of limits that look like degrees."""
-    return [f"Warning: joint {joint['name']} may turn from {joint['lower']:g} to "
-            f"{joint['upper']:g} rad. Are these degrees?" for joint in joints
-            if joint["unit"] == "rad" and joint["lower"] is not None
-            and joint["upper"] is not None and joint["upper"] - joint["lower"] > _TURNS]
-
-
 def _missing(robot: Robot) -> list[str]:
-    joints = _joints(robot)
-    kinds = {"position limits": [j["name"] for j in joints if j["lower"] is None
-                                 and j["upper"] is None],
-             "range between the position limits": [
-                 j["name"] for j in joints if j["lower"] is not None
-                 and j["lower"] == j["upper"]]}
-    said = [f"{kind} of {some(names)}" for kind, names in kinds.items() if names]
+    alike = [joint for joint in _joints(robot) if joint["lower"] == joint["upper"]]
+    said = [f"{kind} of {some(names)}" for kind, unlimited in (
+        ("position limits", True), ("range between the position limits", False))
+            if (names := [one["name"] for one in alike if (one["lower"] is None) == unlimited])]
     if not robot.masses.any():
         said.append("masses: centre-of-mass tasks and torque limits are not possible")
     if not robot.capsules:
@@ -215,29 +207,10 @@ def _lowest(robot: Robot) -> list[str]:
     return [name for height, name in lowest.values() if height < floor + _LEVEL]
 
 
-def _moved_by(robot: Robot) -> int:
-    joint, count = robot.frame(robot.end_effector).joint, 0
-    while joint > (1 if robot.base == "floating" else 0):
-        joint, count = robot.parents[joint], count + 1
-    return count
-
-
 def _carrier(robot: Robot, joint: int) -> str | None:
     """Return the joint's name as in a section; None for the base."""
-    return robot.joint_names[joint - 1] if joint > (1 if robot.base == "floating" else 0) else None
+    return robot.joint_names[joint - 1] if joint > (robot.base == "floating") else None
 
 
 def _rounded(place: Any) -> list[float]:
     return [float(value) + 0.0 for value in np.round(place, _ROUND)]
-
-
-def _or_none(value: float) -> float | None:
-    return float(value) if isfinite(value) else None
-
-
-def _shown(value: float | None) -> str:
-    return "none" if value is None else f"{value:.4g}"
-
-
-def _quoted(text: str) -> str:
-    return tomli_w.dumps({"_": text}).removeprefix("_ = ").rstrip("\n")

@@ -11,51 +11,29 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.cli.options import (
-    PORT,
-    AsJson,
-    Browser,
-    Changes,
-    Duration,
-    Out,
-    Part,
-    Plugins,
-    Port,
-    Scheduler,
-    Workers,
-    app,
-    complete_groups,
-    complete_resolvers,
-    complete_scenarios,
-    complete_sweeps,
-    listed_in,
-    loaded,
-    output,
-    workers_of,
-)
+from scenarios.cli import options as opt
 from scenarios.cli.terminal import exit_code, interruptible, print_json, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from scenarios.config import Scenario
-    from scenarios.recording.recording import Recording
     from scenarios.results.sampled import Finished
 
 
-@app.command()
+@opt.app.command()
 def run(scenario: Annotated[str, typer.Argument(
-            help="Name of a scenario, or a scenario file.", autocompletion=complete_scenarios)],
+            help="Name of a scenario, or a scenario file.", autocompletion=opt.complete_scenarios)],
         resolver: Annotated[str | None, typer.Option(
-            "--resolver", metavar="SPEC", autocompletion=complete_resolvers,
+            "--resolver", metavar="SPEC", autocompletion=opt.complete_resolvers,
             help="Use another resolver: name, or name:setting=value:setting=value.")] = None,
-        changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
-        out: Out = None, certify: Annotated[bool, typer.Option(
+        changes: opt.Changes = None, plugin: opt.Plugins = None, duration: opt.Duration = None,
+        out: opt.Out = None, certify: Annotated[bool, typer.Option(
             "--certify", help="Certify the answer of every tick, outside the measured times.")
             ] = False,
         figures: Annotated[bool, typer.Option(
             "--figures", help="Also draw the run's figures, like `hierarchy figures`.")
-            ] = False, as_json: AsJson = False,
+            ] = False, as_json: opt.AsJson = False,
         live: Annotated[bool, typer.Option(
             "--live", help="Show the run in the browser and change it interactively.")] = False,
         speed: Annotated[float | None, typer.Option(
@@ -64,14 +42,14 @@ def run(scenario: Annotated[str, typer.Argument(
         wait: Annotated[bool, typer.Option(
             "--wait/--no-wait", help="With --live: start when a browser has opened the page, or "
             "at once.")] = True,
-        port: Port = PORT, browser: Browser = True) -> int:
+        port: opt.Port = opt.PORT, browser: opt.Browser = True) -> int:
     """Run a scenario, measure it, and save the run."""
     if live and (certify or figures or as_json):
         raise typer.BadParameter("cannot be combined with --certify, --figures or --json",
                                  param_hint="--live")
     if speed is not None and not live:
         raise typer.BadParameter("needs --live", param_hint="--speed")
-    chosen = loaded(scenario, changes, duration)
+    chosen = opt.loaded(scenario, changes, duration)
     if resolver is not None:
         chosen = chosen.with_resolver(resolver)
     from scenarios.files import claim, next_free
@@ -87,18 +65,20 @@ def run(scenario: Annotated[str, typer.Argument(
 
 def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json: bool) -> int:
     from scenarios.cli.progress import bar
+    from scenarios.cli.terminal import certified, levels_given_up, print_table, troubles
     from scenarios.config.validation import doubtful_units
     from scenarios.loop.first_tick import contact_warnings
     from scenarios.loop.simulation import simulate
     from scenarios.measure.metrics import as_plain_data
     from scenarios.measure.run_folder import kept
+    from scenarios.measure.runs import Run
     from scenarios.measure.verdict import verdict
 
     for text in (*doubtful_units(scenario), *contact_warnings(scenario)):
         print(f"hierarchy: warning: {text}", file=sys.stderr)
     with bar() as told:
-        told_of_it = partial(told, str(scenario.make_resolver().label))
-        recording = simulate(scenario, progress=told_of_it, certified=certify)
+        recording = simulate(scenario, certified=certify,
+                             progress=partial(told, str(scenario.make_resolver().label)))
     if lost := kept(recording, folder):
         return exit_code(lost)
     if figures:
@@ -110,40 +90,31 @@ def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json
                     "folder": shown(folder), **as_plain_data(recording),
                     **verdict(recording).as_plain_data()})
     else:
-        _print(scenario, recording, certify)
-        print(f"\n{recording.ticks} ticks in {shown(folder)}")
+        resolver = scenario.make_resolver()
+        print_table([Run(scenario, scenario.control.resolver, str(resolver.label), recording)])
+        if certify:
+            print(f"\n{certified(recording, resolver.damping)}")
+        print(*troubles(recording), *levels_given_up(recording), "",
+              f"{recording.ticks} ticks in {shown(folder)}", sep="\n")
     return exit_code(recording.fault)
 
 
-def _print(scenario: Scenario, recording: Recording, certify: bool) -> None:
-    """Print the metrics of a run, its certificate, its troubles and the levels that it missed."""
-    from scenarios.cli.terminal import certified, levels_given_up, print_table, troubles
-    from scenarios.measure.runs import Run
-
-    resolver = scenario.make_resolver()
-    print_table([Run(scenario, scenario.control.resolver, str(resolver.label), recording)])
-    if certify:
-        print(f"\n{certified(recording, resolver.damping)}")
-    for line in (*troubles(recording), *levels_given_up(recording)):
-        print(line)
-
-
-@app.command()
+@opt.app.command()
 def compare(scenarios: Annotated[list[str], typer.Argument(
                 help="Names of scenarios or groups, or scenario files.",
-                autocompletion=complete_groups)],
+                autocompletion=opt.complete_groups)],
             resolvers: Annotated[str | None, typer.Option(
-                "--resolvers", metavar="SPEC,SPEC,...", autocompletion=complete_resolvers,
+                "--resolvers", metavar="SPEC,SPEC,...", autocompletion=opt.complete_resolvers,
                 help="Resolvers: name, or name:setting=value; or own, that of each scenario. "
                      "Default: all suitable ones; own for a group.")] = None,
-            changes: Changes = None, plugin: Plugins = None, duration: Duration = None,
-            out: Out = None, starts: Annotated[int | None, typer.Option(
+            changes: opt.Changes = None, plugin: opt.Plugins = None, duration: opt.Duration = None,
+            out: opt.Out = None, starts: Annotated[int | None, typer.Option(
                 "--starts", metavar="N", min=2, help="Compare over N starts sampled from each "
                 "scenario's [variation].")] = None,
             seed: Annotated[int, typer.Option(
                 "--seed", metavar="S", min=0, help="With --starts: seed of the samples.")] = 0,
-            workers: Workers = None, scheduler: Scheduler = None, part: Part = None,
-            as_json: AsJson = False) -> int:
+            workers: opt.Workers = None, scheduler: opt.Scheduler = None, part: opt.Part = None,
+            as_json: opt.AsJson = False) -> int:
     """Run scenarios under several resolvers and report.
 
     With --starts every resolver gets the same sampled starts, and the report gives statistics; run
@@ -155,9 +126,9 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
     from scenarios.config.scenario import OWN
     from scenarios.files import next_free
 
-    chosen = [loaded(name, changes, duration) for name in members(scenarios)]
+    chosen = [opt.loaded(name, changes, duration) for name in members(scenarios)]
     grouped = any(name in shipped_groups() for name in scenarios)
-    specs = listed_in(resolvers) if resolvers is not None else [OWN] if grouped else None
+    specs = opt.listed_in(resolvers) if resolvers is not None else [OWN] if grouped else None
     if starts is None:
         name = scenarios[0] if grouped else chosen[0].name
         folder = out if out is not None else next_free(Path("runs") / f"compare-{name}")
@@ -166,7 +137,7 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
 
     folder = out if out is not None else Path("runs") / f"starts-{chosen[0].name}"
     return _sampled(partial(compare_starts, chosen, specs, starts, seed, folder,
-                            workers=workers_of(workers, scheduler, part)), folder, as_json)
+                            workers=opt.workers_of(workers, scheduler, part)), folder, as_json)
 
 
 def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Path,
@@ -199,18 +170,18 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
     return max([exit_code(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
 
 
-@app.command()
+@opt.app.command()
 def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
-                                              autocompletion=complete_sweeps)],
-          out: Annotated[Path | None, output(
+                                              autocompletion=opt.complete_sweeps)],
+          out: Annotated[Path | None, opt.output(
               "Output folder, new or of a sweep to resume. Default: runs/sweep-NAME.")] = None,
-          plugin: Plugins = None, workers: Workers = None, scheduler: Scheduler = None,
-          part: Part = None, as_json: AsJson = False) -> int:
+          plugin: opt.Plugins = None, workers: opt.Workers = None, scheduler: opt.Scheduler = None,
+          part: opt.Part = None, as_json: opt.AsJson = False) -> int:
     """Run scenarios with sampled parameters.
 
     Run the same command again to resume an interrupted sweep.
     """
-    asked = workers_of(workers, scheduler, part)
+    asked = opt.workers_of(workers, scheduler, part)
     from scenarios.results.plan import load_sweep
     from scenarios.results.sampled import sweep as make
 

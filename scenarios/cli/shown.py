@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
 import time
 from collections.abc import Sequence
@@ -14,11 +13,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scenarios.cli.options import PORT, AsJson, Browser, Plugins, Port, Run, Runs, app, output
-from scenarios.cli.terminal import print_json, shown
+from scenarios.cli.terminal import print_files, print_json
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
-    from scenarios.draw.viewer.live_page import LivePage
+    from scenarios.draw.viewer.live import Live
     from scenarios.recording.recording import Recording
 
 _POLL = 0.5  # [s] between two looks for an interruption
@@ -36,7 +35,10 @@ def view(folders: Runs,
     """
     from scenarios.draw.viewer.server import announce, served
 
-    page = _replay([run for folder in folders for run in _runs_in(folder)], beside=side_by_side)
+    runs = [run for folder in folders for run in (
+        sorted(file.parent for file in folder.glob("*/*/run.npz"))
+        if (folder / "comparison.json").is_file() else [folder])]
+    page = _replay(runs, beside=side_by_side)
     with served(port, lambda: page) as address, suppress(KeyboardInterrupt):
         announce(address, browser)
         while True:
@@ -65,13 +67,6 @@ def labelled(folders: Sequence[Path], recordings: Sequence[Recording]) -> dict[s
             for label, folder, one in zip(labels, folders, recordings, strict=True)}
 
 
-def _runs_in(folder: Path) -> list[Path]:
-    """Return a run folder, or those of a comparison."""
-    if (folder / "comparison.json").is_file():
-        return sorted(file.parent for file in folder.glob("*/*/run.npz"))
-    return [folder]
-
-
 def show_live(scenario: Scenario, folder: Path, port: int, speed: float, browser: bool,
               wait: bool = True) -> int:
     """Run a scenario live in the browser, save the run, and return 1 if it stopped with a fault.
@@ -82,45 +77,39 @@ def show_live(scenario: Scenario, folder: Path, port: int, speed: float, browser
     that is restarted before its end is not saved.
     """
     from scenarios.draw.viewer.live import Live
-    from scenarios.draw.viewer.live_page import LivePage
+    from scenarios.draw.viewer.live_page import FRAMES, LivePage
     from scenarios.draw.viewer.server import announce, served
 
     live = Live(scenario)
-    page = LivePage(live, speed)
+    page, kept = LivePage(live, speed), None
     with served(port, page.html, page.answer) as address:
         try:
             announce(address, browser)
             while wait and not page.opened.wait(_POLL):
                 pass
-            _serve(page, folder)
+            last = time.monotonic()
+            while True:
+                time.sleep(1.0 / FRAMES)
+                now = time.monotonic()
+                page.step(now - last)
+                last = now
+                if live.over and kept is not live.recorder:
+                    kept = live.recorder
+                    _keep(live, folder)
         except KeyboardInterrupt:
             print()
             if not live.over:
-                _keep(page, folder)
+                _keep(live, folder)
     return 1 if live.ending else 0
 
 
-def _serve(page: LivePage, folder: Path) -> None:
-    """Continue the run until Ctrl-C, and save it whenever it ends."""
-    from scenarios.draw.viewer.live_page import FRAMES
-
-    last, kept = time.monotonic(), None
-    while True:
-        time.sleep(1.0 / FRAMES)
-        now = time.monotonic()
-        page.step(now - last)
-        last = now
-        if page.live.over and kept is not page.live.recorder:
-            kept = page.live.recorder
-            _keep(page, folder)
-
-
-def _keep(page: LivePage, folder: Path) -> None:
+def _keep(live: Live, folder: Path) -> None:
     """Save the run in its folder, or in the next free one beside it."""
-    beside = (folder.with_name(f"{folder.name}-{i}") for i in itertools.count(2))
-    free = next(path for path in itertools.chain([folder], beside)
-                if not path.exists() or not any(path.iterdir()))
-    recording = page.live.save(free)
+    from scenarios.files import next_free
+
+    used = folder.exists() and any(folder.iterdir())
+    free = next_free(folder) if used else folder
+    recording = live.save(free)
     print(f"{recording.ticks} ticks in {free}", flush=True)
     if recording.fault:
         print(f"hierarchy: fault: {recording.fault}", file=sys.stderr)
@@ -141,7 +130,7 @@ def export(folder: Run,
     from scenarios import load_run
     from scenarios.export import export as write
 
-    _print_files(write(load_run(folder), out or folder / f"run.{format}"), as_json)
+    print_files(write(load_run(folder), out or folder / f"run.{format}"), as_json)
 
 
 @app.command()
@@ -199,11 +188,4 @@ def figures(folders: Runs,
     """
     from scenarios.draw.figures.letter import redraw
 
-    _print_files(redraw(folders, style, out), as_json)
-
-
-def _print_files(files: list[Path], as_json: bool) -> None:
-    names = [shown(file) for file in files]
-    if as_json:
-        return print_json({"files": names})
-    print(*names, sep="\n")
+    print_files(redraw(folders, style, out), as_json)

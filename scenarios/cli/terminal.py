@@ -13,9 +13,7 @@ from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rich.text import Text
-
-    from scenarios.measure.runs import Cell, Row, Run
+    from scenarios.measure.runs import Row, Run
     from scenarios.results.columns import Results
 
 _WIDTH = 80   # columns of a terminal
@@ -67,7 +65,7 @@ def _finite(data: Any) -> Any:
 
 def print_table(runs: list[Run]) -> None:
     """Print the metrics of runs, where strict resolvers diverge, and the verdict by goal."""
-    from scenarios.measure.partings import partings
+    from scenarios.measure.motions import partings
     from scenarios.measure.runs import flags, table
     from scenarios.measure.verdict import lines, verdicts
 
@@ -101,7 +99,10 @@ def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: 
     console = Console(markup=False, highlight=False)
     console.print("", *above, sep="\n")
     heads = [re.sub(r"(?<=[^ :-])[ :-]", lambda at: at[0].strip() + "\n", one) for one in labels]
-    cells = [[_text(cell) for cell in row.cells] for row in rows]
+    cells = [[Text(cell.text + ("*" if cell.kind == "best" else " "),
+                   "bold" if cell.kind == "best" else "").append(
+                       f"\n{cell.more} " if cell.more else "", "not bold dim")
+              for cell in row.cells] for row in rows]
     widest = max(len(line) for text in (*heads, *(cell.plain for some in cells for cell in some))
                  for line in text.splitlines())
     fit = max(1, (_WIDTH - _NAMES) // (widest + 1))
@@ -116,15 +117,6 @@ def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: 
     console.print(*below, sep="\n", end="\n" if below else "")
 
 
-def _text(cell: Cell) -> Text:
-    """Return a cell in bold with a star if it is the best, its second line dim."""
-    from rich.text import Text
-
-    best = cell.kind == "best"
-    text = Text(cell.text + ("*" if best else " "), "bold" if best else "")
-    return text.append(f"\n{cell.more} ", "not bold dim") if cell.more else text
-
-
 def print_list(what: str, entries: dict[str, str]) -> None:
     """Print names with descriptions in 80 columns."""
     print(f"{what}:")
@@ -133,6 +125,20 @@ def print_list(what: str, entries: dict[str, str]) -> None:
         lines = wrap(text, _WIDTH - width - 4) or [""]
         print(f"  {name:{width}}  {lines[0]}".rstrip())
         print(*(f"{'':{width + 4}}{line}\n" for line in lines[1:]), sep="", end="")
+
+
+def print_lists(lists: dict[str, dict[str, str]], as_json: bool) -> None:
+    """Print lists by heading, or all as JSON."""
+    if as_json:
+        return print_json(lists)
+    for what, entries in lists.items():
+        print_list(what, entries)
+
+
+def print_files(files: list[Path], as_json: bool) -> None:
+    """Print the files that a command has written."""
+    names = [shown(file) for file in files]
+    print_json({"files": names}) if as_json else print(*names, sep="\n")
 
 
 def first_line(thing: Any) -> str:

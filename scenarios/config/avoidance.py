@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from hierarchy.avoidance import Barrier, Obstacle, Repulsion
 from hierarchy.problem import Array
@@ -62,16 +63,14 @@ class ObstacleSection(Section):
     path: PathSection | None = None
     """Path of its middle, for one that moves."""
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         needs = {"point": (), "sphere": ("radius",), "capsule": ("radius", "half_length"),
                  "box": ("half_lengths",)}[self.shape]
         for key in ("radius", "half_length", "half_lengths"):
             if (getattr(self, key) is None) == (key in needs):
-                raise ValueError(f"a {self.shape} takes {listed(needs) if needs else 'no size'}")
+                yield f"a {self.shape} takes {listed(needs) if needs else 'no size'}"
         if (self.centre is None) == (self.path is None):
-            raise ValueError("give either a centre or a path")
-        return self
+            yield "give either a centre or a path"
 
     def make(self, name: str) -> Obstacle:
         """Return the obstacle, with its name in messages."""
@@ -109,24 +108,17 @@ def _varied(obstacle: ObstacleSection, variation: VariationSection,
     path = obstacle.path
     if not isinstance(path, WaypointsSection):
         return obstacle
-    times, points = _moved(np.array(path.times), np.array(path.points), variation.spread,
-                          variation.timing, np.random.default_rng((variation.seed, number)))
-    waypoints = {"times": tuple(times.tolist()), "points": tuple(map(tuple, points.tolist()))}
-    return obstacle.model_copy(update={"path": path.model_copy(update=waypoints)})
-
-
-def _moved(times: Array, points: Array, spread: float, timing: float,
-          random: np.random.Generator) -> tuple[Array, Array]:
-    """Return the times (W,) [s] and points (W, 3) [m] of randomly moved waypoints.
-
-    spread : largest displacement [m] of a point. timing : largest shift in time, as a share of half
-        the interval to its neighbours. The path still rests where it rested.
-    """
-    away = points + spread * _in_ball(random, len(points))
+    random = np.random.default_rng((variation.seed, number))
+    times, points = np.array(path.times), np.array(path.points)
+    away = points + variation.spread * _in_ball(random, len(points))
     for i in range(1, len(points)):
-        if (points[i] == points[i - 1]).all():
+        if (points[i] == points[i - 1]).all():  # it rests where it rested
             away[i] = away[i - 1]
-    return _shifted(times, timing, random), away
+    half = np.diff(times) / 2  # times still increase; the first is unchanged
+    room = np.concatenate([[0.0], np.minimum(half[:-1], half[1:]), half[-1:]])
+    times = times + variation.timing * room * random.uniform(-1.0, 1.0, len(times))
+    waypoints = {"times": tuple(times.tolist()), "points": tuple(map(tuple, away.tolist()))}
+    return obstacle.model_copy(update={"path": path.model_copy(update=waypoints)})
 
 
 def _in_ball(random: np.random.Generator, count: int) -> Array:
@@ -134,13 +126,6 @@ def _in_ball(random: np.random.Generator, count: int) -> Array:
     points = random.standard_normal((count, 3))
     radii = random.random((count, 1)) ** (1 / 3)
     return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True) * radii)
-
-
-def _shifted(times: Array, timing: float, random: np.random.Generator) -> Array:
-    """Return shifted times, still increasing; the first is unchanged."""
-    half = np.diff(times) / 2
-    room = np.concatenate([[0.0], np.minimum(half[:-1], half[1:]), half[-1:]])
-    return np.asarray(times + timing * room * random.uniform(-1.0, 1.0, len(times)))
 
 
 class _Avoiding(Section):
@@ -157,13 +142,11 @@ class _Avoiding(Section):
         return tuple(_varied(obstacle, self.variation, number)
                      for number, obstacle in enumerate(self.obstacles))
 
-    @model_validator(mode="after")
-    def _varies_something(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         moves = self.variation is not None and self.variation.spread + self.variation.timing > 0.0
         if moves and not any(isinstance(obstacle.path, WaypointsSection)
                              for obstacle in self.obstacles):
-            raise ValueError("variation needs an obstacle with waypoints")
-        return self
+            yield "variation needs an obstacle with waypoints"
 
 
 class AvoidanceSection(_Avoiding):
@@ -194,13 +177,12 @@ class AvoidanceSection(_Avoiding):
     """Distance that metrics check for body and end effector, without effect on the run; by
     default `near`, for the body."""
 
-    @model_validator(mode="after")
-    def _areas_nested(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
+        yield from super()._wrong()
         if self.place == "null-space" and self.jacobian == "published":
-            raise ValueError('place = "null-space" goes with jacobian = "exact"')
+            yield 'place = "null-space" goes with jacobian = "exact"'
         if self.near > self.far:
-            raise ValueError(f"near = {self.near} m is beyond far = {self.far} m")
-        return self
+            yield f"near = {self.near} m is beyond far = {self.far} m"
 
     @property
     def thresholds(self) -> dict[str, float]:
@@ -255,12 +237,10 @@ class SeparationSection(BarrierSection, _Avoiding):
     """With control.stack = "smooth": width outside the clearance within which rows act."""
     obstacles: Obstacles = ()
 
-    @model_validator(mode="after")
-    def _areas_nested(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
+        yield from super()._wrong()
         if self.distance >= self.influence:
-            raise ValueError(f"distance = {self.distance} m is not below influence = "
-                             f"{self.influence} m")
-        return self
+            yield f"distance = {self.distance} m is not below influence = {self.influence} m"
 
     @property
     def thresholds(self) -> dict[str, float]:

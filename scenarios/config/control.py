@@ -1,12 +1,24 @@
-"""The keys of [control]."""
+"""The keys of [control], and of [[faults]], which are injected into it."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from scenarios.config.sections import Count, Flag, NotNegative, Section, Span, Time, Unit
+from scenarios.config.robot import ControlPointSection
+from scenarios.config.sections import (
+    Count,
+    Flag,
+    Length,
+    NotNegative,
+    Point,
+    Section,
+    Span,
+    Time,
+    Unit,
+)
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
 BlindPolicy = Literal["brake", "hold", "stop"]
@@ -95,23 +107,17 @@ class ControlSection(Section):
     transition_time: Span = 0.02
     """How long "blend" takes."""
 
-    @model_validator(mode="after")
-    def _makes_a_resolver(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         from solvers import make, names, variants
 
         for name in {*names(), *variants()} & self.options.keys():
             table = self.options[name]
             make(name, **(table if isinstance(table, dict) else {name: table}))
         make(self.resolver, **self.settings())
-        return self
-
-    @model_validator(mode="after")
-    def _can_be_kept(self) -> Self:
         if self.ticks > MOST_TICKS:
-            raise ValueError(f"duration = {self.duration:g} s at period = {self.period:g} s is "
-                             f"{self.duration / self.period:.3g} ticks; a recording keeps at most "
-                             f"{MOST_TICKS:,}")
-        return self
+            yield (f"duration = {self.duration:g} s at period = {self.period:g} s is "
+                   f"{self.duration / self.period:.3g} ticks; a recording keeps at most "
+                   f"{MOST_TICKS:,}")
 
     @property
     def ticks(self) -> int:
@@ -126,3 +132,46 @@ class ControlSection(Section):
         tables = (*names(), *variants())
         plain = {key: value for key, value in self.options.items() if key not in tables}
         return {**(own if isinstance(own, dict) else {self.resolver: own}), **plain}
+
+
+class FaultSection(Section):
+    """An injected fault."""
+
+    kind: Literal["nan_position", "nan_velocity", "nan_distance", "stale", "status", "overrun",
+                  "obstacle", "no_frames", "dark_frames"]
+    """"nan_position", "nan_velocity": the measurement of `joint` is NaN. "nan_distance": the
+    distance of `point` is NaN. "stale": measured joints and distances are frozen. "status": the
+    resolver reports `status`. "overrun": the tick takes longer. "obstacle": a sphere appears.
+    "no_frames": the camera takes no images. "dark_frames": its images have no readings."""
+    at: Time
+    """When it begins."""
+    duration: Span
+    """How long it lasts."""
+    joint: Annotated[int, Field(strict=True, ge=1)] | None = None
+    """Number of a joint from 1; by default all."""
+    point: Annotated[int, Field(strict=True, ge=1)] | None = None
+    """Number of a control point from 1, then of the end effector; by default all."""
+    status: Literal["iteration_limit", "numerical_failure", "backend_failure",
+                    "inaccurate"] | None = None
+    """What the resolver reports."""
+    takes: Span | None = None
+    """Time that a tick takes longer."""
+    centre: Point | None = None
+    """Middle of the sphere."""
+    place: ControlPointSection | None = None
+    """Point of the body, in place of `centre`, where the sphere appears at that time."""
+    radius: Length | None = None
+    """Radius of the sphere."""
+
+    def _wrong(self) -> Iterator[str]:
+        of_kind = {"nan_position": {"joint"}, "nan_velocity": {"joint"}, "nan_distance": {"point"},
+                   "status": {"status"}, "overrun": {"takes"},
+                   "obstacle": {"centre", "place", "radius"}}.get(self.kind, set())
+        for key in ("joint", "point", "status", "takes", "centre", "place", "radius"):
+            if getattr(self, key) is not None and key not in of_kind:
+                yield f"a fault of kind {self.kind!r} takes no {key}"
+        for key in of_kind & {"status", "takes", "radius"}:
+            if getattr(self, key) is None:
+                yield f"a fault of kind {self.kind!r} needs {key}"
+        if self.kind == "obstacle" and (self.centre is None) == (self.place is None):
+            yield "give either a centre or a place"

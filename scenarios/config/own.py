@@ -1,4 +1,4 @@
-"""Sections of plug-in kinds: their keys are the parameters of what a plug-in registered.
+"""Sections that make a part; of plug-in kinds, whose keys are the parameters of what makes it.
 
 A task of `[[tasks]]`, [plant] and [sensor] may have a kind that the package lacks. Its maker is the
 class or function that a plugin registered under that name. The parameters of the maker are the keys
@@ -28,8 +28,8 @@ from hierarchy import plugins
 from hierarchy.errors import HierarchyError
 from hierarchy.paths import Path
 from hierarchy.plugins import Group
-from scenarios.config.errors import ScenarioError
-from scenarios.config.paths import PathSection
+from scenarios.config.errors import ScenarioError, naming
+from scenarios.config.paths import AnyPath, PathSection
 from scenarios.config.sections import Finite, Flag, Section, Whole
 
 if TYPE_CHECKING:
@@ -44,19 +44,17 @@ _KEY = "key_"  # in front of the names of fields
 
 
 class PartSection(Section):
-    """A section of [plant] or [sensor]; `made_by`, "module:name", makes the part.
+    """A section of a task, [plant] or [sensor]; `made_by`, "module:name", makes the part.
 
     Reading a file loads no robot, so that its maker stands here by name.
     """
 
     made_by: ClassVar[str]
-    kind: str
-    """Which kind it is."""
 
     def made(self, robot: Robot, **given: Any) -> Any:
-        """Call the maker with those of this `section`, `robot` and `given` that it takes."""
-        maker = resolve_name(self.made_by)
-        return maker(**_taken(maker, {"section": self, "robot": robot, **given}))
+        """Call the maker with those of the keys, this `section`, `robot` and `given` it takes."""
+        keys = {key: getattr(self, key) for key in type(self).model_fields if key != "kind"}
+        return _called(resolve_name(self.made_by), {"section": self, **keys, **given}, robot)
 
 
 class OwnSection(PartSection):
@@ -65,6 +63,8 @@ class OwnSection(PartSection):
     model_config = ConfigDict(arbitrary_types_allowed=True)
     group: ClassVar[Group]
     maker: ClassVar[Maker]
+    kind: str
+    """Which kind it is."""
 
     @classmethod
     @cache
@@ -77,8 +77,8 @@ class OwnSection(PartSection):
         fields: dict[str, Any] = {
             f"{_KEY}{name}": (kind, Field(alias=name)) if parameter.default is parameter.empty
             else (kind | None, Field(None, alias=name))
-            for name, parameter in _parameters(maker, cls.group).items()
-            if name not in cls.model_fields
+            for name, parameter in _parameters(maker).items()
+            if name not in (*GIVEN[cls.group], *cls.model_fields)
             for kind in (_in_a_file(parameter.annotation),)}
         made = create_model(cls.__name__, __base__=cls, __doc__=cls.__doc__, **fields)
         made.maker = maker
@@ -92,15 +92,12 @@ class OwnSection(PartSection):
 
         Raises ScenarioError, naming the kind, for whatever goes wrong in it: it is the user's code.
         """
-        maker = type(self).maker
         what = f"{self.group[:-1]} of kind {self.kind!r}"
-        provided = {name: value for name, value in {"robot": robot, **given}.items()
-                    if name in GIVEN[self.group]}
+        keys = {name.removeprefix(_KEY): value for name, value in self
+                if name.startswith(_KEY) and value is not None}
+        provided = {name: value for name, value in given.items() if name in GIVEN[self.group]}
         try:
-            keys = {name: _made(parameter.annotation, value, robot)
-                    for name, parameter in _parameters(maker, self.group).items()
-                    if (value := getattr(self, f"{_KEY}{name}", None)) is not None}
-            return maker(**_taken(maker, provided), **keys)
+            return _called(type(self).maker, {**keys, **provided}, robot)
         except HierarchyError as error:
             raise ScenarioError(f"{what}: {error}") from error
         except Exception as error:
@@ -111,24 +108,25 @@ def _again(own: type[OwnSection], kind: str, data: dict[str, Any]) -> OwnSection
     return own.of(plugins.find(own.group, kind)).model_validate(data)
 
 
-def _taken(maker: Maker, given: dict[str, Any]) -> dict[str, Any]:
-    """Return those of the arguments that a maker has parameters for."""
-    known = inspect.signature(maker).parameters
-    return {name: value for name, value in given.items() if name in known}
+def _called(maker: Maker, given: dict[str, Any], robot: Robot) -> Any:
+    """Call a maker with the robot and those of `given` that it has parameters for."""
+    given = {**given, "robot": robot}
+    return maker(**{name: _made(name, parameter.annotation, given[name], robot)
+                    for name, parameter in _parameters(maker).items() if name in given})
 
 
-def _made(annotation: Any, value: Any, robot: Robot) -> Any:
+def _made(key: str, annotation: Any, value: Any, robot: Robot) -> Any:
     """Return the value of a key as the maker wants it: frames by name, paths by their table."""
     from hierarchy.robot import Frame
 
-    kinds = (annotation, *get_args(annotation))
-    if Frame in kinds and isinstance(value, str):
-        return robot.frame(value)
-    return value.make() if Path in kinds and value is not None else value
+    if isinstance(value, str) and Frame in (annotation, *get_args(annotation)):
+        with naming(key):
+            return robot.frame(value)
+    return value.make() if isinstance(value, AnyPath) else value
 
 
-def _parameters(maker: Maker, group: Group) -> dict[str, inspect.Parameter]:
-    """Return the parameters of a maker that are keys, with annotations that are not text."""
+def _parameters(maker: Maker) -> dict[str, inspect.Parameter]:
+    """Return the parameters of a maker by name, with annotations that are not text."""
     try:
         hints = get_type_hints(inspect.getattr_static(maker, "__init__")
                                if isinstance(maker, type) else maker)
@@ -136,8 +134,7 @@ def _parameters(maker: Maker, group: Group) -> dict[str, inspect.Parameter]:
         hints = {}
     return {name: parameter.replace(annotation=hints.get(name, Any))
             for name, parameter in inspect.signature(maker).parameters.items()
-            if name not in GIVEN[group] and parameter.kind not in (
-                inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)}
+            if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)}
 
 
 def _in_a_file(annotation: Any) -> Any:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import model_validator
 
 from hierarchy.paths import (
     Blended,
@@ -48,7 +47,7 @@ class JitterSection(Section):
     """Seed of the motion; the same one gives the same motion."""
 
 
-class _AnyPath(Section):
+class AnyPath(Section):
     """What every path may have."""
 
     of: ClassVar[Callable[..., Path]]
@@ -57,12 +56,10 @@ class _AnyPath(Section):
     out_of_reach: tuple[tuple[Time, Time], ...] | None = None
     """Intervals in which the robot cannot be on the path, for metrics of its return."""
 
-    @model_validator(mode="after")
-    def _spans_are_in_order(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         times = [t for span in self.out_of_reach or () for t in span]
         if any(b <= a for a, b in pairwise(times)):
-            raise ValueError(f"out_of_reach: times must increase, got {times}")
-        return self
+            yield f"out_of_reach: times must increase, got {times}"
 
     def make(self) -> Path:
         """Return the path; raises ScenarioError where the values are no path."""
@@ -73,12 +70,12 @@ class _AnyPath(Section):
 
     def _steady(self) -> Path:
         """Return the path without jitter: what `of` makes of the keys of the kind, in order."""
-        common = {"kind", *_AnyPath.model_fields}
+        common = {"kind", *AnyPath.model_fields}
         return type(self).of(*(getattr(self, key) for key in type(self).model_fields
                                if key not in common))
 
 
-class StillSection(_AnyPath):
+class StillSection(AnyPath):
     """A point that does not move."""
 
     of: ClassVar[Callable[..., Path]] = Still
@@ -87,7 +84,7 @@ class StillSection(_AnyPath):
     """Where the point is in the world."""
 
 
-class EllipseSection(_AnyPath):
+class EllipseSection(AnyPath):
     """p(t) = centre + cosine cos(s) + sine sin(s), with s = rate t + phase."""
 
     kind: Literal["ellipse"]
@@ -111,7 +108,7 @@ class EllipseSection(_AnyPath):
         return Ellipse(self.centre, *turned, self.rate)
 
 
-class WaypointsSection(_AnyPath):
+class WaypointsSection(AnyPath):
     """Straight lines between points, at rest at every point."""
 
     kind: Literal["waypoints"]
@@ -128,7 +125,7 @@ class WaypointsSection(_AnyPath):
                 else Blended(self.times, self.points, self.blend))
 
 
-class LineSection(_AnyPath):
+class LineSection(AnyPath):
     """Straight from one point to another, at rest at both."""
 
     of: ClassVar[Callable[..., Path]] = staticmethod(line)
@@ -143,7 +140,7 @@ class LineSection(_AnyPath):
     """When it begins."""
 
 
-class CircleSection(_AnyPath):
+class CircleSection(AnyPath):
     """A circle."""
 
     of: ClassVar[Callable[..., Path]] = staticmethod(circle)
@@ -160,7 +157,7 @@ class CircleSection(_AnyPath):
     """Angle at the start."""
 
 
-class RecordedSection(_AnyPath):
+class RecordedSection(AnyPath):
     """A recorded motion."""
 
     of: ClassVar[Callable[..., Path]] = Recorded.from_csv

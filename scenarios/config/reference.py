@@ -9,16 +9,15 @@ from __future__ import annotations
 import ast
 import inspect
 import json
-import sys
 from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
-from textwrap import fill
+from textwrap import dedent, fill
 from typing import Any, NamedTuple
 
 from scenarios.config.scenario import Scenario
-from scenarios.config.sections import Section, kinds_of
-from scenarios.config.validation import sections_at
+from scenarios.config.sections import Section, Unit, kinds_of
+from scenarios.config.validation import parts_of, sections_at
 
 _BOUNDS = (("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"), ("exclusiveMaximum", "<"))
 _TYPES = {"string": "string", "boolean": "boolean", "integer": "integer", "object": "table"}
@@ -27,7 +26,7 @@ _TYPES = {"string": "string", "boolean": "boolean", "integer": "integer", "objec
 class Key(NamedTuple):
     """A key of a section: what its value is, in which unit, by default, and what it means.
 
-    `below` has the schemas of the sections that its value may be.
+    `below` has the sections that its value may be.
     """
 
     name: str
@@ -35,17 +34,22 @@ class Key(NamedTuple):
     unit: str
     default: str
     meaning: str
-    below: tuple[str, ...]
+    below: tuple[type[Section], ...]
 
 
-def keys_of(section: type[Section]) -> list[Key]:
+@cache
+def keys_of(section: type[Section]) -> tuple[Key, ...]:
     """Return the keys of a section, but not what says its kind if there is one choice."""
-    schemas = _schemas(section)
-    schema, meaning = schemas[section.__name__], _meanings(section)
-    return [Key(name, _value(value, schemas), _unit(value),
-                "required" if name in schema.get("required", ()) else _default(value),
-                meaning[name], tuple(dict.fromkeys(_below(value, schemas))))
-            for name, value in schema["properties"].items() if "const" not in value]
+    schema, meanings, found = section.model_json_schema(), _meanings(section), []
+    for name, field in section.model_fields.items():
+        key, parts = field.alias or name, (field.annotation, *field.metadata)
+        if "const" not in (value := schema["properties"][key]):
+            units = dict.fromkeys(unit.name for unit in parts_of(parts, Unit))
+            default = "required" if field.is_required() else _default(value)
+            found.append(Key(key, _value(value, schema.get("$defs", {})), " or ".join(units),
+                             default, meanings.get(name, ""),
+                             tuple(dict.fromkeys(parts_of(parts, Section)))))
+    return tuple(found)
 
 
 def title_of(section: type[Section], place: str) -> str:
@@ -99,11 +103,11 @@ def places_of(name: str) -> list[str]:
 
 def sections() -> Iterator[tuple[str, type[Section]]]:
     """Yield every section with the place, "[control]", where its key is met first."""
-    by_name, waiting = _sections(), [("", "Scenario")]
-    met = {"Scenario"}
-    for place, name in waiting:  # grows on the way
-        yield place, by_name[name]
-        for key in keys_of(by_name[name]):
+    waiting: list[tuple[str, type[Section]]] = [("", Scenario)]
+    met: set[type[Section]] = {Scenario}
+    for place, section in waiting:  # grows on the way
+        yield place, section
+        for key in keys_of(section):
             dotted = f"{place.strip('[]')}.{key.name}".lstrip(".")
             new = [one for one in key.below if one not in met]
             waiting += [(f"[[{dotted}]]" if key.value.startswith("list") else f"[{dotted}]", one)
@@ -113,7 +117,7 @@ def sections() -> Iterator[tuple[str, type[Section]]]:
 
 def page() -> str:
     """Return all keys as Markdown; a key that several sections have is described in the first."""
-    places = {section.__name__: place for place, section in sections()}
+    places = {section: place for place, section in sections()}
     parts: list[str] = []
     first: dict[tuple[str, ...], tuple[str, str]] = {}
     for place, section in sections():
@@ -136,9 +140,9 @@ def page() -> str:
     return "\n".join(parts).replace("(default required)", "(required)")
 
 
-def _entry(key: Key, places: dict[str, str]) -> str:
+def _entry(key: Key, places: dict[type[Section], str]) -> str:
     """Return a key as an entry of a list: name, default with unit, else type, and meaning."""
-    below = ", ".join(f"`{one}`" for one in dict.fromkeys(places[name] for name in key.below))
+    below = ", ".join(f"`{one}`" for one in dict.fromkeys(places[one] for one in key.below))
     unit = f" [{key.unit}]" if key.unit else ""
     value = below or _escaped(key.value)
     if key.default == "required":
@@ -169,49 +173,24 @@ def _paragraphs(section: type[Section]) -> Iterator[str]:
         yield fill(text, 88, initial_indent="  ", subsequent_indent="  ")
 
 
-@cache
-def _schemas(section: type[Section]) -> dict[str, Any]:
-    """Return the JSON schemas of a section and of those below it, by the names of the classes."""
-    schema = section.model_json_schema()
-    return {**schema.get("$defs", {}), section.__name__: schema}
-
-
-@cache
-def _sections() -> dict[str, type[Section]]:
-    found: dict[str, type[Section]] = {}
-    waiting = [Section]
-    for section in waiting:  # grows on the way
-        found.setdefault(section.__name__, section)  # those of plugins have the name of their base
-        waiting += section.__subclasses__()
-    return found
-
-
 def _meanings(section: type[Section]) -> dict[str, str]:
     """Return the text below each key, in the section or in what it derives from."""
     found: dict[str, str] = {}
     for base in reversed(section.__mro__):
-        if base.__module__ in sys.modules and issubclass(base, Section):
-            found |= _texts(base)
-    return {field.alias or name: found.get(name, "")
-            for name, field in section.model_fields.items()}
+        found |= _texts(base) if issubclass(base, Section) else {}
+    return found
 
 
 @cache
 def _texts(section: type[Section]) -> dict[str, str]:
-    body = _bodies(section.__module__).get(section.__name__, [])
-    return {above.target.id: " ".join(str(below.value.value).split())
-            for above, below in pairwise(body)
-            if isinstance(above, ast.AnnAssign) and isinstance(above.target, ast.Name)
-            and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)}
-
-
-@cache
-def _bodies(module: str) -> dict[str, list[Any]]:
     try:
-        tree = ast.parse(inspect.getsource(sys.modules[module]))
+        (defined,) = ast.parse(dedent(inspect.getsource(section))).body
     except (OSError, TypeError):  # a plugin without a source
         return {}
-    return {node.name: node.body for node in tree.body if isinstance(node, ast.ClassDef)}
+    return {above.target.id: " ".join(str(below.value.value).split())
+            for above, below in pairwise(getattr(defined, "body", ()))
+            if isinstance(above, ast.AnnAssign) and isinstance(above.target, ast.Name)
+            and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)}
 
 
 def _default(value: dict[str, Any]) -> str:
@@ -219,39 +198,13 @@ def _default(value: dict[str, Any]) -> str:
     return "" if default in (None, [], "") or isinstance(default, dict) else json.dumps(default)
 
 
-def _choices(value: dict[str, Any]) -> list[Any]:
-    several = value.get("anyOf") or value.get("oneOf") or []
-    return [one for one in several if one.get("type") != "null"]
-
-
-def _inside(value: dict[str, Any]) -> list[Any]:
-    """Return the schemas within a schema: of choices, of entries, of the values of a table."""
-    items, more = value.get("items"), value.get("additionalProperties")
-    return [*_choices(value), *value.get("prefixItems", []),
-            *([items] if items else []), *([more] if isinstance(more, dict) else [])]
-
-
-def _unit(value: dict[str, Any]) -> str:
-    """Return the units in a schema, those of entries too."""
-    own = [value["unit"]] if "unit" in value else [_unit(one) for one in _inside(value)]
-    return " or ".join(filter(None, dict.fromkeys(own)))
-
-
-def _below(value: dict[str, Any], schemas: dict[str, Any]) -> Iterator[str]:
-    name = value.get("$ref", "").rpartition("/")[2]
-    if name and "properties" in schemas[name]:
-        yield name
-        return
-    for one in _inside(schemas[name] if name else value):
-        yield from _below(one, schemas)
-
-
 def _value(value: dict[str, Any], schemas: dict[str, Any]) -> str:
     """Return what a value may be, in words."""
     if "$ref" in value:
         schema = schemas[value["$ref"].rpartition("/")[2]]
         return "table" if "properties" in schema else _value(schema, schemas)
-    if choices := _choices(value):
+    several = value.get("anyOf") or value.get("oneOf") or []
+    if choices := [one for one in several if one.get("type") != "null"]:
         return " or ".join(dict.fromkeys(_value(one, schemas) for one in choices))
     if "const" in value or "enum" in value:
         return ", ".join(map(json.dumps, value.get("enum", [value.get("const")])))

@@ -22,22 +22,16 @@ _POSTURES = 200
 class References:
     """The robot at the start of a run, by which a section finds what it names.
 
-    contacts_or_none : the contacts at level "torque".
+    contacts : those at level "torque".
     """
 
     start: State
-    contacts_or_none: Contacts | None = None
+    contacts: Contacts | None = None
 
     @property
     def robot(self) -> Robot:
         """The robot."""
         return self.start.robot
-
-    @property
-    def contacts(self) -> Contacts:
-        """The contacts, of a scenario at level "torque"."""
-        assert self.contacts_or_none is not None, "the level of the scenario was checked"
-        return self.contacts_or_none
 
     def frame(self, name: str | None, key: str = "frame") -> Frame:
         """Return the frame that `key` names, the end effector for None; ScenarioError if none."""

@@ -6,23 +6,20 @@ import dataclasses
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain
 from typing import TYPE_CHECKING, Any, Self
 
 import tomli_w
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 import scenarios.config.kinds  # noqa: F401, registers them
 from hierarchy import plugins
 from hierarchy.errors import expect
 from scenarios.config.avoidance import AvoidanceKind
 from scenarios.config.changes import Tag, change_all, parse_changes, without_none
-from scenarios.config.contacts import ContactSection, ForcesSection
-from scenarios.config.control import ControlSection
+from scenarios.config.control import ControlSection, FaultSection
 from scenarios.config.distributions import Parameters
-from scenarios.config.faults import FaultSection
 from scenarios.config.plant import KinematicSection, PlantKind
-from scenarios.config.robot import RobotSection, StartSection
+from scenarios.config.robot import ContactSection, ForcesSection, RobotSection, StartSection
 from scenarios.config.sections import Name, Section
 from scenarios.config.sensor import ExactSection, SensorKind
 from scenarios.config.stacks import RIVALS, unfit
@@ -100,13 +97,12 @@ class Scenario(Section):
         plugins.require(modules or ())  # before the sections below, which have their kinds
         return modules
 
-    @model_validator(mode="after")
-    def _goes_together(self) -> Self:
-        for reason in chain(self._has_the_level_of_its_forces(), self._sections_go_together(),
-                            self._fits_its_stack(), self._lists_tasks_apart(),
-                            self._faults_have_a_sensor()):
-            raise ValueError(reason)
-        return self
+    def _wrong(self) -> Iterator[str]:
+        yield from self._has_the_level_of_its_forces()
+        yield from self._sections_go_together()
+        yield from self._fits_its_stack()
+        yield from self._lists_tasks_apart()
+        yield from self._faults_have_a_sensor()
 
     def _has_the_level_of_its_forces(self) -> Iterator[str]:
         torque = self.control.level == "torque"

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, get_args
+from typing import Annotated, Any, ClassVar, Self, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError, core_schema
 
 from hierarchy import plugins
@@ -20,9 +21,6 @@ class Unit:
     """The unit of a key, for messages and for the page of keys."""
 
     name: str
-
-    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
-        return {**handler(core), "unit": self.name}
 
 
 # Strict: true is not 1.0, and "5" is not 5. A whole number may be given for a float.
@@ -78,6 +76,16 @@ class Section(BaseModel):
     tag: ClassVar[str] = "kind"
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False,
                               serialize_by_alias=True)
+
+    def _wrong(self) -> Iterator[str]:
+        """Yield what is wrong with the values of the section together."""
+        yield from ()
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> Self:
+        for reason in self._wrong():
+            raise ValueError(reason)
+        return self
 
 
 @dataclass(frozen=True)

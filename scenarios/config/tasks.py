@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import radians
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hierarchy.errors import brief
 from hierarchy.paths import Path, Shifted, Still
 from hierarchy.plugins import Group
 from hierarchy.problem import Array
 from scenarios.config.errors import ScenarioError
-from scenarios.config.own import OwnSection
+from scenarios.config.own import OwnSection, PartSection
 from scenarios.config.paths import PathSection
 from scenarios.config.sections import (
     Flag,
@@ -44,7 +44,7 @@ Acceleration = Annotated[Positive, Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
 
 
-class Made(Section):
+class Made(PartSection):
     """What every section of a task has: a title, and the task that it makes.
 
     `unit` is that of its error, "m", "rad" or ""; `of_forces` says that its rows are over contact
@@ -57,12 +57,18 @@ class Made(Section):
 
     @property
     def one_sided(self) -> bool:
-        """Whether its rows are inequalities."""
-        return False
+        """Whether its rows are inequalities, as the key or the constant `rows` says."""
+        return getattr(self, "rows", "equality") == "inequality"
 
-    def make(self, at: References) -> Task:
-        """Return the task; values that the section omits are those of the start."""
-        raise NotImplementedError
+    def make(self, at: References, **more: Any) -> Task:
+        """Return the task: what `made_by` makes of the keys, of what is `asked`, and of `more`."""
+        task: Task = self.made(at.robot, state=at.start, contacts=at.contacts, name=self.title,
+                               **{**self.asked(at), **more})
+        return task
+
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return what the maker takes that is no key, or that the section leaves to the start."""
+        return {}
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
         """Yield unit and size (T,) of the errors (T, m) of the task."""
@@ -87,11 +93,6 @@ class TaskSection(Made):
     gain: Gain = 10.0
     """Gain of the error at velocity level."""
 
-    @property
-    def gains(self) -> tuple[float, float, float]:
-        """Stiffness, damping and gain."""
-        return self.stiffness, self.damping, self.gain
-
 
 class AlongSection(TaskSection):
     """Follow a path, or stay at the initial position without one."""
@@ -103,11 +104,9 @@ class AlongSection(TaskSection):
     from_start: Flag = False
     """Whether the path is relative to the initial position."""
 
-    @model_validator(mode="after")
-    def _has_a_path_to_shift(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         if self.from_start and self.path is None:
-            raise ValueError("from_start needs a path")
-        return self
+            yield "from_start needs a path"
 
     def along(self, here: Array) -> Path:
         """Return the path of a point that starts `here` (3,) [m]."""
@@ -127,17 +126,23 @@ def of_pose(error: Array) -> Iterator[tuple[str, Array]]:
 class PositionTask(AlongSection):
     """The origin of a frame along a path, in some `axes`."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:Position"
     frame: ClassVar[str | None]
     axes: ClassVar[str]
 
-    def make(self, at: References) -> Task:
-        """Return the task."""
+    def make(self, at: References, **more: Any) -> Task:
+        """Return the task, in its axes."""
         from hierarchy.tasks import Along, Position
 
-        frame = at.frame(self.frame)
-        task = Position(frame, self.along(at.start.position(frame)), *self.gains, name=self.title)
+        task = super().make(at, **more)
+        assert isinstance(task, Position)
         return task if self.axes == "xyz" else Along(
             task, np.eye(3)[["xyz".index(axis) for axis in self.axes]].tolist(), self.title)
+
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return the frame and its path."""
+        frame = at.frame(self.frame)
+        return {"frame": frame, "path": self.along(at.start.position(frame))}
 
     def wanted(self, position: Array, error: Array) -> Array | None:
         """Return where the task wants the point."""
@@ -160,19 +165,13 @@ class PointingTask(TaskSection):
     stiffness: Stiffness = 5.0
     damping: Gain = 2.0
     gain: Gain = 5.0
+    made_by: ClassVar[str] = "hierarchy.tasks:Pointing"
     frame: ClassVar[str | None]
 
-    @property
-    def one_sided(self) -> bool:
-        """Whether its rows are inequalities."""
-        return self.rows == "inequality"
-
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import Pointing
-
-        return Pointing(at.frame(self.frame), self.axis, radians(self.alpha_d), self.rows,
-                        *self.gains, name=self.title)
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return frame, half angle and kind."""
+        return {"frame": at.frame(self.frame), "half_angle": radians(self.alpha_d),
+                "kind": self.rows}
 
     def angle(self, error: Array) -> Array:
         """Return the angle [deg] from the axis of the cone at errors of the task."""
@@ -188,6 +187,7 @@ class PointingTask(TaskSection):
 class PostureTask(TaskSection):
     """All joints to a posture."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:Posture"
     unit: ClassVar[str] = "rad"
     target: tuple[JointPosition, ...] | None = None
     """Values of all joints, or all coordinates, as in `start.q`; by default the
@@ -198,15 +198,10 @@ class PostureTask(TaskSection):
     damping: Gain = 5.0
     gain: Gain = 1.0
 
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import Posture
-
-        robot, q = at.robot, at.start.q
-        if self.target is not None:
-            q = robot.configuration(self.target)
-        return Posture(robot.configuration(self.joints, q), *self.gains, name=self.title,
-                       robot=robot)
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return the posture, by default that of the start."""
+        q = at.start.q if self.target is None else at.robot.configuration(self.target)
+        return {"target": at.robot.configuration(self.joints, q)}
 
 
 class PositionSection(PositionTask):
@@ -304,11 +299,11 @@ class OwnTask(Listed, OwnSection):
         """Whether its rows are inequalities, as the plugin's class says with `kind`."""
         return str(getattr(type(self).maker, "kind", "equality")) == "inequality"
 
-    def make(self, at: References) -> Task:
+    def make(self, at: References, **more: Any) -> Task:
         """Return the task; raises ScenarioError for whatever goes wrong in the user's code."""
         from hierarchy import Task
 
-        task = self.made(at.robot, state=at.start, name=self.title)
+        task = super().make(at, **more)
         if not isinstance(task, Task):
             raise ScenarioError(f"the plugin made {brief(task)}, not a Task")
         if task.name != self.title:

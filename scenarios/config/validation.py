@@ -47,7 +47,7 @@ def tag_at(root: type[Section], path: Sequence[str]) -> Tag | None:
 
 def sections_at(root: type[Section], path: Sequence[str]) -> list[type[Section]]:
     """Return the sections allowed at a path: several if a kind selects one."""
-    return [found for part in _annotations(root, path) for found in _within(part, Section)]
+    return [found for part in _annotations(root, path) for found in parts_of(part, Section)]
 
 
 def _said(root: type[Section], data: Any, error: Any) -> str:
@@ -68,7 +68,7 @@ def _said(root: type[Section], data: Any, error: Any) -> str:
     if isinstance(found, dict) or error["type"] in ("kind", "literal_error"):
         return f"{where}: {text}"
     unit = next((f" {unit.name}" for part in _annotations(root, keys)
-                 for unit in _within(part, Unit)), "")
+                 for unit in parts_of(part, Unit)), "")
     return f"{where}: {text}, got {found!r}{unit}"
 
 
@@ -117,12 +117,12 @@ def _annotations(root: type[Section], path: Sequence[str]) -> list[Any]:
     parts: list[Any] = [root]
     for key in (key for key in path if not key.isdigit()):  # a list index is not a key
         parts = [(field.annotation, *field.metadata) for part in parts
-                 for section in _within(part, Section) for name, field
+                 for section in parts_of(part, Section) for name, field
                  in section.model_fields.items() if key in (name, field.alias)]
     return parts
 
 
-def _within(annotation: Any, wanted: type) -> Iterator[Any]:
+def parts_of(annotation: Any, wanted: type) -> Iterator[Any]:
     """Yield what an annotation has of a type: classes of sections, or units."""
     if isinstance(annotation, wanted) or (
             isinstance(annotation, type) and issubclass(annotation, wanted)):
@@ -134,14 +134,14 @@ def _within(annotation: Any, wanted: type) -> Iterator[Any]:
             yield from choice.sections(parts[0])
             return
         for part in parts:
-            yield from _within(part, wanted)
+            yield from parts_of(part, wanted)
 
 
 def doubtful_units(section: Section, above: str = "") -> Iterator[str]:
     """Yield what stands in a section in another unit than its own, by its size."""
     for name, field in type(section).model_fields.items():
         key, value = f"{above}{field.alias or name}", getattr(section, name)
-        units = {unit.name for unit in _within((field.annotation, *field.metadata), Unit)}
+        units = {unit.name for unit in parts_of((field.annotation, *field.metadata), Unit)}
         for where, one in _leaves(value, key):
             if isinstance(one, Section):
                 yield from doubtful_units(one, f"{where}.")

@@ -6,13 +6,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from hierarchy.errors import HierarchyError
 from scenarios.files import OutputError, named, written
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 
 def export(recording: Recording, path: str | Path) -> list[Path]:

@@ -1,4 +1,9 @@
-"""A run for Foxglove's 3D panel: joint frames, links, obstacles and paths."""
+"""A run for Foxglove's 3D panel: joint frames, links, obstacles and paths.
+
+Foxglove recognizes what it can draw by the schema's name; the fields are those of its published
+message types, as far as they are used here. Its reader takes one type per field, so a number that
+may be null is declared as a number.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +21,8 @@ from scenarios.scene import Scene
 WORLD = "world"
 Message = dict[str, Any]
 
-_ARM, _OBSTACLE, _TRACE, _ASKED = ((0.35, 0.42, 0.5, 1.0), (0.83, 0.23, 0.17, 0.9),
-                                   (0.0, 0.45, 0.7, 1.0), (0.6, 0.6, 0.6, 1.0))
+_ARM, _OBSTACLE, _TRACE, _ASKED = (dict(zip("rgba", colour, strict=True)) for colour in (
+    (0.35, 0.42, 0.5, 1.0), (0.83, 0.23, 0.17, 0.9), (0.0, 0.45, 0.7, 1.0), (0.6, 0.6, 0.6, 1.0)))
 _POINT = 0.01      # [m] radius of a point obstacle as drawn
 _THICK = 2.0       # [px] of lines
 _STRIP, _LIST = 0, 2
@@ -38,7 +43,7 @@ def transforms(scene: Scene, frame: int) -> Message:
         placed.append(("desired", scene.desired[frame], np.eye(3)))
     return {"transforms": [{
         "timestamp": time(t), "parent_frame_id": WORLD, "child_frame_id": name,
-        "translation": xyz(place), "rotation": xyzw(quaternion(rotation))}
+        "translation": xyz(place), "rotation": xyzw(rotation)}
         for name, place, rotation in placed]}
 
 
@@ -72,38 +77,44 @@ def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
 
 
 def link(t: float, capsule: Capsule, joints: Sequence[str]) -> Message:
-    """Return a capsule fixed to the frame of its joint: a cylinder and two balls."""
-    start, end = np.array(capsule.start), np.array(capsule.end)
-    length, wide = float(np.linalg.norm(end - start)), 2.0 * capsule.radius
-    cylinders = [] if length == 0.0 else [_cylinder((start + end) / 2, _z_to(end - start), wide,
-                                                    length, _ARM)]
+    """Return a capsule fixed to the frame of its joint."""
     return entity(t, f"body {capsule.name}", joints[capsule.joint - 1] if capsule.joint else WORLD,
-                  cylinders=cylinders, spheres=[_body(place, wide, _ARM) for place in (start, end)])
+                  **_capsule(np.array(capsule.start), np.array(capsule.end), capsule.radius, _ARM))
 
 
 def obstacle(t: float, number: int, body: Obstacle, centre: Array) -> Message:
     """Return an obstacle at its present place."""
-    turned, parts = np.asarray(body.rotation, dtype=float), dict[str, list[Message]]()
+    turned = np.asarray(body.rotation, dtype=float)
     if body.shape == "box":
-        parts["cubes"] = [_body(centre, 2.0 * np.array(body.size), _OBSTACLE, turned)]
+        parts = {"cubes": [_body(centre, 2.0 * np.array(body.size), _OBSTACLE, turned)]}
     elif body.shape == "capsule":
         radius, half = body.size
         along = half * turned[:, 2]
-        parts["cylinders"] = [_cylinder(centre, turned, 2.0 * radius, 2.0 * half, _OBSTACLE)]
-        parts["spheres"] = [_body(centre + side * along, 2.0 * radius, _OBSTACLE)
-                            for side in (-1.0, 1.0)]
+        parts = _capsule(centre - along, centre + along, radius, _OBSTACLE)
     else:
         radius = body.size[0] if body.size else _POINT
-        parts["spheres"] = [_body(centre, 2.0 * radius, _OBSTACLE)]
+        parts = {"spheres": [_body(centre, 2.0 * radius, _OBSTACLE)]}
     return entity(t, f"obstacle {number + 1}", WORLD, **parts)
 
 
-def line(t: float, name: str, points: Array, colour: tuple[float, ...]) -> Message:
+def _capsule(start: Array, end: Array, radius: float, colour: Message) -> dict[str, list[Message]]:
+    """Return a cylinder between two places, if they are apart, and two balls."""
+    balls = [_body(place, 2.0 * radius, colour) for place in (start, end)]
+    length = np.linalg.norm(end - start)
+    if length == 0.0:
+        return {"spheres": balls}
+    turned = Rotation.align_vectors([end - start], [[0.0, 0.0, 1.0]])[0].as_matrix()
+    size = np.array([2.0 * radius, 2.0 * radius, length])
+    cylinder = _body((start + end) / 2, size, colour, turned)
+    return {"cylinders": [cylinder | {"bottom_scale": 1.0, "top_scale": 1.0}], "spheres": balls}
+
+
+def line(t: float, name: str, points: Array, colour: Message) -> Message:
     """Return a line through points (P, 3) [m] in the world, without those that are not finite."""
     kept = points[np.isfinite(points).all(axis=1)]
     drawn = {"type": _STRIP, "pose": pose(np.zeros(3), np.eye(3)), "thickness": _THICK,
              "scale_invariant": True, "points": [xyz(point) for point in kept],
-             "color": _rgba(colour), "colors": [], "indices": []}
+             "color": colour, "colors": [], "indices": []}
     return entity(t, name, WORLD, lines=[drawn])
 
 
@@ -127,7 +138,7 @@ def nanoseconds(t: float) -> int:
 
 def pose(place: Array, rotation: Array) -> Message:
     """Return a pose as Foxglove's message."""
-    return {"position": xyz(place), "orientation": xyzw(quaternion(rotation))}
+    return {"position": xyz(place), "orientation": xyzw(rotation)}
 
 
 def xyz(vector: Array) -> Message:
@@ -135,35 +146,56 @@ def xyz(vector: Array) -> Message:
     return dict(zip("xyz", np.asarray(vector, dtype=float).tolist(), strict=True))
 
 
-def xyzw(q: Array) -> Message:
-    """Return a quaternion as Foxglove's message."""
-    return dict(zip("xyzw", q.tolist(), strict=True))
+def xyzw(R: Array) -> Message:
+    """Return the unit quaternion, w >= 0, of a rotation (3, 3) as Foxglove's message."""
+    return dict(zip("xyzw", Rotation.from_matrix(R).as_quat(canonical=True).tolist(), strict=True))
 
 
-def quaternion(R: Array) -> Array:
-    """Return the unit quaternion (4,) x, y, z, w >= 0 of a rotation (3, 3)."""
-    return np.asarray(Rotation.from_matrix(R).as_quat(canonical=True))
-
-
-def _z_to(direction: Array) -> Array:
-    """Return a rotation (3, 3) that takes the z axis to a direction (3,)."""
-    z = direction / np.linalg.norm(direction)
-    x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
-
-
-def _cylinder(centre: Array, rotation: Array, wide: float, long: float,
-              colour: tuple[float, ...]) -> Message:
-    return {"pose": pose(centre, rotation), "size": xyz(np.array([wide, wide, long])),
-            "bottom_scale": 1.0, "top_scale": 1.0, "color": _rgba(colour)}
-
-
-def _body(centre: Array, size: float | Array, colour: tuple[float, ...],
-          rotation: Array | None = None) -> Message:
+def _body(centre: Array, size: float | Array, colour: Message, rotation: Array | None = None
+          ) -> Message:
     return {"pose": pose(centre, np.eye(3) if rotation is None else rotation),
-            "size": xyz(np.broadcast_to(size, 3)), "color": _rgba(colour)}
+            "size": xyz(np.broadcast_to(size, 3)), "color": colour}
 
 
-def _rgba(colour: tuple[float, ...]) -> Message:
-    return dict(zip("rgba", colour, strict=True))
+NUMBER: dict[str, Any] = {"type": "number"}
+INTEGER: dict[str, Any] = {"type": "integer"}
+TEXT: dict[str, Any] = {"type": "string"}
+TRUTH: dict[str, Any] = {"type": "boolean"}
+
+
+def an_object(**properties: Any) -> dict[str, Any]:
+    """Return the schema of an object with these properties."""
+    return {"type": "object", "properties": properties}
+
+
+def a_list(items: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of an array."""
+    return {"type": "array", "items": items}
+
+
+_TIME = an_object(sec=INTEGER, nsec=INTEGER)
+_XYZ = an_object(x=NUMBER, y=NUMBER, z=NUMBER)
+_XYZW = an_object(x=NUMBER, y=NUMBER, z=NUMBER, w=NUMBER)
+_POSE = an_object(position=_XYZ, orientation=_XYZW)
+_COLOUR = an_object(r=NUMBER, g=NUMBER, b=NUMBER, a=NUMBER)
+_BODY = an_object(pose=_POSE, size=_XYZ, color=_COLOUR)
+_CYLINDER = an_object(pose=_POSE, size=_XYZ, bottom_scale=NUMBER, top_scale=NUMBER, color=_COLOUR)
+_LINE = an_object(type=INTEGER, pose=_POSE, thickness=NUMBER, scale_invariant=TRUTH,
+                  points=a_list(_XYZ), color=_COLOUR, colors=a_list(_COLOUR),
+                  indices=a_list(INTEGER))
+_ENTITY = an_object(
+    timestamp=_TIME, frame_id=TEXT, id=TEXT, lifetime=_TIME, frame_locked=TRUTH,
+    metadata=a_list(an_object(key=TEXT, value=TEXT)), arrows=a_list(an_object()),
+    cubes=a_list(_BODY), spheres=a_list(_BODY), cylinders=a_list(_CYLINDER), lines=a_list(_LINE),
+    triangles=a_list(an_object()), texts=a_list(an_object()), models=a_list(an_object()))
+_TRANSFORM = an_object(timestamp=_TIME, parent_frame_id=TEXT, child_frame_id=TEXT,
+                       translation=_XYZ, rotation=_XYZW)
+
+FOXGLOVE: dict[str, dict[str, Any]] = {
+    "foxglove.FrameTransforms": an_object(transforms=a_list(_TRANSFORM)),
+    "foxglove.SceneUpdate": an_object(
+        deletions=a_list(an_object(timestamp=_TIME, type=INTEGER, id=TEXT)),
+        entities=a_list(_ENTITY)),
+    "foxglove.Log": an_object(timestamp=_TIME, level=INTEGER, message=TEXT, name=TEXT, file=TEXT,
+                              line=INTEGER),
+}

@@ -11,8 +11,7 @@ import numpy as np
 from hierarchy.allocation import Allocation
 from hierarchy.jit import bind
 from hierarchy.problem import Array, Hierarchy
-from scenarios.cell.build import Cell, build
-from scenarios.cell.stacked import stack_resolver
+from scenarios.cell.build import Cell, build, stack_resolver
 from scenarios.config import Scenario
 from scenarios.loop.faults import Faults
 from scenarios.loop.policy import policy_of, smallest
@@ -49,7 +48,8 @@ class Controller:
         self.level, self.policy = control.level, policy_of(cell, control)
         self.blend = Blend(control.transition_time) if control.transition == "blend" else None
         self.cone_error = nan
-        self._measure_cone = cell.pointing.follow_cone_error(cell.state) if cell.pointing else None
+        pointing = cell.tasks.pointing
+        self._measure_cone = pointing.follow_cone_error(cell.state) if pointing else None
         if cell.sensor is not None:
             self._nearest = bind(smallest, cell.sensor.measurement.distance)
         self.allocation = Allocation((), repulsion=False)

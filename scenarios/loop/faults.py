@@ -17,7 +17,7 @@ from scenarios.cell.build import Cell
 from scenarios.cell.sensors import DepthSensor, Sensor
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import ObstacleSection
-from scenarios.config.faults import FaultSection
+from scenarios.config.control import FaultSection
 from solvers import Resolution, Resolver, Status
 
 Clock = Callable[[], float]

@@ -11,7 +11,7 @@ import numpy as np
 from hierarchy.tasks.self_separation import SelfSeparation
 from hierarchy.words import listed
 from scenarios.cell.build import Cell
-from scenarios.cell.contacts import doubts
+from scenarios.cell.robot import doubts
 from scenarios.config import Scenario
 from scenarios.config.references import inseparable_pairs
 from scenarios.config.validation import doubtful_units
@@ -80,9 +80,9 @@ def _of_contacts(controller: Controller) -> Iterator[str]:
     if cell.contacts is None:
         return
     yield from doubts(cell.scenario, cell.contacts)
-    if cell.limits is None or not controller.answered:
+    if cell.tasks.limits is None or not controller.answered:
         return
-    robot, limit = cell.robot, cell.limits.limits.acceleration
+    robot, limit = cell.robot, cell.tasks.limits.limits.acceleration
     asked = controller.resolution.x[robot.actuated:robot.n]
     i = int((np.abs(asked) / limit).argmax())
     if abs(asked[i]) > _FAR_BEYOND * limit[i]:

@@ -112,7 +112,8 @@ class Policy:
 def policy_of(cell: Cell, control: ControlSection) -> Policy:
     """Return the policy of a cell, with the limits of its robot."""
     if control.level != "torque":
-        clamp = partial(cell.limits.clamp, cell.state, control.level) if cell.limits else None
+        joints = cell.tasks.limits
+        clamp = partial(joints.clamp, cell.state, control.level) if joints else None
         return Policy(control.policy, control.level, control.period, clamp)
     limits, limit = cell.scenario.limits, cell.torque_limit
     speed = cell.robot.velocity_limit[cell.robot.actuated:]

@@ -60,7 +60,8 @@ class Recorder:
     """Memory for a whole run, filled row by row.
 
     `ticks` is the number of rows written so far; `facts` are those of the first controller.
-    `audits` look at every tick that the controller has answered.
+    `audits` examine every tick that the controller has answered; in others their signals are NaN,
+    -1 or false.
     """
 
     def __init__(self, controller: Controller, ticks: int, audits: Sequence[Audit] = ()) -> None:
@@ -76,13 +77,15 @@ class Recorder:
         self._log = _Log(rows(), rows(robot.nq), rows(robot.n),
                          rows(robot.n + len(controller.sent)), rows(3), rows(), rows(points),
                          np.full((ticks, len(_CHOICES)), -1, dtype=np.int16), rows(len(_TIMES)))
-        self._desired = rows(3, 3, count=ticks if cell.position else 0)
+        self._desired = rows(3, 3, count=ticks if cell.tasks.position else 0)
         self._answers = rows(len(controller.resolution.x), count=ticks if cell.contacts else 0)
         self._extra = {name: np.empty((ticks, *value.shape), value.dtype)
                        for name, value in cell.plant.extra.items()}
         self._weights = np.empty(ticks if controller.blend else 0)
         self._events: list[Event] = []
-        self._truth, self._audits = Truth(ticks, cell), (ActiveSets(ticks), *audits)
+        self._always: tuple[Audit, ...] = (Truth(cell),)
+        self._audits: tuple[Audit, ...] = (*self._always, ActiveSets(), *audits)
+        self._audited: dict[str, NDArray[Any]] = {}
         self.facts = facts_of(cell.scenario, robot)
         self.follow(controller)
 
@@ -135,19 +138,25 @@ class Recorder:
         That is not part of the tick's time: a controller does not wait for it.
         """
         controller, cell, k = self._controller, self._cell, self.ticks - 1
-        if cell.position is not None:
-            cell.position.path.write(cell.state.t, self._desired[k])
-        self._truth.look(k, controller)
-        if controller.answered:
-            for audit in self._audits:
-                audit.look(k, controller)
+        if cell.tasks.position is not None:
+            cell.tasks.position.path.write(cell.state.t, self._desired[k])
+        for audit in self._audits if controller.answered else self._always:
+            for name, value in audit(k, controller).items():
+                self._rows_of(name, np.asarray(value))[k] = value
+
+    def _rows_of(self, name: str, value: NDArray[Any]) -> NDArray[Any]:
+        """Return the rows of an audit's signal, which begin when it is first given."""
+        if name not in self._audited:
+            nothing = {"f": np.nan, "i": -1, "b": False}[value.dtype.kind]
+            self._audited[name] = np.full((len(self._log.t), *value.shape), nothing, value.dtype)
+        return self._audited[name]
 
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return the run as recorded so far."""
         recording = replace(self.part(slice(self.ticks), scenario), fault=fault,
                             events=tuple(self._events))
-        for audit in (self._truth, *self._audits):
-            recording.signals.update(audit.signals(recording))
+        recording.signals.update((name, rows[:self.ticks].copy())
+                                 for name, rows in self._audited.items())
         return recording
 
     def part(self, rows: slice | NDArray[np.int64], scenario: Scenario) -> Recording:
@@ -173,15 +182,15 @@ class Recorder:
                    "command": log.given[:, n:].copy(), "ee_position": log.ee_position,
                    "order": order, "status": status, "iterations": iterations,
                    **dict(zip(_TIMES, log.times.T.copy(), strict=True))}
-        if cell.position is not None:
+        if cell.tasks.position is not None:
             desired = self._desired[rows, 0].copy()
             signals |= {"desired_position": desired,
                         "position_error": desired - log.ee_position}
-        if cell.pointing is not None:
+        if cell.tasks.pointing is not None:
             asked = np.array(["pointing" in names for names in self._orders])
             signals |= {"pointing_error": log.pointing_error, "pointing_active": asked[order]}
-        if cell.listed:
-            signals |= listed.signals(cell.robot, cell.listed, log.t, log.q, log.v)
+        if cell.tasks.listed:
+            signals |= listed.signals(cell.robot, cell.tasks.listed, log.t, log.q, log.v)
         if cell.contacts is not None:
             answers = self._answers[rows].copy()
             signals |= {"planned_acceleration": answers[:, :n],

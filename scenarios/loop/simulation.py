@@ -9,9 +9,8 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError, brief, expect
 from scenarios.cell.build import Cell
-from scenarios.cell.plants.plant import fault_of
 from scenarios.config import Scenario, load
-from scenarios.loop.audit import Audit, Certified, Strictness
+from scenarios.loop.audit import Audit, Strictness, certify_tick
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import Faults, with_room
 from scenarios.loop.recorder import FASTEST, Recorder
@@ -45,13 +44,21 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     faults = Faults(scenario) if scenario.faults else None
     controller = Controller(with_room(scenario), faults=faults)
     ticks = scenario.control.ticks
-    recorder = Recorder(controller, ticks, (*_audits(controller, scenario, certified), *audits))
+    fates = Fates(controller.cell.stack.names, ticks, controller.cell.robot.n) \
+        if scenario.sensor.kind != "exact" else None  # rows cannot be written again without images
+    recorder = Recorder(controller, ticks, (
+        *([certify_tick] if certified else []),
+        *([Strictness()] if scenario.control.strictness else []),
+        *([fates.look] if fates else []), *audits))
     try:
         fault = _run(controller, recorder, scenario.control.period, ticks,
                      progress or (lambda done, total: None), faults)
     except KeyboardInterrupt:
         fault = f"interrupted at tick {recorder.ticks}"
-    return completed(recorder.finish(scenario, fault), rehearsal)
+    recording = recorder.finish(scenario, fault)
+    if fates:
+        recording.signals.update(fates.signals(recording))
+    return completed(recording, rehearsal)
 
 
 def rehearsed(scenario: Scenario) -> Cell:
@@ -63,16 +70,6 @@ def rehearsed(scenario: Scenario) -> Cell:
     controller.rehearse()
     Recorder(controller, 1).write()
     return controller.cell
-
-
-def _audits(controller: Controller, scenario: Scenario, certified: bool) -> list[Audit]:
-    ticks = scenario.control.ticks
-    audits: list[Audit] = [Certified(ticks)] if certified else []
-    if scenario.control.strictness:
-        audits.append(Strictness(ticks, scenario))
-    if scenario.sensor.kind != "exact":  # rows cannot be written again without the images
-        audits.append(Fates(controller.cell.stack.names, ticks, controller.cell.robot.n))
-    return audits
 
 
 def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
@@ -104,7 +101,7 @@ def tick(controller: Controller, recorder: Recorder, t: float,
     if not sound or (controller.policy.events and not (
             np.isfinite(plant.q).all() and np.isfinite(plant.v).all())):
         return _unsound(controller)
-    return fault_of(plant)
+    return getattr(plant, "fault", None)
 
 
 def _unsound(controller: Controller) -> str:

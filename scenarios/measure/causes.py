@@ -59,21 +59,17 @@ def causes(before: Tick, after: Tick, solve: Solve) -> Iterator[Cause]:
     at, low, high = _bisected(before, after, solve)
     left = _apart(at.command(low), at.command(high))
     if left <= _MAIN * total:
-        yield from _continuous(before, after, solve, total)
+        yield from _moved(before, after, solve, total)
+        for k, name in enumerate(before.h.names):
+            missed = [is_missed(one.h, one.x, k, _MISSED) for one in (before, after)]
+            if missed[0] != missed[1]:
+                by = (before, after)[missed[1]]
+                how = "from met to missed by {:.3g}" if missed[1] else (
+                    "from missed by {:.3g} to met")
+                yield Cause("miss", f"{name} changed " + how.format(by.h.violations(by.x)[k]))
     if left > _STAYS * total:
         kind, text = _vertex(before, after, at.h, low, high)
         yield Cause(kind, f"{text}, {left:.3g} of the {total:.3g} apart")
-
-
-def _continuous(before: Tick, after: Tick, solve: Solve, total: float) -> Iterator[Cause]:
-    """Yield what moved most of the answer, and the levels that became met or missed."""
-    yield from _moved(before, after, solve, total)
-    for k, name in enumerate(before.h.names):
-        missed = [is_missed(one.h, one.x, k, _MISSED) for one in (before, after)]
-        if missed[0] != missed[1]:
-            by = (before, after)[missed[1]]
-            how = "from met to missed by {:.3g}" if missed[1] else "from missed by {:.3g} to met"
-            yield Cause("miss", f"{name} changed " + how.format(by.h.violations(by.x)[k]))
 
 
 def _others(h: Hierarchy, other: Hierarchy) -> Iterator[Cause]:

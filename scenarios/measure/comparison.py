@@ -10,7 +10,7 @@ from typing import Any
 
 from hierarchy.notebook import html_table
 from scenarios.measure import metrics
-from scenarios.measure.partings import Parting, partings
+from scenarios.measure.motions import partings
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import lines, verdicts
 
@@ -30,36 +30,36 @@ class Comparison:
     folder: str | None = None
 
     def __repr__(self) -> str:
-        names = dict.fromkeys(run.scenario.name for run in self.runs)
         labels = dict.fromkeys(run.label for run in self.runs)
-        return (f"Comparison({', '.join(names)} under {', '.join(labels)}; "
+        return (f"Comparison({', '.join(self._names)} under {', '.join(labels)}; "
                 f"{len(self.runs)} runs, {len(self.faults)} faults)")
 
     def _repr_html_(self) -> str:
         return "".join(_html(name, runs) for name, runs in self.groups().items())
 
     @property
+    def _names(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(run.scenario.name for run in self.runs))
+
+    @property
     def faults(self) -> list[Run]:
         """The runs that did not reach their end."""
         return [run for run in self.runs if run.fault]
 
-    def sampled(self, starts: int) -> str:
-        """Return the command that compares the same from so many sampled starts."""
-        names = dict.fromkeys(run.scenario.name for run in self.runs)
+    def asked(self, *options: str) -> str:
+        """Return the command that compares the same, with further options."""
         specs = ",".join(dict.fromkeys(run.spec for run in self.runs))
-        return shlex.join(["hierarchy", "compare", *names, "--resolvers", specs,
-                           "--starts", str(starts)])
+        return shlex.join(["hierarchy", "compare", *self._names, "--resolvers", specs, *options])
 
     def groups(self) -> dict[str, list[Run]]:
         """Return the runs that stand side by side, with the name of each group.
 
         Those are the runs of one scenario; or, with one resolver, the runs of all scenarios.
         """
-        if len({run.spec for run in self.runs}) == 1:
-            return {self.runs[0].spec: list(self.runs)} if len(self.runs) > 1 else {
-                self.runs[0].scenario.name: list(self.runs)}
-        names = dict.fromkeys(run.scenario.name for run in self.runs)
-        return {name: [run for run in self.runs if run.scenario.name == name] for name in names}
+        if len(self.runs) > 1 and len({run.spec for run in self.runs}) == 1:
+            return {self.runs[0].spec: list(self.runs)}
+        return {name: [run for run in self.runs if run.scenario.name == name]
+                for name in self._names}
 
     def as_plain_data(self) -> dict[str, Any]:
         """Return what `comparison.json` holds."""
@@ -67,8 +67,11 @@ class Comparison:
                 "verdicts": {name: list(lines(verdicts(runs)))
                              for name, runs in self.groups().items()},
                 "runs": [_plain(run) for run in self.runs], "refused": list(self.refused),
-                "partings": {name: [_plain_parting(one) for one in partings(runs)]
-                             for name, runs in self.groups().items()}}
+                "partings": {name: [
+                    {"label": one.label, "from": one.other, "bound_rad": one.bound,
+                     "tick": one.tick, "why": one.why,
+                     "largest_rad": one.largest if math.isfinite(one.largest) else None}
+                    for one in partings(runs)] for name, runs in self.groups().items()}}
 
 
 def _html(name: str, runs: Sequence[Run]) -> str:
@@ -85,16 +88,7 @@ def _html(name: str, runs: Sequence[Run]) -> str:
 def _plain(run: Run) -> dict[str, Any]:
     return {"scenario": run.scenario.name, "resolver": run.spec, "label": run.label,
             "folder": run.folder, "fault": run.fault,
-            "settings": {name: _plain_value(value) for name, value in run.settings.items()},
+            "settings": run.settings,
             "ticks": run.recording.ticks if run.recording else 0,
             "metrics": {name: metrics.plain(metric) for name, metric in run.metrics.items()},
             **verdicts([run])[0].as_plain_data()}
-
-
-def _plain_parting(one: Parting) -> dict[str, Any]:
-    return {"label": one.label, "from": one.other, "bound_rad": one.bound, "tick": one.tick,
-            "largest_rad": one.largest if math.isfinite(one.largest) else None, "why": one.why}
-
-
-def _plain_value(value: Any) -> Any:
-    return value if isinstance(value, (bool, int, float, str, type(None))) else repr(value)

@@ -4,25 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hierarchy.problem import Array
 from scenarios.config.kinds.forces import ListedForce
-from scenarios.measure.metric import (
-    Array,
-    Criteria,
-    Metric,
-    known,
-    largest,
-    least,
-    register,
-    true,
-)
+from scenarios.measure.metric import Criteria, Metric, known, largest, least, register, true
 from scenarios.measure.safety import steps
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 _LOAD = 1.0        # [N] from which a contact counts as loaded
 _AT_LIMIT = 0.999  # share of a torque limit that counts as being at it
@@ -39,22 +28,37 @@ def _forces(recording: Recording, by: Criteria) -> Iterator[Metric]:
             yield from _contacts(recording)
     if recording.scenario.control.level == "torque":
         yield from _torques(recording)
-        yield from _levels(recording)
+        names = recording.task_names if "level_violation" in recording else ()
+        for column, name in enumerate(names):
+            missed = known(recording["level_violation"][:, column])
+            yield Metric(f"miss_{name.replace(' ', '_')}", f"Missed by {name}, mean",
+                         float(missed.mean()) if missed.size else None, "rows", group="Levels")
 
 
 def _contacts(recording: Recording) -> Iterator[Metric]:
-    """Yield what the floor says: slip, margins of friction and of the centre of pressure."""
-    metric = partial(Metric, group="Contacts")
-    if not all(contact.slides for contact in recording.scenario.contacts):
+    """Yield what the floor says: slip, margins of friction and of the centre of pressure.
+
+    Friction left is 1 - |f_t| / (mu f_n) of loaded contacts that do not slide. Forces are compared
+    with those planned in ticks without a push, by their largest component.
+    """
+    metric, force = partial(Metric, group="Contacts"), recording["floor_force"]
+    contacts = recording.scenario.contacts
+    sticks = np.array([not contact.slides for contact in contacts])
+    if sticks.any():
+        normal, along = force[:, :, 2], np.linalg.norm(force[:, :, :2], axis=2)
+        mu = getattr(recording.scenario.plant, "friction", np.nan)
+        left = (1.0 - along / (mu * np.maximum(normal, _LOAD)))[sticks & (normal > _LOAD)]
         yield metric("slip_max", "Slip of a contact, max", largest(known(recording["slip"])), "m")
-        yield metric("friction_margin_min", "Friction left, min",
-                     least(known(friction_left(recording))), "share", False)
+        yield metric("friction_margin_min", "Friction left, min", least(known(left)), "share",
+                     False)
     for key, label in (("pressure", "Centre of pressure from the edge"),
                        ("support", "Centre of mass inside the support polygon")):
         margin = known(recording[f"{key}_margin"])
         if margin.size:
             yield metric(f"{key}_margin_min", f"{label}, min", least(margin), "m", False)
-    error = force_error(recording)
+    first = np.cumsum([0, *(1 if contact.x is None else 4 for contact in contacts[:-1])])
+    planned = np.add.reduceat(recording["planned_force"], first, axis=1)
+    error = known(np.abs(force - planned).max(axis=(1, 2))[~recording["push"].any(axis=1)])
     yield metric("force_error_p95", "Force of a contact against that planned, 95 %",
                  float(np.percentile(error, 95.0)) if error.size else None, "N")
 
@@ -117,31 +121,3 @@ def standing(recording: Recording) -> bool | None:
     return recording.fault is None and bool(
         np.abs(true(recording, "v")[last]).max() < CALM and beyond.max() < _BEYOND
         and height[0] - height[last].min() < SUNK and (recording["support_margin"][last] > 0).all())
-
-
-def _levels(recording: Recording) -> Iterator[Metric]:
-    """Yield by how much each level is missed, on average over the ticks in which it is known."""
-    if "level_violation" in recording:
-        for name, column in zip(recording.task_names, recording["level_violation"].T, strict=True):
-            missed = known(column)
-            yield Metric(f"miss_{name.replace(' ', '_')}", f"Missed by {name}, mean",
-                         float(missed.mean()) if missed.size else None, "rows", group="Levels")
-
-
-def friction_left(recording: Recording) -> Array:
-    """Return 1 - |f_t| / (mu f_n) of loaded contacts (T, C) that do not slide; NaN elsewhere."""
-    force = recording["floor_force"]
-    normal, along = force[:, :, 2], np.linalg.norm(force[:, :, :2], axis=2)
-    mu = getattr(recording.scenario.plant, "friction", np.nan)
-    sticks = np.array([not contact.slides for contact in recording.scenario.contacts])
-    left = 1.0 - along / (mu * np.maximum(normal, _LOAD))
-    return np.where(sticks & (normal > _LOAD), left, np.nan)
-
-
-def force_error(recording: Recording) -> Array:
-    """Return the largest component [N] of floor_force against planned, in ticks without push."""
-    counts = [1 if contact.x is None else 4 for contact in recording.scenario.contacts]
-    first = np.cumsum([0, *counts[:-1]])
-    planned = np.add.reduceat(recording["planned_force"], first, axis=1)
-    error: Array = np.abs(recording["floor_force"] - planned).max(axis=(1, 2))
-    return error[np.isfinite(error) & ~recording["push"].any(axis=1)]

@@ -84,10 +84,8 @@ def _blocked(recording: Recording, missed: dict[str, NDArray[np.int64]]
                 held.update(held_back_by(h, solved, level, names))
                 at.update(most_missed(h, solved.x, level, names))
                 looked += 1
-        found[name] = _shares(held, looked), _shares(at, looked)
+        blocked, rows_at = (tuple(
+            (what, times / looked) for what, times in count.most_common(4)
+            if times >= _OFTEN * looked) for count in (held, at))
+        found[name] = blocked, rows_at
     return found
-
-
-def _shares(count: Counter[str], looked: int) -> Shares:
-    return tuple((what, times / looked) for what, times in count.most_common(4)
-                 if times >= _OFTEN * looked)

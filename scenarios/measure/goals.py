@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from scenarios.measure.forces import wanted_forces
 from scenarios.measure.metric import norms, passed, shown, true
 from scenarios.recording.listed import errors
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 Array = NDArray[np.float64]
 

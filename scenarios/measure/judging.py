@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import nan, sqrt
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,38 +23,9 @@ from solvers.certificate import TOLERANCE
 _SAME = 1e-9  # [m] of distances that are those recorded
 
 
-class Judged(NamedTuple):
-    """Fate (L,) and violation (L,) of each level, and the saturated entries (n,) of x."""
-
-    fate: NDArray[np.int8]
-    violation: Array
-    saturated: NDArray[np.int8]
-
-
-def judged(cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> Judged:
-    """Judge a command x (n,) by the rows of its tick; `accuracy` is the resolver's.
-
-    A row is on a side if it is as near to it as the resolver, or a certificate, may be.
-    """
-    near = max(TOLERANCE, accuracy) * (1.0 + sqrt(float(x @ x)))
-    n, levels = cell.robot.n, len(h.sizes)
-    found = Judged(np.zeros(levels, np.int8), np.zeros(levels), np.zeros(n, np.int8))
-    lower = h.lower if cell.activation is None else cell.activation.demanded(h)
-    _judge_levels(h.A, lower, h.upper, h.offsets, x, near, found.fate, found.violation)
-    if (limits := cell.limits) is not None:
-        if limits.name in h.names:
-            rows = slice(*h.offsets[h.names.index(limits.name):][:2])
-            box = h.lower[rows], h.upper[rows]
-        else:
-            box = limits.box(cell.state, "velocity" if cell.stack.level == "velocity"
-                             else "acceleration")
-        _find_saturated(x[:n], *box, near, found.saturated)
-    return found
-
-
 @final
 class Fates:
-    """Collects the fates of the tasks called `names` tick by tick; an Audit of a run."""
+    """Collects the fates of the tasks called `names` tick by tick; `look` is an Audit of a run."""
 
     def __init__(self, names: tuple[str, ...], ticks: int, joints: int) -> None:
         self._names = names
@@ -63,20 +34,34 @@ class Fates:
         self._saturated = np.zeros((ticks, joints), np.int8)
         self._columns: dict[tuple[str, ...], NDArray[np.int64]] = {}
 
-    def look(self, tick: int, controller: Any) -> None:
+    def look(self, tick: int, controller: Any) -> dict[str, Array]:
         """Judge the command of the tick that a Controller has just answered."""
         self.judge(tick, controller.cell, controller.hierarchy, controller.meant,
                    controller.resolver.accuracy)
+        return {}
 
     def judge(self, tick: int, cell: Cell, h: Hierarchy, x: Array, accuracy: float) -> None:
-        """Judge the command x (n,) of a tick; see `judged`."""
+        """Judge a command x (n,) by the rows of its tick; `accuracy` is the resolver's.
+
+        A row is on a side if it is as near to it as the resolver, or a certificate, may be.
+        """
+        near = max(TOLERANCE, accuracy) * (1.0 + sqrt(float(x @ x)))
         columns = self._columns.get(h.names)
         if columns is None:
             columns = np.array([self._names.index(name) for name in h.names], dtype=np.int64)
             self._columns[h.names] = columns
-        found = judged(cell, h, x, accuracy)
-        self._fate[tick, columns], self._violation[tick, columns] = found.fate, found.violation
-        self._saturated[tick] = found.saturated
+        fate, violation = np.zeros(len(columns), np.int8), np.zeros(len(columns))
+        lower = h.lower if cell.activation is None else cell.activation.demanded(h)
+        _judge_levels(h.A, lower, h.upper, h.offsets, x, near, fate, violation)
+        self._fate[tick, columns], self._violation[tick, columns] = fate, violation
+        if (limits := cell.tasks.limits) is not None:
+            if limits.name in h.names:
+                rows = slice(*h.offsets[h.names.index(limits.name):][:2])
+                box = h.lower[rows], h.upper[rows]
+            else:
+                box = limits.box(cell.state, "velocity" if cell.stack.level == "velocity"
+                                 else "acceleration")
+            _find_saturated(x[:cell.robot.n], *box, near, self._saturated[tick])
 
     def signals(self, recording: Recording) -> dict[str, NDArray[np.int8] | Array]:
         """Return the signals of a Recording; levels that were not judged are UNKNOWN."""
@@ -116,7 +101,10 @@ def judge(recording: Recording, cell: Cell) -> None:
 
 
 class Rows:
-    """Moves a cell through the recorded ticks; `meant` (T, n) is what their commands stand for."""
+    """Moves a cell through the recorded ticks.
+
+    meant : (T, n) what the commands stand for in the rows: at level "torque" the answers.
+    """
 
     def __init__(self, recording: Recording, cell: Cell) -> None:
         self._cell, level = cell, recording.scenario.control.level
@@ -125,13 +113,15 @@ class Rows:
         self._follows = level != "acceleration"  # whether rows depend on the last command
         self._first = self._v[0] if level == "velocity" else None
         self._carried: list[Array | None] = [None]  # by the contacts before each tick
-        self.meant = _meant(recording)
+        self.meant = recording["command"] if level != "torque" else np.hstack([
+            recording["planned_acceleration"],
+            recording["planned_force"].reshape(recording.ticks, -1)])
         if cell.contacts:
             for t, x in zip(self._t, self.meant, strict=True):
                 last = self._carried[-1]
                 self._carried.append(
                     last if np.isnan(x[0]) else cell.contacts.carried(t, x, last))
-        self._cone_error = (cell.pointing.follow_cone_error(cell.state) if cell.pointing
+        self._cone_error = (cell.tasks.pointing.follow_cone_error(cell.state) if cell.tasks.pointing
                             else lambda: nan)
         if "ee_distance" in recording:
             self._distance = np.column_stack([recording["control_point_distance"],
@@ -155,14 +145,6 @@ class Rows:
         return cell.stack.hierarchy(cell.state, order)
 
 
-def _meant(recording: Recording) -> Array:
-    """Return what the commands stand for in the rows: at level "torque" the answers."""
-    if recording.scenario.control.level != "torque":
-        return recording["command"]
-    forces = recording["planned_force"].reshape(recording.ticks, -1)
-    return np.hstack([recording["planned_acceleration"], forces])
-
-
 def depth_view(recording: Recording, t: float | None = None) -> DepthView | None:
     """Take the image of a run's camera at time t [s]; None without a camera or before its first.
 
@@ -172,7 +154,9 @@ def depth_view(recording: Recording, t: float | None = None) -> DepthView | None
     scenario = recording.scenario
     if scenario.sensor.kind != "camera" or not recording.ticks:
         return None
-    k = _nearest(recording) if t is None else int(np.argmin(np.abs(recording["t"] - t)))
+    off = np.nan_to_num(recording["ee_distance"] if t is None else np.abs(recording["t"] - t),
+                        nan=np.inf, posinf=np.inf)
+    k = int(np.argmin(off)) if np.isfinite(off).any() else recording.ticks - 1
     sensor = scenario.sensor.model_copy(update={"latency": 0.0})
     cell = build(scenario.model_copy(update={"sensor": sensor, "plant": KinematicSection()}))
     moved = cell.state.move(float(recording["t"][k]), recording["q"][k], recording["v"][k])
@@ -182,11 +166,6 @@ def depth_view(recording: Recording, t: float | None = None) -> DepthView | None
     return None if image is None else DepthView(
         cell.state.t, image.copy(), cell.sensor.space.pinhole.packed(), seen.points.copy(),
         seen.distance.copy(), seen.nearest.copy(), seen.active)
-
-
-def _nearest(recording: Recording) -> int:
-    distance = np.where(np.isnan(recording["ee_distance"]), np.inf, recording["ee_distance"])
-    return int(np.argmin(distance)) if np.isfinite(distance).any() else recording.ticks - 1
 
 
 @compiled

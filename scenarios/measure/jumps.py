@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from scenarios.cell.build import Cell, build
-from scenarios.cell.stacked import stack_resolver
+from scenarios.cell.build import Cell, build, stack_resolver
 from scenarios.measure.causes import Cause, Solve, Tick, causes
 from scenarios.measure.judging import Rows
 from scenarios.measure.safety import STEPS
-from solvers import Resolver, Status
+from scenarios.recording.recording import Recording
+from solvers import Status
 from solvers.resolvers.merged import Merged
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
 
 _LARGEST = 3
 _UNITS = {"torque": "N m", "acceleration": "rad/s^2", "velocity": "rad/s"}
@@ -59,7 +56,14 @@ def jumps(recording: Recording, tick: int | None = None,
     cell = build(recording.scenario)
     rows = Rows(recording, cell)
     solves = _solves(recording, cell, rows, list(map(int, ticks)) if tick is None else [tick])
-    return [_jump(recording, cell, rows, k, solve) for k, solve in solves.items()]
+    level, found = recording.scenario.control.level, []
+    for k, solve in solves.items():
+        change = np.nan_to_num(np.abs(recording["command"][k] - recording["command"][k - 1]))
+        i = int(change.argmax())
+        joint = cell.robot.velocity_names[cell.robot.n - len(change) + i]
+        found.append(Jump(k, float(recording["t"][k]), f"{level} of {joint}", float(change[i]),
+                          _UNITS[level], tuple(_causes(recording, cell, rows, k, solve))))
+    return found
 
 
 def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
@@ -68,23 +72,15 @@ def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
     resolver = stack_resolver(recording.scenario, cell.stack, cell.activation)
     carried: dict[int, Any] = {}
     memory = None
+
+    def answer(memory: Any, h: Hierarchy) -> Array:
+        return resolver.solve(h, memory).x
+
     for k in range(max(ticks) + 1 if isinstance(resolver, Merged) else 0):
         carried[k] = memory
         if (h := _hierarchy(recording, rows, k)) is not None:
             memory = resolver.solve(h, memory).memory
-    return {k: partial(_answer, resolver, carried.get(k)) for k in ticks}
-
-
-def _answer(resolver: Resolver, memory: Any, h: Hierarchy) -> Array:
-    return resolver.solve(h, memory).x
-
-
-def _jump(recording: Recording, cell: Cell, rows: Rows, k: int, solve: Solve) -> Jump:
-    change = np.nan_to_num(np.abs(recording["command"][k] - recording["command"][k - 1]))
-    i, level = int(change.argmax()), recording.scenario.control.level
-    joint = cell.robot.velocity_names[cell.robot.n - len(change) + i]
-    return Jump(k, float(recording["t"][k]), f"{level} of {joint}", float(change[i]),
-                _UNITS[level], tuple(_causes(recording, cell, rows, k, solve)))
+    return {k: partial(answer, carried.get(k)) for k in ticks}
 
 
 def _causes(recording: Recording, cell: Cell, rows: Rows, k: int, solve: Solve) -> Iterator[Cause]:

@@ -1,18 +1,19 @@
-"""Which runs are the same motion: those are drawn once, and named together."""
+"""Which runs are the same motion, drawn once and named together, and where others diverge."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from scenarios.measure.runs import Run
-    from scenarios.recording.recording import Recording
+from scenarios.measure.runs import Run
+from scenarios.recording.recording import Recording
 
+BOUND = 1e-6  # [rad] of any joint, or what the resolver declares as its accuracy where that is more
+Labelled = tuple[str, Recording]
 # [rad] of any joint at any time, within which two runs are the same motion: 0.01 mm at the end of
 # an arm of 1 m, which no figure shows.
 ALIKE = 1e-5
@@ -43,10 +44,10 @@ class Motion:
 
 
 def motions(runs: Sequence[Run], alike: float = ALIKE,
-            also: Callable[[Run], Any] = lambda run: None) -> list[Motion]:
+            also: Callable[[Recording], Any] = lambda one: None) -> list[Motion]:
     """Return the motions of the runs that have more than one tick, in the order of their first.
 
-    Only runs of one scenario can be alike. `also` gives what they must have in common besides.
+    Only runs of one scenario can be alike. `also` gives what they must have in common.
     """
     found: list[Motion] = []
     for run in runs:
@@ -54,7 +55,7 @@ def motions(runs: Sequence[Run], alike: float = ALIKE,
             continue
         for i, motion in enumerate(found):
             apart = departure(run, motion.runs[0])
-            if apart <= alike and also(run) == also(motion.runs[0]):
+            if apart <= alike and also(run.recording) == also(motion.recording):
                 found[i] = Motion((*motion.runs, run), max(apart, motion.apart))
                 break
         else:
@@ -74,3 +75,75 @@ def departure(run: Run, other: Run) -> float:
         return math.inf
     largest = float(np.abs(q - reference).max(initial=0.0))
     return math.inf if math.isnan(largest) else largest
+
+
+@dataclass(frozen=True)
+class Parting:
+    """How one strict resolver's run stands to that of the first strict one.
+
+    tick : the first at which a joint is more than `bound` [rad] away, or None where none is.
+    largest : [rad] over all ticks that both runs have.
+    why : what was different up to that tick, as half a sentence; "" where tick is None.
+    """
+
+    label: str
+    other: str
+    bound: float
+    largest: float
+    tick: int | None = None
+    time: float = 0.0
+    why: str = ""
+
+    def __str__(self) -> str:
+        if self.largest == 0.0:
+            return f"{self.label} moves as {self.other} to the last bit"
+        if self.tick is None:
+            return f"{self.label} keeps within {self.largest:.1e} rad of {self.other} to the end"
+        return (f"{self.label} parts from {self.other} by more than {self.bound:.0e} rad at tick "
+                f"{self.tick} ({self.time:.2f} s), by {self.largest:.1e} rad at most: {self.why}")
+
+
+def partings(runs: Sequence[Run]) -> list[Parting]:
+    """Return one for each strict resolver after the first, where they ran the same scenario.
+
+    Only resolvers whose answer is the strict one at any rank ought to agree.
+    """
+    if len({run.scenario.name for run in runs}) != 1:
+        return []
+    strict = [(run.label, run.recording) for run in runs if run.recording and run.recording.ticks
+              and run.recording.facts.resolver.strict]
+    return [_parting(one, strict[0]) for one in strict[1:]]
+
+
+def _parting(one: Labelled, other: Labelled) -> Parting:
+    (label, mine), (first, theirs) = one, other
+    ticks, accuracy = min(mine.ticks, theirs.ticks), mine.facts.resolver.accuracy
+    bound = max(BOUND, accuracy)
+    apart = abs(mine["q"][:ticks] - theirs["q"][:ticks]).max(axis=1)
+    beyond = np.flatnonzero(~(apart <= bound))
+    largest = float(np.nan_to_num(apart, nan=np.inf).max())
+    if not beyond.size:
+        return Parting(label, first, bound, largest)
+    tick = int(beyond[0])
+    return Parting(label, first, bound, largest, tick, float(mine["t"][tick]),
+                   _why(one, other, tick, accuracy))
+
+
+def _why(one: Labelled, other: Labelled, tick: int, accuracy: float) -> str:
+    for label, recording in (one, other):
+        failed = np.flatnonzero(recording["status"][:tick + 1] != 0)
+        if failed.size:
+            return f"tick {failed[0]} of {label} was not solved"
+    mine, theirs = one[1].facts, other[1].facts
+    if mine.limits_in_stack != theirs.limits_in_stack:
+        return "the limits are in the stack of one, and a guard outside it for the other"
+    if mine.asks == "bounds" and "bounds" in (mine.resolver.handles, theirs.resolver.handles):
+        return ("while limits act they agree only undamped, and sns not then: it scales what it "
+                "cannot meet")
+    stacks = [np.array([*run.orders, ""])[run["order"][:tick + 1]] for _, run in (one, other)]
+    switched = np.flatnonzero(stacks[0] != stacks[1])
+    if switched.size:
+        return (f"the stack is another one at tick {switched[0]}, where a switch came earlier or "
+                "later for errors below that bound")
+    return (f"no tick failed and the stacks are the same; the motion magnifies the errors of each "
+            f"tick (declared: {accuracy:.0e})")

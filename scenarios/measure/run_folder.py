@@ -28,14 +28,28 @@ _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 
 
 def save(recording: Recording, folder: str | Path) -> Path:
-    """Write a run's folder, completely or not at all, and return its path.
+    """Write a run's folder, which must be new or empty, whole or not at all; return its path.
 
-    It has the files of `write` and `metrics.json`, with the goals; `hierarchy figures` adds the
-    figures. `folder` must be new or empty.
+    The files are `run.npz` (the signals by name, `orders`, `fault` and `events`), `timings.npz`
+    (the signals time_*), `facts.json`, `depth.npz` if there is a camera image, `metrics.json`, with
+    the goals, `scenario.toml` as run, and `versions.json`; `hierarchy figures` adds the figures.
+    Only times are measured: the same scenario and versions give the same bytes of `run.npz`.
     """
     expect("save", recording, Recording, "give what `simulate` returns")
+    times = {name: signal for name, signal in recording.signals.items() if name.startswith("time_")}
+    rest = {name: signal for name, signal in recording.signals.items() if name not in times}
     with whole(file_path("save", folder)) as partial:
-        write(recording, partial)
+        np.savez_compressed(partial / "run.npz", allow_pickle=False, **rest,
+                            orders=np.array(recording.orders, dtype=np.str_),
+                            fault=np.array(recording.fault or ""),
+                            events=np.array(list(recording.events), dtype=_EVENT))
+        np.savez_compressed(partial / "timings.npz", allow_pickle=False, **times)
+        if recording.depth is not None:
+            np.savez_compressed(partial / "depth.npz", allow_pickle=False,
+                                **recording.depth._asdict())
+        write_json(partial / "facts.json", dataclasses.asdict(recording.facts))
+        write_json(partial / "versions.json", versions())
+        (partial / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
         write_json(partial / "metrics.json", metrics.as_plain_data(recording)
                    | verdict(recording).as_plain_data())
     return Path(folder)
@@ -54,30 +68,8 @@ def kept(recording: Recording, folder: Path) -> str | None:
     return None
 
 
-def write(recording: Recording, folder: Path) -> None:
-    """Write a run to an existing folder.
-
-    The files are `run.npz` (the signals by name, `orders`, `fault` and `events`), `timings.npz`
-    (the signals time_*), `facts.json`, `depth.npz` if there is a camera image, `scenario.toml` as
-    run, and `versions.json`. Only times are measured: the same scenario and versions give the same
-    bytes of `run.npz`.
-    """
-    times = {name: signal for name, signal in recording.signals.items() if name.startswith("time_")}
-    rest = {name: signal for name, signal in recording.signals.items() if name not in times}
-    np.savez_compressed(folder / "run.npz", allow_pickle=False, **rest,
-                        orders=np.array(recording.orders, dtype=np.str_),
-                        fault=np.array(recording.fault or ""),
-                        events=np.array(list(recording.events), dtype=_EVENT))
-    np.savez_compressed(folder / "timings.npz", allow_pickle=False, **times)
-    if recording.depth is not None:
-        np.savez_compressed(folder / "depth.npz", allow_pickle=False, **recording.depth._asdict())
-    write_json(folder / "facts.json", dataclasses.asdict(recording.facts))
-    write_json(folder / "versions.json", versions())
-    (folder / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
-
-
 def load_run(folder: str | Path) -> Recording:
-    """Read the Recording that `write` wrote; nothing outside the folder is needed.
+    """Read the Recording that `save` wrote; nothing outside the folder is needed.
 
     Raises
     ------
@@ -93,12 +85,9 @@ def load_run(folder: str | Path) -> Recording:
         hint = f"; it holds runs, such as {inside[0]}" if inside else ""
         raise HierarchyError(f"{path} is not a run folder: it has no run.npz{hint}")
     scenario = load(str(path / "scenario.toml"))
-    signals = _arrays(path / "run.npz")
+    signals = _arrays(path / "run.npz", "orders", "fault", "events")
     if not (path / "facts.json").exists():
         raise HierarchyError(f"{path} was written by an earlier version; run the scenario again")
-    for name in ("orders", "fault", "events"):
-        if name not in signals:
-            raise HierarchyError(f"{path / 'run.npz'} cannot be read: it has no {name!r}")
     orders, fault, events = (signals.pop(name) for name in ("orders", "fault", "events"))
     signals |= _arrays(path / "timings.npz")
     return Recording(signals, tuple(map(str, orders)), scenario, _facts(path / "facts.json"),
@@ -106,16 +95,22 @@ def load_run(folder: str | Path) -> Recording:
                      _depth(path / "depth.npz"))
 
 
-def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+def _arrays(path: Path, *names: str) -> dict[str, NDArray[Any]]:
     try:
-        return read_arrays(path)
+        found = read_arrays(path)
     except HierarchyError as error:
         raise HierarchyError(f"{path} cannot be read: {error}") from error
+    for name in names:
+        if name not in found:
+            raise HierarchyError(f"{path} cannot be read: it has no {name!r}")
+    return found
 
 
 def _facts(path: Path) -> Facts:
     try:
-        return TypeAdapter(Facts).validate_python(json.loads(path.read_text(encoding="utf-8")))
+        found = TypeAdapter(Facts).validate_python(json.loads(path.read_text(encoding="utf-8")))
+        found.robot.placements(np.array(found.robot.rest))  # the model can be read
+        return found
     except (OSError, ValueError, RecursionError) as error:
         raise HierarchyError(f"{path} cannot be read: {error}") from error
 
@@ -123,10 +118,7 @@ def _facts(path: Path) -> Facts:
 def _depth(path: Path) -> DepthView | None:
     if not path.exists():
         return None
-    arrays: dict[str, Any] = _arrays(path)
-    for name in DepthView._fields:
-        if name not in arrays:
-            raise HierarchyError(f"{path} cannot be read: it has no {name!r}")
+    arrays: dict[str, Any] = _arrays(path, *DepthView._fields)
     return DepthView(**{**arrays, "t": float(arrays["t"]), "active": int(arrays["active"])})
 
 
@@ -134,16 +126,15 @@ def versions() -> dict[str, str]:
     """Return the versions and the processor of this installation."""
     packages = ("task-hierarchy", "numpy", "numba", "pin", "qpsolvers", "proxsuite", "osqp",
                 "mujoco")
-    return {"python": platform.python_version(), **{name: _version(name) for name in packages},
+    found = {}
+    for name in packages:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return {"python": platform.python_version(), **found,
             "system": f"{platform.system()} {platform.machine()}",
             "processor": f"{_processor()}, {os.cpu_count()} cores"}
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"
 
 
 def _processor() -> str:

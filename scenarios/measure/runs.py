@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from scenarios.config import Scenario
 from scenarios.config.scenario import OWN
 from scenarios.files import slug
 from scenarios.measure import metrics
+from scenarios.measure.jumps import Happening, happened
 from scenarios.measure.metrics import Metric
-
-if TYPE_CHECKING:
-    from scenarios.config import Scenario
-    from scenarios.measure.jumps import Happening
-    from scenarios.recording.facts import ResolverFacts
-    from scenarios.recording.recording import Recording
+from scenarios.recording.facts import ResolverFacts, resolver_facts
+from scenarios.recording.recording import Recording
 
 # How a resolver that is not strict departs from strict priorities, by its name.
 _DEPARTS = {
@@ -64,8 +62,6 @@ class Run:
     @property
     def settings(self) -> dict[str, Any]:
         """The resolver's settings as they were used, also where the run broke."""
-        from scenarios.recording.facts import resolver_facts
-
         facts = self.recording.facts.resolver if self.recording else resolver_facts(self.scenario)
         return dict(facts.settings)
 
@@ -80,8 +76,6 @@ class Run:
     @cached_property
     def happened(self) -> tuple[Happening, ...]:
         """What happened in it, with the causes of jumps, which take a while to find."""
-        from scenarios.measure.jumps import happened
-
         return tuple(happened(self.recording)) if self.recording else ()
 
 
@@ -120,10 +114,15 @@ def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
     competes = [one_scenario and run.fault is None for run in runs]
     known = {name: metric for run in runs for name, metric in run.metrics.items()
              if details or not metric.detail}
-    groups = list(dict.fromkeys(metric.group for metric in known.values()))
-    return [_row(metric, [run.metrics.get(name) for run in runs], competes,
-                 [run.fault is not None for run in runs])
-            for name, metric in sorted(known.items(), key=lambda one: groups.index(one[1].group))]
+    groups, rows = list(dict.fromkeys(metric.group for metric in known.values())), []
+    for name, metric in sorted(known.items(), key=lambda one: groups.index(one[1].group)):
+        found = [run.metrics.get(name) for run in runs]
+        best = _best({i: m.value for i, m in enumerate(found)
+                      if m and m.value is not None and competes[i]}, metric.lower_is_better)
+        rows.append(Row(metric.label, metric.shown_unit, metric.group, name, tuple(
+            Cell(m.shown() if m else "–", "best" if i in best else "out" if runs[i].fault else "",
+                 m.note if m else "") for i, m in enumerate(found))))
+    return rows
 
 
 def flags(runs: Sequence[Run]) -> list[str]:
@@ -145,15 +144,6 @@ def caveats(resolvers: Mapping[str, ResolverFacts]) -> dict[str, list[str]]:
     return {label: [_DEPARTS.get(one.name, _DEPARTS[""])] * (not one.strict)
             + [f"damped differently from {first}"] * (damped[label] != damped[first])
             for label, one in resolvers.items()}
-
-
-def _row(metric: Metric, found: Sequence[Metric | None], competes: Sequence[bool],
-         out: Sequence[bool]) -> Row:
-    best = _best({i: m.value for i, m in enumerate(found)
-                  if m and m.value is not None and competes[i]}, metric.lower_is_better)
-    return Row(metric.label, metric.shown_unit, metric.group, metric.name, tuple(
-        Cell(m.shown() if m else "–", "best" if i in best else "out" if out[i] else "",
-             m.note if m else "") for i, m in enumerate(found)))
 
 
 def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01,

@@ -4,25 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenarios.measure.metric import (
-    Array,
-    Criteria,
-    Metric,
-    finite,
-    known,
-    largest,
-    least,
-    passed,
-    register,
-    true,
-)
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from hierarchy.problem import Array
+from scenarios.measure.metric import Criteria, Metric, known, largest, least, passed, register, true
+from scenarios.recording.recording import Recording
 
 _ON_IT = 1e-4  # [m] below a distance that still counts as keeping it
 STEPS = {"rad/s": 0.1, "rad/s^2": 50.0, "N m": 5.0}  # from one tick to the next: larger ones count
@@ -40,21 +27,16 @@ def _distances(recording: Recording, by: Criteria) -> Iterator[Metric]:
         seen = not apart and recording.scenario.sensor.kind != "exact"
         yield _metric(f"{who}_distance_min", f"{label} distance, min", least(kept), "m", False,
                       note="as measured: the true one is not known" if seen else "")
-        yield from _below(recording, who, f"Time {label.lower()} is below its distance", kept)
+        avoidance = recording.scenario.avoidance
+        if avoidance is not None and who in avoidance.promised:
+            promised, sure = avoidance.promised[who], kept[~np.isnan(kept)]
+            yield _metric(f"{who}_below_share", f"Time {label.lower()} is below its distance",
+                          float(np.mean(sure < promised - _ON_IT)) if sure.size else None, "share",
+                          note=f"nearer than {promised:g} m")
         if apart:
             yield _metric(f"{who}_distance_min_measured", f"{label} distance measured, min",
                           least(recording[signal]), "m", None, detail=True,
                           note="with the errors of the sensor")
-
-
-def _below(recording: Recording, who: str, label: str, distance: Array) -> Iterator[Metric]:
-    """Share of ticks below the distance that the scenario asks to keep, if it asks for one."""
-    avoidance = recording.scenario.avoidance
-    if avoidance is not None and who in avoidance.promised:
-        promised, sure = avoidance.promised[who], distance[~np.isnan(distance)]
-        yield _metric(f"{who}_below_share", label,
-                      float(np.mean(sure < promised - _ON_IT)) if sure.size else None, "share",
-                      note=f"nearer than {promised:g} m")
 
 
 @register("contacts")
@@ -77,9 +59,12 @@ def _motion(recording: Recording, by: Criteria) -> Iterator[Metric]:
         yield _metric("velocity_step_max_measured", "Joint speed step measured, max",
                       largest(np.diff(recording["v"], axis=0)), "rad/s", None, detail=True,
                       note="with the errors of the sensor")
-    if recording.scenario.control.level != "torque":
-        yield _metric("command_step_max", "Commanded speed step, max", _command_step(recording),
-                      "rad/s", note="of the command, not of the joints")
+    control, command = recording.scenario.control, recording["command"]
+    if control.level != "torque":
+        yield _metric("command_step_max", "Commanded speed step, max",
+                      largest(np.diff(command, axis=0) if control.level == "velocity" else
+                              command * control.period), "rad/s",
+                      note="of the command, not of the joints")
     yield _metric("acceleration_max", "Joint acceleration, max", largest(recording["a"]),
                   "rad/s^2")
     yield from steps("acceleration", "Joint acceleration", recording["a"], "rad/s^2")
@@ -96,13 +81,6 @@ def steps(key: str, label: str, values: Array, unit: str, note: str = "", group:
                  large, "", group=group, note="ticks")
 
 
-def _command_step(recording: Recording) -> float | None:
-    """Return the largest change of a joint's commanded speed in one tick [rad/s]."""
-    control, command = recording.scenario.control, recording["command"]
-    return largest(np.diff(command, axis=0) if control.level == "velocity"
-                   else command * control.period)
-
-
 def _joint_limit_excess(recording: Recording) -> Metric:
     value, note = None, "the robot has no joint limits"
     if "joint_lower" in recording and "joint_upper" in recording:
@@ -111,6 +89,6 @@ def _joint_limit_excess(recording: Recording) -> Metric:
         if np.isfinite(lower).any() or np.isfinite(upper).any():
             excess = passed(np.maximum(np.maximum(q - upper, lower - q), 0.0)).max(axis=0)
             joint = int(np.argmax(excess))
-            value = finite(excess[joint])
+            value = largest(excess)
             note = f"joint {joint + 1}" if excess[joint] > 0.0 else ""
     return _metric("joint_limit_excess", "Beyond a joint limit, max", value, "rad", note=note)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +21,7 @@ from scenarios.measure.metric import (
     true,
 )
 from scenarios.recording import listed
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 STILL = 0.01     # largest joint speed [rad/s] of a robot that counts as standing still
 FAR = 0.01       # error [m] at which it should not

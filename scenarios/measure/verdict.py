@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hierarchy.words import some
 from scenarios.measure.goals import Goal, goals, percent
 from scenarios.measure.metric import shown
-
-if TYPE_CHECKING:
-    from scenarios.measure.runs import Run
-    from scenarios.recording.recording import Recording
+from scenarios.measure.runs import Run
+from scenarios.recording.recording import Recording
 
 _NAMED = 3  # things that a sentence names
 
@@ -34,11 +33,6 @@ class Verdict:
     helped: int = 0
 
     @property
-    def broken(self) -> tuple[Goal, ...]:
-        """The promises that broke."""
-        return tuple(goal for goal in self.goals if goal.promise and not goal.met)
-
-    @property
     def end(self) -> str:
         """How it ended: ran the whole time, stood, fell, or stopped; or how far it is."""
         if self.fault is None:
@@ -48,15 +42,11 @@ class Verdict:
         how = "fell" if "fallen" in self.fault else "stopped"
         return f"{how} at {self.seconds:.2f} s of {self.planned:.4g} s: {self.fault}"
 
-    @property
-    def said(self) -> tuple[str, ...]:
-        """How it ended, and a line for each goal."""
-        return _sentence(self.end).removesuffix("."), *map(str, self.goals)
-
     def on_page(self) -> dict[str, list[Any]]:
-        """Return the lines, and the indices of those about goals that were not met."""
+        """Return how it ended, a line for each goal, and the indices of those about unmet ones."""
         missed = [k for k, goal in enumerate(self.goals, 1) if not goal.met]
-        return {"goals": list(self.said), "missed": missed}
+        return {"goals": [_sentence(self.end).removesuffix("."), *map(str, self.goals)],
+                "missed": missed}
 
     def as_plain_data(self) -> dict[str, Any]:
         """Return the verdict for a JSON file."""
@@ -119,8 +109,9 @@ def _promises(found: Sequence[Verdict]) -> str:
     """Return which promises broke, under whom, and by how much at worst."""
     by: dict[str, list[tuple[str, Goal]]] = {}
     for one in found:
-        for goal in one.broken:
-            by.setdefault(f"{goal.name} {goal.asked}".strip(), []).append((one.label, goal))
+        for goal in one.goals:
+            if goal.promise and not goal.met:
+                by.setdefault(f"{goal.name} {goal.asked}".strip(), []).append((one.label, goal))
     if not by:
         promised = any(goal.promise for one in found for goal in one.goals)
         return "Every promise was kept." if promised else ""
@@ -128,7 +119,7 @@ def _promises(found: Sequence[Verdict]) -> str:
     for what, who in by.items():
         worst = max((goal for _, goal in who), key=lambda goal: goal.worst)
         under = "" if len(found) == 1 else " by all" if len(who) == len(found) else (
-            f" by {_some([label for label, _ in who])}")
+            f" by {some([label for label, _ in who], _NAMED)}")
         said.append(f"{what}{under}, {shown(worst.worst, worst.unit)} at worst, for "
                     f"{percent(worst.share)} of the time")
     return _sentence(f"broken: {'; '.join(said)}")
@@ -146,20 +137,14 @@ def _targets(found: Sequence[Verdict]) -> str:
                 by.setdefault(goal.name, {})[one.label] = goal
     left = sorted(by.items(), key=lambda one: all(goal.met for goal in one[1].values()))
     said = []
-    for name, some in left[:_NAMED]:
-        ranked = sorted(some, key=lambda label: float(f"{some[label].median:.3g}"))
-        low, high = (shown(some[label].median, some[label].unit)
-                     for label in (ranked[0], ranked[-1]))
-        worst = max(some.values(), key=lambda goal: goal.worst)
+    for name, of in left[:_NAMED]:
+        ranked = sorted(of, key=lambda label: float(f"{of[label].median:.3g}"))
+        low, high = (shown(of[label].median, of[label].unit) for label in (ranked[0], ranked[-1]))
+        worst = max(of.values(), key=lambda goal: goal.worst)
         said.append((f"{name} {low}" if low == high else
                      f"{name} {low} ({ranked[0]}) to {high} ({ranked[-1]})")
                     + f", {shown(worst.worst, worst.unit)} at worst")
     return _sentence(f"off in the median: {'; '.join(said)}") if said else ""
-
-
-def _some(labels: Sequence[str]) -> str:
-    left = len(labels) - _NAMED
-    return ", ".join(labels[:_NAMED]) + (f" and {left} more" if left > 0 else "")
 
 
 def _sentence(text: str) -> str:

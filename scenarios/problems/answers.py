@@ -37,20 +37,13 @@ def with_answers(collection: Collection, progress: Progress | None = None) -> Co
 
 
 def answer(h: Hierarchy) -> Proof:
-    """Return the proof that the first suitable candidate leads to, or the best of all."""
-    best: Proof | None = None
-    for x in _candidates(h):
-        found = prove(h, [x])
-        if found.complete:
-            return found
-        if best is None or found.judged > best.judged:
-            best = found
-    assert best is not None
-    return best
+    """Return the proof that the answer of `hcod` leads to, or else the best of all candidates'."""
+    found = prove(h, [make("hcod").solve(h).x])
+    return found if found.complete else max(found, prove(h, _candidates(h)),
+                                            key=lambda one: one.judged)
 
 
 def _candidates(h: Hierarchy) -> Iterator[Array]:
-    yield make("hcod").solve(h).x
     for name in filter(installed, _BACKENDS):
         yield make("hqp", backend=name).solve(h).x
     if h.is_equality:

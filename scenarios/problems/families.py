@@ -87,10 +87,6 @@ def _other(make: Callable[[np.random.Generator], Hierarchy], seed: int, count: i
     return [make(np.random.default_rng([seed, i])) for i in range(count)]
 
 
-def _recipe(seed: int, count: int) -> list[Hierarchy]:
-    return [problems.generate(seed * _STRIDE + i) for i in range(count)]
-
-
 _REFERENCE = {
     "EQ7": "7 unknowns, equalities in levels of 3, 1, 1",
     "EQ7over": "more rows than unknowns, 3 levels of 3",
@@ -152,7 +148,9 @@ def _all() -> dict[str, Family]:
              for name, (make, what) in _OTHERS.items()]
     made += [Family(name, "others", what, partial(others.of_examples, name))
              for name, what in _EXAMPLES.items()]
-    made.append(Family("recipe", "random", "random sizes, ranks, ties, scales", _recipe))
+    made.append(Family("recipe", "random", "random sizes, ranks, ties, scales",
+                       lambda seed, count: [problems.generate(seed * _STRIDE + i)
+                                            for i in range(count)]))
     return {one.name: one for one in made}
 
 
@@ -172,13 +170,10 @@ def available() -> list[Family]:
 
 def unavailable() -> dict[str, str]:
     """Return what to install for each of the other families, by name."""
-    return {name: f"needs {package}: pip install 'task-hierarchy[{extra}]'"
-            for name, (package, extra) in _NEEDS.items() if not _installed(package)}
-
-
-def _installed(package: str) -> bool:
-    try:  # a wheel of example-robot-data has no module of Python
-        distribution(package)
-    except PackageNotFoundError:
-        return False
-    return True
+    found = {}
+    for name, (package, extra) in _NEEDS.items():
+        try:  # a wheel of example-robot-data has no module of Python
+            distribution(package)
+        except PackageNotFoundError:
+            found[name] = f"needs {package}: pip install 'task-hierarchy[{extra}]'"
+    return found

@@ -14,13 +14,10 @@ from typing import Any, final
 import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
-from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.sampling import changed, drawn
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
-from scenarios.measure.judging import Rows
-from scenarios.recording.recording import Recording
 from solvers import Status, certify, make
 from solvers.qp.backends import BACKENDS, installed
 
@@ -45,22 +42,12 @@ def sequences(seed: int) -> Iterator[list[tuple[Hierarchy, Array]]]:
         values = drawn(base, base.variation, seed, run)
         chance = np.random.default_rng([seed, run])
         first = int(chance.uniform(_FIRST, _LAST) / base.control.period)
-        some = [(h, x) for h in _ticks(changed(base, values, "DYN60"), first)
-                if (x := answer(h)) is not None]
+        found = [_without(h, LEFT_OUT)
+                 for h in window(changed(base, values, "DYN60"), first, TOGETHER)]
+        some = [(h, x) for h in found if (x := answer(h)) is not None]
         if len(some) == TOGETHER:
             yield some
         run += 1
-
-
-def _ticks(scenario: Scenario, first: int) -> list[Hierarchy]:
-    """Return the hierarchies of TOGETHER ticks of a run from tick `first` on, none if it fell."""
-    duration = (first + TOGETHER) * scenario.control.period
-    recording = simulate(scenario.with_changes({"control.duration": duration}))
-    if recording.fault is not None:
-        return []
-    rows, order = Rows(recording, build(scenario)), recording.order_names[0]
-    found = (rows.hierarchy(k, order) for k in range(first, first + TOGETHER))
-    return [_without(h, LEFT_OUT) for h in found if h is not None]
 
 
 def _without(h: Hierarchy, name: str) -> Hierarchy:
@@ -102,8 +89,6 @@ def packed(problems: list[tuple[Hierarchy, Array]]) -> dict[str, Array]:
     return found
 
 
-
-
 SCENARIOS = {
     "ellipse-hqp": "an arm on a path, with joint limits, distances and a cone as inequalities",
     "ellipse-limits": "an arm on a path inside its joint limits, with Algorithm 1",
@@ -133,32 +118,34 @@ def recorded(name: str, seed: int, count: int) -> list[Hierarchy]:
     if seed:
         begin = float(np.random.default_rng([seed, 3]).uniform(*_WITHIN))
     first = int(begin * shipped.control.ticks)
-    longest = (first + count) * shipped.control.period
     for run in range(_RUNS if seed else 1):
-        window = Window(first)
         values = drawn(shipped, shipped.variation, seed, run) if seed else {}
-        simulate(changed(shipped, values | {"control.duration": longest}, name), audits=[window])
-        if len(window.problems) >= count:
-            return window.problems[:count]
+        found = window(changed(shipped, values, name), first, count)
+        if len(found) == count:
+            return found
     raise ScenarioError(f"{name}: no run with seed {seed} has {count} problems from tick {first} "
                         "on")
 
 
+def window(scenario: Scenario, first: int, count: int) -> list[Hierarchy]:
+    """Return the problems of `count` ticks of a run from tick `first` on, fewer if it ends."""
+    kept = _Window(first)
+    ticks = (first + count) * scenario.control.period
+    simulate(scenario.with_changes({"control.duration": ticks}), audits=[kept])
+    return kept.problems[:count]
+
+
 @final
-class Window:
-    """Keeps the problems of all ticks from one on; an Audit."""
+class _Window:
+    """Keeps the problems of all ticks from one on; an Audit without signals."""
 
     def __init__(self, first: int) -> None:
         self.first = first
         self.problems: list[Hierarchy] = []
 
-    def look(self, tick: int, controller: Controller) -> None:
-        """Keep the problem of a tick."""
+    def __call__(self, tick: int, controller: Controller) -> Mapping[str, Any]:
         if tick >= self.first:
             self.problems.append(controller.hierarchy.copy())
-
-    def signals(self, recording: Recording) -> Mapping[str, Any]:
-        """Return no signals."""
         return {}
 
 

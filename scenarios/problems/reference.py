@@ -51,8 +51,15 @@ def family(name: str, folder: Path = DATA) -> list[Problem]:
     file = Path(folder) / f"{name}.npz"
     if not file.is_file():
         raise HierarchyError(f"there are no reference problems at {file}")
-    data = read_arrays(file)
-    return _in_sequence([_problem(data, p) for p in range(len(data["x"]))], data.get("sequence"))
+    data, problems = read_arrays(file), []
+    for p in range(len(data["x"])):
+        levels = []
+        for k in range(int(data["L"])):
+            lower, upper = data[f"lb{k}"][p], data[f"ub{k}"][p]
+            levels.append((data[f"A{k}"][p], np.where(lower <= -_MISSING, -np.inf, lower),
+                           np.where(upper >= _MISSING, np.inf, upper)))
+        problems.append(Problem(Hierarchy.from_levels(levels), data["x"][p], data["norms"][p]))
+    return _in_sequence(problems, data.get("sequence"))
 
 
 def _in_sequence(problems: list[Problem], sequence: NDArray[Any] | None) -> list[Problem]:
@@ -63,31 +70,16 @@ def _in_sequence(problems: list[Problem], sequence: NDArray[Any] | None) -> list
             for p, one in enumerate(problems)]
 
 
-def _problem(data: dict[str, Array], p: int) -> Problem:
-    levels = []
-    for k in range(int(data["L"])):
-        lower, upper = data[f"lb{k}"][p], data[f"ub{k}"][p]
-        levels.append((data[f"A{k}"][p], np.where(lower <= -_MISSING, -np.inf, lower),
-                       np.where(upper >= _MISSING, np.inf, upper)))
-    return Problem(Hierarchy.from_levels(levels), data["x"][p], data["norms"][p])
-
-
 def fresh(name: str, seed: int, count: int) -> list[Problem]:
     """Generate problems of a family with seeds `seed`, `seed` + 1, ..., not used for tuning.
 
     Those of DYN60 are recorded from runs sampled with `seed`, which needs the extra `sim`, with the
     answers with which they were kept; of the others no answer is known.
     """
-    if name in RECORDED:
-        return _in_sequence(*_recorded(seed, count))
-    made = (make_problem(name, seed + i) for i in range(count))
-    return [Problem(h, np.full(h.n, np.nan), np.full(len(h.sizes), np.nan)) for h in made]
-
-
-def _recorded(seed: int, count: int) -> tuple[list[Problem], NDArray[Any]]:
     problems: list[Problem] = []
-    for some in sequences(seed):
+    for some in sequences(seed) if name in RECORDED else ():
         problems += [Problem(h, x, h.violations(x)) for h, x in some]
         if len(problems) >= count:
-            break
-    return problems[:count], np.arange(count) // TOGETHER
+            return _in_sequence(problems[:count], np.arange(count) // TOGETHER)
+    made = (make_problem(name, seed + i) for i in range(count))
+    return [Problem(h, np.full(h.n, np.nan), np.full(len(h.sizes), np.nan)) for h in made]

@@ -4,33 +4,29 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
 
-from hierarchy import Robot
+from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule
 from hierarchy.problem import Array
 from hierarchy.robots import DHTable
 from hierarchy.robots.table import Base
-from scenarios.cell.contacts import contacts_of
-from scenarios.cell.robot import sensed_points
+from scenarios.cell.robot import contacts_of, sensed_points
 from scenarios.config import Scenario
-from scenarios.config.kinds.torque import TorqueSection
-from scenarios.recording.tree import (
-    Joint,
-    Matrix,
-    Vector,
-    capsules,
-    joint_units,
-    lowest,
-    placements,
-    tree_of,
-)
-from solvers.resolver import Handles, Resolver
+from scenarios.config.plant import TorqueSection
+from solvers.resolver import Handles
 
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
 Setting = bool | int | float | str | tuple[float | str, ...] | None
+
+_STICK = 0.08  # radius of a link without capsules, relative to the robot's longest link
 
 
 @dataclass(frozen=True)
@@ -60,7 +56,9 @@ class ContactPoint:
 class RobotFacts:
     """What readers of a run need to know of the robot.
 
-    joints : the kinematic tree. rest (nq,) : the robot's own posture.
+    model : pinocchio's, as `saveToString` writes it, and `digest` its SHA-256, without which
+        pinocchio would read what is damaged. is_chain : whether it is one chain of joints
+        from a fixed base. rest (nq,) : the robot's own posture.
     velocity_names, velocity_units (n,) : name of each velocity, and unit of a small step along it;
         position_units (nq,) : "rad", "m", or "1" of a ratio.
     points : the control points, then the end effector, whose axes are `tool` in its joint's frame.
@@ -69,7 +67,10 @@ class RobotFacts:
 
     name: str
     base: Base
-    joints: tuple[Joint, ...]
+    model: str
+    digest: str
+    joint_names: tuple[str, ...]
+    is_chain: bool
     rest: tuple[float, ...]
     velocity_names: tuple[str, ...]
     position_units: tuple[str, ...]
@@ -79,20 +80,22 @@ class RobotFacts:
     capsules: tuple[Capsule, ...]
     floor: float
 
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, in order."""
-        return tuple(joint.name for joint in self.joints)
-
-    @property
-    def is_chain(self) -> bool:
-        """Whether the robot is one chain from a fixed base."""
-        return self.base == "fixed" and all(
-            joint.parent == i for i, joint in enumerate(self.joints))
-
     def placements(self, q: Array) -> Array:
-        """Return the joints' placements (..., J + 1, 12) at q (..., nq), as in a State."""
-        return placements(self.joints, q)
+        """Return the placements (..., J + 1, 12) at q (..., nq), as in a State; NaN where q is."""
+        state = State(_bare(self.model, self.digest, self.name))
+        rows = np.reshape(q, (-1, np.shape(q)[-1]))
+        found = np.full((len(rows), *state.placements.shape), np.nan)
+        for k, row in enumerate(rows):
+            if state.move(0.0, row, np.zeros(state.robot.n)):
+                found[k] = state.placements
+        return found.reshape(*np.shape(q)[:-1], *found.shape[1:])
+
+
+@lru_cache(maxsize=8)
+def _bare(model: str, digest: str, name: str) -> Robot:
+    if sha256(model.encode()).hexdigest() != digest:
+        raise HierarchyError(f"the model of robot {name!r} is damaged")
+    return Robot.of_text(model, name)
 
 
 @dataclass(frozen=True)
@@ -130,19 +133,13 @@ def facts_of(scenario: Scenario, robot: Robot) -> Facts:
     facts, plant = robot_facts(robot, scenario.sensor.foot), scenario.plant
     if isinstance(plant, TorqueSection) and facts.base == "floating":
         facts = replace(facts, floor=plant.height)
-    return Facts(facts, resolver_facts(scenario), scenario.asks, scenario.limits_in_stack,
-                 contact_points(scenario, robot))
-
-
-def contact_points(scenario: Scenario, robot: Robot) -> tuple[ContactPoint, ...]:
-    """Return the contact points of a scenario on its robot, none but at level "torque"."""
     contacts = contacts_of(scenario, robot)
-    if contacts is None:
-        return ()
-    of = [contact for contact in contacts.contacts for _ in contact.points]
-    return tuple(ContactPoint(contact.name, int(joint), _vector(offset), _vector(contact.axes[2]),
-                              contact.friction)
-                 for contact, joint, offset in zip(of, *contacts.points, strict=True))
+    of = [contact for contact in contacts.contacts for _ in contact.points] if contacts else []
+    points = tuple(ContactPoint(contact.name, int(joint), _vector(offset),
+                                _vector(contact.axes[2]), contact.friction)
+                   for contact, joint, offset in zip(
+                       of, *(contacts.points if contacts else ((), ())), strict=True))
+    return Facts(facts, resolver_facts(scenario), scenario.asks, scenario.limits_in_stack, points)
 
 
 def robot_facts(robot: Robot, foot: float = 0.0) -> RobotFacts:
@@ -152,10 +149,15 @@ def robot_facts(robot: Robot, foot: float = 0.0) -> RobotFacts:
     points = tuple(Point(point.name, point.joint, _vector(point.offset))
                    for point in sensed_points(robot))
     x, y, z = (_vector(row) for row in tip.rotation)
-    joints = tree_of(robot)
-    return RobotFacts(robot.name, robot.base, joints, tuple(robot.rest.tolist()),
-                      tuple(robot.velocity_names), *joint_units(joints), points, (x, y, z), links,
-                      -foot if foot else lowest(robot, links))
+    units, chain = tuple(robot.velocity_units), tuple(range(len(robot.joint_names)))
+    model = robot.model.saveToString()
+    return RobotFacts(
+        robot.name, robot.base, model, sha256(model.encode()).hexdigest(), robot.joint_names,
+        robot.base == "fixed" and robot.parents[1:] == chain, tuple(robot.rest.tolist()),
+        tuple(robot.velocity_names),
+        tuple(unit for part in robot.parts
+              for unit in ((units[part.v],) if part.size == 1 else ("1",) * part.size)),
+        units, points, (x, y, z), links, -foot if foot else lowest(robot, links))
 
 
 def resolver_facts(scenario: Scenario) -> ResolverFacts:
@@ -165,13 +167,8 @@ def resolver_facts(scenario: Scenario) -> ResolverFacts:
                 for field in dataclasses.fields(resolver)}
     return ResolverFacts(resolver.name, str(resolver.label), resolver.strict,
                          float(resolver.accuracy), resolver.handles, settings,
-                         _damped(resolver, scenario.asks))
-
-
-def _damped(resolver: Resolver, asked: Handles) -> str:
-    if not resolver.damping:
-        return ""
-    return resolver.damps if asked == "equalities" else resolver.damps_with_bounds
+                         "" if not resolver.damping else resolver.damps
+                         if scenario.asks == "equalities" else resolver.damps_with_bounds)
 
 
 def _plain(value: Any) -> Setting:
@@ -186,3 +183,48 @@ def _plain(value: Any) -> Setting:
 def _vector(values: Any) -> Vector:
     x, y, z = np.asarray(values, dtype=float).tolist()
     return x, y, z
+
+
+def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
+    """Return a robot's links: its capsules or, without any, sticks from joint to joint.
+
+    With `foot` > 0 [m] the first is a column of that height below the base.
+    """
+    links = robot.capsules or _sticks(robot)
+    if foot == 0.0 or robot.base == "floating" or not links:
+        return links
+    return (Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), links[0].radius), *links)
+
+
+def _sticks(robot: Robot) -> tuple[Capsule, ...]:
+    end = robot.frame(robot.end_effector)
+    sticks = [(body.name, body.parent, body.position) for body in robot.bodies()]
+    sticks = [stick for stick in (*sticks, (end.name, end.joint, end.offset))
+              if np.linalg.norm(stick[2]) > 0.0]
+    radius = _STICK * max((float(np.linalg.norm(stick[2])) for stick in sticks), default=0.0)
+    return tuple(Capsule(name, joint, (0.0, 0.0, 0.0), (float(x), float(y), float(z)), radius)
+                 for name, joint, (x, y, z) in sticks)
+
+
+def lowest(robot: Robot, links: Sequence[Capsule]) -> float:
+    """Height [m] of the lowest point of a robot at rest, at most that of its base."""
+    low = ends(links, State.at(robot, robot.rest).placements)[..., 2].min(axis=-1)
+    return float((low - [link.radius for link in links]).min(initial=0.0))
+
+
+def ends(links: Sequence[Capsule], placements: Array) -> Array:
+    """Return start and end of each capsule in the world: (..., C, 2, 3) [m].
+
+    placements (..., J + 1, 12), as in a State.
+    """
+    joints = np.array([link.joint for link in links], dtype=np.int64)
+    return np.stack([place(placements, joints, [getattr(link, side) for link in links])
+                     for side in ("start", "end")], axis=-2)
+
+
+def place(placements: Array, joints: Any, offsets: Any) -> Array:
+    """Return the world positions (..., K, 3) [m] of offsets (K, 3) in the frames of joints (K,)."""
+    rows = placements[..., np.asarray(joints, dtype=np.int64), :]
+    columns = rows[..., :9].reshape(*rows.shape[:-1], 3, 3)
+    turned = np.einsum("...kci,kc->...ki", columns, np.reshape(offsets, (-1, 3)))
+    return np.asarray(turned + rows[..., 9:])

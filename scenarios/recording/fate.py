@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
+from scenarios.config import Scenario
 from scenarios.recording.recording import Recording
-
-if TYPE_CHECKING:
-    from scenarios.config import Scenario
 
 
 class Fate(IntEnum):

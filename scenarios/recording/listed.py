@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +10,8 @@ from hierarchy import HierarchyError, Robot, State, Task
 from hierarchy.problem import Array
 from hierarchy.tasks import Along, CentreOfMass, Position
 from hierarchy.tasks.pose import PoseTask
-
-if TYPE_CHECKING:
-    from scenarios.config.tasks import ListedTask
-    from scenarios.recording.recording import Recording
+from scenarios.config.tasks import ListedTask
+from scenarios.recording.recording import Recording
 
 
 def error_of(name: str) -> str:

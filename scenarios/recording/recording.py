@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import import_module
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.notebook import html_table
 from hierarchy.problem import Array
+from scenarios.config import Scenario
 from scenarios.recording.facts import Facts
-from scenarios.recording.notebook import Column, curves, data_frame
 from scenarios.recording.signals import check, known
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from scenarios.config import Scenario
 
 
 class DepthView(NamedTuple):
@@ -40,7 +40,17 @@ class DepthView(NamedTuple):
     active: int
 
 
+_LIBRARIES = ("pandas", "polars")
+_LABELLED = 10  # curves of a panel that a legend can name
 _USUAL = ("q", "v", "position_error", "minimal_distance")  # what `plot` draws unless told
+
+
+class Column(NamedTuple):
+    """One number or text per tick: name such as `q[0]`, unit or "", values (T,)."""
+
+    name: str
+    unit: str
+    values: NDArray[Any]
 
 
 class Event(NamedTuple):
@@ -109,7 +119,18 @@ class Recording:
             if name not in drawn:
                 raise UnknownNameError("signal", name, drawn)
         asked = names or [name for name in _USUAL if name in drawn]
-        return curves(self["t"], {name: drawn[name] for name in asked}, self.units())
+        figure = _shown_figure(figsize=(8.0, 1.0 + 1.8 * len(asked)), layout="constrained")
+        axes = figure.subplots(len(asked), 1, sharex=True, squeeze=False)[:, 0]
+        units = self.units()
+        for ax, name in zip(axes, asked, strict=True):
+            lines = ax.plot(self["t"], drawn[name].reshape(self.ticks, -1), linewidth=0.9)
+            if 1 < len(lines) <= _LABELLED:
+                ax.legend(lines, [f"{name}{index}" for index, _ in _entries(drawn[name])],
+                          fontsize="x-small", ncols=2, loc="upper right")
+            shown = ", ".join(dict.fromkeys(units.get(name, ())))
+            ax.set_ylabel(f"{name} [{shown}]" if shown else name)
+        axes[-1].set_xlabel("t [s]")
+        return figure
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """Return all signals as a data frame, one row per tick and one column per number.
@@ -117,17 +138,29 @@ class Recording:
         `library` is "pandas", which has the units in `attrs`, or "polars"; None takes the first
         that is installed. Raises HierarchyError, saying what to install, where none is.
         """
-        return data_frame(list(self.columns()), library)
+        if library is not None and library not in _LIBRARIES:
+            raise UnknownNameError("library", library, _LIBRARIES)
+        columns = list(self.columns())
+        for name in _LIBRARIES if library is None else (library,):
+            try:
+                package = import_module(name)
+            except ImportError:
+                continue
+            frame = package.DataFrame({column.name: column.values for column in columns})
+            if hasattr(frame, "attrs"):  # pandas has a place for them
+                frame.attrs["units"] = {one.name: one.unit for one in columns if one.unit}
+            return frame
+        raise HierarchyError(f"to_dataframe needs {library or ' or '.join(_LIBRARIES)}: pip "
+                             f"install {library or _LIBRARIES[0]}")
 
     def columns(self) -> Iterator[Column]:
         """Yield every per-tick signal number by number, then the stack and the events as text."""
         units = self.units()
         for name, signal in self.of_ticks().items():
             unit_of = units.get(name, ("",))
-            for i, place in enumerate(np.ndindex(shape := signal.shape[1:])):
-                index = "".join(f"[{k}]" for k in place)
-                unit = unit_of[i] if len(unit_of) == int(np.prod(shape)) else unit_of[0]
-                yield Column(name + index, unit, signal[(slice(None), *place)])
+            each = len(unit_of) == int(np.prod(signal.shape[1:]))
+            for i, (index, values) in enumerate(_entries(signal)):
+                yield Column(name + index, unit_of[i if each else 0], values)
         yield Column("stack", "", self.stacks())
         events = [""] * self.ticks
         for tick, kind, action in self.events:
@@ -188,3 +221,22 @@ class Recording:
         for tick, kind, action in self.events:
             found.setdefault((kind, action), []).append(tick)
         return found
+
+
+def _entries(signal: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield each number of a signal (T, ...) over time, with its indices as text."""
+    for place in np.ndindex(signal.shape[1:]):
+        yield "".join(f"[{k}]" for k in place), signal[(slice(None), *place)]
+
+
+def _shown_figure(**settings: Any) -> Figure:
+    """Return a figure that a notebook shows; without pyplot it would not."""
+    from matplotlib.figure import Figure
+
+    class Shown(Figure):
+        def _repr_png_(self) -> bytes:
+            png = BytesIO()
+            self.savefig(png, format="png")
+            return png.getvalue()
+
+    return Shown(**settings)

@@ -7,7 +7,6 @@ points, C contacts, H obstacles.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from hierarchy import plugins
@@ -41,17 +40,14 @@ class Signal:
 def known(name: str) -> Signal | None:
     """Return the signal of a name, None if there is none."""
     return plugins.find("signals", name) or next(
-        (signal for signal in _families() if name.startswith(signal.name[:-1])), None)
+        (signal for signal in plugins.known("signals").values()
+         if signal.name[-1] == "*" and name.startswith(signal.name[:-1])), None)
 
 
 def check(name: str) -> None:
     """Raise an UnknownNameError with the nearest name unless a signal has this one."""
     if known(name) is None:
         raise UnknownNameError("signal", name, plugins.known("signals"))
-
-
-def _families() -> Iterator[Signal]:
-    return (signal for signal in plugins.known("signals").values() if signal.name[-1] == "*")
 
 
 def described() -> str:

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from threading import Lock
-from typing import TYPE_CHECKING
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError
 from scenarios.results.run import Job, Outcome, digest
-
-if TYPE_CHECKING:
-    from distributed import Future
 
 _PATIENCE = 30.0  # [s] for a scheduler to answer and to have a worker
 _ONE_AT_A_TIME = Lock()  # the kernels' work arrays are shared by the threads of a worker
@@ -36,7 +32,7 @@ def ended(work: Callable[[Job], Outcome], jobs: Sequence[Job], scheduler: str
     ClusterError : the scheduler is lost, or a worker has another version of the code.
     """
     try:
-        from distributed import Client, as_completed
+        from distributed import Client, KilledWorker, as_completed
     except ImportError as error:
         raise HierarchyError("--scheduler needs dask.distributed: "
                              "pip install 'task-hierarchy[sweep]'") from error
@@ -52,21 +48,11 @@ def ended(work: Callable[[Job], Outcome], jobs: Sequence[Job], scheduler: str
         futures = client.map(partial(_checked, work, digest()), jobs, pure=False)
         job_of = {future.key: job for future, job in zip(futures, jobs, strict=True)}
         for future in as_completed(futures):
-            yield job_of[future.key], _outcome(future)
+            broken = future.exception() if future.status == "error" else None
+            if future.status != "finished" and not isinstance(broken, KilledWorker):
+                raise ClusterError(f"{broken or 'the scheduler is lost'}; finished runs are kept")
+            yield job_of[future.key], None if broken else future.result()
             future.release()
-
-
-def _outcome(future: Future) -> Outcome | None:
-    """Return the outcome of a run, or None if it killed its workers."""
-    from distributed import KilledWorker
-
-    if future.status == "finished":
-        found: Outcome = future.result()
-        return found
-    error = future.exception() if future.status == "error" else None
-    if isinstance(error, KilledWorker):
-        return None
-    raise ClusterError(f"{error or 'the scheduler is lost'}; finished runs are kept")
 
 
 def _checked(work: Callable[[Job], Outcome], versions: str, job: Job) -> Outcome:

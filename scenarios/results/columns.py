@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -83,15 +83,6 @@ class Results:
         names = np.array([run.label for run in self.runs])
         return {label: names == label for label in self.labels}
 
-    def firsts(self) -> list[Job]:
-        """Return the first run of each label."""
-        return [next(run for run in self.runs if run.label == label) for label in self.labels]
-
-    def of(self, name: str, label: str) -> NDArray[np.float64]:
-        """Return the known values of a metric under a resolver."""
-        values = self.values[name][self._of[label]]
-        return np.asarray(values[np.isfinite(values)])
-
     @cached_property
     def samples(self) -> int:
         """Number of samples."""
@@ -137,10 +128,9 @@ class Results:
             found.append(Criterion("Touched nothing", np.all(
                 [*(values > 0.0 for values in near), *(values == 0.0 for values in contacts)],
                 axis=0)))
-        for label, name, most in (("Kept the joint limits", "joint_limit_excess", tolerance),
-                                  ("Every tick solved", "ticks_not_solved", 0.0)):
-            if name in self.values:
-                found.append(Criterion(label, self.values[name] <= most))
+        found += [Criterion(label, self.values[name] <= most) for label, name, most in (
+            ("Kept the joint limits", "joint_limit_excess", tolerance),
+            ("Every tick solved", "ticks_not_solved", 0.0)) if name in self.values]
         below = [self.values[name] for name in ("body_below_share", "ee_below_share")
                  if name in self.values]
         if below:
@@ -252,16 +242,13 @@ def results(plan: Plan, kept: Mapping[str, Outcome]) -> dict[str, Results]:
     groups: dict[str, list[Job]] = {}
     for run in plan.runs:
         groups.setdefault(run.group, []).append(run)
-    return {name: _group(runs, [kept[run.key] for run in runs])
-            for name, runs in groups.items()}
-
-
-def _group(runs: Sequence[Job], found: Sequence[Outcome]) -> Results:
-    known = {one.name: one for outcome in found for one in outcome.metrics
-             if one.value is not None}
-    values = {name: np.full(len(runs), np.nan) for name in known}
-    for i, outcome in enumerate(found):
-        for one in outcome.metrics:
-            if one.value is not None:
-                values[one.name][i] = one.value
-    return Results(tuple(runs), tuple(one.reason for one in found), known, values)
+    found = {}
+    for name, runs in groups.items():
+        each = [{one.name: one for one in kept[run.key].metrics if one.value is not None}
+                for run in runs]
+        metrics = {metric: one for known in each for metric, one in known.items()}
+        values = {metric: np.array([known[metric].value if metric in known else np.nan
+                                    for known in each], dtype=float) for metric in metrics}
+        found[name] = Results(tuple(runs), tuple(kept[run.key].reason for run in runs), metrics,
+                              values)
+    return found

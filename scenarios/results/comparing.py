@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import shlex
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -61,8 +60,10 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     """
     planned, refused = _plan(scenarios, resolvers)
     folder = None if out is None else make_folder(claim(file_path("compare: out", out)))
-    with _Written(folder, Comparison((), command or _command(planned, out), versions(), refused,
-                                     None if out is None else str(out)), len(planned)) as written:
+    where = [] if out is None else ["--out", str(out)]
+    said = command or Comparison(tuple(planned), "", {}).asked(*where)
+    empty = Comparison((), said, versions(), refused, None if out is None else str(out))
+    with _Written(folder, empty, len(planned)) as written:
         for i, run in (_together(planned, folder, workers, progress)
                        if min(workers, len(planned)) > 1 else
                        _one_by_one(planned, folder, progress)):
@@ -129,8 +130,7 @@ class _Written:
 
 def _row(run: Run) -> tuple[Job, Outcome]:
     """Return a run as the table has it."""
-    job = _job(run)
-    ticks = run.recording.ticks if run.recording else 0
+    job, ticks = _job(run), run.recording.ticks if run.recording else 0
     return job, Outcome(job.key, ticks, run.fault, float("nan"), tuple(run.metrics.values()))
 
 
@@ -220,10 +220,3 @@ def _timed(run: Run) -> Recording | None:
     with suppress(Exception):  # a scenario that allows no shorter duration keeps its own times
         return simulate(run.scenario.with_changes({"control.duration": ticks * control.period}))
     return None
-
-
-def _command(planned: Sequence[Run], out: str | Path | None) -> str:
-    names = dict.fromkeys(run.scenario.name for run in planned)
-    specs = ",".join(dict.fromkeys(run.spec for run in planned))
-    where = ["--out", str(out)] if out is not None else []
-    return shlex.join(["hierarchy", "compare", *names, "--resolvers", specs, *where])

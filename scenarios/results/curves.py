@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,10 +14,8 @@ from scenarios.draw.figures.drawing import ALERT, INK, Array
 from scenarios.draw.figures.palette import Look
 from scenarios.draw.figures.panels import Draw, Panel
 from scenarios.measure.metrics import Metric
+from scenarios.recording.recording import Recording
 from scenarios.results.columns import Results
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
 
 
 def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]
@@ -141,8 +139,9 @@ def spread(results: Results, metric: Metric) -> Figure:
     Box: quartiles with the median; line: 5th to 95th percentile; dots: smallest and largest value,
     where they are near. How many lie beyond the axis stands at its end.
     """
-    known = {label: metric.scale * values for label in results.labels
-             if (values := results.of(metric.name, label)).size}
+    columns = {label: results.column(metric.name, label) for label in results.labels}
+    known = {label: metric.scale * values[np.isfinite(values)]
+             for label, values in columns.items() if np.isfinite(values).any()}
     fig, (ax,) = drawing.figure(width=3.9, height=0.5 + 0.3 * len(known))
     colours = drawing.colours(results.labels)
     low, high = _limits(list(known.values()))

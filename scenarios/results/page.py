@@ -5,26 +5,25 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from markupsafe import Markup
 
 from hierarchy.errors import HierarchyError
 from hierarchy.words import in_words, listed
+from scenarios.config import load, shipped
 from scenarios.config.scenario import OWN
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.draw.figures.picture import picture
-from scenarios.measure.motions import Motion, motions
+from scenarios.draw.replay.page import html
+from scenarios.measure.comparison import Comparison
+from scenarios.measure.motions import BOUND, Motion, motions, partings
+from scenarios.measure.runs import Run
 from scenarios.measure.verdict import lines, table, verdicts
 from scenarios.results import sections
 from scenarios.templates import render, resource
-
-if TYPE_CHECKING:
-    from scenarios.measure.comparison import Comparison
-    from scenarios.measure.runs import Run
-    from scenarios.recording.recording import Recording
 
 
 def run_command(run: Run, folder: str) -> str:
@@ -33,8 +32,6 @@ def run_command(run: Run, folder: str) -> str:
     It uses the scenario's name where that gives the same scenario, otherwise the file in the run's
     folder.
     """
-    from scenarios.config import load, shipped
-
     name = run.scenario.name
     if name in shipped() and load(name).with_resolver(run.spec) == run.scenario:
         return shlex.join(["hierarchy", "run", name, "--resolver", run.spec])
@@ -66,39 +63,24 @@ def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
 
     The frame rate is lowered if the replay would exceed `most_bytes`.
     """
-    shown = list(found[:MOST])
+    shown, left, rate = found[:MOST], found[MOST:], _FASTEST
+    recordings = {one.label: one.recording for one in shown}
+    happenings = {one.label: one.runs[0].happened for one in shown}
     try:
-        document, rate = _document(name, shown, most_bytes)
+        document = html(recordings, name, happenings, rate=rate, embedded=True)
+        if len(document) > most_bytes:
+            rate = max(_SLOWEST, float(int(rate * most_bytes / len(document))))
+            document = html(recordings, name, happenings, rate=rate, embedded=True)
     except HierarchyError as error:
         return render("results/replay.html", problem=str(error), said="")
-    return render("results/replay.html", name=name, document=document, problem="",
-                  said=_said(shown, found, rate))
-
-
-def _document(name: str, shown: Sequence[Motion], most_bytes: int) -> tuple[str, float]:
-    from scenarios.draw.replay.page import html
-
-    recordings: dict[str, Recording] = {one.label: one.recording for one in shown}
-    happenings = {one.label: one.runs[0].happened for one in shown}
-    document, rate = html(recordings, name, happenings, rate=_FASTEST, embedded=True), _FASTEST
-    if len(document) > most_bytes:
-        rate = max(_SLOWEST, float(int(_FASTEST * most_bytes / len(document))))
-        document = html(recordings, name, happenings, rate=rate, embedded=True)
-    return document, rate
-
-
-def _said(shown: Sequence[Motion], found: Sequence[Motion], rate: float) -> str:
-    """Return which runs are shown and which move in the same way."""
-    said = f"Shown: {listed([one.label for one in shown])}, {rate:g} frames per second."
-    for one in shown:
-        if len(one.runs) > 1:
-            moves = "moves" if len(one.runs) == 2 else "move"
-            said += f" {listed(one.labels[1:])} {moves} like {one.label}."
-    left = found[len(shown):]
+    said = [f"Shown: {listed(list(recordings))}, {rate:g} frames per second."]
+    said += [f"{listed(one.labels[1:])} {'moves' if len(one.runs) == 2 else 'move'} like "
+             f"{one.label}." for one in shown if len(one.runs) > 1]
     if left:
-        said += (f" Not shown: {listed([label for one in left for label in one.labels])}; the "
-                 f"replay here shows at most {in_words(MOST)} motions.")
-    return said
+        said.append(f"Not shown: {listed([label for one in left for label in one.labels])}; the "
+                    f"replay here shows at most {in_words(MOST)} motions.")
+    return render("results/replay.html", name=name, document=document, problem="",
+                  said=" ".join(said))
 
 
 _STARTS = 16  # starts to sample before a difference is believed
@@ -120,7 +102,7 @@ def comparison_page(comparison: Comparison, planned: int = 0) -> str:
                       about_rows=_about_rows(comparison), file="",
                       contents=ends if len(ends) > 1 else {},
                       count=in_words(len(groups)).capitalize(),
-                      sampled=comparison.sampled(_STARTS), groups=articles,
+                      sampled=comparison.asked("--starts", str(_STARTS)), groups=articles,
                       refused=comparison.refused, command=comparison.command,
                       versions=comparison.versions))
 
@@ -137,8 +119,7 @@ def _about_rows(comparison: Comparison) -> str:
 
 def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
     """Return the article about the runs of one group."""
-    found, look = motions(runs), looks(run.label for run in runs)
-    judged = verdicts(runs)
+    found, look, judged = motions(runs), looks(run.label for run in runs), verdicts(runs)
     room = min(_REPLAY_BYTES, _REPLAYS_BYTES // len(comparison.groups()))
     moved = {"replay": replay(name, found, room),
              "panels": sections.multiples(name, found, look),
@@ -148,8 +129,11 @@ def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
                   **_about(name, runs), **_picture(name, found, look),
                   **{"replay": "", "panels": "", "overlays": "", **moved},
                   numbers=sections.numbers(runs, look), stack=sections.stack(name, runs, look),
-                  partings=sections.parted(runs), commands=commands(comparison, runs),
-                  settings=sections.settings(runs))
+                  partings=[str(one) for one in partings(runs)], bound=BOUND,
+                  commands=commands(comparison, runs),
+                  settings=[(run, ", ".join(f"{name} = {value!r}" for name, value in
+                                            run.settings.items()) or "none") for run in runs],
+                  scenarios={run.scenario.name: run for run in reversed(runs)})
 
 
 def _about(name: str, runs: Sequence[Run]) -> dict[str, Any]:

@@ -12,8 +12,9 @@ from pydantic import Field
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError
+from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, is_shipped, load
-from scenarios.config.distributions import Parameters, Value
+from scenarios.config.distributions import Parameters
 from scenarios.config.resolvers import check_names, usable
 from scenarios.config.sampling import changed, drawn
 from scenarios.config.sections import Name, Section
@@ -113,7 +114,12 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
     runs: dict[str, Job] = {}
     for index in range(sweep.samples):
         for scenario in asked:
-            values = _drawn(sweep, index, scenario)
+            if sweep.variation and not scenario.variation:
+                raise ScenarioError(f"scenario {scenario.name!r} has no [variation] to sample "
+                                    "from; add one, such as start.q = { around = 0.02 }")
+            own = scenario.variation if sweep.variation else {}
+            values = drawn(scenario, own, sweep.seed, index) | drawn(
+                scenario, sweep.parameters, sweep.seed, index, f"sweep {sweep.name!r}: parameters")
             what = f"sweep {sweep.name!r}: sample {index} of scenario {scenario.name!r}"
             text = changed(scenario, values, what).to_toml()
             for run in columns:
@@ -123,16 +129,6 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
                         key, text, run.spec, scenario.name, index, values, plugins.loaded(),
                         run.spec if alone else scenario.name, run.label))
     return Plan(sweep, tuple(asked), tuple(runs.values()), refused)
-
-
-def _drawn(sweep: Sweep, index: int, scenario: Scenario) -> dict[str, Value]:
-    """Return the values of a sample: the scenario's own variation, overridden by the sweep's."""
-    if sweep.variation and not scenario.variation:
-        raise ScenarioError(f"scenario {scenario.name!r} has no [variation] to sample from; add "
-                            "one, such as start.q = { around = 0.02 }")
-    own = drawn(scenario, scenario.variation, sweep.seed, index) if sweep.variation else {}
-    return own | drawn(scenario, sweep.parameters, sweep.seed, index,
-                       f"sweep {sweep.name!r}: parameters")
 
 
 def side_by_side(scenarios: Sequence[Scenario], specs: Sequence[str] | None, what: str = ""
@@ -147,8 +143,6 @@ def side_by_side(scenarios: Sequence[Scenario], specs: Sequence[str] | None, wha
     HierarchyError : two scenarios of one name, with `what` in front; a scenario that does not fit
         its robot; an unknown resolver or setting; no resolver that can resolve any scenario.
     """
-    from scenarios.cell.build import build
-
     check_names(scenarios, what)
     runs: list[Run] = []
     refused: list[str] = []

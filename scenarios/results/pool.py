@@ -12,12 +12,16 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from pathlib import Path
-from queue import SimpleQueue
-from threading import Event, Thread
-from typing import Any, final
+from queue import Empty, SimpleQueue
+from threading import Event
+from typing import Any
 
+Process = subprocess.Popen[bytes]
+
+_GIVEN_UP = object()  # what an interrupted job returns
 _TRIES = 2  # processes that may die of the same job
 _SERVE = "from scenarios.results.pool import serve; serve()"
 
@@ -39,81 +43,55 @@ def ended(work: Callable[[Any], Any], jobs: Sequence[Any], workers: int | None =
     salvage : at Ctrl-C, interrupt the work in progress too and yield what it returns before
         KeyboardInterrupt is raised; otherwise it is given up.
     """
-    waiting, done, stop = iter(jobs), SimpleQueue[Any](), Event()
-    count = min(workers or processors(), len(jobs))
-    crew = [_Worker(work, waiting, done, stop) for _ in range(count)]
-    left = len(jobs)
+    stop, idle, alive = Event(), SimpleQueue[Process](), list[Process]()
+
+    def made(job: Any) -> Any:
+        for _ in range(_TRIES):
+            try:
+                process = idle.get_nowait()
+            except Empty:
+                alive.append(process := _started())
+            if stop.is_set():
+                break
+            try:
+                pickle.dump((work, job), process.stdin)  # type: ignore[arg-type]
+                process.stdin.flush()  # type: ignore[union-attr]
+                result = pickle.load(process.stdout)  # type: ignore[arg-type]
+            except (EOFError, OSError, pickle.UnpicklingError):
+                _end(process)
+                continue
+            idle.put(process)
+            return result
+        return _GIVEN_UP if stop.is_set() else None
+
+    threads = ThreadPoolExecutor(max(1, min(workers or processors(), len(jobs))))
+    waiting = {threads.submit(made, job): job for job in jobs}
     try:
-        while left:
-            yield done.get()
-            left -= 1
+        for future in as_completed(list(waiting)):
+            yield waiting.pop(future), future.result()
     except KeyboardInterrupt:
         stop.set()
-        if salvage:
-            for worker in crew:
-                worker.signal(salvage=True)
-            for worker in crew:
-                worker.join()
-            while not done.empty():
-                yield done.get()
+        threads.shutdown(wait=False, cancel_futures=True)
+        for process in alive if salvage else ():
+            process.terminate()
+        for future, job in waiting.items() if salvage else ():
+            if not future.cancelled() and (result := future.result()) is not _GIVEN_UP:
+                yield job, result
         raise
     finally:
         stop.set()
-        for worker in crew:
-            worker.signal(salvage=False)
+        threads.shutdown(wait=False, cancel_futures=True)
+        for process in alive:
+            _end(process)
 
 
-@final
-class _Worker(Thread):
-    """A process, and the thread that hands it jobs."""
-
-    def __init__(self, work: Any, waiting: Iterator[Any], done: SimpleQueue[Any], stop: Event
-                 ) -> None:
-        super().__init__(daemon=True)
-        self._work, self._waiting, self._done, self._stopped = work, waiting, done, stop
-        self._process: subprocess.Popen[bytes] | None = None
-        self.start()
-
-    def run(self) -> None:
-        """Hand on jobs until there are none left."""
-        while not self._stopped.is_set() and (job := next(self._waiting, None)) is not None:
-            result = None
-            for _ in range(_TRIES):
-                result = self._asked(job)
-                if result is not None or self._stopped.is_set():
-                    break
-            if result is not None or not self._stopped.is_set():
-                self._done.put((job, result))
-        self._end()
-
-    def _asked(self, job: Any) -> Any:
-        """Return what the process answers, None if it dies of it."""
-        process = self._process = self._process or _started()
-        assert process.stdin is not None
-        assert process.stdout is not None
-        if self._stopped.is_set():
-            return None
-        try:
-            pickle.dump((self._work, job), process.stdin)
-            process.stdin.flush()
-            return pickle.load(process.stdout)
-        except (EOFError, OSError, pickle.UnpicklingError):
-            self._end()
-            return None
-
-    def signal(self, salvage: bool) -> None:
-        """Interrupt the work in progress as Ctrl-C would, or kill the process; any thread may."""
-        if self._process is not None:
-            self._process.terminate() if salvage else self._process.kill()
-
-    def _end(self) -> None:
-        process, self._process = self._process, None
-        if process is not None:
-            with suppress(BrokenPipeError), process:
-                process.kill()
+def _end(process: Process) -> None:
+    """Kill a process, which may have ended; any thread may."""
+    with suppress(BrokenPipeError, ValueError), process:
+        process.kill()
 
 
-def _started() -> subprocess.Popen[bytes]:
+def _started() -> Process:
     path = os.pathsep.join(entry or str(Path.cwd()) for entry in sys.path)
     settings = {**os.environ, "PYTHONPATH": path, "TASK_HIERARCHY_WORKER": "1"}
     return subprocess.Popen([sys.executable, "-c", _SERVE], stdin=subprocess.PIPE,

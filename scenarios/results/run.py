@@ -9,19 +9,17 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hierarchy import plugins
+from scenarios.config import Scenario
 from scenarios.measure.metrics import Metric
-
-if TYPE_CHECKING:
-    from scenarios.config import Scenario
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 # Code that only requests or shows runs: changing it does not change the measurements.
 _NOT_IN_A_RUN = ("cli/", "draw/", "export/", "library/", "problems/", "results/", "scene/",
                  "files.py", "templates.py", *(f"measure/{name}.py" for name in (
-                     "goals", "motions", "partings", "runs", "statistics", "verdict")))
+                     "goals", "motions", "runs", "statistics", "verdict")))
 _PLACE = ("system", "processor")  # entries of versions() that describe the machine
 
 

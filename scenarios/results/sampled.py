@@ -167,25 +167,23 @@ def _plain(plan: Plan, found: Mapping[str, Results], command: str) -> dict[str, 
             "versions": versions(), "refused": list(plan.refused),
             "groups": {name: {
                 "verdict": verdict(one),
-                "columns": {label: {"shares": _shares(one, label), "metrics": {
-                    metric.name: _metric(one, metric.name, label) for metric in one.shown()}}
-                    for label in one.labels},
+                "columns": {label: _column(one, label) for label in one.labels},
                 "failures": [{"reason": each.reason, "resolver": each.run.label,
                               "runs": each.count} for each in one.failures()]}
                 for name, one in found.items()}}
 
 
-def _shares(results: Results, label: str) -> dict[str, Any]:
-    shares = {one.label: results.share(one, label) for one in results.criteria()}
-    return {name: {"met": share.met, "of": share.of, "wilson_95": list(share.interval)}
-            for name, share in shares.items()}
-
-
-def _metric(results: Results, name: str, label: str) -> dict[str, Any]:
-    """Return a metric of a column, also beside the first column."""
-    metric, found = results.metrics[name], results.spread(name, label)
-    beside = results.paired(name, label)
-    return {"label": metric.label, "unit": metric.unit, **(asdict(found) if found else {}),
+def _column(results: Results, label: str) -> dict[str, Any]:
+    """Return shares and metrics of a column, also beside the first column."""
+    shares, metrics = {}, {}
+    for one in results.criteria():
+        share = results.share(one, label)
+        shares[one.label] = {"met": share.met, "of": share.of, "wilson_95": list(share.interval)}
+    for metric in results.shown():
+        spread, beside = results.spread(metric.name, label), results.paired(metric.name, label)
+        metrics[metric.name] = {
+            "label": metric.label, "unit": metric.unit, **(asdict(spread) if spread else {}),
             **({} if label == results.labels[0] else
                {"against_first": {**asdict(beside), "said": str(beside)}}),
             "best": label in results.best(metric)}
+    return {"shares": shares, "metrics": metrics}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
+import numpy as np
 from markupsafe import Markup
 
 from hierarchy import plugins
@@ -14,16 +14,12 @@ from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, task_colours
 from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
-from scenarios.measure.partings import BOUND, partings
-from scenarios.measure.runs import table
+from scenarios.measure.runs import Run, table
 from scenarios.recording.listed import errors
+from scenarios.recording.recording import Recording
 from scenarios.results import curves
 from scenarios.results.columns import flags
 from scenarios.templates import render
-
-if TYPE_CHECKING:
-    from scenarios.measure.runs import Run
-    from scenarios.recording.recording import Recording
 
 # The most important metrics; the others are folded away.
 _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_violation_max",
@@ -42,12 +38,12 @@ def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     rows = table(runs, details=False)
     first = [row for row in rows if row.name in _FIRST or (
         row.name.startswith("task_") and row.name.endswith("_rms"))]
-    rest = [row for row in rows if row not in first]
     marked = flags({run.label: run.scenario for run in runs})
     heads = {run.label: [(kind, text) for kind, text in (
         ("alert", _stopped(run)), ("quiet", marked[run.label])) if text] for run in runs}
-    return render("results/measured.html", heads=heads, looks=looks, first=first, rest=rest,
-                  said=_marks(runs)) if rows else Markup()
+    return render("results/measured.html", heads=heads, looks=looks, first=first,
+                  rest=[row for row in rows if row not in first], said=_marks(runs)
+                  ) if rows else Markup()
 
 
 def _marks(runs: Sequence[Run]) -> str:
@@ -70,9 +66,8 @@ def _marks(runs: Sequence[Run]) -> str:
 def _stopped(run: Run) -> str:
     if run.fault is None:
         return ""
-    if run.recording is None or not run.recording.ticks:
-        return "did not start"
-    return f"stopped at {run.recording['t'][-1]:.2f} s"
+    t = run.recording["t"] if run.recording else np.zeros(0)
+    return f"stopped at {t[-1]:.2f} s" if len(t) else "did not start"
 
 
 def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
@@ -81,44 +76,21 @@ def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
     That is the problem, the action taken or the reason, the number of ticks and the first time.
     Only the first row of a run has its label.
     """
-    return [(run.label if i == 0 else "", row)
-            for run in runs for i, row in enumerate(_happened(run))]
-
-
-def _happened(run: Run) -> list[tuple[str, str, str, str]]:
-    recording = run.recording
-    found = [(what, why, str(ticks), f"{t:.3f} s") for what, why, ticks, t in run.happened]
-    if run.fault:
-        ended = f"{recording['t'][-1]:.3f} s" if recording and recording.ticks else "the start"
-        found.append((f"fault: {run.fault}", "run stopped", "–", ended))
+    found = []
+    for run in runs:
+        rows = [(what, why, str(ticks), f"{t:.3f} s") for what, why, ticks, t in run.happened]
+        if run.fault:
+            t = run.recording["t"] if run.recording else np.zeros(0)
+            rows.append((f"fault: {run.fault}", "run stopped", "–",
+                         f"{t[-1]:.3f} s" if len(t) else "the start"))
+        found += [(run.label if i == 0 else "", row) for i, row in enumerate(rows)]
     return found
-
-
-def parted(runs: Sequence[Run]) -> Markup:
-    """Return where the runs of strict resolvers diverge, and why."""
-    found = [str(one) for one in partings(runs)]
-    return render("results/partings.html", partings=found, bound=BOUND) if found else Markup()
-
-
-def settings(runs: Sequence[Run]) -> Markup:
-    """Return the resolvers' settings and the scenario files as used."""
-    first = {run.scenario.name: run for run in reversed(runs)}
-    rows = [(run, ", ".join(f"{name} = {value!r}" for name, value in run.settings.items())
-             or "none") for run in runs]
-    return render("results/settings.html", rows=rows, scenarios=list(reversed(first.values())))
-
-
-def same_motion(found: Sequence[Motion]) -> str:
-    """Return which runs are drawn once because their motion is the same; "" if none."""
-    said = [f"{listed(one.labels)} are the same motion "
-            + (f"to {one.apart:.0e} rad" if one.apart else "to the last bit")
-            for one in found if len(one.runs) > 1]
-    return f"Drawn once: {'; '.join(said)} (within {ALIKE:.0e} rad)." if said else ""
 
 
 def stack(name: str, runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     """Return the section with the stack over time, one figure for each motion and its events."""
-    found = motions(runs, also=_events)
+    found = motions(runs, also=lambda one: (one.events, one.fault, tuple(
+        one.get("status", np.zeros(0)).nonzero()[0])))
     beside = [one.recording for one in found]
     colours = task_colours(tasks(beside))
     bands = [(one, svg(timeline(one.recording, beside),
@@ -127,14 +99,6 @@ def stack(name: str, runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
              for one in found if colours]
     return render("results/stack.html", looks=looks, colours=colours, drawn=bands,
                   events=events(runs))
-
-
-def _events(run: Run) -> object:
-    recording = run.recording
-    if recording is None:
-        return None
-    return recording.events, recording.fault, tuple(recording["status"].nonzero()[0]) \
-        if "status" in recording else ()
 
 
 def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> Markup:
@@ -147,7 +111,11 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
             cards.append((panel, _key(panel.name, recordings), [
                 (one, svg(small[one.label], f"{name}, {one.label}: {panel.title}"))
                 for one in found if one.label in small]))
-    said = f"Over time [s], on equal axes. {same_motion(found)}".strip()
+    same = [f"{listed(one.labels)} are the same motion "
+            + (f"to {one.apart:.0e} rad" if one.apart else "to the last bit")
+            for one in found if len(one.runs) > 1]
+    said = "Over time [s], on equal axes." + (
+        f" Drawn once: {'; '.join(same)} (within {ALIKE:.0e} rad)." if same else "")
     return render("results/panels.html", cards=cards, beside=min(len(found), 5), looks=looks,
                   said=said) if cards else Markup()
 

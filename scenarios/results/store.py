@@ -108,12 +108,9 @@ def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
 def append(file: Path, added: Sequence[Sequence[Any]]) -> None:
     """Append rows to a file in one piece that is on the disk on return; raises FullError."""
     text = _as_text(added if file.exists() and file.stat().st_size else [COLUMNS, *added])
-    with writing(file), file.open("a+b") as stream:
-        if stream.tell():
-            stream.seek(-1, os.SEEK_END)
-            if stream.read(1) != b"\n":  # a row was cut off by a full disk or a loss of power
-                text = f"\n{text}"
-        stream.write(text.encode())
+    with writing(file), file.open("ab") as stream:
+        begun = b"\n" * bool(stream.tell())  # ends a row cut off by a full disk or a loss of power
+        stream.write(begun + text.encode())
         stream.flush()
         os.fsync(stream.fileno())
 

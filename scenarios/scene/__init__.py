@@ -1,6 +1,6 @@
 """What is drawn of a run, as arrays, independent of any drawing library."""
 
-from scenarios.recording.tree import capsules, ends, place
+from scenarios.recording.facts import capsules, ends, place
 from scenarios.scene.curves import Series, series
 from scenarios.scene.drawn import SEPARATION, Moved, Scene, Stage, scene, stage
 

@@ -14,11 +14,10 @@ from hierarchy import HierarchyError
 from hierarchy.avoidance import Measurement, Obstacles
 from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.problem import Array
-from scenarios.cell.sensors.sensor import make_obstacles
+from scenarios.cell.sensors.sensor import make_obstacles, packed_laws
 from scenarios.recording import listed
-from scenarios.recording.facts import RobotFacts
+from scenarios.recording.facts import RobotFacts, ends
 from scenarios.recording.fate import Fate, Levels, levels_at
-from scenarios.recording.tree import ends
 from scenarios.scene.curves import Areas, Series, marks_of, series
 from scenarios.scene.pushes import Pushes, pushes
 
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from scenarios.recording.recording import Recording
 
 SEPARATION = "separation"  # the task that keeps all points away from all obstacles
-_NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # no repulsion
 
 
 @dataclass(frozen=True)
@@ -185,7 +183,7 @@ def _distances(fixed: Stage, recording: Recording, ticks: NDArray[np.int64],
     seen, now = Measurement(len(fixed.robot.points) - 1), np.empty(placements.shape[1:])
     measure = exact_measurer(seen, now, np.array([point.joint for point in fixed.robot.points]),
                              np.array([point.offset for point in fixed.robot.points]),
-                             fixed.obstacles.table, _NO_LAWS, np.zeros(2))
+                             fixed.obstacles.table, packed_laws(), np.zeros(2))
     frames: dict[str, list[Array]] = {name: [] for name in (
         "points", "nearest", "distance", "centres")}
     offsets = recording.get("obstacle_offset", np.empty((recording.ticks, 0, 3)))

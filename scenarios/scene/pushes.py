@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from hierarchy.problem import Array
-from scenarios.config.kinds.torque import PushSection
+from scenarios.config.plant import PushSection
 from scenarios.recording.facts import ContactPoint, Facts, RobotFacts
 
 if TYPE_CHECKING:
@@ -158,26 +159,15 @@ def _cone(point: ContactPoint) -> Array:
 
 def _hull(points: Array, count: int) -> Array:
     """Return the edges (count, 2, 3) of the hull of points (k, 3) from above, NaN beyond them."""
-    edges = np.full((count, 2, 3), np.nan)
-    ring = _ring(points)
-    if len(ring) > 1:
-        edges[:len(ring)] = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
+    edges, ring = np.full((count, 2, 3), np.nan), _ring(points)
+    edges[:len(ring)] = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
     return edges
 
 
 def _ring(points: Array) -> Array:
-    """Return the corners of the hull in turn (Andrew's monotone chain), seen from above."""
-    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
-    chains = []
-    for some in (ordered, ordered[::-1]):
-        chain: list[Array] = []
-        for p in some:
-            while len(chain) > 1 and _turn(chain[-2], chain[-1], p) <= 0.0:
-                chain.pop()
-            chain.append(p)
-        chains += chain[:-1]
-    return np.array(chains).reshape(-1, 3)
-
-
-def _turn(a: Array, b: Array, c: Array) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    """Return the corners of the hull in turn, seen from above; the ends of points on a line."""
+    try:
+        return np.asarray(points[ConvexHull(points[:, :2]).vertices])
+    except (QhullError, ValueError):  # ValueError: there are none
+        ordered = np.lexsort((points[:, 1], points[:, 0]))
+        return np.asarray(points[ordered[[0, -1]]] if len(points) > 1 else points[:0])

@@ -22,9 +22,11 @@ def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]
     """Return the joint velocity (nv,) [rad/s or m/s] that serves mink's tasks in strict order.
 
     Takes the arguments of `mink.solve_ik` in its order; their meaning, and that of the others, is
-    that of `solvers.adapters.for_pink.solve_ik`, with mink's exceptions.
+    that of `solvers.adapters.for_pink.solve_ik`, with mink's exceptions. Without `safety_break` a
+    joint outside its limits is not looked for: mink then writes a line at the level "debug".
     """
-    configuration.check_limits(safety_break=safety_break)
+    if safety_break:
+        configuration.check_limits()
     return answer(solver, of_the_solver, damping, tolerance, lambda solve: packed(
         configuration, tasks, dt, limits, constraints, damping, solve), _no_solution)
 

@@ -161,63 +161,57 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     if threads is not None and threads < 1:
         raise HierarchyError(f"threads = {threads}, expected at least 1")
     batch = replace(batch)  # numpy lets its holder change the shape of an array: through the gate
-    run = _Run(batch, resolver, cores() if threads is None else threads, memory)
+    (_, m, n), levels = batch.A.shape, len(batch.sizes)
+    begun = partial(_Run, batch, cores() if threads is None else threads, memory)
     if isinstance(resolver, Merged):
-        return run.by_merged(resolver)
-    return run.by_tpm() if isinstance(resolver, Tpm) else run.by_hcod()
+        names = tuple(f"level {k + 1}" for k in range(levels))
+        run = begun(resolver._settings_for(names), record_size(n, m), True)
+        run.solve(batch_merged, np.arange(len(batch)), run.record)
+        for p in np.flatnonzero(run.codes == NOTHING)[:1]:
+            refuse_safety_alone(batch[int(p)])
+        return run.answer(run.record[:, m], run.record)
+    size, warm = 3 * m + 3, resolver.damping == 0.0
+    if isinstance(resolver, Tpm):
+        return begun(resolver._settings, n + levels + size, warm).by_tpm(resolver)
+    run = begun(resolver._settings, size, warm)
+    run.solve(batch_exact, np.arange(len(batch)), run.record)
+    return run.answer(run.record[:, -3] + run.record[:, -2], run.record)
 
 
 class _Run:
-    """The arrays that the kernels write, and the choice of kernel for each problem."""
+    """The arrays that the kernels write; the record (B, size) starts as the memory if it fits."""
 
-    def __init__(self, batch: Batch, resolver: Tpm | Hcod | Merged, threads: int,
-                 memory: Array | None) -> None:
-        self.batch, self.resolver, self.threads = batch, resolver, threads
-        count, rows, n = batch.A.shape
-        bounds = n + len(batch.sizes) if isinstance(resolver, Tpm) else 0
-        shape = (count, record_size(n, rows) if isinstance(resolver, Merged) else
-                 bounds + 3 * rows + 3)
+    def __init__(self, batch: Batch, threads: int, memory: Array | None, settings: Array,
+                 size: int, warm: bool) -> None:
+        self.batch, self.threads, self.settings = batch, threads, settings
+        self.x, self.codes = np.zeros(batch.A.shape[::2]), np.zeros(len(batch), dtype=np.int64)
+        self.record = np.zeros((len(batch), size))
         before = None if memory is None else readable("memory", memory)
-        self.before = before if before is not None and before.shape == shape else None
-        self.warm: NDArray[np.bool_] = np.zeros(count, dtype=bool)
-        if self.before is not None:
-            self.warm |= (self.before != 0.0).any(axis=1)
-        self.x, self.codes = np.zeros((count, n)), np.zeros(count, dtype=np.int64)
-        self.record = np.zeros(shape)
-        if self.before is not None and (resolver.damping == 0.0 or isinstance(resolver, Merged)):
-            self.record[:] = self.before
-        self.settings = resolver._settings
+        if before is not None and before.shape == self.record.shape and warm:
+            self.record[:] = before
 
-    def by_tpm(self) -> BatchResolution:
+    def by_tpm(self, resolver: Tpm) -> BatchResolution:
         """Resolve those with a memory exactly; if no bound is active there, and the others, anew.
 
         Anew: with the staircase, then as if there were no bounds, then exactly.
         """
-        saturated = np.zeros(len(self.codes), dtype=bool)
-        if self.warm.any() and self.resolver.damping == 0.0:
-            saturated = self._at_bounds(self.warm)
+        saturated = self._at_bounds((self.record != 0.0).any(axis=1))
         anew = np.flatnonzero(~saturated)
         self.record[anew] = 0.0
-        self._set_reference(anew)
-        self._call(batch_staircase, anew, self.x, self.codes, self.settings)
-        doubtful = anew[self.codes[anew] == INACCURATE]
-        self._set_reference(doubtful)
-        self._call(batch_exact, doubtful, self.x, self.codes, self.record, self.settings)
-        bounded = anew[self.codes[anew] < 0]
-        self._set_reference(bounded)
-        self._call(batch_without_bounds, bounded, self.x, self.codes, self.record, self.settings)
+        self.solve(batch_staircase, anew)
+        self.solve(batch_exact, anew[self.codes[anew] == INACCURATE], self.record)
+        self.solve(batch_without_bounds, anew[self.codes[anew] < 0], self.record)
         saturated |= self._at_bounds(self.codes == UNPROVED)
         for p in np.flatnonzero(self.codes < 0)[:1]:
-            refuse_inequality(self.resolver, self.batch[p], -int(self.codes[p]) - 1)
+            refuse_inequality(resolver, self.batch[p], -int(self.codes[p]) - 1)
         steps = np.maximum(self.record[:, -3] + self.record[:, -2], 1.0)
         self.record[~saturated] = 0.0
-        return self._answer(steps, self.record if saturated.any() else None)
+        return self.answer(steps, self.record if saturated.any() else None)
 
     def _at_bounds(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Resolve the chosen problems exactly; return those of them with an unknown at a bound."""
         which, saturated = np.flatnonzero(chosen), np.zeros(len(chosen), dtype=bool)
-        self._set_reference(which)
-        self._call(batch_exact, which, self.x, self.codes, self.record, self.settings)
+        self.solve(batch_exact, which, self.record)
         named = np.full(len(chosen), NUMERICAL_FAILURE)
         self._call(batch_saturation, which[self.codes[which] != NUMERICAL_FAILURE], self.x, named,
                    self.record)
@@ -225,29 +219,14 @@ class _Run:
         saturated[which] = named[which] == SOLVED
         return saturated
 
-    def by_hcod(self) -> BatchResolution:
-        """Resolve with the kernel of `hcod`."""
-        everything = np.arange(len(self.batch))
-        self._set_reference(everything)
-        self._call(batch_exact, everything, self.x, self.codes, self.record, self.settings)
-        return self._answer(self.record[:, -3] + self.record[:, -2], self.record)
-
-    def by_merged(self, resolver: Merged) -> BatchResolution:
-        """Resolve with the kernel of `merged`."""
-        everything = np.arange(len(self.batch))
-        names = tuple(f"level {k + 1}" for k in range(len(self.batch.sizes)))
-        self._set_reference(everything)
-        self._call(batch_merged, everything, self.x, self.codes, self.record,
-                   resolver._settings_for(names))
-        for p in np.flatnonzero(self.codes == NOTHING)[:1]:
-            refuse_safety_alone(self.batch[int(p)])
-        return self._answer(self.record[:, self.batch.A.shape[1]], self.record)
-
-    def _set_reference(self, which: Indices) -> None:
-        self.x[which] = self.batch.reference[which]
-
-    def _answer(self, steps: Array, memory: Array | None) -> BatchResolution:
+    def answer(self, steps: Array, memory: Array | None) -> BatchResolution:
+        """Return the answers, with the iterations (B,)."""
         return BatchResolution(self.x, self.codes, steps.astype(np.int64), memory)
+
+    def solve(self, kernel: Callable[..., int], which: Indices, *records: Array) -> None:
+        """Solve the problems `which` with a kernel."""
+        self.x[which] = self.batch.reference[which]
+        self._call(kernel, which, self.x, self.codes, *records, self.settings)
 
     def _call(self, kernel: Callable[..., int], which: Indices, *arguments: Any) -> None:
         """Run a kernel over the problems `which`, on several threads if there are many."""

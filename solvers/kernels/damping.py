@@ -1,16 +1,16 @@
 """Damping beside inequalities: each damped level is one convex problem.
 
-The staircase of the equalities alone gives an x. Where inequalities hold it, that is the answer, as
-in `tpm`, unless a bound fixes an unknown, for bounds are not damped. Where a row is exceeded, what
-lies along it is taken out of the equalities, in proportion up to all of it, and the staircase of
-the rest gives each level its lambda: an arm that would be singular with a joint at its limit is
-damped as one that is singular. Then level by level
+The staircase of the equalities alone gives an x. Where the inequalities are met, that is the
+answer, as in `tpm`, unless a bound fixes an unknown, for bounds are not damped. Where a row is
+exceeded, what lies along it is taken out of the equalities, in proportion up to all of it, and the
+staircase of the rest gives each level its lambda: an arm that would be singular with a joint at its
+limit is damped as one that is singular. Then level by level
 
-    min |A_k x - b_k|^2 + lambda_k^2 |x|^2, levels above at what they have reached,
+    min |A_k x - b_k|^2 + lambda_k^2 |x - c_k|^2, levels above at what they have reached,
 
-and last the distance to the reference. No lambda depends on which inequalities act, so each of
-these is one strictly convex problem, and its answer varies continuously with the data. From the
-staircase to these x jumps where a level alone would pass a bound that the answer keeps.
+and last the distance to the reference. c_k is the x of the staircase without what level k adds to
+it. So each level alone has that x for its minimum, and keeps it where inequalities allow. No lambda
+depends on which of them act, and what a level hands down is unique: x is continuous in the sides.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -183,13 +183,17 @@ def _factor_equalities(d, A, sizes, settings, work, whole):
 @compiled
 def damp_level(d, k):
     """Write the rows of damping below level k; return the number of rows up to them."""
-    n, end = d.free.size, ZERO
+    n, end, begin = d.free.size, ZERO, ZERO
     for j in range(k + 1):
-        end += d.sizes[j]
+        begin, end = begin + (d.ends[j] if j < k else 0), end + d.sizes[j]
     for t in range(n):
         for c in range(n):
             d.A[end + t, c] = d.factor[k] if c == t else 0.0
-        d.lower[end + t] = d.upper[end + t] = 0.0
+        d.lower[end + t] = d.factor[k] * d.free[t]
+    for q in range(begin, begin + d.ranks[k]):
+        add_multiple(d.lower[end:end + n], -d.factor[k] * inner_product(d.Q[q], d.free), d.Q[q])
+    for t in range(n):
+        d.upper[end + t] = d.lower[end + t]
     return end
 
 

@@ -27,7 +27,7 @@ from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import MET, PASS_STEPS, SEARCH_STEPS
+from solvers.kernels.tolerances import LARGER, MET, PASS_STEPS, SEARCH_STEPS
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     COARSE,
@@ -41,6 +41,7 @@ from solvers.kernels.working_set import (
     meet,
     rescale,
     restore,
+    take_up,
     working_set_size,
 )
 from solvers.status import (
@@ -122,7 +123,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
             x[c] = d.free[c]
         _keep_staircase(lower, upper, record)
         return finish(x, staircase)
-    whole = last >= 0 and d.factor[last] > 0.0 and length_of(reference) == 0.0
+    whole = last >= 0 and d.factor[last] > 0.0
     for k in range(sizes.size + (not whole)):
         if code != SOLVED or (k <= last and d.factor[k] == 0.0):
             continue
@@ -208,7 +209,8 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
             steps += tries
             code = _verified(s, code, YES)
     if code == SOLVED and neglects(s):
-        code = ZERO + INACCURATE
+        code, tries, more = _solve_with_light_rows(s, current, saved, limit - steps)
+        steps, blocks = steps + tries + more, blocks + tries
     elif code not in (SOLVED, NUMERICAL_FAILURE):
         finished = s.count[FINISHED]
         for c in range(n if finished == sizes.size or (code == UNPROVED and finished > 0) else 0):
@@ -219,6 +221,31 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     if code == ITERATION_LIMIT:
         record[3 * m + 2] = _resume(s, level)
     return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
+
+
+@inlined
+def _solve_with_light_rows(s, current, saved, limit):
+    """Go on with the rows that were neglected; return SOLVED if they make no answer large.
+
+    Else INACCURATE, with x as it was; and the tries in blocks and row by row.
+    """
+    n, steps, largest = s.x.size, ZERO, LARGER * (1.0 + length_of(s.x))
+    for c in range(n):
+        saved[c] = s.x[c]
+    s.count[FINISHED] = s.multiplier.shape[0]  # nothing else is saved
+    restore(s)
+    take_up(s)
+    code, tries = pivot_in_blocks(s, limit, YES)
+    if code != SOLVED and tries < limit:
+        restore(s)
+        code, steps, _ = pivot_one_by_one(
+            s, current, saved, min(limit - tries, SEARCH_STEPS * (s.A.shape[0] + n)), ZERO)
+        code = _verified(s, code, YES)
+    if code == SOLVED and length_of(s.x) <= largest:
+        return code, tries, steps
+    for c in range(n):
+        s.x[c] = saved[c]
+    return ZERO + INACCURATE, tries, steps
 
 
 @compiled
@@ -235,10 +262,12 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
     for c in range(n):
         found[c] = x[n + c]
     s, code, _ = _open(A, lower, upper, sizes, found, record, settings, work[at:])
-    for coarse in range(2 if code == SOLVED else 0):
+    for reading in range(4 if code == SOLVED else 0):
         if not proved:
-            s.count[COARSE] = coarse
+            s.count[COARSE] = reading % 2
             restore(s)
+            if reading == 2:
+                take_up(s)
             meet(s, sizes.size)
             write_multipliers(s, MET)
             for c in range(n):

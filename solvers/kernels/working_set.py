@@ -206,6 +206,14 @@ def restore(s):
             _measure(s, i)
 
 
+@compiled
+def take_up(s):
+    """Give the rows that are negligible beside those of other levels their norms."""
+    s.count[NEGLECTED] = 0
+    for i in range(s.A.shape[0]):
+        s.number[NORM, i] = abs(s.number[NORM, i])
+
+
 @inlined
 def value_at(s, i):
     """Return row i, as it is after cuts, times x."""

@@ -7,6 +7,8 @@ They differ from Python in one point: a work space that is too small is reported
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
@@ -46,121 +48,29 @@ from solvers.status import (
 )
 
 
-def solve_hcod(problem, settings, record, x, work, size):
-    """Solve like `Hcod`."""
-    code = judged(problem, settings, record, x, work, size)
-    if code != SOLVED:
-        return np.int32(code)
-    call = opened(problem, record, x, work, size)
-    _write_exact(call.settings, given(settings))
-    return closed(call, _hcod(call))
+def entry(solve: Callable[..., int]) -> Entry:
+    """Return the function of C around a solver of a Call and its settings, which returns a code."""
+    def entered(problem, settings, record, x, work, size):
+        code = judged(problem, settings, record, x, work, size)
+        if code != SOLVED:
+            return np.int32(code)
+        call, s = opened(problem, record, x, work, size), given(settings)
+        write_exact(call.settings, s)
+        return closed(call, solve(call, s))
 
-
-def solve_tpm(problem, settings, record, x, work, size):
-    """Solve like `Tpm` in its staircase form."""
-    code = judged(problem, settings, record, x, work, size)
-    if code != SOLVED:
-        return np.int32(code)
-    call = opened(problem, record, x, work, size)
-    _write_exact(call.settings, given(settings))
-    return closed(call, _tpm(call))
-
-
-def solve_recursive(problem, settings, record, x, work, size):
-    """Solve like `Recursive`."""
-    code = judged(problem, settings, record, x, work, size)
-    if code != SOLVED:
-        return np.int32(code)
-    call, s = opened(problem, record, x, work, size), given(settings)
-    _write_shared(call.settings, s)
-    call.settings[3], call.settings[4], call.settings[5] = s.method, s.isotropic, s.largest
-    begun(call, ZERO)
-    return closed(call, recursion(call.A, call.lower, call.upper, call.sizes, call.x, call.settings,
-                                  call.work))
-
-
-def solve_sns(problem, settings, record, x, work, size):
-    """Solve like `Sns`."""
-    code = judged(problem, settings, record, x, work, size)
-    if code != SOLVED:
-        return np.int32(code)
-    call, s = opened(problem, record, x, work, size), given(settings)
-    _write_shared(call.settings, s)
-    call.settings[3], call.settings[4] = s.optimal, s.miss
-    begun(call, call.x.size + call.sizes.size + 1)
-    values = call.values[:call.state[USED]]
-    code = sns(call.A, call.lower, call.upper, call.sizes, call.x, values, call.settings, call.work)
-    last = np.int64(values[values.size - 1])
-    if code == CONTRADICTION:
-        call.state[ROW] = last
-    else:
-        call.state[ITERATIONS] = last
-    return closed(call, code)
-
-
-def solve_merged(problem, settings, record, x, work, size):
-    """Solve like `Merged`, without damping."""
-    code = judged(problem, settings, record, x, work, size)
-    if code != SOLVED:
-        return np.int32(code)
-    call = opened(problem, record, x, work, size)
-    return closed(call, _merged(call, given(settings)))
-
-
-def violations_at(problem, x, norms):
-    """Write like `Hierarchy.violations`; infinity where that is not finite."""
-    code = judged_problem(problem)
-    if code == SOLVED and (x == 0 or norms == 0):
-        code = INVALID
-    if code == SOLVED and not violations(problem, x, norms):
-        code = NUMERICAL_FAILURE
-    return np.int32(code)
-
-
-def verify_x(problem, settings, record, x, work, size):
-    """Verify like `Resolution.verified`; x and the record are only read."""
-    code = can_open(problem, settings, record, x, work, size)
-    if code != SOLVED:
-        return np.int32(code)
-    call, s = opened(problem, record, x, work, size), given(settings)
-    (m, n), used = call.A.shape, call.state[USED]
-    _write_exact(call.settings, s)
-    both = call.work[:2 * n]
-    for c in range(n):
-        both[c] = call.x[c]
-        both[n + c] = call.reference[c] if call.reference.size > 0 else 0.0
-    states, first = call.work[2 * n:2 * n + m], used - 3 * m - 3
-    known = first == 0 or first == n + call.sizes.size
-    for i in range(m):  # without a record of `hcod` or `tpm` no inequality acts
-        states[i] = call.values[first + i] if known else 0.0
-    return np.int32(verify_answer(call.A, call.lower, call.upper, call.sizes, both, states,
-                                  call.settings, call.work[2 * n + m:]))
-
-
-def size_of_work(n, m, levels):
-    """Return the numbers that a work space needs, -1 for sizes out of range."""
-    return work_size(n, m, levels) if in_range(n, m, levels) else -1
-
-
-def size_of_record(n, m, levels):
-    """Return the numbers that a record needs, -1 for sizes out of range."""
-    return record_size(n, m, levels) if in_range(n, m, levels) else -1
+    return Entry(entered, 6, STATUS, NUMERICAL_FAILURE)
 
 
 @inlined
-def _write_shared(settings, s):
+def write_exact(settings, s):
+    """Write the settings of the exact kernels, of which the first three are those of all."""
     settings[0], settings[1], settings[2] = s.damping, s.threshold, s.rank_tolerance
-
-
-@inlined
-def _write_exact(settings, s):
-    _write_shared(settings, s)
     settings[3], settings[4] = s.tolerance, s.max_iterations
 
 
-@inlined
-def _hcod(call):
-    """Solve like `Hcod.solve`."""
+@compiled
+def solve_hcod(call, s):
+    """Solve like `Hcod`."""
     size = 3 * call.lower.size + 3
     begun(call, size)
     code = exactly(call, call.values[:size])
@@ -170,11 +80,29 @@ def _hcod(call):
 
 
 @compiled
-def _merged(call, s):
-    """Solve like `Merged.solve`; INVALID with damping, or a scale that is not positive."""
+def solve_recursive(call, s):
+    """Solve like `Recursive`."""
+    call.settings[3], call.settings[4], call.settings[5] = s.method, s.isotropic, s.largest
+    begun(call, ZERO)
+    return recursion(call.A, call.lower, call.upper, call.sizes, call.x, call.settings, call.work)
+
+
+@compiled
+def solve_sns(call, s):
+    """Solve like `Sns`."""
+    call.settings[3], call.settings[4] = s.optimal, s.miss
+    begun(call, call.x.size + call.sizes.size + 1)
+    values = call.values[:call.state[USED]]
+    code = sns(call.A, call.lower, call.upper, call.sizes, call.x, values, call.settings, call.work)
+    call.state[ROW if code == CONTRADICTION else ITERATIONS] = np.int64(values[values.size - 1])
+    return code
+
+
+@compiled
+def solve_merged(call, s):
+    """Solve like `Merged`; INVALID with damping, or a scale that is not positive."""
     (m, n), levels = call.A.shape, call.sizes.size
     own, scale = call.work[:OWN + 2 * levels], call.work[OWN + 2 * levels:OWN + 3 * levels]
-    _write_exact(call.settings, s)
     begun(call, merged_record(n, m))
     given_scale = numbers_at(s.scales, levels if s.scales != 0 else ZERO)
     for k in range(levels):
@@ -183,7 +111,7 @@ def _merged(call, s):
             return ZERO + INVALID
     if s.damping > 0.0:
         return ZERO + INVALID
-    _write_exact(own, s)
+    write_exact(own, s)
     own[5], own[6], own[7] = s.strict_levels, s.regularisation, s.step
     write_levels(own, s.ratio, s.cap, scale)
     record = call.values[:call.state[USED]]
@@ -203,9 +131,9 @@ def exactly(call, record):
                            call.settings, call.work)
 
 
-@inlined
-def _tpm(call):
-    """Solve like `Tpm.solve`: warm from the active bounds, cold if none is active any more."""
+@compiled
+def solve_tpm(call, s):
+    """Solve like `Tpm`: warm from the active bounds, cold if none is active any more."""
     size = call.x.size + call.sizes.size + 3 * call.lower.size + 3
     warm = begun(call, size)
     if warm:
@@ -242,13 +170,49 @@ def _within_bounds(call, record, warm):
     return code
 
 
-RESOLVERS = {
-    "hcod": Entry(solve_hcod, 6, STATUS, NUMERICAL_FAILURE),
-    "tpm": Entry(solve_tpm, 6, STATUS, NUMERICAL_FAILURE),
-    "recursive": Entry(solve_recursive, 6, STATUS, NUMERICAL_FAILURE),
-    "sns": Entry(solve_sns, 6, STATUS, NUMERICAL_FAILURE),
-    "merged": Entry(solve_merged, 6, STATUS, NUMERICAL_FAILURE),
-}
+def violations_at(problem, x, norms):
+    """Write like `Hierarchy.violations`; infinity where that is not finite."""
+    code = judged_problem(problem)
+    if code == SOLVED and (x == 0 or norms == 0):
+        code = INVALID
+    if code == SOLVED and not violations(problem, x, norms):
+        code = NUMERICAL_FAILURE
+    return np.int32(code)
+
+
+def verify_x(problem, settings, record, x, work, size):
+    """Verify like `Resolution.verified`; x and the record are only read."""
+    code = can_open(problem, settings, record, x, work, size)
+    if code != SOLVED:
+        return np.int32(code)
+    call, s = opened(problem, record, x, work, size), given(settings)
+    (m, n), used = call.A.shape, call.state[USED]
+    write_exact(call.settings, s)
+    both = call.work[:2 * n]
+    for c in range(n):
+        both[c] = call.x[c]
+        both[n + c] = call.reference[c] if call.reference.size > 0 else 0.0
+    states, first = call.work[2 * n:2 * n + m], used - 3 * m - 3
+    known = first == 0 or first == n + call.sizes.size
+    for i in range(m):  # without a record of `hcod` or `tpm` no inequality acts
+        states[i] = call.values[first + i] if known else 0.0
+    return np.int32(verify_answer(call.A, call.lower, call.upper, call.sizes, both, states,
+                                  call.settings, call.work[2 * n + m:]))
+
+
+def size_of_work(n, m, levels):
+    """Return the numbers that a work space needs, -1 for sizes out of range."""
+    return work_size(n, m, levels) if in_range(n, m, levels) else -1
+
+
+def size_of_record(n, m, levels):
+    """Return the numbers that a record needs, -1 for sizes out of range."""
+    return record_size(n, m, levels) if in_range(n, m, levels) else -1
+
+
+RESOLVERS = {"hcod": entry(solve_hcod), "tpm": entry(solve_tpm),
+             "recursive": entry(solve_recursive), "sns": entry(solve_sns),
+             "merged": entry(solve_merged)}
 ALWAYS = {"th_work_size": Entry(size_of_work, 3, INTEGER, -1),
           "th_record_size": Entry(size_of_record, 3, INTEGER, -1),
           "th_verify": Entry(verify_x, 6, STATUS, NUMERICAL_FAILURE),

@@ -75,22 +75,27 @@ class Collection:
     @property
     def digest(self) -> str:
         """SHA-256 of the problems, in hexadecimal, without answers and head."""
-        return _digest(_packed_problems(self.problems))
+        return _digest(_packed(_DATA, self.problems))
 
     def save(self, path: str | Path) -> None:
         """Write a file; the same content makes the same bytes."""
-        arrays = _packed_problems(self.problems)
+        for p, h in enumerate(self.problems):
+            if h.metric is not None or h.giving:
+                what = "has a metric" if h.metric is not None else "gives"
+                raise HierarchyError(f"problem {p} {what}, which version {VERSION} of the format "
+                                     "does not know")
+        arrays = _packed(_DATA, self.problems)
         head = {"format": FORMAT, "version": VERSION, **asdict(self.head),
                 "count": len(self.problems), "answers": self.answers is not None,
                 "sha256": _digest(arrays)}
         if self.answers is not None:
-            arrays |= _packed_answers(self.answers)
+            arrays |= _packed(_ANSWERS, self.answers)
         with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-            _add(archive, _HEAD, json.dumps(head, indent=1).encode())
+            archive.writestr(zipfile.ZipInfo(_HEAD, _STAMP), json.dumps(head, indent=1))
             for name, values in arrays.items():
                 stream = io.BytesIO()
                 np.lib.format.write_array(stream, values, version=(1, 0), allow_pickle=False)
-                _add(archive, f"{name}.npy", stream.getvalue())
+                archive.writestr(zipfile.ZipInfo(f"{name}.npy", _STAMP), stream.getvalue())
 
 
 def read(path: str | Path) -> Collection:
@@ -104,7 +109,7 @@ def read(path: str | Path) -> Collection:
     head, arrays = _opened(Path(path))
     try:
         problems = tuple(_unpacked(arrays))
-        answers = tuple(_answers(arrays, problems)) if head["answers"] else None
+        answers = _answers(arrays, problems) if head["answers"] else None
     except ValueError as error:
         raise ProblemFileError(f"{path}: {error}") from error
     if len(problems) != head["count"]:
@@ -159,76 +164,53 @@ def _reason(error: Exception) -> str:
     return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
 
 
-def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
-    archive.writestr(zipfile.ZipInfo(name, _STAMP), content)
-
-
-def _packed_problems(problems: Sequence[Hierarchy]) -> Arrays:
-    for p, h in enumerate(problems):
-        if h.metric is not None or h.giving:
-            what = "has a metric" if h.metric is not None else "gives"
-            raise HierarchyError(f"problem {p} {what}, which version {VERSION} of the format does "
-                                 "not know")
-    columns: dict[str, list[Any]] = {
-        "n": [[h.n] for h in problems], "levels": [[len(h.sizes)] for h in problems],
-         "sizes": [h.sizes for h in problems], "A": [h.A.ravel() for h in problems],
-        "lower": [h.lower for h in problems], "upper": [h.upper for h in problems],
-        "reference": [h.reference for h in problems]}
-    return _joined(columns, _DATA)
-
-
-def _packed_answers(answers: Sequence[Proof]) -> Arrays:
-    columns = {name: [np.atleast_1d(getattr(one, name)) for one in answers] for name in _ANSWERS}
-    return _joined(columns, _ANSWERS)
-
-
-def _joined(columns: dict[str, list[Any]], kinds: dict[str, str]) -> Arrays:
-    return {name: np.concatenate([np.empty(0), *parts]).astype(f"<{kinds[name]}")
-            for name, parts in columns.items()}
+def _packed(kinds: dict[str, str], things: Sequence[Any]) -> Arrays:
+    """Return what each of the problems or answers has of each name, one after the other."""
+    return {name: np.concatenate([np.empty(0), *(
+        np.ravel(len(one.sizes) if name == "levels" else getattr(one, name)) for one in things)]
+        ).astype(f"<{kind}") for name, kind in kinds.items()}
 
 
 def _unpacked(arrays: Arrays) -> Iterable[Hierarchy]:
     """Yield the problems; raises ValueError where lengths do not fit or a row is not valid."""
-    rest = {name: values for name, values in arrays.items() if name in _DATA}
-    if len(rest["n"]) != len(rest["levels"]):
-        raise ValueError(f"n is of {len(rest['n'])} problems and levels of {len(rest['levels'])}")
-    for p, (n, count) in enumerate(zip(rest["n"].tolist(), rest["levels"].tolist(), strict=True)):
-        sizes = _taken(rest, "sizes", count, p).tolist()
-        m = sum(sizes)
-        if n < 1 or min(sizes, default=0) < 0:
-            raise ValueError(f"problem {p}: n = {n}, sizes = {sizes}")
-        reference, A = _taken(rest, "reference", n, p), _taken(rest, "A", m * n, p).reshape(m, n)
-        lower, upper = _taken(rest, "lower", m, p), _taken(rest, "upper", m, p)
+    n, levels = arrays["n"].tolist(), arrays["levels"].tolist()
+    if len(n) != len(levels):
+        raise ValueError(f"n is of {len(n)} problems and levels of {len(levels)}")
+    sizes = [one.tolist() for one in _parts(arrays, "sizes", levels)]
+    for p, own in enumerate(sizes):
+        if n[p] < 1 or min(own, default=0) < 0:
+            raise ValueError(f"problem {p}: n = {n[p]}, sizes = {own}")
+    m = [sum(own) for own in sizes]
+    entries = [a * b for a, b in zip(m, n, strict=True)]
+    numbers = (_parts(arrays, name, counts) for name, counts in (
+        ("reference", n), ("A", entries), ("lower", m), ("upper", m)))
+    for p, (reference, A, lower, upper) in enumerate(zip(*numbers, strict=True)):
         try:
-            yield Hierarchy(A, lower, upper, sizes, reference)
+            yield Hierarchy(A.reshape(m[p], n[p]), lower, upper, sizes[p], reference)
         except HierarchyError as error:
             raise ValueError(f"problem {p}, {error}") from error
-    _all_taken(rest, ("sizes", "A", "lower", "upper", "reference"))
 
 
-def _answers(arrays: Arrays, problems: Sequence[Hierarchy]) -> Iterable[Proof]:
-    rest = {name: values for name, values in arrays.items() if name in _ANSWERS}
-    for p, h in enumerate(problems):
-        x, least = _taken(rest, "x", h.n, p), _taken(rest, "least", len(h.sizes), p)
-        proved, posed = (int(_taken(rest, name, 1, p)[0]) for name in ("proved", "posed"))
-        shift, turn = (float(_taken(rest, name, 1, p)[0]) for name in ("shift", "turn"))
-        yield Proof(x, least, proved, posed, shift, turn)
-    _all_taken(rest, tuple(_ANSWERS))
+def _answers(arrays: Arrays, problems: Sequence[Hierarchy]) -> tuple[Proof, ...]:
+    one = [1] * len(problems)
+    counts = {"x": [h.n for h in problems], "least": [len(h.sizes) for h in problems]}
+    columns = [_parts(arrays, name, counts.get(name, one)) for name in _ANSWERS]
+    return tuple(Proof(x, least, *(number.item() for number in numbers))
+                 for x, least, *numbers in zip(*columns, strict=True))
 
 
-def _taken(rest: Arrays, name: str, count: int, p: int) -> NDArray[Any]:
-    """Return the next numbers of an array and leave the others."""
-    if not 0 <= count <= len(rest[name]):
-        raise ValueError(f"{name} is too short: problem {p} needs {count} more numbers, there are "
-                         f"{len(rest[name])}")
-    taken, rest[name] = rest[name][:count].copy(), rest[name][count:]
-    return taken
-
-
-def _all_taken(rest: Arrays, names: Sequence[str]) -> None:
-    for name in names:
-        if len(rest[name]):
-            raise ValueError(f"{name} has {len(rest[name])} numbers more than the problems need")
+def _parts(arrays: Arrays, name: str, counts: Sequence[int]) -> list[NDArray[Any]]:
+    """Return the numbers of each problem in an array, of which there must be as many."""
+    rest, parts = arrays[name], []
+    for p, count in enumerate(counts):
+        if not 0 <= count <= len(rest):
+            raise ValueError(f"{name} is too short: problem {p} needs {count} more numbers, there "
+                             f"are {len(rest)}")
+        parts.append(rest[:count].copy())
+        rest = rest[count:]
+    if len(rest):
+        raise ValueError(f"{name} has {len(rest)} numbers more than the problems need")
+    return parts
 
 
 def _digest(arrays: Arrays) -> str:

@@ -13,10 +13,8 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.qp.backends import Backend, backend_of
 from solvers.qp.programs import null_space_program, slack_program
 from solvers.qp.refinement import EXACT, Rows, below_largest, refined, split
-from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.resolver import Handles, Resolution, Resolver, number, one_of, register
 from solvers.status import Status
-
-FORMS = ("null-space", "slack")
 
 _SHARE = 0.01  # of the declared accuracy: allowed error of one level, which lower levels magnify
 _BROKEN = 1e-4  # excess of a row that must hold, relative to 1 + its side
@@ -57,8 +55,8 @@ class Hqp(Resolver):
     """
 
     backend: str = "proxqp"
-    form: str = "null-space"
-    slack: float = 1e-7
+    form: str = one_of("null-space", "slack")
+    slack: float = number(1e-7, high=1.0)
 
     name: ClassVar[str] = "hqp"
     handles: ClassVar[Handles] = "inequalities"
@@ -66,8 +64,6 @@ class Hqp(Resolver):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._number("slack", 0.0, 1.0)
-        self._one_of("form", FORMS)
         backend_of(self.backend)
 
     @property

@@ -8,13 +8,12 @@ from functools import cached_property
 from typing import ClassVar, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.kernels.merged import BY_RULE, NOTHING, merged, record_size, write_levels
-from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.resolver import Handles, Resolution, Resolver, number, register, whole_number
 from solvers.resolvers.hcod import Hcod, warm_record
 from solvers.status import Status
 from solvers.workspace import entry, run
@@ -24,23 +23,16 @@ from solvers.workspace import entry, run
 class MergedResolution(Resolution):
     """A resolution whose memory is y (m,), the iterations, and a working set."""
 
-    __slots__ = ("_m",)
-
-    memory: Array
+    __slots__ = ("_carried",)
 
     def __init__(self, x: Array, status: Status, memory: Array, m: int) -> None:
-        super().__init__(x, status, int(memory[m]), memory)
-        self._m = m
-
-    @property
-    def active(self) -> NDArray[np.int8]:
-        """State of each row: (m,)."""
-        return self.memory[self._m + 1:2 * self._m + 1].astype(np.int8)
+        super().__init__(x, status, int(memory[m]), memory, memory[m + 1:2 * m + 1])
+        self._carried = memory[:m]
 
     @property
     def carried(self) -> Array:
         """By how much the sides of each row move in the next solve: (m,), in its unit."""
-        return self.memory[:self._m].copy()
+        return self._carried.copy()
 
 
 @final
@@ -68,25 +60,17 @@ class Merged(Resolver):
     handles: ClassVar[Handles] = "inequalities"
     damps: ClassVar[str] = "the merged level as a whole"
     damps_with_bounds: ClassVar[str] = damps
-    ratio: float = 4.0
+    ratio: float = number(4.0, 1.0, 1e6)
     scales: Mapping[str, float] | tuple[tuple[str, float], ...] = ()
-    cap: float = 1.0
-    step: float = 0.1
-    strict_levels: int | None = None
-    regularisation: float = 1e-3
-    tolerance: float = Hcod.tolerance
-    max_iterations: int = Hcod.max_iterations
+    cap: float = number(1.0)
+    step: float = number(0.1, high=np.nextafter(1.0, 2.0), open_below=True)
+    strict_levels: int | None = whole_number(None, 0)
+    regularisation: float = number(1e-3)
+    tolerance: float = number(Hcod.tolerance, high=1e-3, open_below=True)
+    max_iterations: int = whole_number(Hcod.max_iterations, 1)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._number("ratio", 1.0, 1e6)
-        self._number("cap", 0.0, np.inf)
-        self._number("step", 0.0, np.nextafter(1.0, 2.0), open_below=True)
-        self._number("regularisation", 0.0, np.inf)
-        self._number("tolerance", 0.0, 1e-3, open_below=True)
-        self._whole_number("max_iterations", 1)
-        if self.strict_levels is not None:
-            self._whole_number("strict_levels", 0)
         set_frozen(self, scales=_checked(self.scales))
 
     @property

@@ -12,33 +12,13 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.resolver import Handles, Resolution, Resolver
-from solvers.status import EQUAL, FREE, LOWER, UPPER, Status
-
-
-@final
-class ModeResolution(Resolution):
-    """The resolution of the mode that was chosen; `iterations` is the number of modes resolved.
-
-    active : (m,) int8, 2 for an equality, +1 or -1 for a row frozen at its upper or lower side, 0
-        for a row that is ignored.
-    """
-
-    __slots__ = ("_active",)
-
-    def __init__(self, x: Array, status: Status, modes: int, active: NDArray[np.int8]) -> None:
-        super().__init__(x, status, modes)
-        self._active = active
-
-    @property
-    def active(self) -> NDArray[np.int8]:
-        """State of each row (m,)."""
-        return self._active
+from solvers.resolver import Around, Handles, Resolution, number, whole_number
+from solvers.status import EQUAL, FREE, LOWER, UPPER
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class SetBased(Resolver):
+class SetBased(Around):
     """The modes of set-based tasks over the equality stacks that `inner` resolves.
 
     A row with one side is the extended tangent cone of a task at the bound of its set or beyond
@@ -56,42 +36,25 @@ class SetBased(Resolver):
     and AI 3:16 (2016).
     """
 
-    inner: Resolver
-    tolerance: float = 1e-10
-    most: int = 256
+    tolerance: float = number(1e-10, high=1e-3)
+    most: int = whole_number(256, 1)
     name: ClassVar[str] = "set-based"
     handles: ClassVar[Handles] = "inequalities"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._number("tolerance", 0.0, 1e-3)
-        self._whole_number("most", 1)
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
+        """Resolve h; every mode is resolved afresh, `memory` is not used.
 
-    @property
-    def label(self) -> str:
-        """The label of the inner resolver."""
-        return self.inner.label
-
-    @property
-    def strict(self) -> bool:
-        """Whether the inner resolver is."""
-        return self.inner.strict
-
-    @property
-    def accuracy(self) -> float:
-        """The accuracy of the inner resolver."""
-        return self.inner.accuracy
-
-    def solve(self, h: Hierarchy, memory: Array | None = None) -> ModeResolution:
-        """Resolve h; every mode is resolved afresh, `memory` is not used."""
+        Of the mode that was chosen `active` says EQUAL for an equality, UPPER or LOWER for a frozen
+        row, FREE for one that is ignored; `iterations` is the number of modes resolved.
+        """
         active = _states(h)
         edges = np.flatnonzero((active == LOWER) | (active == UPPER))
-        for number, frozen in enumerate(_modes(edges, self.most), 1):
+        for count, frozen in enumerate(_modes(edges, self.most), 1):
             ignored = np.setdiff1d(edges, frozen, assume_unique=True)
             found = self.inner.solve(_mode(h, active, ignored))
             if self._in_tangent_cones(h, ignored, found.x):
                 active[ignored] = FREE
-                return ModeResolution(found.x, found.status, number, active)
+                return Resolution(found.x, found.status, count, active=active)
         raise AssertionError("the last mode ignores no row")
 
     def _in_tangent_cones(self, h: Hierarchy, rows: NDArray[np.int64], x: Array) -> bool:

@@ -31,7 +31,7 @@ import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.met import plainly_met
-from solvers.resolver import Handles, Resolution, Resolver
+from solvers.resolver import Around, Handles, Resolution, Resolver, number
 from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.status import Status
 
@@ -45,7 +45,7 @@ _PACE = 1e-5      # [rad/s or m/s] by which levels below may always change the s
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Settled(Resolver):
+class Settled(Around):
     """Resolves as `inner`, but the levels named in `curved` come to rest where they cannot be met.
 
     period : T [s] for which x, a velocity, will be held.
@@ -55,32 +55,11 @@ class Settled(Resolver):
     Theory: the module's docstring.
     """
 
-    inner: Resolver
-    period: float
-    softness: float = 1.0
+    period: float = number(open_below=True)
+    softness: float = number(1.0)
     curved: frozenset[str] = frozenset()
     name: ClassVar[str] = "settled"
     handles: ClassVar[Handles] = "inequalities"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._number("period", 0.0, np.inf, open_below=True)
-        self._number("softness", 0.0, np.inf)
-
-    @property
-    def label(self) -> str:
-        """The label of the inner resolver."""
-        return self.inner.label
-
-    @property
-    def strict(self) -> bool:
-        """Whether the inner resolver is."""
-        return self.inner.strict
-
-    @property
-    def accuracy(self) -> float:
-        """The accuracy of the inner resolver."""
-        return self.inner.accuracy
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; where a curved level is not plainly met, some problems of the levels to it."""

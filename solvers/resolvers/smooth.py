@@ -27,7 +27,15 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.resolver import Handles, Resolution, Resolver, refuse_inequality, register
+from solvers.resolver import (
+    Around,
+    Handles,
+    Resolution,
+    Resolver,
+    number,
+    refuse_inequality,
+    register,
+)
 from solvers.status import Status
 
 
@@ -54,13 +62,9 @@ class Smooth(Resolver):
 
     name: ClassVar[str] = "smooth"
     handles: ClassVar[Handles] = "activations"
-    damping: float = 1e-4
-    threshold: float = 1e-2
-    eta: float = 10.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._number("eta", 0.0, np.inf, open_below=True)
+    damping: float = number(1e-4)
+    threshold: float = number(1e-2, open_below=True)
+    eta: float = number(10.0, open_below=True)
 
     @property
     def strict(self) -> bool:
@@ -123,7 +127,7 @@ class Smooth(Resolver):
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Activated(Resolver):
+class Activated(Around):
     """A `Smooth` resolver with the `activation` (m,) that is called at each solve.
 
     A hierarchy with fewer levels takes the first of the activations.
@@ -133,16 +137,6 @@ class Activated(Resolver):
     activation: Callable[[], Array]
     name: ClassVar[str] = "smooth"
     handles: ClassVar[Handles] = "activations"
-
-    @property
-    def strict(self) -> bool:
-        """As the inner resolver."""
-        return self.inner.strict
-
-    @property
-    def accuracy(self) -> float:
-        """As the inner resolver."""
-        return self.inner.accuracy
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h at the present activations."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, final
 
 import numpy as np
@@ -11,13 +10,10 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.sns import sns
-from solvers.resolver import Handles, Resolution, Resolver, register
-from solvers.resolvers.saturation import SaturatedResolution
+from solvers.resolution import SaturatedResolution
+from solvers.resolver import Handles, Resolution, Resolver, one_of, register
 from solvers.status import CONTRADICTION, TOO_SMALL, Status
 from solvers.workspace import WORKSPACE
-
-FORMS = ("basic", "optimal")
-SCALES = ("target", "miss")
 
 
 @final
@@ -43,24 +39,8 @@ class Sns(Resolver):
     name: ClassVar[str] = "sns"
     handles: ClassVar[Handles] = "bounds"
     damps_with_bounds: ClassVar[str] = "each task on the joints that are not saturated"
-    form: str = "basic"
-    scales: str = "target"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._one_of("form", FORMS)
-        self._one_of("scales", SCALES)
-
-    @property
-    def label(self) -> str:
-        """`sns`, with the form and the scaling where they are not the defaults."""
-        form = "" if self.form == "basic" else f" {self.form}"
-        return self.name + form + ("" if self.scales == "target" else f" {self.scales}")
-
-    @cached_property
-    def _settings(self) -> Array:
-        return np.array([self.damping, self.threshold, self.rank_tolerance,
-                         self.form == "optimal", self.scales == "miss"], dtype=float)
+    form: str = one_of("basic", "optimal")
+    scales: str = one_of("target", "miss")
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h and return a `SaturatedResolution`; `memory` is ignored."""

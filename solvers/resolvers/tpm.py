@@ -15,16 +15,17 @@ from hierarchy.records import set_frozen
 from solvers.kernels.bounds import name_saturation, solve_without_bounds
 from solvers.kernels.published import matrix_as_published, solve_as_published
 from solvers.kernels.staircase import solve_by_staircase
+from solvers.resolution import SaturatedResolution
 from solvers.resolver import (
     Handles,
     Resolution,
     Resolver,
+    one_of,
     refuse_inequality,
     register,
     register_variant,
 )
 from solvers.resolvers.hcod import Hcod, solve_exactly, warm_record
-from solvers.resolvers.saturation import SaturatedResolution
 from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
 from solvers.workspace import WORKSPACE, entry, run
 
@@ -54,11 +55,10 @@ class Tpm(Resolver):
     name: ClassVar[str] = "tpm"
     handles: ClassVar[Handles] = "bounds"
     damps_with_bounds: ClassVar[str] = Hcod.damps_with_bounds
-    form: str = "staircase"
+    form: str = one_of(*FORMS)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._one_of("form", FORMS)
         if self.form == "published":
             set_frozen(self, handles="equalities", damps="each pivot", damps_with_bounds="")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import ClassVar, final
@@ -17,30 +17,17 @@ from solvers.kernels.weighted import weighted, weighted_steps
 from solvers.qp.backends import BACKENDS, backend_of
 from solvers.qp.programs import slack_program
 from solvers.qp.refinement import Rows
-from solvers.resolver import Handles, Resolution, Resolver, register
+from solvers.resolver import Handles, Resolution, Resolver, number, one_of, register, whole_number
 from solvers.resolvers.hcod import Hcod, warm_record
 from solvers.resolvers.merged import Merged
-from solvers.status import SOLVED, TOO_SMALL, UNPROVED, Status
+from solvers.status import TOO_SMALL, UNPROVED, Status
 from solvers.workspace import WORKSPACE, run
 
 OWN = "own"
 Mask = NDArray[np.bool_]
+_SOLVED = Status.SOLVED
 _OUTSIDE = 1e-9  # of |a| |x| + |side|: a larger miss means contradictory constraints
 _NEAR = 1e-6  # distance, relative to 1 + |x|, at which a backend's x counts as on a side
-
-
-@final
-class WeightedResolution(Resolution):
-    """A resolution that reports the state of each row, the first m entries of its memory."""
-
-    __slots__ = ()
-
-    memory: Array
-
-    @property
-    def active(self) -> NDArray[np.int8]:
-        """State of each row: (m,)."""
-        return self.memory[:len(self.memory) // 2].astype(np.int8)
 
 
 @final
@@ -66,26 +53,18 @@ class Weighted(Resolver):
     handles: ClassVar[Handles] = "inequalities"
     damps: ClassVar[str] = "all active soft rows as one level"
     damps_with_bounds: ClassVar[str] = damps
-    ratio: float = 100.0
+    ratio: float = number(100.0, 1.0)
     weights: Sequence[float] | None = None
-    strict_levels: int = 0
-    regularisation: float = 1e-6
-    hard_levels: int = 1
-    backend: str = OWN
-    tolerance: float = 1e-10
-    guesses: int = 10
-    max_iterations: int = 1000
+    strict_levels: int = whole_number(0, 0)
+    regularisation: float = number(1e-6, open_below=True)
+    hard_levels: int = whole_number(1, 0)
+    backend: str = one_of(OWN, *BACKENDS)
+    tolerance: float = number(1e-10, high=1e-3, open_below=True)
+    guesses: int = whole_number(10, 1)
+    max_iterations: int = whole_number(1000, 1)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._number("ratio", 1.0, np.inf)
-        self._number("regularisation", 0.0, np.inf, open_below=True)
-        self._number("tolerance", 0.0, 1e-3, open_below=True)
-        self._whole_number("strict_levels", 0)
-        self._whole_number("hard_levels", 0)
-        self._whole_number("guesses", 1)
-        self._whole_number("max_iterations", 1)
-        self._one_of("backend", (OWN, *BACKENDS))
         if self.backend != OWN:
             backend_of(self.backend)
         if self.weights is not None:
@@ -106,18 +85,12 @@ class Weighted(Resolver):
         return self.name + ratio + strict + (f" {self.backend}" if self.backend != OWN else "")
 
     @cached_property
-    def _known(self) -> dict[int, Array]:
-        """Cache of `_settings_for`."""
-        return {}
-
-    def _settings_for(self, levels: int) -> Array:
-        """Return the kernels' `Options`, followed by the weight of each level."""
-        if levels not in self._known:
-            self._known[levels] = np.array([
-                self.damping, self.threshold, self.rank_tolerance, self.regularisation,
-                self.tolerance, self.hard_levels, self.guesses, self.max_iterations,
-                *self._weights(levels)])
-        return self._known[levels]
+    def _settings_for(self) -> Callable[[int], Array]:
+        """The kernels' `Options`, followed by the weight of each level, by the number of these."""
+        return cache(lambda levels: np.array([
+            self.damping, self.threshold, self.rank_tolerance, self.regularisation,
+            self.tolerance, self.hard_levels, self.guesses, self.max_iterations,
+            *self._weights(levels)]))
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h, starting from the row states of an earlier resolution if given."""
@@ -127,32 +100,31 @@ class Weighted(Resolver):
         record = warm_record(memory, 2 * h.m + 1)
         settings = self._settings_for(len(h.names))
         code = weighted(*h.rows, x, record, settings, WORKSPACE.array)
-        if code == SOLVED:
-            return WeightedResolution(x, Status.SOLVED, int(record[-1]), record)
         if code == TOO_SMALL:
             return self._otherwise(h, x, code, memory)
         if code == UNPROVED:
             return self._continued(h, settings, record)
-        return WeightedResolution(x, Status(code), int(record[-1]), record)
-
-    def _below(self, names: tuple[str, ...]) -> Merged:
-        """Return what resolves levels of these names below `strict_levels`: without a memory."""
-        if names not in self._merging:
-            weights = self._weights(len(names))
-            self._merging[names] = Merged(
-                ratio=1.0, scales=dict(zip(names, (1.0 / weights).tolist(), strict=True)), cap=0.0,
-                strict_levels=max(0, min(self.strict_levels, len(names) - 1)), regularisation=0.0,
-                rank_tolerance=self.rank_tolerance, damping=self.damping, threshold=self.threshold)
-        return self._merging[names]
+        return _reported(x, code, record)
 
     @cached_property
-    def _merging(self) -> dict[tuple[str, ...], Merged]:
-        """Cache of `_below`."""
-        return {}
+    def _below(self) -> Callable[[tuple[str, ...]], Merged]:
+        """What resolves levels below `strict_levels`, without a memory, by their names."""
+        return cache(lambda names: Merged(
+            ratio=1.0, cap=0.0, regularisation=0.0, rank_tolerance=self.rank_tolerance,
+            scales=dict(zip(names, (1.0 / self._weights(len(names))).tolist(), strict=True)),
+            strict_levels=max(0, min(self.strict_levels, len(names) - 1)),
+            damping=self.damping, threshold=self.threshold))
+
+    @cached_property
+    def _inside(self) -> Hcod:
+        return Hcod(rank_tolerance=self.rank_tolerance)
 
     def _weights(self, levels: int) -> Array:
+        """Return weights (L,), 1 for the lowest; where they overflow, the status reports it."""
         if self.weights is None:
-            return _geometric(self.ratio, levels)
+            with np.errstate(over="ignore"):
+                powers = self.ratio ** np.arange(levels - 1, -1, -1.0)
+            return np.minimum(powers, np.finfo(float).max)
         if len(self.weights) != levels:
             raise HierarchyError(f"weighted: {len(self.weights)} weights for {levels} levels")
         return np.array(self.weights)
@@ -161,26 +133,26 @@ class Weighted(Resolver):
         """Continue after the guesses, from an x within the constraints or from a backend's x."""
         hard, x = record[h.m:2 * h.m] == np.inf, h.start()
         if hard.any():
-            inside = self._within(h, hard)
-            x = inside.x
-            if inside.status is not Status.SOLVED:
-                return Resolution(x, inside.status, int(record[-1]))
+            x, status = self._within(h, hard)
+            if status is not Status.SOLVED:
+                return Resolution(x, status, int(record.item(-1)))
         if self.backend != OWN:
             return self._by_backend(h, settings, record, hard, x)
         answer = np.array([x, h.reference])
         code = run(weighted_steps, *h.rows, answer, record, settings)
-        return WeightedResolution(answer[0].copy(), Status(code), int(record[-1]), record)
+        return _reported(answer[0].copy(), code, record)
 
-    def _within(self, h: Hierarchy, hard: Mask) -> Resolution:
+    def _within(self, h: Hierarchy, hard: Mask) -> tuple[Array, Status]:
         """Return the feasible x nearest to the reference; INACCURATE if there is none."""
         limits = h.changed(A=h.A[hard], lower=h.lower[hard], upper=h.upper[hard],
                            sizes=[hard.sum()], names=("constraints",), give=None)
-        x, status = _nearest(limits, self.rank_tolerance)
+        found = self._inside.solve(limits)
+        x, status = found.x, found.status
         value, slack = limits.A @ x, limits.slacks(x)
         size = np.linalg.norm(limits.A, axis=1) * np.linalg.norm(x) + abs(value - slack)
         if status is Status.SOLVED and (abs(slack) > _OUTSIDE * size).any():
             status = Status.INACCURATE
-        return Resolution(x, status)
+        return x, status
 
     def _by_backend(self, h: Hierarchy, settings: Array, record: Array, hard: Mask,
                     inside: Array) -> Resolution:
@@ -191,10 +163,10 @@ class Weighted(Resolver):
         code = run(weighted, *h.rows, x, record, settings)
         record[-1] += before
         if code != UNPROVED:
-            return WeightedResolution(x, Status(code), int(record[-1]), record)
+            return _reported(x, code, record)
         if vouched:
-            return Resolution(found, Status.INACCURATE, int(record[-1]))
-        return Resolution(inside, Status.BACKEND_FAILURE, int(record[-1]))
+            return Resolution(found, Status.INACCURATE, int(record.item(-1)))
+        return Resolution(inside, Status.BACKEND_FAILURE, int(record.item(-1)))
 
     def _backend_x(self, h: Hierarchy, hard: Mask, weight: Array) -> tuple[Array, bool]:
         """Return the backend's x (n,), and whether the backend vouches for it."""
@@ -242,24 +214,16 @@ def lexicographic_weights(violations: ArrayLike, tolerance: float, regularised: 
     return tuple(reversed(weights))
 
 
+def _reported(x: Array, code: int, record: Array) -> Resolution:
+    status = Status(code) if code else _SOLVED  # a look-up takes twice the time
+    return Resolution(x, status, int(record.item(-1)), record, record[:len(record) // 2])
+
+
 def _checked(weights: Sequence[float]) -> tuple[float, ...]:
     plain = isinstance(weights, (list, tuple, np.ndarray))
     if not plain or not all(isinstance(w, (int, float)) and 0.0 < w < np.inf for w in weights):
         raise HierarchyError(f"weighted: weights = {weights!r}, expected numbers > 0")
     return tuple(float(w) for w in weights)
-
-
-@cache
-def _geometric(ratio: float, levels: int) -> Array:
-    """Return weights (L,), 1 for the lowest; where they overflow, the status reports it."""
-    with np.errstate(over="ignore"):
-        powers = ratio ** np.arange(levels - 1, -1, -1.0)
-    return np.minimum(powers, np.finfo(float).max)
-
-
-def _nearest(limits: Hierarchy, rank_tolerance: float) -> tuple[Array, Status]:
-    inside = Hcod(rank_tolerance=rank_tolerance).solve(limits)
-    return inside.x, inside.status
 
 
 def _acting(h: Hierarchy, hard: Mask, x: Array) -> Array:

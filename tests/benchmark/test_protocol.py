@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmark.reproduce import claims, protocol, verdicts
-from benchmark.reproduce.effect import blocked
+from benchmark.reproduce import blocks, protocol, verdicts
 from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, dominated
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
 from scenarios.config import load
@@ -70,10 +69,10 @@ def test_a_run_that_ends_in_a_fault_has_the_worst_value():
 def test_the_blocked_test_is_wilcoxons_in_one_block_and_ignores_shifts_between_blocks(chance):
     scipy = pytest.importorskip("scipy.stats")
     apart = chance.standard_normal(40) + 0.3
-    found = blocked(apart, np.zeros(40, dtype=int))
+    found = verdicts.blocked(apart, np.zeros(40, dtype=int))
     assert found.p == pytest.approx(scipy.wilcoxon(apart, method="asymptotic").pvalue, rel=0.05)
     assert found.low < found.estimate < found.high
-    shifted = blocked(apart - found.low - 1e-9, np.zeros(40, dtype=int))
+    shifted = verdicts.blocked(apart - found.low - 1e-9, np.zeros(40, dtype=int))
     assert shifted.p == pytest.approx(0.05, abs=0.01)
     assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
 
@@ -85,7 +84,7 @@ def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
     for claim in PROTOCOL.claims:
         assert {claim.of, claim.rival} - {""} <= set(PROTOCOL.columns)
         assert bool(claim.quotation) == (claim.family == "letter")
-    assert len(claims.asked(PROTOCOL)) > 5
+    assert len(blocks.block("asked-letter", blocks.Stored(None, []), str).splitlines()) > 5
 
 
 @pytest.mark.slow

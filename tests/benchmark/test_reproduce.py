@@ -25,8 +25,8 @@ def test_a_page_has_what_its_rows_and_commands_say(name):
 
 def test_every_output_that_is_stored_stands_in_a_page_or_is_linked():
     texts = [path.read_text("utf-8") for path in (ROOT / "README.md", *ROOT.glob("docs/**/*.md"))]
-    shown = {pages.file_of(found["command"], ROOT).name for text in texts
-             for found in pages._OUTPUT.finditer(text)}
+    shown = {pages.file_of(found["name"], ROOT).name for text in texts
+             for found in pages._MARK.finditer(text) if found["kind"] != "reproduce"}
     linked = {name for text in texts for name in re.findall(r"output/([\w.-]+\.txt)\)", text)}
     assert {"README.md", "docs/results/problems.md", "docs/results/loops.md"} <= set(PAGES)
     assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == shown | linked

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from benchmark import start, tick
-from benchmark.plain import PlainTick
 from benchmark.solve import resolvers
 from benchmark.solve.entrants import HIERARCHICAL, NUMPY
 from benchmark.start import Cost, own_seconds, run
+from benchmark.tick import PlainTick
 from scenarios.cell.build import build
 from scenarios.config import load
 from scenarios.loop.simulation import simulate

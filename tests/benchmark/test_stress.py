@@ -23,7 +23,7 @@ FIRST = 10_000_000  # seeds that nothing was tuned on
 @pytest.mark.parametrize("name", JUDGED[:1])
 def test_generated_problems_are_solved_and_certified(name, part):
     each = COUNT // PARTS
-    found = stress.tally(name, range(FIRST + part * each, FIRST + (part + 1) * each))
+    found = stress.tally((name, range(FIRST + part * each, FIRST + (part + 1) * each), "recipe"))
     assert not found.failing
     assert found.counts[stress.CERTIFIED] >= 0.999 * each, "the rest says that it is not sure"
 
@@ -31,12 +31,12 @@ def test_generated_problems_are_solved_and_certified(name, part):
 @pytest.mark.parametrize("kind", problems.KINDS)
 @pytest.mark.parametrize("name", JUDGED[:2])
 def test_structured_problems_end_certified_or_with_a_status(name, kind):
-    assert not stress.tally(name, range(FIRST, FIRST + 12), kind).failing
+    assert not stress.tally((name, range(FIRST, FIRST + 12), kind)).failing
 
 
 @pytest.mark.parametrize("name", JUDGED[1:])
 def test_generated_equalities_and_bounds_are_solved_and_certified(name):
-    found = stress.tally(name, range(FIRST, FIRST + COUNT // 4))
+    found = stress.tally((name, range(FIRST, FIRST + COUNT // 4), "recipe"))
     assert found.counts == {stress.CERTIFIED: COUNT // 4}
 
 
@@ -102,7 +102,7 @@ def test_many_processes_count_like_one_and_report_all_kinds_apart(tmp_path, monk
     monkeypatch.setattr(stress, "KINDS", stress.KINDS[:3])
     found = stress.run(2 * len(stress.KINDS), "tpm", processes=2, kind=stress.ALL)
     told = stress.report("tpm", found, tmp_path / "none")
-    assert found == {kind: stress.tally("tpm", range(2), kind) for kind in stress.KINDS}
+    assert found == {kind: stress.tally(("tpm", range(2), kind)) for kind in stress.KINDS}
     assert [row["kind"] for row in told.rows["stress"]] == [*stress.KINDS, stress.ALL]
     assert told.rows["stress"][-1]["problems"] == 2 * len(stress.KINDS)
     assert not told.failed
@@ -112,7 +112,7 @@ def test_many_processes_count_like_one_and_report_all_kinds_apart(tmp_path, monk
 def test_failing_problems_are_listed_and_saved(tmp_path, monkeypatch):
     monkeypatch.setattr(stress, "make", lambda name: Wrong(stress.WRONG))
     monkeypatch.setattr(stress, "_TRIALS", 3)  # every trial is proved wrong, in 120 digits
-    found = stress.tally("wrong", range(1, 2))
+    found = stress.tally(("wrong", range(1, 2), "recipe"))
     told = stress.report("wrong", {stress.RECIPE: found}, tmp_path)
     assert told.failed
     assert f"recipe, seed {found.failing[0][0]}, {stress.WRONG}" in told.sections[0].text

@@ -35,8 +35,8 @@ class Hanging(LeastSquares):
     """Never comes back from the problem whose first side is 2."""
 
     def solve(self, prepared):
-        if prepared.lower[0] == 2.0:
-            time.sleep(1000.0)
+        while prepared.lower[0] == 2.0:
+            pass
         return super().solve(prepared)
 
 

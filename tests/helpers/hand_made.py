@@ -11,8 +11,8 @@ import numpy as np
 
 from hierarchy import Robot
 from scenarios.config.avoidance import ObstacleSection
-from scenarios.config.kinds.camera import FramesSection
 from scenarios.config.robot import RobotSection
+from scenarios.config.sensor import FramesSection
 from scenarios.config.tasks import PointingSection, PositionSection
 from scenarios.recording.facts import Facts, ResolverFacts, RobotFacts, robot_facts
 from scenarios.recording.recording import Recording

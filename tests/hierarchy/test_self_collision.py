@@ -88,7 +88,7 @@ def test_rows_give_the_second_derivative_with_nearest_points_that_slide():
         for t in (-h, 0.0, h):
             state = State.at(ROBOT, q + v * t + a * t * t / 2)
             d.append(task.distances(state))
-            seen = measure_capsules(state.placements, task.joints, task.table, task.indices)
+            seen = measure_capsules(state.placements, *pack_capsules(task.capsules), task.indices)
             free.append((seen[:, 4:] > 0) & (seen[:, 4:] < 1))
         state = State.at(ROBOT, q, v)
         A, lower, _ = task.rows(state, "acceleration")

@@ -60,9 +60,9 @@ def test_commands_compile_nothing(tmp_path):
 
 
 def test_a_call_with_other_types_is_compiled_and_right(tmp_path):
-    code = ("import numpy as np\nfrom hierarchy.state import _copy_if_finite\n"
+    code = ("import numpy as np\nfrom hierarchy.state import _copy_if_sound\n"
             "q, v, to = np.ones(3, np.float32), np.ones(2), np.zeros(3)\n"
-            "assert _copy_if_finite(q, v, to, np.zeros(2)) == 1\n"
+            "assert _copy_if_sound(np.zeros((0, 2), int), q, v, to, np.zeros(2)) == 1\n"
             "assert to.tolist() == [1.0] * 3")
     [name] = compiled(code, tmp_path)
-    assert "hierarchy.state._copy_if_finite" in name
+    assert "hierarchy.state._copy_if_sound" in name

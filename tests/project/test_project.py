@@ -122,12 +122,15 @@ def test_a_package_of_the_same_name_is_named_in_one_line(name, tmp_path):
     (tmp_path / name).mkdir()
     file = tmp_path / name / "__init__.py"
     file.touch()
-    done = subprocess.run([sys.executable, "-c", "from task_hierarchy import main"], text=True,
-                          env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
-                          capture_output=True, check=False, cwd=tmp_path)
-    assert done.returncode == 1
-    assert done.stderr.splitlines()[-1].startswith(
-        f"ImportError: the package {name!r} is {file}, not task-hierarchy's")
+    message = f"the package {name!r} is {file}, not task-hierarchy's"
+    command = "import sys; sys.argv = ['bin/hierarchy', 'doctor']; "
+    for before, said in ("", f"ImportError: {message}"), (command, f"hierarchy: error: {message}"):
+        done = subprocess.run([sys.executable, "-c", f"{before}from task_hierarchy import main"],
+                              env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+                              text=True, capture_output=True, check=False, cwd=tmp_path)
+        assert done.returncode == 1
+        assert done.stderr.splitlines()[-1].startswith(said)
+    assert len(done.stderr.splitlines()) == 1
 
 
 @pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])

@@ -7,7 +7,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.avoidance.obstacles import distance_to_obstacle
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
-from scenarios.config.kinds.camera import CameraSection, DepthErrors
+from scenarios.config.sensor import CameraSection, DepthErrors
 
 ROBOT = Robot.named("kuka_lwr")
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])

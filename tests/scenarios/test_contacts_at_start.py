@@ -10,7 +10,7 @@ from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
-from scenarios.config.kinds.torque import TorqueSection
+from scenarios.config.plant import TorqueSection
 from scenarios.loop.first_tick import first_tick
 
 changed = load("stand-push").with_changes

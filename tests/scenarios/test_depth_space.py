@@ -14,11 +14,11 @@ from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
-from scenarios.cell.sensors.depth_space import DepthSpace, ObstacleImage
+from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
 from scenarios.config import ScenarioError
-from scenarios.config.kinds.camera import CameraSection, ImageSection
+from scenarios.config.sensor import CameraSection, ImageSection
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)

@@ -61,7 +61,7 @@ def true_motion(run):
 
 
 def within_limits(run):
-    limits = build(run.scenario).limits.limits
+    limits = build(run.scenario).tasks.limits.limits
     for q, v, x in zip(*true_motion(run), run["command"], strict=True):
         low, up = limits.box(q, v, run.scenario.control.level)
         slack = 1e-9 * (1.0 + np.abs(low) + np.abs(up))

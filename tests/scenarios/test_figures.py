@@ -109,7 +109,7 @@ def letters(name, **changed):
 def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
     names = ("ellipse-35deg-equality", "ellipse", "ellipse-velocity", "ellipse-35deg", "ellipse-3d")
     runs = [letters(name, v=np.full((5, 7), float(i))) for i, name in enumerate(names)]
-    drawn = dict(letter._together(runs))
+    drawn = dict(letter.figures(runs))
     assert list(drawn) == ["figure-4-joint-velocities", "figure-5-distances",
                            "figure-6-velocities-and-distance", "figure-7-pointing-error"]
     headings = [ax.get_title(loc="left")[:4] for ax in drawn["figure-5-distances"].axes]

@@ -46,7 +46,7 @@ def test_beside_one_sided_distances_algorithm_1_switches_the_cone_alone():
     cell = build(load("ellipse-hqp", ["control.stack=switched"]))
     assert cell.order(None, 1.0).order == ("joint limits", "separation", "position", "pointing")
     assert cell.order(None, -1.0).order == ("joint limits", "separation", "position")
-    assert cell.pointing.kind == "equality"
+    assert cell.tasks.pointing.kind == "equality"
 
 
 @pytest.mark.slow

@@ -74,7 +74,7 @@ def test_all_levels_above_the_posture_are_met_and_their_errors_recorded(standing
     assert found["joint_limit_excess"].value == 0.0
     cell, k = build(standing.scenario), 700
     cell.state.move(standing["t"][k], standing["q"][k], standing["v"][k])
-    for task in cell.listed:
+    for task in cell.tasks.listed:
         np.testing.assert_allclose(standing[f"task_error_{task.name.replace(' ', '_')}"][k],
                                    task.error(cell.state), atol=1e-15)
 

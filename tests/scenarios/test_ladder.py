@@ -12,8 +12,7 @@ from scenarios import compare, load
 from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError, members, shipped_groups
 from scenarios.config.resolvers import default_resolvers
-from scenarios.measure.motions import motions
-from scenarios.measure.partings import partings
+from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run
 from solvers.qp import backends
 

@@ -11,8 +11,10 @@ from hierarchy.tasks import JointCoupling, SelfSeparation, Separation
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import KinematicArm
+from scenarios.cell.sensors import ExactDistances
 from scenarios.config.plant import AnyPlant
 from scenarios.config.sections import Unit
+from scenarios.config.sensor import AnySensor
 from scenarios.config.tasks import Listed
 from scenarios.measure.metrics import measure
 
@@ -220,3 +222,17 @@ def test_a_new_plant_is_its_class_and_one_section(kinds, tmp_path):
             for plant in ({"kind": "kinematic"}, {"kind": "slow", "share": 0.5})]
     exact, slow = (run["q"][1] - run["q"][0] for run in runs)
     np.testing.assert_allclose(slow, 0.5 * exact)
+
+
+def test_a_new_sensor_is_its_class_and_one_section(kinds, tmp_path):
+    @plugins.register("sensors", "near", shipped=True)
+    class NearSection(AnySensor):
+        foot: ClassVar[float] = 0.0
+        kind: Literal["near"]
+
+        def made(self, robot, **given):
+            return given["exact"]
+
+    avoidance = {"kind": "separation", "obstacles": [[0.1, 0.5, 0.1]]}
+    cell = build(scenario_of(tmp_path, COUPLING, avoidance=avoidance, sensor={"kind": "near"}))
+    assert isinstance(cell.sensor, ExactDistances)

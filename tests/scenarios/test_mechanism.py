@@ -14,7 +14,7 @@ from scenarios import simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.kinds.torque import TorqueSection
+from scenarios.config.plant import TorqueSection
 from scenarios.loop.first_tick import first_tick
 from solvers import solve_ik
 

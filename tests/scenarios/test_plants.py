@@ -13,8 +13,7 @@ from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError
-from scenarios.config.kinds.mujoco import PhysicsSection
-from scenarios.config.plant import MeasurementSection
+from scenarios.config.plant import MeasurementSection, PhysicsSection
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
 from scenarios.measure.run_folder import load_run, save

@@ -5,7 +5,7 @@ import pytest
 
 from hierarchy import HierarchyError
 from hierarchy.tasks import CumulatedRepulsion, DangerBounds, Pointing
-from hierarchy.tasks.tangent_cone import TangentCone
+from hierarchy.tasks.together import TangentCone
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
@@ -138,7 +138,7 @@ def test_limits_go_with_both_as_a_guard():
     for name in RIVALS:
         scenario = load(name, ["limits={acceleration=10.0, place='either'}"])
         assert not scenario.limits_in_stack
-        assert build(scenario).limits is not None
+        assert build(scenario).tasks.limits is not None
 
 
 # The avoidance of the letter's references [5] and [10].

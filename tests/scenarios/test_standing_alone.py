@@ -13,7 +13,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.robots import TABLES
 from scenarios import load, load_run, save, simulate
 from scenarios.draw.replay.page import html
-from scenarios.recording.tree import joint_units, placements, tree_of
+from scenarios.recording.facts import robot_facts
 from scenarios.scene import scene
 
 pytestmark = pytest.mark.slow
@@ -115,7 +115,7 @@ def test_facts_that_are_missing_or_damaged_are_named(made, tmp_path):
     folder, run, _ = made
     shutil.copytree(folder, tmp_path / "bad")
     facts = asdict(run.facts)
-    del facts["robot"]["joints"]
+    del facts["robot"]["model"]
     for text in ("{", json.dumps(facts)):
         (tmp_path / "bad" / "facts.json").write_text(text)
         with pytest.raises(HierarchyError, match=r"facts\.json cannot be read"):
@@ -153,12 +153,12 @@ def robots(folder):
     yield Robot.from_file(folder / "doll.xml")
 
 
-def test_the_tree_places_every_joint_as_pinocchio_does(tmp_path):
+def test_the_facts_place_every_joint_as_the_robot_does(tmp_path):
     for robot in robots(tmp_path):
         pin.seed(0)
         q = np.array([pin.randomConfiguration(robot.model, -np.ones(robot.nq), np.ones(robot.nq))
                       for _ in range(5)])
         expected = [State.at(robot, one).placements.copy() for one in q]
-        tree = tree_of(robot)
-        np.testing.assert_allclose(placements(tree, q), expected, atol=1e-14)
-        assert tuple(map(len, joint_units(tree))) == (robot.nq, robot.n)
+        facts = robot_facts(robot)
+        np.testing.assert_allclose(facts.placements(q), expected, atol=1e-14)
+        assert (len(facts.position_units), len(facts.velocity_units)) == (robot.nq, robot.n)

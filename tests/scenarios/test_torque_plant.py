@@ -11,7 +11,7 @@ from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
-from scenarios.config.kinds.torque import PushSection, TorqueSection
+from scenarios.config.plant import PushSection, TorqueSection
 from scenarios.measure.forces import standing
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("with_mujoco")]

@@ -57,9 +57,7 @@ def test_an_exact_sensor_measures_the_true_distances_and_nothing_is_recorded_twi
 
 
 def noted(sets, hierarchies, resolver="hcod"):
-    for k, h in enumerate(hierarchies):
-        sets.note(k, h, make(resolver).solve(h))
-    return sets.signals(SimpleNamespace(ticks=len(hierarchies)))["active_set"].tolist()
+    return [sets.number(h, make(resolver).solve(h)) for h in hierarchies]
 
 
 def bounded(target, box=1.0, names=("box", "task")):
@@ -72,16 +70,15 @@ def bounded(target, box=1.0, names=("box", "task")):
 def test_a_row_acts_where_its_side_holds_the_task_back(resolver):
     rows = [bounded((0.0, 0.5)), bounded((2.0, 0.5)), bounded((3.0, 0.5)), bounded((-2.0, 0.5)),
             bounded((-2.0, 5.0)), bounded((0.2, 0.1))]
-    assert noted(ActiveSets(6), rows, resolver) == [0, 1, 1, 2, 3, 0]
+    assert noted(ActiveSets(), rows, resolver) == [0, 1, 1, 2, 3, 0]
 
 
 def test_a_tick_without_an_answer_or_without_a_report_has_no_set():
-    sets, h = ActiveSets(3), bounded((2.0, 0.5))
-    run = SimpleNamespace(ticks=3)
-    sets.note(0, h, Resolution(np.zeros(2)))
-    assert sets.signals(run) == {}
-    sets.note(1, h, make("hcod").solve(h))
-    failed = make("hcod").solve(h)
-    failed.status = Status.ITERATION_LIMIT
-    sets.note(2, h, failed)
-    assert sets.signals(run)["active_set"].tolist() == [-1, 0, -1]
+    sets, h = ActiveSets(), bounded((2.0, 0.5))
+    tick = SimpleNamespace(hierarchy=h, resolution=Resolution(np.zeros(2)))
+    assert sets(0, tick) == {}
+    tick.resolution = make("hcod").solve(h)
+    assert sets(1, tick) == {"active_set": 0}
+    tick.resolution = make("hcod").solve(h)
+    tick.resolution.status = Status.ITERATION_LIMIT
+    assert sets(2, tick) == {"active_set": -1}

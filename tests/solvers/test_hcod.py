@@ -88,6 +88,19 @@ def test_explain_names_the_rows_that_are_missed_by_most_and_not_those_missed_by_
     assert said.startswith("wish is missed by 1.12, at a and b: held back by limits a at")
 
 
+def test_a_level_that_is_rounding_beside_others_counts_where_limits_hold_x():
+    """Recorded in an example of pink: a vertical motion of an arm that moves in a plane."""
+    limits, lifted = (np.eye(2), [-2.0] * 2, [2.0] * 2), ([[2.56e-18, 1.8e-18]], [-700.0])
+    h = Hierarchy.from_levels([limits, lifted])
+    res = HCOD.solve(h)
+    assert res.status is Status.SOLVED
+    np.testing.assert_array_equal(res.x, [-2.0, -2.0])
+    assert res.verified(h)
+    free = HCOD.solve(Hierarchy.from_levels([([[1.0, 0.0]], [0.5]), lifted]))
+    assert free.status is Status.INACCURATE
+    np.testing.assert_array_equal(free.x, [0.5, 0.0])
+
+
 def test_rows_whose_sides_cross_are_all_that_is_said():
     h = Hierarchy.from_levels([(np.eye(2), [0.0, 0.0], [1.0, 1.0])], names=["box"])
     h.lower[1] = 2.0
@@ -138,6 +151,26 @@ def test_damped_x_is_continuous_in_the_targets_under_a_box(name, angle):
             assert res.status is Status.SOLVED
             x.append(res.x)
         assert np.abs(x[1] - x[0]).max() <= 1e-6
+
+
+@pytest.mark.parametrize("name", ["hcod", "tpm"])
+def test_damped_x_is_continuous_where_a_bound_begins_to_act(name):
+    """A level alone passes the bound, the levels below move x away: it jumped by 3.6."""
+    resolver = make(name, damping=0.1)
+    for seed in range(60):
+        r = np.random.default_rng([seed, 3206])
+        n, half = 2 + seed % 6, 9.0
+        A, B = r.normal(size=(1 + seed % 2, n)), r.normal(size=(1, n))
+        A[-1] = A[0] * (seed % 2) + A[-1] * 10.0 ** r.uniform(-3.0, 0.0)
+        tasks, x = [(A, r.normal(size=len(A))), (B, r.normal(size=1))], []
+        for step in (0.0, 0.0, 1e-11):
+            limits = np.full(n, half)
+            if x:
+                limits[seed % n] = abs(x[0][seed % n])
+            h = Hierarchy.from_levels([(np.eye(n), -limits, limits),
+                                       (A, tasks[0][1] + step), tasks[1]])
+            x.append(resolver.solve(h).x)
+        assert np.abs(x[2] - x[1]).max() <= 1e-6
 
 
 @pytest.mark.filterwarnings("ignore:overflow")

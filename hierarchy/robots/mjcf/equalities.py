@@ -13,7 +13,7 @@ from hierarchy.robots.found import Coupled, Loop
 from hierarchy.robots.mjcf.compiled import WORLD
 from hierarchy.robots.mjcf.model import Built, add_frame, pose
 from hierarchy.robots.mjcf.part import Part
-from hierarchy.words import some
+from hierarchy.words import each
 
 _CONNECT, _WELD, _JOINT, _TENDON = 0, 1, 2, 3  # mjtEq
 _WRAP_JOINT = 1                    # mjtWrap
@@ -34,15 +34,15 @@ def couplings(part: Part) -> tuple[tuple[Coupled, ...], list[str]]:
                 said.append(f"{name!r} is left out: joint {file.joints[one]!r} does not move")
             continue
         own = mj.qpos0[mj.jnt_qposadr[one]]
-        if other < 0:
-            found.append(Coupled(file.joints[one], "", (float(own + moved(0.0)),)))
-            continue
         here = mj.jnt_qposadr[other]
-        q = moved(Polynomial([-mj.qpos0[here], 1.0])) + own
+        reference, held = (mj.qpos0[here], part.held[here]) if other >= 0 else (0.0, 0.0)
+        q = moved(Polynomial([-reference, 1.0])) + own
         if other in part.joints:
-            found.append(Coupled(file.joints[one], file.joints[other], _trimmed(q)))
+            coefficients = np.trim_zeros(q.coef, "b").tolist()
+            found.append(Coupled(file.joints[one], file.joints[other],
+                                 tuple(coefficients + [0.0] * (2 - len(coefficients)))))
         else:
-            found.append(Coupled(file.joints[one], "", (float(q(part.held[here])),)))
+            found.append(Coupled(file.joints[one], "", (float(q(held)),)))
     return tuple(found), said
 
 
@@ -79,13 +79,6 @@ def _fixed(mj: Any, i: int) -> list[tuple[int, float]]:
     return weights[::-1] if fixed and 1 <= len(weights) <= 2 else []
 
 
-def _trimmed(polynomial: Any) -> tuple[float, ...]:
-    coefficients = [float(value) for value in polynomial.coef]
-    while len(coefficients) > 2 and coefficients[-1] == 0.0:
-        coefficients.pop()
-    return tuple(coefficients)
-
-
 def loops(built: Built) -> tuple[tuple[Loop, ...], list[str]]:
     """Return the chains that the file closes, and sentences on equalities left out.
 
@@ -105,9 +98,8 @@ def loops(built: Built) -> tuple[tuple[Loop, ...], list[str]]:
     idle = [_name(mj, i) for i in range(mj.neq) if not mj.eq_active0[i]]
     others = [name for kind in set(mj.eq_type.tolist()) - {_CONNECT, _WELD, _JOINT}
               for name, i in _active(mj, kind) if kind != _TENDON or not _fixed(mj, i)]
-    said += [f"equalities that are not active are left out: {some(idle)}"] if idle else []
-    said += [f"equalities of flexes, distances and some tendons are left out: {some(others)}"] if (
-        others) else []
+    said += each(("equalities that are not active are left out", idle),
+                 ("equalities of flexes, distances and some tendons are left out", others))
     return tuple(found), said
 
 

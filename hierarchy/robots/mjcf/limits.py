@@ -1,4 +1,4 @@
-"""Limits of the joints of an MJCF: ranges, and what their actuators can do."""
+"""Limits of the joints of an MJCF: ranges, what their actuators can do; and what a robot lacks."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 
 from hierarchy.problem import Array
 from hierarchy.robots.mjcf.compiled import Compiled, name_of
-from hierarchy.robots.mjcf.model import Built, address, joint_actuators
-from hierarchy.words import some
+from hierarchy.robots.mjcf.model import Built, address, armature, joint_actuators
+from hierarchy.robots.mjcf.part import Part
+from hierarchy.words import each, listed, some
 
 _FREE: Array = np.array([-np.inf, np.inf])
 
@@ -33,8 +34,7 @@ def set_limits(built: Built) -> Iterator[str]:
     model.lowerPositionLimit, model.upperPositionLimit = lower, upper
     model.upperVelocityLimit = np.full(model.nv, np.inf)
     yield "velocity limits: an MJCF has none"
-    if balls:
-        yield f"limits of the angle of ball joints are ignored: {some(balls)}"
+    yield from each(("limits of the angle of ball joints are ignored", balls))
 
 
 def effort_limits(built: Built) -> Iterator[str]:
@@ -61,12 +61,14 @@ def effort_limits(built: Built) -> Iterator[str]:
             f"{file.joints[j]} ({total[0]:g} to {total[1]:g})"]
         efforts[joint.idx_v] = least
     model.effortLimit = efforts
-    if idle and mj.nu:
-        yield f"no actuator moves the joint, and nothing limits its effort here: {some(idle)}"
-    if uneven:
-        yield ("effort limits that differ by sign; the smaller counts both ways, and one of a "
-               f"single sign not at all: {some(uneven)}")
-    yield from _elsewhere(file)
+    known = {i for i, _, _ in joint_actuators(mj)}
+    others = [name_of(mj, "actuator", i) for i in range(len(mj.actuator_trnid)) if i not in known]
+    yield from each(
+        ("no actuator moves the joint, and nothing limits its effort here", idle if mj.nu else []),
+        ("effort limits that differ by sign; the smaller counts both ways, and one of a single "
+         "sign not at all", uneven),
+        ("actuators that act on a tendon, a site, a body, a crank or a joint of several velocities "
+         "are left out", others))
 
 
 def _force(mj: Any, i: int) -> Array:
@@ -83,11 +85,32 @@ def _force(mj: Any, i: int) -> Array:
 _INTEGRATOR = 1  # mjDYN_INTEGRATOR: control is a rate of the activation
 
 
-def _elsewhere(file: Compiled) -> Iterator[str]:
-    """Yield what acts on anything but one hinge or slide."""
+def left_out(part: Part) -> Iterator[str]:
+    """Yield a sentence for each thing that the file has and the robot lacks."""
+    mj = part.compiled.model
+    yield from each(*((said, [name_of(mj, kind, i) for i in range(n)]) for kind, n, said in (
+        ("tendon", mj.ntendon, "of tendons only couplings of joints are here"),
+        ("flex", mj.nflex, "of flexes only the joints are here"),
+        ("skin", mj.nskin, "skins are left out"))))
+    if mj.nplugin:
+        yield f"plugins of MuJoCo do nothing here: {mj.nplugin}"
+    yield from each(("compensation of gravity is left out", [
+        part.compiled.bodies[body] for body in np.flatnonzero(mj.body_gravcomp)]))
+    passive = {"stiffness": mj.jnt_stiffness, "damping": mj.dof_damping,
+               "friction": mj.dof_frictionloss}
+    if found := [what for what, values in passive.items() if np.any(values)]:
+        yield f"{listed(found)} of joints: not in the equations of motion"
+
+
+def refuse(file: Compiled) -> None:
+    """Raise RobotError for inertia that no body or joint has: that of a tendon, or of its drive."""
     mj = file.model
-    known = {i for i, _, _ in joint_actuators(mj)}
-    others = [name_of(mj, "actuator", i) for i in range(len(mj.actuator_trnid)) if i not in known]
-    if others:
-        yield ("actuators that act on a tendon, a site, a body, a crank or a joint of several "
-               f"velocities are left out: {some(others)}")
+    drives = armature(mj, "actuator", len(mj.actuator_trnid))
+    on_joint = {i for i, _, _ in joint_actuators(mj)}
+    heavy = [f"tendon {name_of(mj, 'tendon', i)!r}" for i in range(mj.ntendon)
+             if armature(mj, "tendon", mj.ntendon)[i]]
+    heavy += [f"actuator {name_of(mj, 'actuator', i)!r}" for i in range(len(drives))
+              if i not in on_joint and drives[i]]
+    if heavy:
+        raise file.error("an armature acts on several joints, which a robot here cannot have: "
+                         f"{some(heavy)}; give it to the joints")

@@ -14,7 +14,7 @@ from hierarchy.robots.joints import Part as JointPart
 from hierarchy.robots.joints import set_joint
 from hierarchy.robots.mjcf.compiled import WORLD, Compiled
 from hierarchy.robots.table import Base
-from hierarchy.words import some
+from hierarchy.words import each
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,8 @@ def _from(file: Compiled, root: Sequence[str]) -> tuple[set[int], tuple[str, ...
     others = [file.bodies[top] for top in _tops(file) if not bodies & set(_below(file, top))]
     above = {body for body in _above(parents, bodies) if body not in bodies}
     held = [name for j, name in enumerate(file.joints) if file.model.jnt_bodyid[j] in above]
-    return bodies, tuple(f"{what}: {some(names)}" for what, names in (
-        ("left out, since it is not under root", others),
-        ("held at the reference, since it is above root", held)) if names)
+    return bodies, tuple(each(("left out, since it is not under root", others),
+                              ("held at the reference, since it is above root", held)))
 
 
 def _above(parents: Array, bodies: Iterable[int]) -> Iterator[int]:
@@ -86,22 +85,20 @@ def _above(parents: Array, bodies: Iterable[int]) -> Iterator[int]:
 
 def _scene(file: Compiled) -> tuple[set[int], tuple[str, ...]]:
     """Return all bodies, without those that only float beside a robot, and those of a mocap."""
-    model, said = file.model, []
-    moves = {top: [j for j in range(model.njnt) if model.body_rootid[model.jnt_bodyid[j]] == top]
-             for top in _tops(file)}
-    loose = [top for top, joints in moves.items() if [file.kind(j) for j in joints] == ["free"]]
+    model = file.model
+    moves = {top: [file.kind(j) for j in range(model.njnt)
+                   if model.body_rootid[model.jnt_bodyid[j]] == top] for top in _tops(file)}
+    loose = [top for top, kinds in moves.items() if kinds == ["free"]]
     if len(loose) == sum(map(bool, moves.values())):
         loose = []
     mocap = [top for top in moves if model.body_mocapid[top] >= 0]
     targets = [top for top in mocap if not moves[top]]
-    for tops, what in (
-            (loose, "bodies that only float are left out (root = \"NAME\" takes one as the robot)"),
-            (targets, "mocap bodies are left out"),
-            (sorted({*mocap} - {*targets}), "mocap bodies stay where the file has them")):
-        if tops:
-            said.append(f"{what}: {some([file.bodies[top] for top in tops])}")
+    told = (("bodies that only float are left out (root = \"NAME\" takes one as the robot)", loose),
+            ("mocap bodies are left out", targets),
+            ("mocap bodies stay where the file has them", sorted({*mocap} - {*targets})))
     gone = {body for top in (*loose, *targets) for body in _below(file, top)}
-    return set(range(model.nbody)) - gone, tuple(said)
+    return set(range(model.nbody)) - gone, tuple(
+        each(*((what, [file.bodies[top] for top in tops]) for what, tops in told)))
 
 
 def _tops(file: Compiled) -> Iterator[int]:

@@ -1,10 +1,12 @@
-"""What a plant is, how its joints are measured, and the plant that [plant] asks for."""
+"""What a plant is, one that follows its commands exactly, how joints are measured, and [plant]."""
+
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
-from typing import Any, Protocol, cast
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +14,14 @@ from numpy.typing import NDArray
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacles
 from hierarchy.contacts import Contacts
+from hierarchy.jit import compiled
 from hierarchy.problem import Array
+from hierarchy.task import Level
+from hierarchy.tasks.mechanism import Mechanism
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.plant import MeasurementSection
+
+_WHOLE = 1e-6  # of a period: tolerance of a delay in whole periods
 
 
 class Plant(Protocol):
@@ -42,38 +49,43 @@ class Plant(Protocol):
         """Apply a command for one period: velocities or accelerations (n,), or joint torques."""
 
 
-def fault_of(plant: Plant) -> str | None:
-    """Return why a plant cannot go on, None if it can."""
-    fault: str | None = getattr(plant, "fault", None)
-    return fault
+class KinematicArm:
+    """Integrator: q += v T + a T^2 / 2, v += a T, or at velocity level q += x T, v = x.
 
+    Joints that follow others, and closed chains, stay so: after a step q and v are moved back onto
+    the robot's mechanism. `q` (nq,), `v` (n,) hold the state, `a` (n,) the acceleration of the last
+    step [rad, s]; `extra` is empty.
+    """
 
-class Driven(Plant, Protocol):
-    """A plant whose servos follow a reference (nq,) [rad], (n,) [rad/s]."""
+    def __init__(self, robot: Robot, q: Array, v: Array, period: float, level: Level) -> None:
+        self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(robot.n)
+        self.extra: dict[str, NDArray[Any]] = {}
+        self._robot, self._period = robot, period
+        self._acceleration = int(level == "acceleration")
+        self._step = np.zeros(robot.n)
+        self._turning = robot.nq != robot.n  # joints with more coordinates than velocities
+        self._q = np.zeros(robot.n) if self._turning else self.q
+        self._mechanism = Mechanism(robot)
 
-    @property
-    def reference_q(self) -> Array: ...  # noqa: D102
-
-    @property
-    def reference_v(self) -> Array: ...  # noqa: D102
-
-
-_WHOLE = 1e-6  # of a period: tolerance of a delay in whole periods
-
-
-class Sensed(Protocol):
-    """Turns the true state into the measured one."""
-
-    def __call__(self, q: Array, v: Array) -> tuple[Array, Array]: ...  # noqa: D102
+    def act(self, command: Array) -> None:
+        """Apply a command (n,) for one period."""
+        _integrate(command, self._period, self._acceleration, self.v, self.a, self._step,
+                   self._q)
+        if self._turning:
+            self.q = self._robot.integrate(self.q, self._step)
+        if self._mechanism:
+            self.q[:] = self._mechanism.closed(self.q)
+            self.v[:] = self._mechanism.moving(self.q, self.v)
 
 
 class Apart:
-    """A plant whose q and v are measured by `sensed`, once per period.
+    """A plant whose q and v are what `sensed` returns for the true ones, once per period.
 
     The true state at the start of each period is recorded as `true_q`, `true_v`.
     """
 
-    def __init__(self, plant: Plant, sensed: Sensed) -> None:
+    def __init__(self, plant: Plant,
+                 sensed: Callable[[Array, Array], tuple[Array, Array]]) -> None:
         self._plant, self._sensed = plant, sensed
         self._true_q, self._true_v = plant.q.copy(), plant.v.copy()
         self.extra: Mapping[str, NDArray[Any]] = {
@@ -88,7 +100,8 @@ class Apart:
     @property
     def fault(self) -> str | None:
         """Why the plant cannot go on, or None."""
-        return fault_of(self._plant)
+        fault: str | None = getattr(self._plant, "fault", None)
+        return fault
 
     def act(self, command: Array) -> None:
         """Apply a command (n,) for one period, then measure."""
@@ -96,17 +109,6 @@ class Apart:
         self._true_q[:], self._true_v[:] = plant.q, plant.v
         plant.act(command)
         self.q, self.v = self._sensed(plant.q, plant.v)
-
-
-class Commanded:
-    """Returns the integral of the controller's own commands instead of the real joint state."""
-
-    def __init__(self, plant: Driven) -> None:
-        self._plant = plant
-
-    def __call__(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return the reference in place of q (n,), v (n,)."""
-        return self._plant.reference_q.copy(), self._plant.reference_v.copy()
 
 
 def whole_periods(delay: float, period: float, key: str) -> int:
@@ -176,14 +178,29 @@ def plant_of(scenario: Scenario, start: State, obstacles: Obstacles,
     """
     section, control, robot = scenario.plant, scenario.control, start.robot
     sensor = JointSensor(section.measurement, control.period, robot)
-    plant: Plant = section.made(robot, q=start.q, v=start.v, period=control.period,
-                                level=control.level, obstacles=obstacles, contacts=contacts)
+    plant = section.made(robot, q=start.q, v=start.v, period=control.period, level=control.level,
+                         obstacles=obstacles, contacts=contacts)
     driven = hasattr(plant, "reference_q")
-    if section.feedback == "measured":
-        return plant if section.measurement.ideal and not driven else Apart(plant, sensor)
-    if section.follows:
-        return plant
-    if not driven:
+    if section.feedback == "commanded" and not (driven or section.follows):
         raise ScenarioError(f'plant.feedback = "commanded": a plant of kind {section.kind!r} has '
                             "no reference_q and reference_v")
-    return Apart(plant, Commanded(cast(Driven, plant)))
+    if section.feedback == "measured" and (driven or not section.measurement.ideal):
+        return Apart(plant, sensor)
+    if section.feedback == "commanded" and driven:  # the integral of the controller's commands
+        return Apart(plant, lambda q, v: (plant.reference_q.copy(), plant.reference_v.copy()))
+    found: Plant = plant
+    return found
+
+
+@compiled
+def _integrate(x, T, acceleration, v, a, step, q):
+    for i in range(len(v)):
+        if acceleration:
+            a[i] = x[i]
+            step[i] = v[i] * T + x[i] * T * T / 2
+            v[i] += x[i] * T
+        else:
+            a[i] = (x[i] - v[i]) / T
+            step[i] = x[i] * T
+            v[i] = x[i]
+        q[i] += step[i]

@@ -6,12 +6,12 @@ from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 
 _LOADED = 1.0  # [N] of normal force from which a contact carries
-_SAME = 1e-6   # [m] between points that count as one
 _CORNERS = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1)])  # of a box, its bottom
 
 
@@ -23,7 +23,7 @@ class Touch:
     since it touched down, NaN if it is to slide; `margin` (C,) [m], of the centre of pressure from
     the nearest edge of the sole, NaN for a point or without force; `balance` () [m], how far inside
     the support polygon, the hull of all points of the loaded contacts, the centre of mass is from
-    above, NaN below three such points.
+    above, NaN below three such points, or if they are on a line.
     `signals` has these arrays by the names of signals.
     """
 
@@ -87,18 +87,14 @@ class Touch:
 
 
 def inside(points: Array, place: Array) -> float:
-    """Return how far [m] `place` (2,) is inside the convex hull of points (k, 2), NaN for k < 3.
+    """Return how far [m] `place` (2,) is inside the convex hull of points (k, 2).
 
-    That is the distance from the nearest edge, negative outside.
+    That is the distance from the nearest edge, negative outside; NaN for points on a line.
     """
     if len(points) < 3:
         return np.nan
-    along = points[None] - points[:, None]  # from each point to each other
-    length = np.hypot(along[..., 0], along[..., 1])
-    i, j = np.nonzero(length > _SAME)
-    normal = np.stack([-along[i, j, 1], along[i, j, 0]], axis=1) / length[i, j, None]
-    height = normal @ points.T - (normal * points[i]).sum(axis=1)[:, None]
-    edges = (height > -_SAME).all(axis=1)
-    if not edges.any():
+    try:
+        edges = ConvexHull(points).equations  # outward normal, and minus its product with the edge
+    except QhullError:
         return np.nan
-    return float((normal * (place - points[i])).sum(axis=1)[edges].min())
+    return float(-(edges[:, :2] @ place + edges[:, 2]).max())

@@ -1,40 +1,93 @@
-"""The depth sensors of [sensor]: a camera or recorded frames in the loop, late or missing."""
+"""The depth sensors of [sensor]: a camera or recorded frames in the loop, and their distances."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from math import inf
 from time import perf_counter
-from typing import Protocol
 
 import numpy as np
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import Capsule, ControlPoint, Measurement, Obstacles
+from hierarchy.avoidance import Capsule, ControlPoint, Measurement, Pairs
+from hierarchy.avoidance.control_points import pack_points
+from hierarchy.avoidance.self_collision import pack_capsules
+from hierarchy.jit import bind
 from hierarchy.problem import Array
-from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
-from scenarios.cell.sensors.depth_space import DepthSpace
-from scenarios.cell.sensors.errors import Image
+from scenarios.cell.sensors.camera import DepthCamera, Image, Pinhole, looking_at
 from scenarios.cell.sensors.frames import RecordedFrames
-from scenarios.cell.sensors.pixels import ObstacleImage
-from scenarios.cell.sensors.sensor import Asked, ExactDistances
-from scenarios.config.kinds.camera import CameraSection, FramesSection, ImageSection
+from scenarios.cell.sensors.pixels import (
+    ObstacleImage,
+    Space,
+    farthest,
+    find_obstacles,
+    measure_pixels,
+)
+from scenarios.cell.sensors.rendering import draw_robot
+from scenarios.cell.sensors.sensor import Asked, ExactDistances, packed_laws
+from scenarios.config.sensor import CameraSection, FramesSection, ImageSection
 
-_ROUNDING = 1e-9  # [s] of times that are compared
+_ON_ITS_WAY = 0.3  # [m]
+_ROUNDING = 1e-9   # [s] of times that are compared
 
 
-class Source(Protocol):
-    """A source of depth images: `DepthCamera` or `RecordedFrames`."""
+Source = DepthCamera | RecordedFrames
 
-    pinhole: Pinhole
-    obstacles: Obstacles
-    latency: float
 
-    def newest(self, t: float) -> int:
-        """Return the number of the last frame taken by time t [s], -1 before the first."""
+class DepthSpace:
+    """Turns depth images into obstacle images, and measures distances of points in them.
 
-    def image(self, frame: int, state: State) -> tuple[Image, Array]:
-        """Return the image (h, w) [m] of a frame and the robot's placements when it was taken."""
+    section : its `region` is rho [m], the largest distance that is measured. Space hidden by an
+        obstacle counts as occupied up to `thin` [m] behind its surface. `support` removes
+        outliers, but also surfaces that are smaller or steeper.
+    points : control points, the end effector last.
+    capsules : the robot; pixels that show it or anything behind it do not count as obstacles.
+    asked : the direction is the mean (25)-(26) over all pixels of the region within `mean_within`
+        [m]; with 0 it is that of the nearest pixel, except for a point in the shadow of its own.
+
+    `measurement.nearest` is a pixel v width + u, -1 for none.
+    """
+
+    def __init__(self, section: ImageSection, pinhole: Pinhole, points: Sequence[ControlPoint],
+                 capsules: Sequence[Capsule], asked: Asked, pairs: bool = False) -> None:
+        self.pinhole, self.points = pinhole, tuple(points)
+        self.region = section.region or asked.region
+        self.measurement = Measurement(len(points) - 1)
+        self._pairs = Pairs(len(points), 1)
+        if pairs:
+            self.measurement.pairs = self._pairs
+        self._eye, self._section = pinhole.packed(), section
+        self._links, self._capsules = pack_capsules(capsules)
+        self._space = Space(*pack_points(points), self._eye, self.region,
+                            inf if section.thin is None else section.thin,
+                            np.array(asked.mean_within),
+                            packed_laws(asked.body, asked.tip))
+        self._image: ObstacleImage | None = None
+        self._placements: Array | None = None
+        self._robot = ObstacleImage.empty(pinhole.height, pinhole.width).depth
+
+    def find_obstacles(self, reading: Image, placements: Array, into: ObstacleImage) -> float:
+        """Fill an obstacle image from a reading (h, w) [m] and the robot's placements then.
+
+        Pixels beyond the region of every point, even if the robot moves by _ON_ITS_WAY until the
+        next frame, are ignored. Returns the share of valid pixels, which are neither 0 nor NaN.
+        """
+        section = self._section
+        draw_robot(self._robot, self._eye, placements, self._links, self._capsules, section.margin)
+        beyond = farthest(placements, self._space.joints, self._space.offsets, self._eye)
+        return float(find_obstacles(reading, self._robot, section.support, section.band,
+                                    beyond + self.region + _ON_ITS_WAY, into.depth, into.tiles))
+
+    def measure(self, obstacles: ObstacleImage, placements: Array) -> Measurement:
+        """Measure the points of the robot at its current placements; valid until the next call."""
+        seen = self.measurement
+        if obstacles is not self._image or placements is not self._placements:
+            self._image, self._placements = obstacles, placements
+            self._measure = bind(measure_pixels, placements, self._space, obstacles, seen.arrays,
+                                 self._pairs.table)
+        seen.active = self._measure()
+        return seen
 
 
 class DepthSensor:
@@ -124,28 +177,22 @@ class DepthSensor:
         self.measurement.stamp, self.measurement.blind = -inf, True
 
 
-def camera(section: CameraSection, robot: Robot, exact: ExactDistances,
-           asked: Asked) -> DepthSensor:
-    """Make the sensor of a simulated camera, for the points that `exact` measures."""
-    rotation = (looking_at(section.position, section.look_at) if section.rotation is None
-                else np.array(section.rotation))
-    pinhole = Pinhole(section.width, section.height, section.fx, section.fy, section.cx,
-                      section.cy, section.position, rotation)
+def depth_sensor(section: CameraSection | FramesSection, robot: Robot, exact: ExactDistances,
+                 asked: Asked) -> DepthSensor:
+    """Make the sensor of a simulated camera or of recorded frames, for the points of `exact`.
+
+    Recorded frames cannot be checked for obstacles at the start.
+    """
     capsules = _capsules(robot, section.foot)
-    source = DepthCamera(section, pinhole, exact.obstacles, capsules)
-    return _sensor(section, source, capsules, exact, asked, exact)
-
-
-def frames(section: FramesSection, robot: Robot, exact: ExactDistances,
-           asked: Asked) -> DepthSensor:
-    """Make the sensor of recorded frames, which cannot be checked for obstacles at the start."""
-    capsules = _capsules(robot, section.foot)
-    source = RecordedFrames(section.folder, robot, section.latency)
-    return _sensor(section, source, capsules, exact, asked, None)
-
-
-def _sensor(section: ImageSection, source: Source, capsules: tuple[Capsule, ...],
-            exact: ExactDistances, asked: Asked, checked: ExactDistances | None) -> DepthSensor:
+    source: Source
+    if isinstance(section, CameraSection):
+        rotation = (looking_at(section.position, section.look_at) if section.rotation is None
+                    else np.array(section.rotation))
+        pinhole = Pinhole(section.width, section.height, section.fx, section.fy, section.cx,
+                          section.cy, section.position, rotation)
+        source, checked = DepthCamera(section, pinhole, exact.obstacles, capsules), exact
+    else:
+        source, checked = RecordedFrames(section.folder, robot, section.latency), None
     space = DepthSpace(section, source.pinhole, exact.points, capsules, asked,
                        exact.measurement.pairs is not None)
     return DepthSensor(section, source, space, checked)

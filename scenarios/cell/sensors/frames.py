@@ -21,8 +21,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacles
 from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Array
-from scenarios.cell.sensors.camera import Pinhole
-from scenarios.cell.sensors.errors import Image
+from scenarios.cell.sensors.camera import Image, Pinhole
 from scenarios.config.reading import LIBRARY
 from scenarios.toml_text import read_toml
 

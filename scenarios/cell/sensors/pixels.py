@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.avoidance.repulsion import repulsion
-from hierarchy.avoidance.self_collision import dot
 from hierarchy.jit import compiled
-from hierarchy.kinematics import place
+from hierarchy.kinematics import dot, place
 from hierarchy.problem import Array
 from scenarios.cell.sensors.rendering import in_camera, pixels_of_ball
 
@@ -145,7 +144,7 @@ def _nearest(space, image, mean, point, direction, pair):
         pair[1] = pair[2] = pair[3] = 0.0
         return np.inf, at
     D = sqrt(DD)
-    norm = sqrt(dot(*total, *total))
+    norm = sqrt(dot(total, total))
     if D < c[2] * max(1.0 / eye[0], 1.0 / eye[1]):  # in the shadow of a pixel: its centre is void
         nearest = total if norm > 1e-6 else (1.0, 0.0, 0.0)
     _turn_unit_back(eye, nearest, pair[1:4])

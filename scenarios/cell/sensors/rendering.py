@@ -14,9 +14,9 @@ from math import ceil, floor, sqrt
 
 import numpy as np
 
-from hierarchy.avoidance.self_collision import dot, turned
+from hierarchy.avoidance.self_collision import turned
 from hierarchy.jit import compiled, inlined
-from hierarchy.kinematics import place
+from hierarchy.kinematics import dot, place
 
 _ALONG = 1e-12  # squared sine between ray and axis below which the side of a capsule is not met
 
@@ -67,10 +67,10 @@ def _draw_capsule(depth, eye, start, along, radius):
     height, width = depth.shape
     u0, u1 = _pixels_of_capsule(eye[0], eye[2], width, x, z, ax, az, radius)
     v0, v1 = _pixels_of_capsule(eye[1], eye[3], height, y, z, ay, az, radius)
-    aa, am = dot(ax, ay, az, ax, ay, az), dot(ax, ay, az, x, y, z)
-    mm = dot(x, y, z, x, y, z) - radius * radius
+    aa, am = dot((ax, ay, az), (ax, ay, az)), dot((ax, ay, az), (x, y, z))
+    mm = dot((x, y, z), (x, y, z)) - radius * radius
     bx, by, bz = x + ax, y + ay, z + az
-    nn = dot(bx, by, bz, bx, by, bz) - radius * radius
+    nn = dot((bx, by, bz), (bx, by, bz)) - radius * radius
     for v in range(v0, v1):
         ry = (v - eye[3]) / eye[1]
         for u in range(u0, u1):
@@ -114,12 +114,15 @@ def _pixels_of_capsule(f, c, size, x, z, ax, az, radius):
 @compiled
 def _draw_box(depth, eye, row):
     height, width = depth.shape
-    u0, u1, v0, v1 = _pixels_of_box(eye, row, width, height)
     cx, cy, cz = in_camera(eye, row[4], row[5], row[6])
+    around = sqrt(dot(row[1], row[2], row[3], row[1], row[2], row[3]))  # radius of the ball
+    u0, u1 = pixels_of_ball(eye[0], eye[2], width, cx, cz, around)
+    v0, v1 = pixels_of_ball(eye[1], eye[3], height, cy, cz, around)
     ax, ay, az = turned_into_camera(eye, row[7], row[10], row[13])
     bx, by, bz = turned_into_camera(eye, row[8], row[11], row[14])
     dx, dy, dz = turned_into_camera(eye, row[9], row[12], row[15])
-    a, b, d = dot(ax, ay, az, cx, cy, cz), dot(bx, by, bz, cx, cy, cz), dot(dx, dy, dz, cx, cy, cz)
+    c = cx, cy, cz
+    a, b, d = dot((ax, ay, az), c), dot((bx, by, bz), c), dot((dx, dy, dz), c)
     ha, hb, hd = row[1], row[2], row[3]
     for v in range(v0, v1):
         ry = (v - eye[3]) / eye[1]
@@ -141,23 +144,6 @@ def _between_faces(along, centre, half):
     per = 1.0 / along
     near, far = (centre - half) * per, (centre + half) * per
     return min(near, far), max(near, far)
-
-
-@compiled
-def _pixels_of_box(eye, row, width, height):
-    u0, u1, v0, v1 = width, 0, height, 0
-    for corner in range(8):
-        x, y, z = row[4], row[5], row[6]
-        for i in range(3):
-            h = row[1 + i] if corner >> i & 1 else -row[1 + i]
-            x, y, z = x + h * row[7 + i], y + h * row[10 + i], z + h * row[13 + i]
-        x, y, z = in_camera(eye, x, y, z)
-        a0, a1 = pixels_of_ball(eye[0], eye[2], width, x, z, 0.0)
-        b0, b1 = pixels_of_ball(eye[1], eye[3], height, y, z, 0.0)
-        if z <= 0.0:  # it reaches behind the camera
-            a0, a1, b0, b1 = 0, width, 0, height
-        u0, u1, v0, v1 = min(u0, a0 - 1), max(u1, a1 + 1), min(v0, b0 - 1), max(v1, b1 + 1)
-    return max(u0, 0), min(u1, width), max(v0, 0), min(v1, height)
 
 
 @inlined

@@ -19,6 +19,7 @@ from hierarchy.avoidance import (
 from hierarchy.avoidance.control_points import pack_points
 from hierarchy.avoidance.measurement import exact_measurer
 from hierarchy.avoidance.repulsion import laws
+from hierarchy.problem import Array
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceKind, AvoidanceSection, ObstacleSection
 
@@ -55,7 +56,11 @@ class Sensor(Protocol):
 
 
 _TOUCHING = 1e-9  # [m] a control point this close to an obstacle has no direction away from it
-_NO_LAWS = np.array([[0.0, 1.0, 1.0, 1.0]] * 2)  # r_max = 0
+
+
+def packed_laws(body: Repulsion | None = None, tip: Repulsion | None = None) -> Array:
+    """Return the laws (2, 4) of both for kernels; without both there is no repulsion."""
+    return laws(body, tip) if body and tip else np.array([[0.0, 1.0, 1.0, 1.0]] * 2)
 
 
 class ExactDistances:
@@ -78,7 +83,7 @@ class ExactDistances:
                        ControlPoint(robot.end_effector, end.joint, end.offset))
         self.obstacles, self._mean_within = obstacles, np.array(mean_within)
         self._joints, self._offsets = pack_points(self.points)
-        self._laws = laws(body, tip) if body and tip else _NO_LAWS
+        self._laws = packed_laws(body, tip)
         self.measurement = Measurement(len(robot.control_points))
         self._followed: State | None = None
         self._measure: Callable[[], object]

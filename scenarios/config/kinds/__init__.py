@@ -1,4 +1,4 @@
-"""The kinds of `[[tasks]]`, one file each: the keys of a kind, and the task that they make.
+"""The kinds of `[[tasks]]`: the keys of a kind, and the task that they make.
 
 A file in this folder is a kind: nothing else lists them. Makers import what they make when they are
 called, so that reading a file loads no robot.

@@ -2,48 +2,35 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from hierarchy.plugins import register
 from scenarios.config.sections import Finite
 from scenarios.config.tasks import Listed
 
-if TYPE_CHECKING:
-    from hierarchy import Task
-    from scenarios.config.references import References
 
-
-
-
-@register("tasks", "contact-force", shipped=True)
-class ListedForce(Listed):
-    """The force of a contact at a value; at level "torque". See hierarchy.tasks.ContactForce."""
+class _OfForces(Listed):
+    """A task with rows over contact forces."""
 
     unit: ClassVar[str] = "N"
     of_forces: ClassVar[bool] = True
+
+
+@register("tasks", "contact-force", shipped=True)
+class ListedForce(_OfForces):
+    """The force of a contact at a value; at level "torque". See hierarchy.tasks.ContactForce."""
+
+    made_by: ClassVar[str] = "hierarchy.tasks:ContactForce"
     kind: Literal["contact-force"]
     contact: str
     """Name of the contact."""
     target: tuple[Finite, ...]
     """One number, the normal force [N]; three, the force [N]; or six, the wrench [N, N m]."""
 
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import ContactForce
-
-        return ContactForce(at.contacts, self.contact, self.target, self.title)
-
 
 @register("tasks", "least-force", shipped=True)
-class ListedLeastForce(Listed):
+class ListedLeastForce(_OfForces):
     """The smallest contact forces, as a last level; at level "torque"."""
 
-    unit: ClassVar[str] = "N"
-    of_forces: ClassVar[bool] = True
+    made_by: ClassVar[str] = "hierarchy.tasks:LeastForce"
     kind: Literal["least-force"]
-
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import LeastForce
-
-        return LeastForce(at.contacts, self.title)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import model_validator
 
-from hierarchy.paths import Path
 from hierarchy.plugins import register
 from hierarchy.problem import Array
 from scenarios.config.sections import Flag, Gain, NotNegative, Point, Rows3, Stiffness
@@ -24,7 +21,7 @@ from scenarios.config.tasks import (
 )
 
 if TYPE_CHECKING:
-    from hierarchy import Frame, Task
+    from hierarchy import Task
     from scenarios.config.references import References
 
 
@@ -48,11 +45,11 @@ class _AlongPose(Listed, AlongSection):
     """Rows of the wanted rotation matrix from the frame to the world; by default the initial
     one."""
 
-    def asked(self, at: References) -> tuple[Frame, Path, Array]:
-        """Return the frame, its path, and its rotation, by default the initial one."""
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return the path of the frame, and its rotation, by default the initial one."""
         frame = at.frame(self.frame)
         rotation = at.start.rotation(frame) if self.rotation is None else self.rotation
-        return frame, self.along(at.start.position(frame)), np.asarray(rotation)
+        return {"path": self.along(at.start.position(frame)), "rotation": np.asarray(rotation)}
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
         """Yield the error of the position and of the rotation."""
@@ -63,13 +60,8 @@ class _AlongPose(Listed, AlongSection):
 class ListedPose(_AlongPose):
     """Origin and axes of a frame (6 rows)."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:Pose"
     kind: Literal["pose"]
-
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import Pose
-
-        return Pose(*self.asked(at), *self.gains, name=self.title)
 
     def wanted(self, position: Array, error: Array) -> Array | None:
         """Return where the task wants the point."""
@@ -80,13 +72,8 @@ class ListedPose(_AlongPose):
 class ListedFrame(_AlongPose):
     """As `pose`, with the error log(T^-1 T_d) of SE(3) in the axes of `frame` (6 rows)."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:FrameLog"
     kind: Literal["frame"]
-
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import FrameLog
-
-        return FrameLog(*self.asked(at), *self.gains, name=self.title)
 
 
 @register("tasks", "pointing", shipped=True)
@@ -102,6 +89,7 @@ class ListedPointing(PointingTask, Listed):
 class ListedLookAt(Listed, TaskSection):
     """The z axis of a frame toward a point of the world (2 rows)."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:LookAt"
     kind: Literal["look-at"]
     frame: str
     """Frame of the robot."""
@@ -110,12 +98,6 @@ class ListedLookAt(Listed, TaskSection):
     stiffness: Stiffness = 20.0
     damping: Gain = 10.0
     gain: Gain = 5.0
-
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import LookAt
-
-        return LookAt(at.frame(self.frame), self.target, *self.gains, self.title)
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
         """Yield the angle [deg] from the direction to the point."""
@@ -126,6 +108,7 @@ class ListedLookAt(Listed, TaskSection):
 class ListedRelative(Listed, TaskSection):
     """The pose of a frame in the axes of another one (6 rows, or 3)."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:RelativePose"
     kind: Literal["relative"]
     frame: str
     """Frame of the robot."""
@@ -138,23 +121,18 @@ class ListedRelative(Listed, TaskSection):
     orientation: Flag = True
     """Whether the orientation counts too."""
 
-    @model_validator(mode="after")
-    def _counts_its_rotation(self) -> Self:
+    def _wrong(self) -> Iterator[str]:
         if self.rotation is not None and not self.orientation:
-            raise ValueError("rotation goes with orientation = true")
-        return self
+            yield "rotation goes with orientation = true"
 
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import RelativePose
-
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return position and rotation, by default the initial ones."""
         start, frame, to = at.start, at.frame(self.frame), at.frame(self.to, "to")
         axes = start.rotation(to).T
         position = (axes @ (start.position(frame) - start.position(to)) if self.position is None
                     else self.position)
         rotation = axes @ start.rotation(frame) if self.rotation is None else self.rotation
-        return RelativePose(frame, to, position, rotation if self.orientation else None,
-                            *self.gains, self.title)
+        return {"position": position, "rotation": rotation if self.orientation else None}
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
         """Yield the error of the position and of the rotation."""
@@ -165,6 +143,7 @@ class ListedRelative(Listed, TaskSection):
 class ListedManipulability(Listed, TaskSection):
     """The manipulability of a frame at a value or above it (1 row)."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:Manipulability"
     unit: ClassVar[str] = ""
     kind: Literal["manipulability"]
     frame: str
@@ -179,16 +158,12 @@ class ListedManipulability(Listed, TaskSection):
     damping: Gain = 10.0
     gain: Gain = 5.0
 
-    @property
-    def one_sided(self) -> bool:
-        """Whether its rows are inequalities."""
-        return self.rows == "inequality"
-
-    def make(self, at: References) -> Task:
+    def make(self, at: References, **more: Any) -> Task:
         """Return the task."""
-        from hierarchy.tasks import Manipulability
-
-        task = Manipulability(at.frame(self.frame), self.least, self.part, self.rows,
-                              name=self.title)
+        task = super().make(at, **more)
         task.jacobian(at.start)  # refuses a robot that it is not for
-        return replace(task, stiffness=self.stiffness, damping=self.damping, gain=self.gain)
+        return task
+
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return the kind."""
+        return {"kind": self.rows}

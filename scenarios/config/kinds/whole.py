@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -10,10 +10,9 @@ from hierarchy.paths import Still
 from hierarchy.plugins import register
 from scenarios.config.avoidance import BarrierSection
 from scenarios.config.sections import Finite, Gain, JointPosition, Stiffness
-from scenarios.config.tasks import AlongSection, Listed, PostureTask, TaskSection
+from scenarios.config.tasks import AlongSection, Listed, PostureTask, Rows, TaskSection
 
 if TYPE_CHECKING:
-    from hierarchy import Task
     from scenarios.config.references import References
 
 
@@ -29,6 +28,7 @@ class ListedCoupling(Listed, TaskSection):
     """The sum of factor times position over some joints at a value (1 row)."""
 
     unit: ClassVar[str] = "rad"
+    made_by: ClassVar[str] = "hierarchy.tasks:JointCoupling"
     kind: Literal["coupling"]
     joints: Annotated[dict[str, Finite], Field(min_length=1)]
     """The factor of each joint, by name."""
@@ -36,35 +36,30 @@ class ListedCoupling(Listed, TaskSection):
     """The value of the sum."""
     stiffness: Stiffness = 100.0
 
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import JointCoupling
-
-        return JointCoupling(at.robot, self.joints, self.value, *self.gains, self.title)
-
 
 @register("tasks", "com", shipped=True)
 class ListedCentreOfMass(Listed, AlongSection):
     """The centre of mass along a path."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:CentreOfMass"
     kind: Literal["com"]
     axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
     """Axes of the world that count."""
 
-    def make(self, at: References) -> Task:
-        """Return the task."""
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return the path and the numbers of the axes."""
         from hierarchy.tasks import CentreOfMass
 
         anywhere = CentreOfMass(at.robot, Still((0.0, 0.0, 0.0)))
-        return CentreOfMass(at.robot, self.along(anywhere.position(at.start)),
-                            tuple("xyz".index(axis) for axis in self.axes), *self.gains,
-                            name=self.title)
+        return {"path": self.along(anywhere.position(at.start)),
+                "axes": tuple("xyz".index(axis) for axis in self.axes)}
 
 
 @register("tasks", "momentum", shipped=True)
 class ListedMomentum(Listed):
     """The momentum of the whole robot to zero."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:Momentum"
     kind: Literal["momentum"]
     part: Literal["linear", "angular"] = "angular"
     """Which of the two."""
@@ -76,36 +71,25 @@ class ListedMomentum(Listed):
         """That of its error."""
         return "N s" if self.part == "linear" else "N m s"
 
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import Momentum
-
-        return Momentum(self.part, damping=self.damping, name=self.title)
-
 
 class _Apart(Listed):
     """A task with one-sided rows between bodies."""
 
     unit: ClassVar[str] = "m"
-
-    @property
-    def one_sided(self) -> bool:
-        """Whether its rows are inequalities."""
-        return True
+    rows: ClassVar[Rows] = "inequality"
 
 
 @register("tasks", "self-collision", shipped=True)
 class ListedSelfCollision(_Apart, BarrierSection):
     """Links that are not neighbours, kept apart."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:SelfSeparation"
     kind: Literal["self-collision"]
 
-    def make(self, at: References) -> Task:
-        """Return the task."""
-        from hierarchy.tasks import SelfSeparation
-
-        return SelfSeparation(at.robot.capsules, self.barrier(self.distance),
-                              at.pairs(self.distance), name=self.title)
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return the capsules, those of them to keep apart, and how."""
+        return {"capsules": at.robot.capsules, "barrier": self.barrier(self.distance),
+                "pairs": at.pairs(self.distance)}
 
 
 @register("tasks", "collision", shipped=True)

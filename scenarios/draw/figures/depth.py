@@ -20,20 +20,15 @@ _AROUND = 0.35   # [m] shown around the points
 
 
 def depth_figure(view: DepthView) -> Figure:
-    """Return an image of the camera with the distances that follow from it."""
-    fig, (ax,) = drawing.figure(width=4.9, height=3.9)
-    draw_depth(ax, view)
-    ax.set_title(f"t = {view.t:.2f} s", pad=4.0, loc="left", fontsize=9.0)
-    return fig
-
-
-def draw_depth(ax: Axes, view: DepthView) -> None:
-    """Draw an image, its points as circles, and lines to the pixels they are nearest to.
+    """Return an image of the camera, its points as circles, lines to the pixels nearest to them.
 
     The line of D_minimal is blue, that of the end effector cyan, the others are thin. Near is
     bright, black is no reading. Only the surroundings of the points are shown.
     """
-    pinhole = _pinhole(view)
+    fig, (ax,) = drawing.figure(width=4.9, height=3.9)
+    (height, width), (fx, fy, cx, cy) = view.image.shape, view.camera[:4].tolist()
+    pinhole = Pinhole(width, height, fx, fy, cx, cy, view.camera[4:7],
+                      view.camera[7:].reshape(3, 3))
     pixels = pinhole.project(view.points)
     _image(ax, np.asarray(view.image, dtype=float), pixels[:, 2])
     ends = [divmod(int(at), pinhole.width)[::-1] if at >= 0 else None for at in view.pixel]
@@ -56,12 +51,8 @@ def draw_depth(ax: Axes, view: DepthView) -> None:
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1,
                   borderpad=0.0, handlelength=1.4, frameon=False, fontsize=9.0)
-
-
-def _pinhole(view: DepthView) -> Pinhole:
-    height, width = view.image.shape
-    fx, fy, cx, cy = view.camera[:4].tolist()
-    return Pinhole(width, height, fx, fy, cx, cy, view.camera[4:7], view.camera[7:].reshape(3, 3))
+    ax.set_title(f"t = {view.t:.2f} s", pad=4.0, loc="left", fontsize=9.0)
+    return fig
 
 
 def _image(ax: Axes, reading: Array, depths: Array) -> None:

@@ -204,7 +204,8 @@ def svg(fig: Figure, title: str) -> Markup:
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = re.sub(r' id="[a-zA-Z0-9]+_\d+"', "", body)
     body = re.sub(r"<!--.*?-->\s*|\s*\n\s*", lambda m: "" if m[0][0] == "<" else " ", body)
-    body = re.sub(r' d="[^"]*"', _rounded, body)
+    body = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d)\d+", r"\1", path[0]),
+                  body)  # to a tenth of a point, which cannot be seen
     body = body.replace(INK, "currentColor").replace("'DejaVu Sans'", "inherit")
     head = f'<svg role="img" aria-label="{escape(title)}" viewBox="'
     return Markup(re.sub(r'<svg [^>]*?viewBox="', lambda _: head, body, count=1))
@@ -221,8 +222,3 @@ def write(fig: Figure, stem: str) -> None:
         fig.set_layout_engine("none")
         for kind in present().formats:
             fig.savefig(f"{stem}.{kind}", facecolor="white", dpi=160, metadata=undated.get(kind))
-
-
-def _rounded(path: re.Match[str]) -> str:
-    """Round a path's coordinates to a tenth of a point, which cannot be seen."""
-    return re.sub(r"(\.\d)\d+", r"\1", path[0])

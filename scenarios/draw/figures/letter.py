@@ -7,72 +7,58 @@ shows there, as shipped.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hierarchy.errors import HierarchyError, UnknownNameError
+from scenarios.config import load
 from scenarios.draw.figures import drawing
+from scenarios.draw.figures.depth import depth_figure
 from scenarios.draw.figures.drawing import INK
 from scenarios.draw.figures.panels import PANEL, Panel
 from scenarios.draw.figures.picture import picture
 from scenarios.draw.figures.timeline import timeline
 from scenarios.files import added_to, claim, named, whole
+from scenarios.measure.run_folder import load_run
+from scenarios.recording.recording import Recording
 
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
-
+Names = tuple[str, ...]
 _STRIP, _NARROW_STRIP, _MOST_STRIPS = 1.7, 1.2, 3  # heights [in], and up to how many are high
 
 
-@dataclass(frozen=True)
-class Part:
-    """Part (a), (b), ... of a figure: its panels, and the scenarios from which the letter has it.
+class LetterFigure(NamedTuple):
+    """A figure of a run, and of the letter if it has a number there.
 
-    None of them where the letter has no such figure.
+    parts : (a), (b), ...: the panels of each, and the scenarios from which the letter has it.
     """
 
-    panels: tuple[str, ...]
-    of: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class LetterFigure:
-    """A figure of a run, and of the letter if it has a number there."""
-
     name: str
-    parts: tuple[Part, ...]
+    parts: tuple[tuple[Names, Names], ...]
     number: int | None = None
-
-    @property
-    def panels(self) -> tuple[str, ...]:
-        """The panels of one run, each once."""
-        return tuple(dict.fromkeys(name for part in self.parts for name in part.panels))
 
 
 _ELLIPSE, _HUMAN = ("ellipse", "ellipse-published"), ("human",)
-_BODY = ("active-point", "body-distance")
+_VELOCITIES, _ACCELERATIONS = ("joint-velocities",), ("joint-accelerations",)
+_BODY, _TIP, _CONE = ("active-point", "body-distance"), ("ee-distance",), ("pointing-error",)
 SIMULATION = (
-    LetterFigure("joint-velocities", (Part(("joint-velocities",), ("ellipse-velocity",)),
-                                      Part(("joint-velocities",), _ELLIPSE)), 4),
-    LetterFigure("distances", (Part(("ee-distance",), _ELLIPSE), Part(_BODY, _ELLIPSE)), 5),
-    LetterFigure("velocities-and-distance", (Part(("joint-velocities",), ("ellipse-3d",)),
-                                             Part(_BODY, ("ellipse-3d",))), 6),
-    LetterFigure("pointing-error", (Part(("pointing-error",), ("ellipse-35deg",)),
-                                    Part(("pointing-error",), ("ellipse-35deg-equality",))), 7),
-    LetterFigure("position-error", (Part(("position-error",)),)),
-    LetterFigure("task-errors", (Part(("task-errors",)), Part(("task-angles",)))),
+    LetterFigure("joint-velocities", (
+        (_VELOCITIES, ("ellipse-velocity",)), (_VELOCITIES, _ELLIPSE)), 4),
+    LetterFigure("distances", ((_TIP, _ELLIPSE), (_BODY, _ELLIPSE)), 5),
+    LetterFigure("velocities-and-distance", (
+        (_VELOCITIES, ("ellipse-3d",)), (_BODY, ("ellipse-3d",))), 6),
+    LetterFigure("pointing-error", (
+        (_CONE, ("ellipse-35deg",)), (_CONE, ("ellipse-35deg-equality",))), 7),
+    LetterFigure("position-error", ((("position-error",), ()),)),
+    LetterFigure("task-errors", ((("task-errors", "task-angles"), ()),)),
 )
 EXPERIMENT = (
-    LetterFigure("velocities-and-accelerations", (Part(("joint-velocities",), _HUMAN),
-                                                  Part(("joint-accelerations",), _HUMAN)), 9),
+    LetterFigure("velocities-and-accelerations", (
+        (_VELOCITIES, _HUMAN), (_ACCELERATIONS, _HUMAN)), 9),
     LetterFigure("errors-and-distances", (
-        Part(("position-components",), _HUMAN), Part(("pointing-error",), _HUMAN),
-        Part(("ee-distance",), _HUMAN), Part(_BODY, _HUMAN)), 10),
+        (("position-components",), _HUMAN), (_CONE, _HUMAN), (_TIP, _HUMAN), (_BODY, _HUMAN)), 10),
 )
 _SINGLE = ("velocities-and-distance",)  # of two runs, its panels are in other figures
 
@@ -89,8 +75,6 @@ def redraw(runs: Sequence[str | Path], style: str = "screen",
     HierarchyError : one of `runs` is not a run folder or is damaged, `style` is not in
         drawing.STYLES, `out` is missing or cannot be written, or there is nothing to draw.
     """
-    from scenarios.measure.run_folder import load_run
-
     if style not in drawing.STYLES:
         raise UnknownNameError("style", style, drawing.STYLES)
     if len(runs) > 1 and out is None:
@@ -112,79 +96,69 @@ def write_all(recordings: Sequence[Recording], folder: Path) -> None:
     two runs also each quantity of both. Raises HierarchyError if several runs make no figure.
     """
     with drawing.styled(drawing.present()):
-        drawn = dict(_all(recordings[0]) if len(recordings) == 1 else _together(recordings))
-        if len(recordings) > 1 and not drawn:
+        drawn = dict(figures(recordings))
+        if not drawn and len(recordings) > 1:
             raise HierarchyError("more than two runs make only the letter's figures 4 to 7, 9 and "
                                  "10, and its runs are not among these")
         for name, fig in drawn.items():
             drawing.write(fig, str(folder / name))
 
 
-def _all(recording: Recording) -> Iterator[tuple[str, Figure]]:
-    for wanted in EXPERIMENT if recording.scenario.is_experiment else SIMULATION:
-        panels = _fitting(wanted.panels, recording)
-        if panels:
-            stem, title = _named(wanted, recording)
-            whole = all(is_letters(recording, part.of) for part in wanted.parts)
-            yield stem, stacked([(recording, _fitting(part.panels, recording))
-                                 for part in wanted.parts] if whole else [(recording, panels)],
-                                title, lettered=whole)
-    if "ee_position" in recording and recording.ticks > 1:
-        yield "picture", picture({label_of(recording): recording})
-    if recording.ticks > 1:
-        yield "stack", timeline(recording)
-    if recording.depth is not None and np.isfinite(recording.depth.distance[-1]):
-        from scenarios.draw.figures.depth import depth_figure
-
-        number = "figure-8-" if is_letters(recording, _HUMAN) else ""
-        yield f"{number}depth-image", depth_figure(recording.depth)
-    if "time_tick" in recording and recording.ticks > 1:
-        yield "tick-times", tick_times(recording)
-
-
-def _together(recordings: Sequence[Recording]) -> Iterator[tuple[str, Figure]]:
-    """Yield the letter's figures whose runs are there, then those of two runs side by side."""
-    shown: set[str] = set()
-    for wanted in (*SIMULATION, *EXPERIMENT):
-        runs = [next((run for run in recordings if is_letters(run, part.of)), None)
-                for part in wanted.parts]
-        parts = [(run, _fitting(part.panels, run))
-                 for part, run in zip(wanted.parts, runs, strict=True) if run is not None]
-        if len(parts) == len(wanted.parts):
+def figures(recordings: Sequence[Recording]) -> Iterator[tuple[str, Figure]]:
+    """Yield the letter's figures whose runs are there, then the others of one run or of two."""
+    alone, shown = len(recordings) == 1, set[str]()
+    usual = EXPERIMENT if all(run.scenario.is_experiment for run in recordings) else SIMULATION
+    for wanted in usual if alone else (*SIMULATION, *EXPERIMENT):
+        runs = [next((run for run in recordings if is_letters(run, of)), None)
+                for _, of in wanted.parts]
+        parts = [(run, _fitting(panels, run))
+                 for (panels, _), run in zip(wanted.parts, runs, strict=True) if run is not None]
+        if len(parts) == len(runs):
             yield f"figure-{wanted.number}-{wanted.name}", stacked(
                 parts, f"Figure {wanted.number}", lettered=True)
-            shown |= {wanted.name} if len({id(run) for run in runs}) > 1 else set()
-    if len(recordings) != 2:
-        return
-    experiment = all(run.scenario.is_experiment for run in recordings)
-    for wanted in EXPERIMENT if experiment else SIMULATION:
-        both = [(run, _fitting(wanted.panels, run)) for run in recordings]
-        if wanted.name not in (*shown, *_SINGLE) and all(panels for _, panels in both):
-            yield wanted.name, stacked(both, wanted.name.replace("-", " ").capitalize(),
-                                       lettered=True)
+            shown |= {wanted.name} if alone or len({id(run) for run in runs}) > 1 else set()
+    for wanted in usual if len(recordings) < 3 else ():
+        names = list(dict.fromkeys(name for panels, _ in wanted.parts for name in panels))
+        beside = [(run, _fitting(names, run)) for run in recordings]
+        if (wanted.name not in shown and (alone or wanted.name not in _SINGLE)
+                and all(panels for _, panels in beside)):
+            stem, title = _named(wanted, recordings)
+            yield stem, stacked(beside, title, lettered=not alone)
+    if alone:
+        yield from _others(recordings[0])
+
+
+def _others(recording: Recording) -> Iterator[tuple[str, Figure]]:
+    """Yield the picture of a run, its stack over time, its depth image and its times of ticks."""
+    if recording.ticks > 1:
+        if "ee_position" in recording:
+            yield "picture", picture({label_of(recording): recording})
+        yield "stack", timeline(recording)
+        if "time_tick" in recording:
+            yield "tick-times", tick_times(recording)
+    if recording.depth is not None and np.isfinite(recording.depth.distance[-1]):
+        number = "figure-8-" if is_letters(recording, _HUMAN) else ""
+        yield f"{number}depth-image", depth_figure(recording.depth)
 
 
 def _fitting(names: Sequence[str], recording: Recording) -> list[Panel]:
     return [panel for panel in map(PANEL.__getitem__, names) if panel.fits(recording)]
 
 
-def _named(wanted: LetterFigure, recording: Recording) -> tuple[str, str]:
-    """Return the file name and the title of a figure of one run, with the letter's number if any.
+def _named(wanted: LetterFigure, recordings: Sequence[Recording]) -> tuple[str, str]:
+    """Return file name and title of a figure that is not the letter's, or one part of it.
 
     A run that is one of several parts has the letter of its part: "figure-4b-joint-velocities".
     """
-    own = [i for i, part in enumerate(wanted.parts) if is_letters(recording, part.of)]
+    own = [letter for letter, (_, of) in zip("abcd", wanted.parts, strict=False)
+           if len(recordings) == 1 and is_letters(recordings[0], of)]
     if not own:
         return wanted.name, wanted.name.replace("-", " ").capitalize()
-    part = "" if len(own) == len(wanted.parts) else "abcd"[own[0]]
-    return (f"figure-{wanted.number}{part}-{wanted.name}",
-            f"Figure {wanted.number}" + (f" ({part})" if part else ""))
+    return (f"figure-{wanted.number}{own[0]}-{wanted.name}", f"Figure {wanted.number} ({own[0]})")
 
 
-def is_letters(recording: Recording, names: Sequence[str]) -> bool:
+def is_letters(recording: Recording, names: Names) -> bool:
     """Whether this is a whole run of one of the scenarios of these names, as shipped."""
-    from scenarios.config import load
-
     name = recording.scenario.name
     return name in names and recording.fault is None and recording.scenario == load(name)
 
@@ -207,22 +181,17 @@ def stacked(parts: Sequence[tuple[Recording, Sequence[Panel]]], title: str,
         which = f", {_run_of(run)}" if drawing.present().titled and letter and len(runs) > 1 else ""
         ax.set_title(f"{letter}{panel.heading}{which}", loc="left")
         before = i
-    _explain(fig, axes)
-    axes[-1].set_xlabel("time [s]")
-    if drawing.present().titled:
-        said = f"{title}: {next(iter(runs.values()))}" if len(runs) == 1 else title
-        fig.suptitle(said, x=0.01, ha="left", fontsize="medium", color=INK)
-    return fig
-
-
-def _explain(fig: Figure, axes: Sequence[Axes]) -> None:
-    """Add one legend of all lines that have a name, on whichever axes they are."""
     lines = {label: line for ax in axes
              for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     if lines:
         fig.legend(list(lines.values()), list(lines), fontsize="small", frameon=False,
                    ncols=7 if drawing.present().titled else 4, handlelength=1.8,
                    columnspacing=1.0, loc="outside lower center")
+    axes[-1].set_xlabel("time [s]")
+    if drawing.present().titled:
+        said = f"{title}: {next(iter(runs.values()))}" if len(runs) == 1 else title
+        fig.suptitle(said, x=0.01, ha="left", fontsize="medium", color=INK)
+    return fig
 
 
 def tick_times(recording: Recording) -> Figure:

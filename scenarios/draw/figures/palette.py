@@ -44,12 +44,6 @@ def colour(label: str) -> str:
     return COLOURS.get(_parts(label)[0], SPARE[0])
 
 
-def dash(label: str) -> Dash:
-    """Return the dashes of a resolver's label: solid except for variants."""
-    variant = _parts(label)[1]
-    return SOLID if variant in _USUAL else _VARIANTS.get(variant, _DASHES[1])
-
-
 def looks(labels: Iterable[str]) -> dict[str, Look]:
     """Return how to draw labels side by side, no two alike as long as dashes and colours last.
 
@@ -62,10 +56,11 @@ def looks(labels: Iterable[str]) -> dict[str, Look]:
     free = [*SPARE, *free] if known else [*free, *SPARE]
     shades, found = dict(COLOURS), dict[str, Look]()
     for label in sorted(labels, key=lambda label: _parts(label)[1] not in _USUAL):
-        name = _parts(label)[0]
+        name, variant = _parts(label)
         if name not in shades:
             shades[name] = free.pop(0) if free else SPARE[0]
-        lines = (line for line in (dash(label), *_DASHES)
+        own = SOLID if variant in _USUAL else _VARIANTS.get(variant, _DASHES[1])
+        lines = (line for line in (own, *_DASHES)
                  if Look(shades[name], line) not in found.values())
         found[label] = Look(shades[name], next(lines, SOLID))
     return {label: found[label] for label in labels}

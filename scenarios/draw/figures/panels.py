@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,11 +14,11 @@ from hierarchy import plugins
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK, MEASURED, Array
 from scenarios.recording.listed import errors
+from scenarios.recording.recording import Recording
 
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+Draw = Callable[[Axes, Recording, str], None]
 
-Draw = Callable[[Axes, "Recording", str], None]
+_DASHED = (0, (4, 3))
 
 
 @dataclass(frozen=True)
@@ -52,27 +51,35 @@ class Panel:
         return known and recording.ticks > 1
 
 
-def joint_velocities(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw figure 4: every joint's velocity [rad/s]."""
-    for joint, velocity in enumerate(recording["v"].T):
-        drawing.curve(ax, recording["t"], velocity, **drawing.joint_line(joint), linewidth=0.8,
-                      label=f"joint {joint + 1}")
+def columns(ax: Axes, recording: Recording, colour: str, signal: str, width: float,
+            named: Callable[[int], str] | None = None, scale: float = 1.0) -> None:
+    """Draw each column of a signal, as figures 4, 9 (b) and 10 (a) do."""
+    for i, values in enumerate(recording[signal].T):
+        drawing.curve(ax, recording["t"], scale * values, **drawing.joint_line(i), linewidth=width,
+                      label=None if named is None else named(i))
 
 
-def joint_accelerations(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw figure 9 (b): every joint's acceleration [rad/s^2]."""
-    for joint, acceleration in enumerate(recording["a"].T):
-        drawing.curve(ax, recording["t"], acceleration, **drawing.joint_line(joint), linewidth=0.6)
+def distance(ax: Axes, recording: Recording, colour: str, signal: str) -> None:
+    """Draw D_min [m] of the end effector, red while repelled, or D_minimal of the body: figure 5.
 
-
-def ee_distance(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw figure 5 (a): D_min of the end effector [m], with eps_ee; red while repelled."""
-    t, distance = recording["t"], _distance(ax, recording, "ee_distance", colour)
-    if "repulsion_active" in recording:
-        _in_red(ax, t, distance, recording["repulsion_active"])
-    avoidance = recording.scenario.avoidance
-    for symbol, threshold in avoidance.tip_thresholds.items() if avoidance else ():
-        _threshold(ax, t, threshold, symbol)
+    The true one has the measured one behind it; where no other is known, it is the measured one.
+    """
+    t, measured, avoidance = recording["t"], recording[signal], recording.scenario.avoidance
+    if true := f"true_{signal}" in recording:
+        drawing.curve(ax, t, np.where(np.isfinite(measured), measured, np.nan), color=MEASURED,
+                      linewidth=0.7, label="measured")
+    shown = recording[f"true_{signal}"] if true else measured
+    drawing.curve(ax, t, shown, color=colour, label="true" if true else None)
+    tip = signal == "ee_distance"
+    if tip and "repulsion_active" in recording:
+        _in_red(ax, t, shown, recording["repulsion_active"])
+    if avoidance is not None:
+        for symbol, value in (avoidance.tip_thresholds if tip else avoidance.thresholds).items():
+            ax.axhline(value, color=INK, linewidth=0.6, linestyle=_DASHED)
+            ax.annotate(symbol, (1.0, value), xycoords=("axes fraction", "data"),
+                        fontsize="small", va="bottom", ha="right", color=INK)
+    if not tip:
+        ax.set_ylim(bottom=0.0)
 
 
 def active_point(ax: Axes, recording: Recording, colour: str) -> None:
@@ -89,30 +96,13 @@ def active_point(ax: Axes, recording: Recording, colour: str) -> None:
     ax.set_yticks(range(1, points + 1, 1 + points // 6))
 
 
-def body_distance(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw figure 5 (b), below: D_minimal of the body [m], with eps_1 and eps_2."""
-    t = recording["t"]
-    _distance(ax, recording, "minimal_distance", colour)
-    avoidance = recording.scenario.avoidance
-    for symbol, distance in avoidance.thresholds.items() if avoidance else ():
-        _threshold(ax, t, distance, symbol)
-    ax.set_ylim(bottom=0.0)
-
-
 def pointing_error(ax: Axes, recording: Recording, colour: str) -> None:
     """Draw figure 7: cos(alpha_d) - cos(alpha), in red while the task is in the stack."""
     t, error = recording["t"], recording["pointing_error"]
     drawing.curve(ax, t, error, color=colour)
     if "pointing_active" in recording:
         _in_red(ax, t, error, recording["pointing_active"])
-    ax.axhline(0.0, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
-
-
-def position_components(ax: Axes, recording: Recording, colour: str) -> None:
-    """Draw figure 10 (a): the end effector's position error along x, y and z [mm]."""
-    for axis, error in enumerate(recording["position_error"].T):
-        drawing.curve(ax, recording["t"], 1e3 * error, **drawing.joint_line(axis), linewidth=0.9,
-                      label="xyz"[axis])
+    ax.axhline(0.0, color=INK, linewidth=0.6, linestyle=_DASHED)
 
 
 def position_error(ax: Axes, recording: Recording, colour: str) -> None:
@@ -139,20 +129,24 @@ def _has_errors(unit: str, recording: Recording) -> bool:
 
 
 PANELS = (
-    Panel("joint-velocities", "Joint velocities", "rad/s", "v", joint_velocities,
+    Panel("joint-velocities", "Joint velocities", "rad/s", "v",
+          partial(columns, signal="v", width=0.8, named=lambda j: f"joint {j + 1}"),
           "Continuous at acceleration level, with jumps at velocity level."),
-    Panel("joint-accelerations", "Joint accelerations", "rad/s²", "a", joint_accelerations,
+    Panel("joint-accelerations", "Joint accelerations", "rad/s²", "a",
+          partial(columns, signal="a", width=0.6),
           "It jumps where the stack changes."),
     Panel("position-error", "Distance from the desired position", "mm, logarithmic",
           "position_error", position_error,
           "The shipped ellipses start off their path on purpose."),
-    Panel("body-distance", "Body to the nearest obstacle", "m", "minimal_distance", body_distance,
+    Panel("body-distance", "Body to the nearest obstacle", "m", "minimal_distance",
+          partial(distance, signal="minimal_distance"),
           "Dashed: below ε₂ a lowest-priority task pushes away, below ε₁ the first; d_min is "
           "kept."),
     Panel("active-point", "Control point being pushed away", "number", "active_control_point",
           active_point, "The control point nearest to an obstacle, while within ε₂.",
           shows=lambda recording: bool(recording["active_control_point"].any())),
-    Panel("ee-distance", "End effector to the nearest obstacle", "m", "ee_distance", ee_distance,
+    Panel("ee-distance", "End effector to the nearest obstacle", "m", "ee_distance",
+          partial(distance, signal="ee_distance"),
           "Dashed: below ε_ee, in red, the position task is pushed off its path; d_min is kept."),
     Panel("pointing-error", "Pointing error", "cos α_d − cos α", "pointing_error", pointing_error,
           "Above zero the axis is outside the cone; red while the task is in the stack.",
@@ -168,32 +162,13 @@ TASK_PANELS = (
 for _panel in (*PANELS, *TASK_PANELS):
     plugins.register("figures", _panel.name, shipped=True)(_panel)
 _COMPONENTS = Panel("position-components", "Position error of the end effector", "mm",
-                    "position_error", position_components)
+                    "position_error",
+                    partial(columns, signal="position_error", width=0.9,
+                            named="xyz".__getitem__, scale=1e3))
 PANEL = {panel.name: panel for panel in (*PANELS, *TASK_PANELS, _COMPONENTS)}
-
-
-def _distance(ax: Axes, recording: Recording, signal: str, colour: str) -> Array:
-    """Draw a distance [m] and return it (T,): the true one, with the measured one behind it.
-
-    Where no other is known, it is the measured one.
-    """
-    t, measured, true = recording["t"], recording[signal], f"true_{signal}"
-    if true not in recording:
-        drawing.curve(ax, t, measured, color=colour)
-        return measured
-    drawing.curve(ax, t, np.where(np.isfinite(measured), measured, np.nan), color=MEASURED,
-                  linewidth=0.7, label="measured")
-    drawing.curve(ax, t, recording[true], color=colour, label="true")
-    return recording[true]
 
 
 def _in_red(ax: Axes, t: Array, y: Array, mask: Array) -> None:
     if mask.any():
         drawing.curve(ax, t, np.where(mask, y, np.nan), color=ALERT, linewidth=1.7,
                       label="task active")
-
-
-def _threshold(ax: Axes, t: Array, value: float, name: str) -> None:
-    ax.axhline(value, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
-    ax.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), fontsize="small",
-                va="bottom", ha="right", color=INK)

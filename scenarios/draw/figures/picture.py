@@ -1,51 +1,59 @@
-"""The scene of a run in space: the arm, its desired and actual path, the obstacles."""
+"""The scene of a run in space: the robot, its desired and actual paths, the obstacles."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Polygon
 
+from hierarchy.avoidance import Obstacles
+from scenarios.cell.sensors.sensor import make_obstacles
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK, Array
+from scenarios.recording.facts import RobotFacts
+from scenarios.recording.recording import Recording
+from scenarios.scene import ends, place
 
-if TYPE_CHECKING:
-    from hierarchy.avoidance import Obstacle, Obstacles
-    from scenarios.recording.facts import RobotFacts
-    from scenarios.recording.recording import Recording
-
-_VERTICES = 1200
+_VERTICES = 800
 _OTHER_POSES = 5
 _AREA_ALPHAS = (0.08, 0.18)  # of the outer and the inner area
 _BALLS = 24  # that a capsule is drawn with
 _NEAR = 1.0  # [m] from the end effector: moving obstacles farther away are left out
+_DESIRED = (0, (3, 3))  # dashes
+
+# Of a robot that branches:
+_POSES = 4
+_APART = 1.1    # distance between bodies, in widths of the widest
+_WIDTH, _HEADROOM = 6.4, 0.5  # of the figure [in]
+_AZIMUTH, _ELEVATION = 40.0, 12.0  # [deg] of the camera: in front of a robot that looks along x
+_AROUND = np.linspace(0.0, np.pi, 13)  # of half a rim
+_LIGHT, _DARK = (0.835, 0.851, 0.871), (0.553, 0.588, 0.631)  # of links far away and near
 
 
 def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str] | None = None
             ) -> Figure:
-    """Return the scene, after figure 3 of the letter.
+    """Return the scene of the first run with every run's path, in the colour of its label.
 
-    The arm is that of the first run, drawn dark when its body is nearest to an obstacle, with its
-    control points and the line to that obstacle; every run's path has the colour given for its
-    label, or that of its resolver. `scenarios.draw.figures.bodies` draws robots that branch.
+    Robots that branch stand side by side, see `_bodies`. The arm of another is drawn as in figure 3
+    of the letter, dark when its body is nearest to an obstacle, with its control points and the
+    line to that obstacle.
     """
-    from scenarios.draw.figures import bodies
-
+    chosen = drawing.colours(recordings) if colours is None else colours
     first = next(iter(recordings.values()))
     if not first.facts.robot.is_chain:
-        return bodies.picture(recordings, colours or drawing.colours(recordings))
+        return _bodies(recordings, chosen)
     fig, (ax,) = drawing.figure(width=4.9, height=3.9)
     _obstacles(ax, first)
     _arms(ax, first.facts.robot, first)
-    chosen = drawing.colours(recordings) if colours is None else colours
     for label, colour in reversed(list(chosen.items())):
-        _line(ax, recordings[label]["ee_position"], color=colour, linewidth=1.8)
+        _line(ax, drawing.project(recordings[label]["ee_position"]), color=colour, linewidth=1.8)
     if "desired_position" in first:
-        _line(ax, once(first["desired_position"]), color=INK, linewidth=0.9, linestyle=(0, (3, 3)))
+        _line(ax, drawing.project(once(first["desired_position"])), color=INK, linewidth=0.9,
+              linestyle=_DESIRED)
     ax.set_aspect("equal")
     ax.set_axis_off()
     return fig
@@ -61,8 +69,8 @@ def once(path: Array) -> Array:
 
 
 def _line(ax: Axes, path: Array, **style: object) -> None:
-    kept = path[:: max(1, len(path) // _VERTICES)]
-    ax.plot(*drawing.project(kept).T, **style)  # type: ignore[arg-type]
+    """Draw a path (T, 2), thinned."""
+    ax.plot(*path[:: max(1, len(path) // _VERTICES)].T, **style)  # type: ignore[arg-type]
 
 
 def _obstacles(ax: Axes, recording: Recording) -> None:
@@ -77,8 +85,10 @@ def _obstacles(ax: Axes, recording: Recording) -> None:
         if obstacle.path is not None and np.linalg.norm(centre - tip) > _NEAR:
             continue
         radius = obstacle.size[0] if obstacle.size and obstacle.shape != "box" else 0.0
-        for place in _along(obstacle, centre):
-            _ball(ax, place, radius, 1.0)
+        half = obstacle.size[1] if obstacle.shape == "capsule" else 0.0
+        axis = np.asarray(obstacle.rotation, dtype=float)[:, 2]
+        for at in np.linspace(-half, half, _BALLS if half else 1):
+            _ball(ax, centre + at * axis, radius, 1.0)
         ax.plot(*drawing.project(centre), "o", color=ALERT, markersize=5)
         if obstacle.path is None:
             for area, alpha in zip(areas, _AREA_ALPHAS[-len(areas):], strict=True):
@@ -91,20 +101,10 @@ def _ball(ax: Axes, centre: Array, radius: float, alpha: float) -> None:
 
 
 def _obstacles_at(recording: Recording, tick: int) -> Obstacles:
-    from scenarios.cell.sensors.sensor import make_obstacles
-
     avoidance = recording.scenario.avoidance
     obstacles = make_obstacles(avoidance.placed if avoidance else ())
     obstacles.at(float(recording["t"][tick]))
     return obstacles
-
-
-def _along(obstacle: Obstacle, centre: Array) -> Array:
-    """Return centres (P, 3) [m] of balls that make up a capsule; of other shapes the centre."""
-    if obstacle.shape != "capsule":
-        return centre[None]
-    axis = np.asarray(obstacle.rotation, dtype=float)[:, 2] * obstacle.size[1]
-    return np.asarray(centre + np.linspace(-1.0, 1.0, _BALLS)[:, None] * axis)
 
 
 def _nearest(recording: Recording) -> int:
@@ -123,8 +123,6 @@ def _exact(recording: Recording) -> bool:
 
 
 def _arms(ax: Axes, robot: RobotFacts, recording: Recording) -> None:
-    from scenarios.scene import place
-
     nearest = _nearest(recording)
     others = np.linspace(0, recording.ticks - 1, _OTHER_POSES).astype(int)
     for k, alpha in (*((int(k), 0.16) for k in others), (nearest, 0.9)):
@@ -139,13 +137,80 @@ def _arms(ax: Axes, robot: RobotFacts, recording: Recording) -> None:
             body = place(placements, [p.joint for p in points], [p.offset for p in points])
             if len(body):
                 ax.plot(*drawing.project(body).T, "o", color=ALERT, markersize=3)
-                _shortest(ax, recording, k, body)
+            centres = _obstacles_at(recording, k).centres
+            if (len(body) and centres.size and "control_point_distance" in recording
+                    and _exact(recording)):  # the shortest distance, as in figure 3
+                point = body[int(np.argmin(recording["control_point_distance"][k]))]
+                end = centres[int(np.argmin(np.linalg.norm(centres - point, axis=1)))]
+                ax.plot(*drawing.project(np.array([point, end])).T, color=ALERT, linewidth=1.2)
 
 
-def _shortest(ax: Axes, recording: Recording, k: int, body: Array) -> None:
-    """Draw a line between the nearest control point and its obstacle, as in figure 3."""
-    ends = _obstacles_at(recording, k).centres
-    if ends.size and "control_point_distance" in recording and _exact(recording):
-        point = body[int(np.argmin(recording["control_point_distance"][k]))]
-        end = ends[int(np.argmin(np.linalg.norm(ends - point, axis=1)))]
-        ax.plot(*drawing.project(np.array([point, end])).T, color=ALERT, linewidth=1.2)
+def _bodies(recordings: Mapping[str, Recording], colours: Mapping[str, str]) -> Figure:
+    """Return the first run's body at several times, with the paths of every run's tasks.
+
+    Desired paths are dashed; actual paths, up to the time of the body, have the run's colour.
+    """
+    first = next(iter(recordings.values()))
+    robot = first.facts.robot
+    ticks = np.linspace(0, first.ticks - 1, _POSES).astype(int)
+    width, lowest, highest = _extent(robot, first, ticks)
+    apart = _APART * width
+    fig, (ax,) = drawing.figure(width=_WIDTH, height=_HEADROOM + _WIDTH * (highest - lowest) / (
+        _POSES * apart))
+    for i, k in enumerate(ticks):
+        aside = np.array([i * apart, 0.0])
+        _body(ax, robot, first["q"][k], aside)
+        for label, colour in reversed(list(colours.items())):
+            run = recordings[label]
+            for signal in (one for one in run.signals if one.startswith("task_position_")):
+                path, name = run[signal], signal.removeprefix("task_position_")
+                if "task_error_" + name in first and run is first:
+                    error = run[f"task_error_{name}"]
+                    if error.shape[1] >= 3:
+                        _line(ax, aside + _flat(path + error[:, :3]), color=INK, linewidth=0.7,
+                              linestyle=_DESIRED)
+                _line(ax, aside + _flat(path[:k + 1]), color=colour, linewidth=1.6)
+        ax.text(i * apart, lowest - 0.03, f"{first['t'][k]:.1f} s",
+                ha="center", va="top")
+    ax.set_aspect("equal")
+    ax.autoscale_view()
+    ax.margins(0.02, 0.08)
+    ax.set_axis_off()
+    return fig
+
+
+def _body(ax: Axes, robot: RobotFacts, q: Array, aside: Array) -> None:
+    """Draw the capsules, the farthest first and lightest."""
+    links = robot.capsules
+    segments = ends(links, robot.placements(q))
+    a, e = np.radians([_AZIMUTH, _ELEVATION])
+    depth = segments.mean(axis=1) @ [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
+    order = np.argsort(depth)
+    shade = (depth - depth.min()) / max(float(np.ptp(depth)), 1e-9)
+    flat = _flat(segments)
+    shapes = [Polygon(aside + outline(flat[i, 0], flat[i, 1], links[i].radius)) for i in order]
+    ax.add_collection(PatchCollection(
+        shapes, facecolors=np.array(_LIGHT) + np.outer(shade[order], np.subtract(_DARK, _LIGHT)),
+        edgecolors="white", linewidths=0.6))
+
+
+def outline(start: Array, end: Array, radius: float) -> Array:
+    """Return the outline (N, 2) of a capsule seen from the side: two half circles."""
+    along = np.arctan2(*(end - start)[::-1])
+    angles = np.concatenate([along - np.pi / 2 + _AROUND, along + np.pi / 2 + _AROUND])
+    centres = np.repeat([end, start], len(_AROUND), axis=0)
+    return np.asarray(centres + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+
+
+def _flat(points: Array) -> Array:
+    return drawing.project(points, _AZIMUTH, _ELEVATION)
+
+
+def _extent(robot: RobotFacts, recording: Recording, ticks: Array) -> tuple[float, float, float]:
+    """Return the greatest width [m] of the drawn bodies, and their lowest and highest point."""
+    links = robot.capsules
+    radii = np.array([[link.radius] for link in links])
+    flat = [_flat(ends(links, robot.placements(q))) for q in recording["q"][ticks]]
+    low = np.array([(body - radii[..., None]).min(axis=(0, 1)) for body in flat])
+    high = np.array([(body + radii[..., None]).max(axis=(0, 1)) for body in flat])
+    return float((high - low)[:, 0].max()), float(low[:, 1].min()), float(high[:, 1].max())

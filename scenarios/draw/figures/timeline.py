@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,9 +14,7 @@ from hierarchy.words import counted
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.draw.figures.palette import task_colours
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 _ON_BAND = "#101214"   # text on a band, in any theme: bands are light
 _LETTER = 0.016        # width of a character, relative to the time axis, in a band's name
@@ -44,14 +41,27 @@ def timeline(recording: Recording, beside: Sequence[Recording] = ()) -> Figure:
     for place in range(places):
         for task, colour in colours.items():
             _band(ax, recording, place, task, colour, end)
+    t, start = recording["t"], float(recording["t"][0])
     for name, mask in happened(recording).items():
-        _marks(ax, recording["t"], mask, places + rows.index(name),
-               ALERT if name.endswith(_GRAVE) else INK, end)
-    _frame(ax, [*(str(k + 1) for k in range(places)), *rows], float(recording["t"][0]), end)
+        spans = [(t[a], max(t[b - 1] - t[a], _LEAST * (end - start)))
+                 for a, b in drawing.spans(mask)]
+        ax.broken_barh(spans, (places + rows.index(name) - 0.3, 0.6), linewidth=0,
+                       color=ALERT if name.endswith(_GRAVE) else INK)
+    ax.set_yticks(range(places + len(rows)), [*(str(k + 1) for k in range(places)), *rows])
+    ax.set_ylim(places + len(rows) - 0.5, -0.5)
+    ax.set_xlim(start, end if end > start else start + 1.0)
+    ax.tick_params(axis="y", length=0)
+    ax.grid(False, axis="y")
+    ax.set_axisbelow(True)
+    ax.spines["left"].set_visible(False)
     if recording.fault:
-        _ended(ax, float(recording["t"][-1]), end)
+        _ended(ax, float(t[-1]), end)
     if alone:
-        _explain(fig, ax, colours, recording.switches().size)
+        fig.legend(handles=[Patch(color=colour, label=task) for task, colour in colours.items()],
+                   loc="outside lower center", ncols=4, fontsize="small", handlelength=1.0)
+        ax.set_title(f"Place in the stack, {counted(recording.switches().size, 'change')}",
+                     loc="left")
+        ax.set_xlabel("time [s]")
     return fig
 
 
@@ -67,16 +77,10 @@ def happened(recording: Recording) -> dict[str, Mask]:
         rows["contact"] = touched
     troubles = recording.troubles()
     for (kind, action), ticks in troubles.items():
-        rows[f"{kind.replace('_', ' ')}: {action}"] = _at(ticks, recording.ticks)
+        rows[f"{kind.replace('_', ' ')}: {action}"] = np.isin(np.arange(recording.ticks), ticks)
     if "status" in recording and not troubles and (failed := recording["status"] != 0).any():
         rows["no answer"] = failed
     return rows
-
-
-def _at(ticks: list[int], count: int) -> Mask:
-    mask = np.zeros(count, dtype=bool)
-    mask[[tick for tick in ticks if tick < count]] = True
-    return mask
 
 
 def _band(ax: Axes, recording: Recording, place: int, task: str, colour: str, end: float) -> None:
@@ -90,29 +94,6 @@ def _band(ax: Axes, recording: Recording, place: int, task: str, colour: str, en
     if longest is not None and longest[1] - longest[0] > _LETTER * len(task) * (end - t[0]):
         ax.text(sum(longest) / 2, place, task, color=_ON_BAND, fontsize="small", ha="center",
                 va="center_baseline")
-
-
-def _marks(ax: Axes, t: NDArray[np.float64], mask: Mask, row: int, colour: str, end: float) -> None:
-    least = _LEAST * (end - t[0])
-    spans = [(t[a], max(t[b - 1] - t[a], least)) for a, b in drawing.spans(mask)]
-    ax.broken_barh(spans, (row - 0.3, 0.6), color=colour, linewidth=0)
-
-
-def _frame(ax: Axes, names: list[str], start: float, end: float) -> None:
-    ax.set_yticks(range(len(names)), names)
-    ax.set_ylim(len(names) - 0.5, -0.5)
-    ax.set_xlim(start, end if end > start else start + 1.0)
-    ax.tick_params(axis="y", length=0)
-    ax.grid(False, axis="y")
-    ax.set_axisbelow(True)
-    ax.spines["left"].set_visible(False)
-
-
-def _explain(fig: Figure, ax: Axes, colours: Mapping[str, str], changes: int) -> None:
-    fig.legend(handles=[Patch(color=colour, label=task) for task, colour in colours.items()],
-               loc="outside lower center", ncols=4, fontsize="small", handlelength=1.0)
-    ax.set_title(f"Place in the stack, {counted(changes, 'change')}", loc="left")
-    ax.set_xlabel("time [s]")
 
 
 def _ended(ax: Axes, t: float, end: float) -> None:

@@ -5,24 +5,22 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
-from scenarios.draw.figures.palette import looks
+from scenarios.config import Scenario
+from scenarios.draw.figures.palette import Look, looks
 from scenarios.measure.jumps import Happening, happened
 from scenarios.measure.verdict import verdict
 from scenarios.recording.fate import PHRASES, Fate
-from scenarios.scene import Scene, Series, scene
+from scenarios.recording.recording import Recording
+from scenarios.scene import Scene, scene
 from scenarios.scene.pushes import key
 from scenarios.templates import render, resource
-
-if TYPE_CHECKING:
-    from scenarios.config import Scenario
-    from scenarios.recording.recording import Recording
 
 NOTHING = 65535  # NaN or infinite
 _STEPS = 65534
@@ -34,24 +32,23 @@ def packed(values: NDArray[Any], steps: bool = False) -> dict[str, Any]:
     Integers become int16 or, if they are small, int8; others float32 or, with `steps`, 65535 even
     steps from the smallest to the largest value.
     """
+    about: dict[str, Any] = {"shape": list(values.shape)}
     if steps:
-        return _in_steps(values)
-    large = np.abs(values).max(initial=0) > np.iinfo(np.int8).max
-    kind = "<f4" if values.dtype.kind == "f" else "<i2" if large else "|i1"
-    return {"shape": list(values.shape), "kind": kind[1:], "data": _base64(values.astype(kind))}
+        known = np.isfinite(values)
+        low, high = (values[known].min(), values[known].max()) if known.any() else (0.0, 0.0)
+        step = float(high - low) / _STEPS or 1.0
+        values = np.where(known, np.round((np.where(known, values, low) - low) / step), NOTHING)
+        kind, about = "<u2", about | {"low": float(low), "step": step}
+    else:
+        large = np.abs(values).max(initial=0) > np.iinfo(np.int8).max
+        kind = "<f4" if values.dtype.kind == "f" else "<i2" if large else "|i1"
+    data = np.ascontiguousarray(values.astype(kind)).tobytes()
+    return {**about, "kind": kind[1:], "data": base64.b64encode(data).decode("ascii")}
 
 
-def _in_steps(values: NDArray[Any]) -> dict[str, Any]:
-    known = np.isfinite(values)
-    low, high = (values[known].min(), values[known].max()) if known.any() else (0.0, 0.0)
-    step = float(high - low) / _STEPS or 1.0
-    at = np.where(known, np.round((np.where(known, values, low) - low) / step), NOTHING)
-    return {"shape": list(values.shape), "kind": "u2", "low": float(low), "step": step,
-            "data": _base64(at.astype("<u2"))}
-
-
-def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
-    """Return one run as the page's script reads it; `about` is added unchanged."""
+def run_data(scene: Scene, scenario: Scenario, label: str, look: Look, **more: Any
+             ) -> dict[str, Any]:
+    """Return one run as the page's script reads it, with what `more` there is to say."""
     fixed, levels, frames = scene.stage, scene.levels, np.arange(len(scene.t))
     still = bool((scene.centres == scene.centres[:1]).all())
     places = {"links": scene.links, "points": scene.points, "axis": scene.axis,
@@ -65,7 +62,9 @@ def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
         "t": scene.t, "linked": scene.linked, "active": scene.active, "order": scene.order,
         "distance": scene.distance[frames, scene.linked], "fate": levels.fate,
         "violation": levels.violation, "saturated": levels.saturated}
-    return {**about,
+    return {"label": label, **look._asdict(), "scenario": scenario.name, "title": scenario.title,
+            "level": scenario.control.level,
+            "limited": getattr(scenario, "limits", None) is not None, **more,
             "radii": [capsule.radius for capsule in fixed.robot.capsules],
             "obstacles": [{"shape": obstacle.shape, "size": list(obstacle.size),
                            "rotation": np.asarray(obstacle.rotation, float).ravel().tolist()}
@@ -80,27 +79,10 @@ def run_data(scene: Scene, about: dict[str, Any]) -> dict[str, Any]:
             "switches": packed(scene.switches),
             **{name: packed(values, steps=True) for name, values in places.items()},
             **{name: packed(values) for name, values in others.items()},
-            "series": [_curve(series) for series in scene.series]}
-
-
-def fates() -> dict[str, int]:
-    """Return the values of `Fate` by name, for the page's script."""
-    return {fate.name.lower(): int(fate) for fate in Fate}
-
-
-def phrases() -> dict[str, str]:
-    """Return the words for each `Fate` by name, for the page's script."""
-    return {fate.name.lower(): said for fate, said in PHRASES.items()}
-
-
-def _curve(series: Series) -> dict[str, Any]:
-    return {"name": series.name, "unit": series.unit, "labels": series.labels,
-            "marks": series.marks, "logarithmic": series.logarithmic,
-            **{side: packed(getattr(series, side)) for side in ("value", "low", "high")}}
-
-
-def _base64(values: NDArray[Any]) -> str:
-    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+            "series": [{"name": one.name, "unit": one.unit, "labels": one.labels,
+                        "marks": one.marks, "logarithmic": one.logarithmic,
+                        **{side: packed(getattr(one, side)) for side in ("value", "low", "high")}}
+                       for one in scene.series]}
 
 
 _FOLDER = "draw/replay"
@@ -121,12 +103,11 @@ def html(recordings: Mapping[str, Recording], title: str,
     if not recordings:
         raise HierarchyError("a replay needs at least one run")
     look = looks(recordings)
-    runs = [run_data(scene(recording, rate), {
-        "label": label, **look[label]._asdict(), **about(recording.scenario),
-        "fault": recording.fault, **verdict(recording).on_page(),
-        "events": [{"t": one.t, "text": f"{one.what}: {one.why}"} for one in (
-            happenings[label] if happenings else happened(recording))]})
-        for label, recording in recordings.items()]
+    runs = [run_data(
+        scene(recording, rate), recording.scenario, label, look[label], fault=recording.fault,
+        events=[{"t": one.t, "text": f"{one.what}: {one.why}"} for one in (
+            happenings[label] if happenings else happened(recording))],
+        **verdict(recording).on_page()) for label, recording in recordings.items()]
     drawn = {name: words for one in recordings.values()
              for name, words in key(one.facts, one.scenario).items()}
     return document(title, {"runs": runs, "embedded": embedded, "beside": beside, "drawn": drawn},
@@ -138,7 +119,9 @@ def document(title: str, data: Mapping[str, Any], kind: str, more: str = "",
     """Return the page of a `kind` that its `player` plays; `more` is a script that it needs."""
     from scenarios.draw.figures.drawing import JOINTS
 
-    known = {**data, "fates": fates(), "phrases": phrases(), "joints": JOINTS}
+    known = {**data, "joints": JOINTS,
+             "fates": {fate.name.lower(): int(fate) for fate in Fate},
+             "phrases": {fate.name.lower(): said for fate, said in PHRASES.items()}}
     return str(render(  # not markup: a page that embeds it has to escape it
         f"{_FOLDER}/replay.html", title=title, style=resource(f"{_FOLDER}/replay.css"),
         script=Markup("\n").join([*(resource(f"{_FOLDER}/{name}") for name in _SCRIPTS),
@@ -149,9 +132,3 @@ def document(title: str, data: Mapping[str, Any], kind: str, more: str = "",
 def as_json(data: Any) -> str:
     """Return plain data as compact JSON."""
     return json.dumps(data, separators=(",", ":"), allow_nan=False)
-
-
-def about(scenario: Scenario) -> dict[str, Any]:
-    """Return what the page says of a scenario."""
-    return {"scenario": scenario.name, "title": scenario.title, "level": scenario.control.level,
-            "limited": getattr(scenario, "limits", None) is not None}

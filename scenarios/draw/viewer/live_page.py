@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection
+from contextlib import suppress
+from functools import reduce
 from queue import SimpleQueue
 from threading import Event
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,18 +17,57 @@ from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.pose import PoseTask
 from scenarios.config import Scenario
+from scenarios.config.resolvers import default_resolvers
 from scenarios.draw.figures.palette import looks
-from scenarios.draw.replay.page import about, as_json, document, packed, run_data
-from scenarios.draw.viewer.knobs import knobs
+from scenarios.draw.replay.page import as_json, document, packed, run_data
 from scenarios.draw.viewer.live import Live
 from scenarios.scene.pushes import key
 from scenarios.templates import resource
+from solvers import names, variants
 
 FRAMES = 30.0   # frames per second
 _BUSY = 0.05    # [s] of ticks between two frames, at most
 _HAND = 1.0     # [m/s] greatest speed of a dragged path
 _POINTS = 300   # of a desired path
 _OFFSET = "position.offset"
+
+
+class Knob(NamedTuple):
+    """A number in a scenario, by its dotted key, and the range of its slider."""
+
+    key: str
+    label: str
+    high: float
+    step: float
+
+
+_BOTH = (
+    Knob("pointing.alpha_d", "Cone, half angle [deg]", 90.0, 0.5),
+    Knob("avoidance.near", "Body, near distance [m]", 0.4, 0.005),
+    Knob("avoidance.far", "Body, far distance [m]", 0.4, 0.005),
+    Knob("avoidance.end_effector", "End effector, distance [m]", 0.4, 0.005),
+    Knob("avoidance.distance", "Distance kept [m]", 0.3, 0.005),
+    Knob("avoidance.influence", "Influence from [m]", 0.8, 0.01),
+    Knob("avoidance.rate", "Approach rate [1/s]", 40.0, 0.5),
+    Knob("limits.acceleration", "Joint acceleration [rad/s²]", 40.0, 0.5),
+    Knob("damping.value", "Joint damping [1/s]", 20.0, 0.1))
+_ACCELERATION = (
+    Knob("position.stiffness", "Path, stiffness [1/s²]", 200.0, 1.0),
+    Knob("position.damping", "Path, damping [1/s]", 60.0, 0.5),
+    Knob("pointing.stiffness", "Cone, stiffness [1/s²]", 100.0, 0.5),
+    Knob("pointing.damping", "Cone, damping [1/s]", 40.0, 0.5))
+_VELOCITY = (
+    Knob("position.gain", "Path, gain [1/s]", 50.0, 0.5),
+    Knob("pointing.gain", "Cone, gain [1/s]", 50.0, 0.5))
+
+
+def knobs(scenario: Scenario) -> list[tuple[Knob, float]]:
+    """Return those of the settings that a scenario has, with their values."""
+    gains = _ACCELERATION if scenario.control.level == "acceleration" else _VELOCITY
+    whole: Any = scenario
+    return [(knob, float(value)) for knob in (*_BOTH, *gains)
+            if isinstance(value := reduce(lambda of, name: getattr(of, name, None),
+                                          knob.key.split("."), whole), int | float)]
 
 
 class LivePage:
@@ -84,11 +125,9 @@ class LivePage:
     def data(self) -> dict[str, Any]:
         """Return what the page shows now: a frame of the run, and the state of its controls."""
         live, scenario, playing = self.live, self.live.scenario, self.playing and not self.live.over
-        run = run_data(live.frame(), {
-            "label": self.label, **self._looks[self.label]._asdict(), **about(scenario),
-            "fault": live.fault, "events": [], "goals": [], "missed": [],
-            **({} if playing else live.goals()),
-            "ahead": [packed(path) for path in self._paths]})
+        run = run_data(live.frame(), scenario, self.label, self._looks[self.label],
+                       fault=live.fault, events=[], **live.goals(1.0 if playing else 0.0),
+                       ahead=[packed(path) for path in self._paths])
         return {"runs": [run], "playing": playing, "refused": [self._refusals, self.refused],
                 "begun": self._begun, "speed": self.speed, "resolver": self.label,
                 "resolvers": list(self.specs), "handles": self._handles(),
@@ -119,13 +158,18 @@ class LivePage:
             if what == "toggle" and not self.live.over:
                 self.playing = not self.playing
             elif what in ("toggle", "restart"):
-                self._restart()
+                self.live.restart()
+                self._due, self.playing, self._begun = 0.0, True, self._begun + 1
+                self.live.tick()
+                self._follow()
             elif what == "speed":
                 self.speed = min(max(float(value), 0.01), 100.0)
             elif what == "path":
                 self._path_wanted = np.asarray(value, dtype=float).reshape(3) - self.middle
-            elif what.startswith("obstacle "):
-                self._drag(int(what.removeprefix("obstacle ")), np.asarray(value, dtype=float))
+            elif what.startswith("obstacle ") and (obstacles := self.live.obstacles) is not None:
+                h = int(what.removeprefix("obstacle "))
+                kept = obstacles.centres[h] - obstacles.offset[h]
+                self.live.drag(h, np.asarray(value, dtype=float) - kept)
             elif what == "resolver":
                 self.live.switch(self.specs[named("resolver", value, self.specs)])
                 self._follow()
@@ -135,17 +179,6 @@ class LivePage:
                 self._follow()
         except (HierarchyError, TypeError, ValueError, IndexError, OverflowError) as error:
             self.refused, self._refusals = str(error), self._refusals + 1
-
-    def _restart(self) -> None:
-        self.live.restart()
-        self._due, self.playing, self._begun = 0.0, True, self._begun + 1
-        self.live.tick()
-        self._follow()
-
-    def _drag(self, h: int, place: Array) -> None:
-        obstacles = self.live.obstacles
-        if obstacles is not None:
-            self.live.drag(h, place - (obstacles.centres[h] - obstacles.offset[h]))
 
     def _drag_path(self, seconds: float) -> None:
         """Move the path toward its dragged place."""
@@ -170,7 +203,7 @@ class LivePage:
         cell = self.live.controller.cell
         times = np.linspace(0.0, self.live.scenario.control.duration, _POINTS)
         self._paths = [np.array([task.path(t)[0] for t in times])
-                       for task in (cell.position, *cell.listed)
+                       for task in (cell.tasks.position, *cell.tasks.listed)
                        if isinstance(task, Position | PoseTask)]
         first = self._paths[0] if self._paths else np.zeros((1, 3))
         self.middle = (first.min(axis=0) + first.max(axis=0)) / 2 - self._path_offset()
@@ -184,21 +217,13 @@ def named(what: str, name: Any, known: Collection[str]) -> str:
 
 
 def resolvers(scenario: Scenario) -> dict[str, str]:
-    """Return the specs of resolvers that can resolve a scenario's stack, by label.
-
-    The scenario's own resolver is the first.
-    """
-    from scenarios.config.resolvers import default_resolvers
-    from solvers import names, variants
-
+    """Return the specs of resolvers that can resolve a scenario, by label, its own first."""
     own = scenario.control.resolver
     found: dict[str, str] = {}
     for spec in (own, *default_resolvers(scenario.asks)[0], *names(), *variants()):
-        try:
+        with suppress(HierarchyError):
             other = scenario if spec == own else scenario.with_resolver(spec)
             resolver = other.make_resolver()
-        except HierarchyError:
-            continue
-        if resolver.can_resolve(other.asks):
-            found.setdefault(str(resolver.label), spec)
+            if resolver.can_resolve(other.asks):
+                found.setdefault(str(resolver.label), spec)
     return found

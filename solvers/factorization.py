@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,13 +12,31 @@ from numpy.typing import ArrayLike
 from hierarchy.errors import HierarchyError, UnknownNameError, expect
 from hierarchy.gate import check_rows, level_names, readable, shaped
 from hierarchy.problem import Array, Hierarchy
-from solvers.factorization.rows import FEWEST, FactoredRows, Held
+from solvers.kernels.factorization import (
+    EXTRA_ROWS,
+    factorization_work,
+    project_rows,
+    refactor,
+    resolve,
+    resolve_units,
+)
 from solvers.resolver import Resolution
 from solvers.resolvers.tpm import Tpm
 from solvers.status import Status
 
+_FEWEST = 8  # rows for which there is always room
+_ROUND = 4   # the width of a staircase is a multiple of this, to reallocate less often
+
 Level = int | str
 Targets = Array | Mapping[str, ArrayLike] | Sequence[ArrayLike]
+
+
+class _Held(NamedTuple):
+    """A level that occupies rows `slot` .. `slot + rows - 1` of the arrays."""
+
+    name: str
+    slot: int
+    rows: int
 
 
 @final
@@ -56,9 +74,22 @@ class Factorization:
         elif not isinstance(n, Integral) or n < 1:
             raise HierarchyError(f"n = {n!r}, expected a whole number >= 1")
         self._n = int(n)
-        self._levels: list[Held] = []
-        blocks = [self._checked(*level) for level in zip(names, levels, strict=True)]
-        self._factor_afresh(list(zip(names, blocks, strict=True)))
+        self._factor_afresh([(name, self._checked(name, A))
+                             for name, A in zip(names, levels, strict=True)])
+
+    def _factor_afresh(self, blocks: list[tuple[str, Array]], more: int = 0) -> None:
+        """Factor levels given by name and rows, with room for twice these and `more` rows."""
+        self._m = sum(len(block) for _, block in blocks)
+        room = max(2 * (self._m + more), _FEWEST)
+        widest = min(room, self._n)
+        self._J, self._used, self._r, self._width = np.empty((room, self._n)), 0, 0, 0
+        self._Q = np.empty((widest + 1, self._n))  # its rows are the columns of the letter's Q
+        self._C, self._squares = np.empty((room, _rounded_up(widest))), np.empty(room)
+        self._pivots = np.empty(room, dtype=np.int64)
+        self._table = np.empty((0, 3), dtype=np.int64)  # of the levels above `kept`
+        self._W, self._work, self._kept = np.empty((0, 0)), np.empty(0), 0
+        self._status = Status.SOLVED
+        self._levels = self._append(blocks)
 
     @classmethod
     def of(cls, h: Hierarchy, settings: Tpm | None = None) -> Factorization:
@@ -90,23 +121,23 @@ class Factorization:
     @property
     def rows(self) -> Array:
         """J (m, n) as given, in order of priority: a copy."""
-        return self._data.J[self._slots()]
+        return self._J[self._slots()]
 
     @property
     def basis(self) -> Array:
         """Q (n, r): a copy. It may still span rows of deleted levels."""
-        return self._data.basis.T.copy()
+        return self._basis.T.copy()
 
     @property
     def coefficients(self) -> Array:
         """C (m, r) with J = C Q^T, in order of priority: a copy."""
-        return self._data.coefficients[self._slots()]
+        return self._C[self._slots(), :self._r]
 
     @property
     def ranks(self) -> tuple[int, ...]:
         """Rank that each level adds to the levels above it."""
         self.update()
-        return tuple(np.diff(self._data.ranks, prepend=0).tolist())
+        return tuple(np.diff(self._table[:, 2], prepend=0).tolist())
 
     @property
     def F(self) -> Array:  # noqa: N802
@@ -120,7 +151,7 @@ class Factorization:
     @property
     def G(self) -> Array:  # noqa: N802
         """The map (n, m) = J^# F from targets to x, for a reference of zero: G = Q Z^T, see `F`."""
-        return np.asarray((self._units() @ self._data.basis).T)
+        return np.asarray((self._units() @ self._basis).T)
 
     # -- edits ------------------------------------------------------------------------------------
 
@@ -162,17 +193,30 @@ class Factorization:
         if not isinstance(place, Integral) or not 0 <= place <= len(self._levels):
             raise HierarchyError(f"{level}: index {at} is outside 0 .. {len(self._levels)}")
         block = self._checked(level, A)
-        used = self._data.used + len(block)
-        if used > len(self._data.J) or used > 2 * (self._m + len(block)) + FEWEST:
-            self._factor_afresh([(held.name, self._data.rows(held)) for held in self._levels],
-                                len(block))
-        self._levels[place:place] = self._data.append([(level, block)])
+        used = self._used + len(block)
+        if used > len(self._J) or used > 2 * (self._m + len(block)) + _FEWEST:
+            self._factor_afresh([(held.name, self._J[held.slot:held.slot + held.rows])
+                                 for held in self._levels], len(block))
+        self._levels[place:place] = self._append([(level, block)])
         self._m += len(block)
         self._changed(place)
 
     def update(self) -> Status:
         """Refactor C from the first changed level on, now rather than at the next solve."""
-        return self._data.refactor(self._levels)
+        count, kept = len(self._levels), self._kept
+        if kept < count or self._status is Status.NUMERICAL_FAILURE:
+            table = self._table  # slot, rows, rank so far
+            if len(table) != count:
+                table = np.vstack([table[:kept], np.empty((count - kept, 3), dtype=np.int64)])
+            for k in range(kept, count):
+                _, table[k, 0], table[k, 1] = self._levels[k]
+            self._table = table
+            self._status = Status(refactor(
+                self._C, self._squares, table, kept, self._W, self._pivots,
+                self._settings.rank_tolerance, self._work))
+            self._kept = 0 if self._status is Status.NUMERICAL_FAILURE else count
+        self._table = self._table[:count]
+        return self._status
 
     # -- answers ----------------------------------------------------------------------------------
 
@@ -194,7 +238,8 @@ class Factorization:
         status = self.update()
         if status is Status.NUMERICAL_FAILURE:
             return Resolution(np.zeros(self._n), status)
-        code = self._data.resolve(b, x)
+        code = int(resolve(b, x, self._basis, self._table, self._W, self._pivots,
+                           self._settings._settings, self._work))
         if code < 0:
             self._refuse(b, x, -code - 1)
         if status is Status.INACCURATE and self._settings.damping == 0.0:
@@ -219,21 +264,44 @@ class Factorization:
         return level
 
     def _changed(self, place: int) -> None:
-        self._data.kept = min(self._data.kept, place)
+        self._kept = min(self._kept, place)
 
     def _slots(self) -> list[int]:
         return [i for _, slot, rows in self._levels for i in range(slot, slot + rows)]
 
-    def _factor_afresh(self, blocks: list[tuple[str, Array]], more: int = 0) -> None:
-        """Factor levels given by name and rows, with room for twice these and `more` rows."""
-        self._m = sum(len(block) for _, block in blocks)
-        self._data = FactoredRows(self._n, max(2 * (self._m + more), FEWEST), self._settings)
-        self._levels = self._data.append(blocks)
+    def _append(self, blocks: list[tuple[str, Array]]) -> list[_Held]:
+        """Put levels into the next slots, and add their new directions to the basis."""
+        held, slot = [], self._used
+        for name, block in blocks:
+            held.append(_Held(name, slot, len(block)))
+            self._J[slot:slot + len(block)] = block
+            slot += len(block)
+        self._r = project_rows(self._J, self._used, slot, self._r, self._Q, self._C, self._squares)
+        self._used = slot
+        if _rounded_up(self._r) > self._width:
+            self._widen(_rounded_up(self._r))
+        return held
+
+    def _widen(self, width: int) -> None:
+        """Make room for a wider basis; factored rows get zeros in the new columns."""
+        old, before, room = self._W, self._width, len(self._J)
+        self._W, self._width = np.zeros((room + width + EXTRA_ROWS, width)), width
+        if before:
+            self._W[:room + before, :before] = old[:room + before]
+        self._work = np.empty(factorization_work(room, width))
+
+    @property
+    def _basis(self) -> Array:
+        """Q^T (r, n), a view."""
+        return self._Q[:self._r]
 
     def _units(self) -> Array:
+        """Return the answers to the m unit targets, in coordinates of the basis: (m, r)."""
         if self.update() is Status.NUMERICAL_FAILURE:
-            raise HierarchyError(f"no task priority matrix: {self._data.status}")
-        return self._data.units(self._m)
+            raise HierarchyError(f"no task priority matrix: {self._status}")
+        Z = np.empty((self._m, self._width))
+        resolve_units(Z, self._table, self._W, self._pivots, self._settings._settings, self._work)
+        return Z[:, :self._r]
 
     def _checked(self, name: str, A: ArrayLike) -> Array:
         block = readable(f"{name}: A", A)
@@ -283,3 +351,7 @@ class Factorization:
             if row < level.rows:
                 raise HierarchyError(f"{level.name}, row {row}: target is {b[i]}")
             row -= level.rows
+
+
+def _rounded_up(width: int) -> int:
+    return max(-(-width // _ROUND), 1) * _ROUND

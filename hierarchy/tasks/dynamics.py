@@ -1,25 +1,23 @@
-"""Joint torque limits as rows over the accelerations, and the contact forces if there are any."""
-
-# mypy: disable-error-code="no-untyped-def"
+"""Rows of the equations of motion: those of a floating base, and limits of joint torques."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
 import numpy as np
 
-from hierarchy.contacts import Contacts, write_dynamics
+from hierarchy.contacts import Contacts, write_dynamics, zero_while_open
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level
-from hierarchy.tasks.joint_rows import JointRows
+from hierarchy.tasks.forces import WRENCH, ForceTask
+from hierarchy.tasks.joint_limits import JointRows
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,6 @@ class TorqueLimits(JointRows):
     name: str = "torque limits"
     contacts: Contacts | None = None
     step: float = inf
-    limit: Array = field(init=False, repr=False, compare=False)  # (n,) [N m or N]
     kind = "inequality"
     of_forces: ClassVar[bool] = True
     straight = False
@@ -57,25 +54,16 @@ class TorqueLimits(JointRows):
         if self.robot.base == "floating" and self.contacts is None:
             raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has a floating "
                                  "base; its torques depend on contact forces, so give the contacts")
-        limit = self.robot.effort_limit[self.robot.actuated:]
-        set_frozen(self, limit=self.fraction * limit)
+
+    @property
+    def limit(self) -> Array:
+        """The largest torque of each row (n,) [N m or N]."""
+        return self.fraction * self.robot.effort_limit[self.robot.actuated:]
 
     def error(self, state: State) -> Array:
         """Distance of the torque with x = 0 from the limits (n,) [N m or N]."""
         h = state.bias_effort()[self.robot.actuated:]
         return np.asarray(np.clip(h, -self.limit, self.limit) - h)
-
-    def jacobian(self, state: State) -> Array:
-        """Rows of the mass matrix M(q) [kg m^2], to the left of -J_c^T [m] with contacts."""
-        M = state.mass_matrix()
-        J = np.empty((0, state.n)) if self.contacts is None else self.contacts.jacobian(state)
-        return np.hstack([M, -J.T])[self.robot.actuated:]
-
-    def jacobian_derivative(self, state: State) -> Array:
-        """Time derivative of M(q) [kg m^2/s] without contacts, else zero; no row uses it."""
-        if self.contacts is None:
-            return state.mass_matrix_derivative()
-        return np.zeros((self.dimension, self.contacts.unknowns))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
@@ -86,7 +74,7 @@ class TorqueLimits(JointRows):
         M, h = state.dynamics
         contacts = Contacts(self.robot) if self.contacts is None else self.contacts
         parameters = M, h, state.kinematics, contacts.points, self.robot.actuated
-        write_rows = bind(_write, parameters, self.limit, A, lower, upper, row)
+        write_rows = bind(write_torques, parameters, self.limit, A, lower, upper, row)
         if level != "torque" or self.step == inf:
             return write_rows
         rows, efforts = slice(row, row + self.dimension), h[self.robot.actuated:]
@@ -103,9 +91,46 @@ class TorqueLimits(JointRows):
 
 
 @compiled
-def _write(parameters, limit, A, lower, upper, row):
+def write_torques(parameters, limit, A, lower, upper, row):
+    """Write rows of M a + h - J_c^T f from -limit to limit, of the velocities from `first` on."""
     M, h, kinematics, points, first = parameters
     write_dynamics(M, kinematics, points, A, row, first, len(limit))
     for i in range(len(limit)):
         lower[row + i] = -limit[i] - h[first + i]
         upper[row + i] = limit[i] - h[first + i]
+
+
+@dataclass(frozen=True)
+class BaseDynamics(ForceTask):
+    """Let the contact forces move the base: M_b(q) a + h_b(q, v) = J_cb^T f [N, N m].
+
+    Six rows, those of the floating base; none for a fixed one. It belongs at the top of a stack: an
+    x that violates it cannot happen. A contact without load moves nothing; without contacts the
+    rows say that the robot falls.
+
+    Source: A. Herzog et al., "Momentum control with hierarchical inverse dynamics on a
+    torque-controlled humanoid", Autonomous Robots (2016), eq. (7).
+    """
+
+    contacts: Contacts
+    name: str = "base dynamics"
+
+    @property
+    def dimension(self) -> int:
+        """Six rows, or none for a fixed base."""
+        return self.contacts.robot.actuated
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Force and moment along the axes of the base."""
+        return WRENCH[:self.dimension]
+
+    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
+               row: int) -> Callable[[], object]:
+        """See `Task.writer`."""
+        M, h = state.dynamics
+        parameters = M, h, state.kinematics, self.contacts.points, 0
+        write_rows = bind(write_torques, parameters, np.zeros(self.dimension), A, lower, upper, row)
+        forces = [(A[row:row + self.dimension, self.contacts.blocks[contact.name]],)
+                  for contact in self.contacts.contacts]
+        return zero_while_open(write_rows, state, self.contacts, forces)
