@@ -22,6 +22,7 @@ from hierarchy.tasks import (
     Position,
     Posture,
     SelfSeparation,
+    Separation,
     TorqueLimits,
 )
 
