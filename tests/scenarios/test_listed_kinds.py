@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, State, plugins
-from hierarchy.tasks import JointCoupling, SelfSeparation, Separation
+from hierarchy import HierarchyError, plugins
+from hierarchy.tasks import JointCoupling, Separation
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import KinematicArm
@@ -54,21 +54,6 @@ def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path)
     run = simulate(scenario_of(tmp_path, task, control=at_level(level)))
     assert run.fault is None
     assert measure(run)[metric].value < (0.1 if "look" in metric else 1e-3)  # deg, or m and rad
-
-
-@pytest.mark.slow
-def test_self_collision_is_a_task_of_the_list(tmp_path):
-    apart = {"kind": "self-collision", "distance": 0.02, "name": "apart"}
-    home = {"kind": "posture", "target": [0.9, -1.9, 0.9, 2.0, 1.0, 1.9, 0.3]}
-    cell = build(scenario_of(tmp_path, home, apart))
-    assert cell.stack.names == ("posture", "apart")
-    assert isinstance(cell.stack["apart"], SelfSeparation)
-    scenario = scenario_of(tmp_path, apart, home)
-    assert scenario.asks == "inequalities"
-    run = simulate(scenario)
-    task = build(scenario).stack["apart"]
-    robot = build(scenario).robot
-    assert min(task.distances(State.at(robot, q)).min() for q in run["q"]) > 0.0199
 
 
 @pytest.mark.slow

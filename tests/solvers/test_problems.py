@@ -8,20 +8,7 @@ from pinned import problem_sums, read
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import certify, make, problems
-from solvers.problems import KINDS, Recipe, generate, structured
-
-SEEDS = range(200)
-
-
-def everything(recipe):
-    return [generate(seed, recipe) for seed in SEEDS]
-
-
-def test_every_problem_is_a_valid_hierarchy():
-    found = everything(Recipe())
-    for h in found:
-        Hierarchy.from_levels(list(h.levels()), h.reference)
-    assert not all(h.is_equality for h in found)
+from solvers.problems import KINDS, Recipe, structured
 
 
 @pytest.mark.parametrize(("knob", "value"), [
