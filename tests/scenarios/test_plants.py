@@ -203,7 +203,8 @@ def test_only_an_arm_given_as_a_table_has_physics(mujoco, tmp_path):
         '<limit lower="-1" upper="2" velocity="3" effort="10"/></joint></robot>')
     with pytest.raises(ScenarioError, match="robot 'arm' is not one of kuka_lwr"):
         build(load("ellipse", ["plant.kind=mujoco", f"robot.model={tmp_path}/arm.urdf",
-                               "robot.end_effector=hand", "start={q=[0.0]}"]))
+                               "robot.end_effector=hand", "start={q=[0.0]}",
+                               "robot.control_points=[{joint='hinge', offset=[0, 0, 1]}]"]))
 
 
 @pytest.mark.parametrize("level", ["acceleration", "velocity"])
