@@ -22,6 +22,7 @@ from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level, Task, derivative
 
+Measure = tuple[Kernel, Any]  # the function, and what it reads; see `Measured.measure`
 _NONE, _EXACT, _DIFFERENCE = 0, 1, 2  # the derivative of the Jacobian
 
 
@@ -64,7 +65,7 @@ class Measured(Task):
     exact: ClassVar[bool] = False  # derivatives, also where the state has differences
 
     @abstractmethod
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """Return the function, see `measured`, and what it reads beside the kinematics.
 
         That is a tuple of numbers and arrays; an array that moves with the state, such as

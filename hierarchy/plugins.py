@@ -147,18 +147,15 @@ def _sources(file: Path) -> list[Path]:
 
 
 def _load(point: EntryPoint, group: Group) -> None:
+    what = f"entry point {point.name!r} of {_PREFIX}.{group}"
     if point.name not in _registered[group]:
-        _import(point.module, f"entry point {point.name!r} of {_PREFIX}.{group}")
-        if point.name not in _registered[group]:  # unless the module registers it itself
-            register(group, point.name)(_loaded_object(point, group))
+        _import(point.module, what)
+    if point.name not in _registered[group]:  # unless the module registers it itself
+        try:
+            register(group, point.name)(point.load())
+        except AttributeError as error:
+            raise HierarchyError(f"{what}: {error}") from error
     _loaded.setdefault(point.module)
-
-
-def _loaded_object(point: EntryPoint, group: Group) -> Any:
-    try:
-        return point.load()
-    except AttributeError as error:
-        raise HierarchyError(f"entry point {point.name!r} of {_PREFIX}.{group}: {error}") from error
 
 
 @cache

@@ -22,6 +22,7 @@ from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 
 Level = Literal["velocity", "acceleration", "torque"]
+Writer = Callable[[], object]  # of rows, see `Task.writer`
 Kind = Literal["equality", "inequality"]
 
 _ROUNDING = 1e-9  # of a period, relative
@@ -127,7 +128,7 @@ class Task(ABC):
                 + self.stiffness * np.asarray(self.error(state)))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """Return a function that writes this task's rows into A (m_all, n), lower, upper (m_all,).
 
         Each call writes the rows from `row` on for the present values of the state. A stack keeps
@@ -242,7 +243,7 @@ def seen_by(task: Task, state: State) -> Measurement:
     return state.measurement
 
 
-def in_turn(*functions: Callable[[], object]) -> Callable[[], object]:
+def in_turn(*functions: Writer) -> Writer:
     """Return a function that calls some, or the only one."""
     def call() -> None:
         for function in functions:
@@ -252,7 +253,7 @@ def in_turn(*functions: Callable[[], object]) -> Callable[[], object]:
 
 
 def writer_in_stack(task: Task, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                    row: int) -> Callable[[], object]:
+                    row: int) -> Writer:
     """Return the writer of a task; at level "torque" one of the joints writes their columns."""
     if level == "torque" and not task.of_forces:
         level, A = "acceleration", A[:, :state.n]
@@ -279,7 +280,7 @@ class Written(Task):
 
     @abstractmethod
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
 
     def rows(self, state: State, level: Level = "velocity") -> tuple[Array, Array, Array]:

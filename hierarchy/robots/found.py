@@ -96,14 +96,12 @@ def neutral_within_limits(model: Any, neutral: Array) -> Array:
 
     A coordinate outside finite limits goes to their middle, else to the nearer limit.
     """
-    q = np.array(neutral)
-    for joint in model.joints[1:]:
-        if joint.nq == joint.nv == 1:
-            i = joint.idx_q
-            lower, upper = model.lowerPositionLimit[i], model.upperPositionLimit[i]
-            if not lower <= q[i] <= upper:
-                q[i] = (lower + upper) / 2 if np.isfinite([lower, upper]).all() else (
-                    min(max(q[i], lower), upper))
+    q, ends = np.array(neutral), np.array([model.lowerPositionLimit, model.upperPositionLimit])
+    for i in (joint.idx_q for joint in model.joints[1:] if joint.nq == joint.nv == 1):
+        lower, upper = ends[:, i]
+        if not lower <= q[i] <= upper:
+            q[i] = (lower + upper) / 2 if np.isfinite(ends[:, i]).all() else (
+                min(max(q[i], lower), upper))
     return q
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
-from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import (
     add_row,
     dot,
@@ -21,10 +20,10 @@ from hierarchy.kinematics import (
     write_identity,
     write_point_jacobian,
 )
-from hierarchy.measured import Measured, measured
+from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Task, in_turn, seen_by
+from hierarchy.task import Level, Task, Writer, in_turn, seen_by
 from hierarchy.tasks.posture import JointTask
 
 
@@ -76,7 +75,7 @@ class Avoidance(Measured):
         """One row or three."""
         return self.rows
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`; the error is the repulsion [m/s^2 or m/s]."""
         return _avoidance, (*pack_points(self.points), seen_by(self, state).arrays)
 
@@ -113,7 +112,7 @@ class CumulatedRepulsion(JointTask):
                                  f"{self.base.dimension} rows, expected {self.joints}")
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         self.check_size(state)
         below = bind(write_identity, A, row, self.joints) if self.base is None else (

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import compiled, inlined
-from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import moving_point, place, row_times
-from hierarchy.measured import Measured, measured
+from hierarchy.measured import Measure, Measured, measured
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
@@ -63,7 +62,7 @@ class CentreOfMass(Measured):
         points = state.placements[:, 9:] + np.einsum("jki,jk->ji", R, self.robot.centres)
         return np.asarray(self.shares @ points)
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
         return _centre_of_mass, (self.shares, self.robot.centres, self.columns)
 
@@ -163,7 +162,7 @@ class Momentum(Measured):
         names = [f"{kind} {axis}" for kind in ("linear", "angular") for axis in "xyz"]
         return tuple(names[i] for i in self.columns)
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`; a momentum has no position, so there is no error."""
         return _momentum, (*state.momentum, self.columns)
 

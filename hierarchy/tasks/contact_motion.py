@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -14,7 +14,7 @@ from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Task, Written
+from hierarchy.task import Level, Task, Writer, Written
 from hierarchy.tasks.pose import Pose
 from hierarchy.tasks.position import Along, Position
 from hierarchy.tasks.together import Together
@@ -86,7 +86,7 @@ class ContactMotion(Written):
         return np.zeros(self.dimension) if self.anchors is None else self._tasks.error(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         write_rows, rows = self._tasks.writer(state, level, A, lower, upper, row), []
         for contact in self.of.contacts:

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import zip_longest
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError, expect, number
 from hierarchy.jit import compiled
-from hierarchy.jit.sources import Kernel
-from hierarchy.measured import Measured, measured
+from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
@@ -49,7 +48,7 @@ class _Coupling(Measured):
         """One row per coupling."""
         return len(self.terms.turns)
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`; the error is to the nearest full turn of a continuous joint."""
         return _coupling, (state.q, self.terms)
 

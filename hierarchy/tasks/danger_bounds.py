@@ -25,7 +25,7 @@ velocity at contact.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +39,7 @@ from hierarchy.kinematics import place
 from hierarchy.limits import clipped
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Written, in_turn, seen_by
+from hierarchy.task import Level, Writer, Written, in_turn, seen_by
 from hierarchy.tasks.joint_limits import JointLimits
 
 
@@ -106,13 +106,13 @@ class DangerBounds(Written):
         return self.limits.error(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`; the rows have two sides."""
         return in_turn(self.limits.writer(state, level, A, lower, upper, row),
                        self._tighten(state, level, lower, upper, row))
 
     def _tighten(self, state: State, level: Level, lower: Array, upper: Array,
-                 row: int) -> Callable[[], object]:
+                 row: int) -> Writer:
         parameters = (*pack_points(self.points), self.reach, self.shape, self.lever,
                       self.limits.limits.packed[2], max(self.limits.period, self.limits.horizon),
                       level == "acceleration")

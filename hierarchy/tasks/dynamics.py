@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
@@ -15,7 +14,7 @@ from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level
+from hierarchy.task import Level, Writer
 from hierarchy.tasks.forces import WRENCH, ForceTask
 from hierarchy.tasks.joint_limits import JointRows
 
@@ -66,7 +65,7 @@ class TorqueLimits(JointRows):
         return np.asarray(np.clip(h, -self.limit, self.limit) - h)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`; HierarchyError at velocity level."""
         if level == "velocity":
             raise HierarchyError(f"task {self.name!r}: torque limits need the acceleration level, "
@@ -126,7 +125,7 @@ class BaseDynamics(ForceTask):
         return WRENCH[:self.dimension]
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         M, h = state.dynamics
         parameters = M, h, state.kinematics, self.contacts.points, 0

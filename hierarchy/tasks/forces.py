@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,7 +15,7 @@ from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import place, write_equality
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Written
+from hierarchy.task import Level, Writer, Written
 
 WRENCH = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
@@ -38,28 +38,24 @@ class ForceTask(Written):
 
 
 class FixedRows(ForceTask):
-    """Rows over forces that do not change with the state. Abstract: needs `forces` and `sides`."""
+    """Rows over forces that do not change with the state. Abstract: needs `fixed`."""
 
     @property
     @abstractmethod
-    def forces(self) -> Array:
-        """The rows over the forces (m, 3 p)."""
-
-    @property
-    @abstractmethod
-    def sides(self) -> tuple[Array, Array]:
-        """Their lower and upper sides (m,), (m,)."""
+    def fixed(self) -> tuple[Array, Array, Array]:
+        """The rows over the forces (m, 3 p), their lower and upper sides (m,)."""
 
     @property
     def dimension(self) -> int:
-        """One row for each of `forces`."""
-        return len(self.forces)
+        """One row for each of `fixed`."""
+        return len(self.fixed[0])
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
-        rows = np.hstack([np.zeros((self.dimension, state.n)), self.forces])
-        return bind(_copy, rows, *self.sides, A, lower, upper, row)
+        forces, *sides = self.fixed
+        rows = np.hstack([np.zeros((len(forces), state.n)), forces])
+        return bind(_copy, rows, *sides, A, lower, upper, row)
 
 
 def required(contacts: Contacts, task: str) -> Contacts:
@@ -113,7 +109,7 @@ class ContactForce(ForceTask):
         return WRENCH[:self.dimension]
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         contact, block = self.contacts[self.contact], self.contacts.blocks[self.contact]
         first, joints, offsets = (block.start - state.n) // 3, *self.contacts.points
@@ -169,11 +165,7 @@ class LeastForce(FixedRows):
                      for k in range(len(contact.points)) for axis in "xyz")
 
     @property
-    def forces(self) -> Array:
-        """The identity (3 p, 3 p)."""
-        return np.eye(3 * len(self.contacts.points.joints))
-
-    @property
-    def sides(self) -> tuple[Array, Array]:
-        """Zero (3 p,), twice."""
-        return np.zeros(self.dimension), np.zeros(self.dimension)
+    def fixed(self) -> tuple[Array, Array, Array]:
+        """The identity (3 p, 3 p), and zeros (3 p,), twice."""
+        count = 3 * len(self.contacts.points.joints)
+        return np.eye(count), np.zeros(count), np.zeros(count)

@@ -14,7 +14,7 @@ from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, in_turn
+from hierarchy.task import Level, Writer, in_turn
 from hierarchy.tasks.forces import FixedRows, required
 
 _SLOW = 0.01      # [m/s] below which the friction of a sliding point falls to zero
@@ -67,32 +67,24 @@ class Friction(FixedRows):
         return tuple(names)
 
     @property
-    def forces(self) -> Array:
-        """The rows over the forces (m, 3 p)."""
-        parts, n = [], self.contacts.robot.n
-        for contact in self.contacts.contacts:
-            own = self._of(contact)
-            part = np.zeros((len(own), self.contacts.unknowns))
-            part[:, self.contacts.blocks[contact.name]] = own
-            parts.append(part[:, n:])
-        return np.vstack(parts)
-
-    @property
-    def sides(self) -> tuple[Array, Array]:
-        """Their lower and upper sides (m,), (m,) [N].
+    def fixed(self) -> tuple[Array, Array, Array]:
+        """The rows over the forces (m, 3 p), their lower and upper sides (m,), (m,) [N].
 
         A `least` of zero has no side: opposite faces together already say that the point pushes,
         and a row that says it again is a tie at the tip of the pyramid.
         """
-        low, up = list[float](), list[float]()
+        parts, low, up = list[Array](), list[float](), list[float]()
         for contact in self.contacts.contacts:
-            count, summed = len(contact.points), _summed(contact)
+            own, count, summed = self._of(contact), len(contact.points), _summed(contact)
+            part = np.zeros((len(own), self.contacts.unknowns))
+            part[:, self.contacts.blocks[contact.name]] = own
+            parts.append(part[:, self.contacts.robot.n:])
             low += [*[0.0] * self.faces, self.least or -inf] * count + [-inf] * summed
             up += [*[inf] * self.faces, self.largest] * count + [inf] * summed
-        return np.array(low), np.array(up)
+        return np.vstack(parts), np.array(low), np.array(up)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         write_rows, n = super().writer(state, level, A, lower, upper, row), state.n
         changing: list[Callable[[], object]] = []
@@ -207,8 +199,8 @@ class CentreOfPressure(FixedRows):
                      for i in range(len(_distances(contact))))
 
     @property
-    def forces(self) -> Array:
-        """The rows over the forces (m, 3 p) [m]."""
+    def fixed(self) -> tuple[Array, Array, Array]:
+        """The rows over the forces (m, 3 p) [m], zero and infinity (m,)."""
         rows = []
         for contact in self._surfaces():
             block = self.contacts.blocks[contact.name]
@@ -216,12 +208,7 @@ class CentreOfPressure(FixedRows):
                 row = np.zeros(self.contacts.unknowns)
                 row[block] = np.outer(distances - self.margin, contact.axes[2]).ravel()
                 rows.append(row[self.contacts.robot.n:])
-        return np.array(rows)
-
-    @property
-    def sides(self) -> tuple[Array, Array]:
-        """Zero and infinity, (m,) each."""
-        return np.zeros(self.dimension), np.full(self.dimension, np.inf)
+        return np.array(rows), np.zeros(len(rows)), np.full(len(rows), inf)
 
     def _surfaces(self) -> list[Contact]:
         return [contact for contact in self.contacts.contacts if contact.is_surface]

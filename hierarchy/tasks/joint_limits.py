@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +16,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Written
+from hierarchy.task import Level, Writer, Written
 
 
 class JointRows(Written):
@@ -141,7 +140,7 @@ class JointLimits(JointRows):
         return np.asarray(np.clip(q, *self.limits.packed[:2]) - q)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`; the rows have two sides."""
         write_rows, limits = bind(write_identity, A, row, self.dimension), self.limits.packed
         acceleration = level == "acceleration"
@@ -209,7 +208,7 @@ class StepLimits(JointRows):
         return np.maximum(self.box(state)[0], 0.0)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`; for velocity level."""
         if level != "velocity":
             raise HierarchyError(f"task {self.name!r}: for velocity level; see JointLimits")

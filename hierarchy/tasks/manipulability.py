@@ -8,14 +8,13 @@ before it turn, so the gradient of w and its time derivative are known without d
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from hierarchy.errors import HierarchyError, number
-from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import Kinematics
-from hierarchy.measured import Measured, Motion, plain
+from hierarchy.measured import Measure, Measured, Motion, plain
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
@@ -62,7 +61,7 @@ class Manipulability(Measured):
         """w at a state."""
         return _measure(Placed.of(state.kinematics, self.frame).J[:self.rows])
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`; HierarchyError for a joint with several velocities."""
         if len(state.supports) != state.n + 1:
             raise HierarchyError(f"task {self.name!r}: a joint of the robot has several "

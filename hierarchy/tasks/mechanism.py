@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task, Written
+from hierarchy.task import Level, Task, Writer, Written
 from hierarchy.tasks.coupling import FollowedJoints
 from hierarchy.tasks.relative import RelativePose
 from hierarchy.tasks.together import Together
@@ -107,7 +107,7 @@ class ClosedChains(Written):
         return self.whole.jacobian(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         m = self.dimension
         J, side, rows = np.zeros((m, state.n)), np.zeros(m), slice(row, row + m)

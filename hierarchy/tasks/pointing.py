@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import cos
-from typing import Any
 
 import numpy as np
 
 from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.jit import bind, compiled
-from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import (
     axis_at,
     crossed,
@@ -22,7 +20,7 @@ from hierarchy.kinematics import (
     triple,
     velocity_of_point,
 )
-from hierarchy.measured import Measured, measured
+from hierarchy.measured import Measure, Measured, measured
 from hierarchy.paths.path import check_point
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -110,7 +108,7 @@ class Pointing(Measured):
         return bind(_cone_error, state.placements, self.frame.joint, self.z_e, self.z_d,
                     self.cos_alpha_d)
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
         return _pointing, (self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d)
 
@@ -143,7 +141,7 @@ class LookAt(Measured):
         super().__post_init__()
         check_point(f"task {self.name!r}: target", self.target)
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`: the error is -2 (u_x, u_y) / (1 + u_z)."""
         return _look_at, (Spot.of(self.frame), np.array(self.target, dtype=float))
 

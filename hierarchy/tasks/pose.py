@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
-from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import (
     Kinematics,
     drift_of_point,
@@ -20,7 +19,7 @@ from hierarchy.kinematics import (
     write_point_jacobian,
     write_rotation_jacobian,
 )
-from hierarchy.measured import Measured, Motion, measured, plain
+from hierarchy.measured import Measure, Measured, Motion, measured, plain
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
@@ -96,7 +95,7 @@ class Pose(PoseTask, Measured):
     world axes; the last three rows are those of the angular velocity.
     """
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
         frame = self.frame
         return _pose, (frame.joint, frame.offset, frame.rotation,
@@ -124,7 +123,7 @@ class FrameLog(PoseTask, Measured):
     columns = np.arange(6)
     exact = True
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
         return _frame_log, (self, state)
 
@@ -142,30 +141,24 @@ def _frame_log(kinematics: Kinematics, reads: tuple[FrameLog, State], goal: Arra
     """J = D(e) J_b, with the Jacobian J_b of the frame in its own axes; de/dt = D(-e) V_d - J v."""
     task, state = reads
     v, placed, R_d = state.v, Placed.of(kinematics, task.frame), np.array(task.rotation, float)
-    p_d, velocity, acceleration = task.path(state.t)
-    R = placed.R
-    turn, away = rotation_vector(R.T @ R_d), R.T @ (p_d - placed.p)
+    R, target = placed.R, task.path(state.t)
+    turn, away = rotation_vector(R.T @ R_d), R.T @ (target[0] - placed.p)
     K = cross(turn)
     e = np.concatenate([away - K @ away / 2 + _of_angle(turn @ turn)[0] * (K @ K @ away), turn])
-    J_b = _own_axes(R, placed.J)
-    dJ_b = _own_axes(R, placed.dJ) - _own_axes(R, _both(cross(placed.J[3:] @ v)) @ placed.J)
-    J[:] = _left(e) @ J_b
-    goal[1] = _left(-e) @ np.append(R_d.T @ velocity, np.zeros(3))
+    to_frame, D, D_target = _both(R.T), _left(e), _left(-e)
+    J_b = to_frame @ placed.J
+    dJ_b = to_frame @ (placed.dJ - _both(cross(placed.J[3:] @ v)) @ placed.J)
+    _, V_d, dV_d = np.hstack([target @ R_d, np.zeros((3, 3))])  # of the target in its own axes
+    J[:], goal[1] = D @ J_b, D_target @ V_d
     rate = goal[1] - J @ v
-    goal[2] = (_left(-e) @ np.append(R_d.T @ acceleration, np.zeros(3))
-               + _along(-e, -rate) @ np.append(R_d.T @ velocity, np.zeros(3)))
+    goal[2] = D_target @ dV_d + _along(-e, -rate) @ V_d
     motion.error[:], motion.rate[:] = e, J @ v
-    motion.drift[:] = _left(e) @ (dJ_b @ v) + _along(e, rate) @ (J_b @ v)
+    motion.drift[:] = D @ (dJ_b @ v) + _along(e, rate) @ (J_b @ v)
 
 
 def _both(A: NDArray[Any]) -> NDArray[Any]:
     """Return the matrix (6, 6) that does to both parts of a twist what A (3, 3) does to one."""
     return np.kron(np.eye(2), A)
-
-
-def _own_axes(R: Array, J: Array) -> Array:
-    """Return a Jacobian (6, n) in the axes of its frame."""
-    return _both(R.T) @ J
 
 
 def _left(e: NDArray[Any]) -> NDArray[Any]:

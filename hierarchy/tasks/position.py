@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.errors import HierarchyError, expect
-from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import moving_point, point_at, write_point_jacobian
-from hierarchy.measured import Measured, measured
+from hierarchy.measured import Measure, Measured, measured
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Written
+from hierarchy.task import Level, Writer, Written
 
 _NOTHING_SEEN = Measurement(0).arrays
 
@@ -55,7 +53,7 @@ class Position(Measured):
     dimension = 3
     row_names = ("x", "y", "z")
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
         seen = _NOTHING_SEEN if state.measurement is None else state.measurement.arrays
         return _position, (self.frame.joint, self.frame.offset, seen, self.repulsion_within)
@@ -95,7 +93,7 @@ class Along(Written):
         return np.asarray(self.directions) @ self.task.error(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         rows, b, above = np.zeros((3, A.shape[1])), np.zeros(3), np.zeros(3)
         write_rows = self.task.writer(state, level, rows, b, above, 0)

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, expect, finite_numbers
 from hierarchy.jit import bind, compiled
-from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import write_equality, write_identity
-from hierarchy.measured import Measured, measured
+from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Written
+from hierarchy.task import Level, Writer, Written
 
 
 class JointTask(Written):
@@ -100,7 +99,7 @@ class Posture(Measured):
         robot = self.robot
         return super().row_names if robot is None else tuple(robot.velocity_names[robot.actuated:])
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
         robot, m = state.robot, self.dimension
         positions = state.q[robot.nq - m:] if _plain(robot) else np.zeros(m)
@@ -159,7 +158,7 @@ class JointDamping(JointTask):
         expect(f"task {self.name!r}: joints", self.joints, int, "give robot.n")
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         self.check_size(state)
         if self.weight == "identity" or level == "velocity":

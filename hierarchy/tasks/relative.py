@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,9 +10,8 @@ from numpy.typing import ArrayLike
 from hierarchy.errors import finite_numbers
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
-from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import crossed, less, plus, row_times
-from hierarchy.measured import Measured, measured
+from hierarchy.measured import Measure, Measured, measured
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.tasks.geometric import (
@@ -62,7 +60,7 @@ class RelativePose(Measured):
         """Axes of `to`."""
         return ("x", "y", "z", "about x", "about y", "about z")[:self.dimension]
 
-    def measure(self, state: State) -> tuple[Kernel, Any]:
+    def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
         rotation = np.eye(3) if self.rotation is None else self.rotation
         return _relative, (Spot.of(self.frame), Spot.of(self.to),

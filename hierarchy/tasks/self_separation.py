@@ -15,7 +15,7 @@ kink, and bend falls without bound; `barrier.limit` then limits the row, and d m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -44,7 +44,7 @@ from hierarchy.kinematics import add_row, crossed, dot, less, moving_point, plac
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Written
+from hierarchy.task import Kind, Level, Writer, Written
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class SelfSeparation(Written):
         return self.barrier.distance - self.distances(state)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         parameters = (*pack_capsules(self.capsules), self.indices, self.barrier.packed(),
                       level == "acceleration")

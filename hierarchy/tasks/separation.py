@@ -16,7 +16,7 @@ difference, as in the state.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +34,7 @@ from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import add_row, dot, less, moving_point, place, triple
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Written
+from hierarchy.task import Kind, Level, Writer, Written
 
 _SHARPEST = 1e-3  # [m] smallest radius of turning that is used
 
@@ -79,7 +79,7 @@ class Separation(Written):
         return np.asarray((pairs[:, 1:4] * pairs[:, 4:7]).sum(axis=1))
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         parameters = (*pack_points(self.points), self.barrier.packed(), self.obstacles is None,
                       level == "acceleration")

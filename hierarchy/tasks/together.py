@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Task, Written, in_turn, writer_in_stack
+from hierarchy.task import Kind, Level, Task, Writer, Written, in_turn, writer_in_stack
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Together(Written):
         return np.concatenate([task.error(state) for task in self.tasks])
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         writers = []
         for task in self.tasks:
@@ -132,7 +132,7 @@ class TangentCone(Written):
         return np.where(self.error(state) >= 0.0, self.desired_velocity(state), -np.inf)
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+               row: int) -> Writer:
         """See `Task.writer`."""
         if level != "velocity":
             raise HierarchyError(f"task {self.name!r}: set-based tasks are defined at velocity "

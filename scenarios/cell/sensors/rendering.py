@@ -115,7 +115,7 @@ def _pixels_of_capsule(f, c, size, x, z, ax, az, radius):
 def _draw_box(depth, eye, row):
     height, width = depth.shape
     cx, cy, cz = in_camera(eye, row[4], row[5], row[6])
-    around = sqrt(dot(row[1], row[2], row[3], row[1], row[2], row[3]))  # radius of the ball
+    around = sqrt(dot(row[1:4], row[1:4]))  # radius of the ball
     u0, u1 = pixels_of_ball(eye[0], eye[2], width, cx, cz, around)
     v0, v1 = pixels_of_ball(eye[1], eye[3], height, cy, cz, around)
     ax, ay, az = turned_into_camera(eye, row[7], row[10], row[13])
