@@ -48,11 +48,7 @@ class CutOff(Resolver):
 
     name: ClassVar[str] = "tpm, cut off"
     handles: ClassVar[Handles] = "bounds"
-
-    @property
-    def strict(self) -> bool:
-        """Never: clipping affects every level."""
-        return False
+    strict: ClassVar[bool] = False  # clipping affects every level
 
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:
         """Resolve h, whose first level bounds every unknown."""

@@ -8,13 +8,6 @@ from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-
-try:
-    import pinocchio as pin
-except ModuleNotFoundError as error:
-    from hierarchy.errors import missing
-
-    raise missing(error, "robots") from None
 from numpy.typing import ArrayLike
 
 from hierarchy import plugins
@@ -33,6 +26,7 @@ from hierarchy.robots.found import (
 )
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.joints import coordinates_of, normalise, parts_of, set_joint, values_of
+from hierarchy.robots.library import pin
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.robots.table import Base, Table
 

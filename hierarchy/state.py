@@ -7,13 +7,6 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
-
-try:
-    import pinocchio as pin
-except ModuleNotFoundError as error:
-    from hierarchy.errors import missing
-
-    raise missing(error, "robots") from None
 from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
@@ -24,6 +17,7 @@ from hierarchy.kinematics import Kinematics
 from hierarchy.notebook import numbers
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
+from hierarchy.robots.library import pin
 
 _MISFIT = -1  # arrays of other shapes
 _OFF, _EXACT = 2e-3, 1e-14  # of the squared length of a quaternion: too much, and rounding

@@ -305,7 +305,7 @@ def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, f
     qr = _QR.of((rows @ Z).T)
     pivots = np.abs(qr.pivots)
     rank = int(np.count_nonzero(pivots > parallel))
-    return (qr.from_the_right(Z)[:, rank:], float(pivots[:rank].min(initial=1.0)),
+    return (qr.times(Z.T, "T").T[:, rank:], float(pivots[:rank].min(initial=1.0)),
             float(pivots[rank:].max(initial=0.0)))
 
 
@@ -377,7 +377,7 @@ def _least_turn(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: 
     own, own_size, _ = _on_sides(level, size)
     C = np.hstack([(cone.rows @ (cone.Z.T @ Z)).T, ((own @ Z) * own_size[:, None]**2).T])
     f = Z.T @ (level.unit.T @ force)
-    left = min((C @ search(C, -f, 0.0) + f for search in (_non_negative, _non_negative_by_scipy)),
+    left = min((C @ _non_negative(C, -f, 0.0, by_scipy) + f for by_scipy in (False, True)),
                key=_length)
     least, square = float((size[judged]**2).min()) * _length(level.t[judged]), float(force @ force)
     if not (least > 0.0 and square > 0.0):
@@ -414,9 +414,8 @@ def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: Array | fl
     by scipy's, which chooses otherwise, and then without the rows that only repeat heavier ones.
     """
     least = np.inf
-    for search in (_non_negative, _non_negative_by_scipy,
-                   lambda C, b, enough: _non_negative(_unrepeated(C, terms), b, enough)):
-        z = search(C, -f, enough)
+    for by_scipy, repeated in ((False, True), (True, True), (False, False)):
+        z = _non_negative(C if repeated else _unrepeated(C, terms), -f, enough, by_scipy)
         left = C @ z + f
         noise = unknown * (size + terms @ z)
         least = min(least, _length(left[np.abs(left) > noise]))
@@ -476,7 +475,7 @@ class _View:
         by_size = np.argsort(-size, kind="stable")
         qr = _QR.of((T[:rank] * size**2).T[by_size])
         Q = np.empty((len(size), rank))
-        Q[by_size] = qr.from_the_left(np.eye(len(size), rank))
+        Q[by_size] = qr.times(np.eye(len(size), rank))
         return _View(size, Q, qr.raw[:rank], qr.order, V[:, :rank], V[:, rank:], thinnest, angle,
                      parallel)
 
@@ -516,7 +515,7 @@ def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float
         if not lost.any():
             break
         candidate[chosen[qr.order[int(np.argmax(lost))]]] = False
-    V = qr.from_the_left(np.eye(P.shape[1]))
+    V = qr.times(np.eye(P.shape[1]))
     T = V.T @ P.T
     left = np.sqrt(np.cumsum(T[::-1]**2, axis=0)[::-1])
     out = left <= 0.5 * parallel  # half: the remainder of a pivot must survive rounding
@@ -526,39 +525,38 @@ def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float
     return V, T, float(pivots.min(initial=1.0)), angle, len(pivots)
 
 
-def _non_negative(C: Array, b: Array, enough: float) -> Array:
+def _non_negative(C: Array, b: Array, enough: float, by_scipy: bool = False) -> Array:
     """Return z >= 0 that minimises |C z - b| (Lawson and Hanson 1974, ch. 23).
 
-    Stops early once |C z - b| <= enough, and in any case after three steps per column.
+    Stops early once |C z - b| <= enough, and in any case after three steps per column. Or, by
+    scipy's search, which ends elsewhere.
     """
-    z, largest = np.zeros(C.shape[1]), float(np.abs(b).max(initial=0.0))
-    peak = np.abs(C).max(axis=0, initial=0.0)
-    usable = (peak > 0.0) & (peak < np.inf)
-    if not usable.any() or largest == 0.0:
-        return z
-    heavy = np.argsort(-np.abs(C).max(axis=1), kind="stable")  # rows differ in weight
-    D, target = C[:, usable][heavy], b[heavy] / largest
-    z[usable] = largest * _active_set(D, target, D / peak[usable], enough, largest)
-    return z
-
-
-def _non_negative_by_scipy(C: Array, b: Array, enough: float) -> Array:
-    """Return z >= 0 that minimises |C z - b|, zero where the search fails.
-
-    It gets finite numbers of at most 1: others can end the process.
-    """
-    from scipy.optimize import nnls
-
     z, largest = np.zeros(C.shape[1]), float(np.abs(b).max(initial=0.0))
     peak = np.abs(C).max(axis=0, initial=0.0)
     usable = (peak > 0.0) & (peak < np.inf)
     if not usable.any() or not 0.0 < largest < np.inf:
         return z
+    D, peak = C[:, usable], peak[usable]
+    if by_scipy:
+        z[usable] = _by_scipy(D / peak, b / largest) * (largest / peak)
+        return z if np.isfinite(z).all() else np.zeros(len(z))
+    heavy = np.argsort(-np.abs(C).max(axis=1), kind="stable")  # rows differ in weight
+    z[usable] = largest * _active_set(D[heavy], b[heavy] / largest, D[heavy] / peak, enough,
+                                      largest)
+    return z
+
+
+def _by_scipy(D: Array, b: Array) -> Array:
+    """Return y >= 0 that minimises |D y - b|, zero if that takes too many steps.
+
+    It gets finite numbers of at most 1: others can end the process.
+    """
+    from scipy.optimize import nnls
+
     try:
-        z[usable] = nnls(C[:, usable] / peak[usable], b / largest)[0] * (largest / peak[usable])
-    except RuntimeError:  # it takes too many steps
-        return z
-    return z if np.isfinite(z).all() else np.zeros(C.shape[1])
+        return np.asarray(nnls(D, b)[0])
+    except RuntimeError:
+        return np.zeros(D.shape[1])
 
 
 def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) -> Array:
@@ -634,7 +632,7 @@ def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
     chosen = D[:, free]
     qr = _QR.of(chosen)
     depth = len(qr.pivots)
-    inside = qr.from_the_left(b[:, None], "T")[:, 0]
+    inside = qr.times(b[:, None], "T")[:, 0]
     rounding = _SMALL * np.minimum(norm(chosen, axis=0)[qr.order[:depth]],  # of columns and rows
                                    np.abs(chosen).max(axis=1)[:depth])
     pivots = np.abs(qr.pivots) > rounding
@@ -642,7 +640,7 @@ def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
     solved = _solve_triangular(qr.raw[:rank, :rank], inside[:rank, None])[:, 0]
     s[np.flatnonzero(free)[qr.order[:rank]]] = solved
     inside[:rank] = 0.0
-    return s, qr.from_the_left(inside[:, None])[:, 0]
+    return s, qr.times(inside[:, None])[:, 0]
 
 
 @final
@@ -674,20 +672,13 @@ class _QR:
         """The diagonal of R: (min(m, n),)."""
         return np.diagonal(self.raw)
 
-    def from_the_left(self, matrix: Array, trans: str = "N") -> Array:
-        """Return Q or Q^T times a matrix (m, k)."""
-        return self._times("L", matrix, trans)
-
-    def from_the_right(self, matrix: Array) -> Array:
-        """Return a matrix (k, m) times Q."""
-        return self._times("R", matrix, "N")
-
-    def _times(self, side: str, matrix: Array, trans: str) -> Array:
+    def times(self, matrix: Array, trans: str = "N") -> Array:
+        """Return Q, or Q^T if trans is "T", times a matrix (m, k)."""
         from scipy.linalg import lapack
 
         if not (len(self.tau) and matrix.size):
             return matrix.copy()
-        found: Array = lapack.dormqr(side, trans, self.raw[:, :len(self.tau)], self.tau, matrix,
+        found: Array = lapack.dormqr("L", trans, self.raw[:, :len(self.tau)], self.tau, matrix,
                                      max(matrix.shape) * _BLOCK)[0]
         return found
 

@@ -13,6 +13,7 @@ from solvers.resolution import Resolution
 from solvers.status import Status
 
 _Kind = TypeVar("_Kind", bound=Resolution)
+_NONE = np.empty(0)  # memory of a solve that was not needed
 
 
 def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy, levels: Sequence[int],
@@ -72,6 +73,3 @@ def _split(memory: Array | None, count: int) -> list[Array | None]:
             return alone
         parts.append(memory[at:(at := at + int(length))])
     return parts if at == memory.size - count else alone
-
-
-_NONE = np.empty(0)

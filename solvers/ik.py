@@ -7,7 +7,7 @@ resolver and needs nothing else. Like the adapters it meets pinocchio only throu
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, overload
 
 import numpy as np
@@ -17,13 +17,12 @@ from hierarchy.errors import HierarchyError, brief, expect, number
 from hierarchy.notebook import numbers
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Robot
-from hierarchy.stack import Stack
 from hierarchy.state import State
 from hierarchy.task import Task, check_period
 from hierarchy.tasks.joint_limits import StepLimits
-from hierarchy.tasks.mechanism import MECHANISM, Mechanism, above, bends, model_rows
+from hierarchy.tasks.mechanism import MECHANISM, Mechanism, bends
 from hierarchy.words import listed
-from solvers.reaching import Reached, reach
+from solvers.reaching import Reached, reach, stacked
 from solvers.resolver import Resolution, Resolver, make
 from solvers.resolvers.settled import Settled
 from solvers.status import Status
@@ -115,21 +114,15 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
                                  f"{limits.name!r}: a configuration has no speed")
         return reach(robot, q, tasks, until, limits=limits, resolver=inner, t=t, damping=damping)
     begun, before = _before(memory, v, limits)
-    return _step(robot, State.at(robot, q, before, t), tasks, dt, limits,
-                 _settled(inner, tasks, dt, damping), begun)
-
-
-def _step(robot: Robot, state: State, tasks: Sequence[Task], dt: float, limits: bool | Task,
-          resolver: Settled, memory: Array | None) -> Step:
+    state = State.at(robot, q, before, t)
     state.commanded = state.v.copy()
     if limits is True:
         _warn_of_speeds(robot)
     box = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
-    first = above(model_rows(robot, dt), box, resolver.inner.can_resolve("inequalities"))
-    stack = Stack([*first, *tasks], "velocity")
+    stack, settled = stacked(robot, tasks, dt, box, inner, damping)
     for task in (*box, *tasks):
         check_period(task, dt)
-    found = _solved(robot, state.q, stack.hierarchy(state), resolver, memory)
+    found = _solved(robot, state.q, stack.hierarchy(state), settled, begun)
     return Step(found.x, found.status, Memory(found.memory, found.x.copy()))
 
 
@@ -151,9 +144,6 @@ def _solved(robot: Robot, q: Array, h: Hierarchy, resolver: Settled,
     return found
 
 
-def _settled(inner: Resolver, tasks: Iterable[Task], dt: float, damping: float) -> Settled:
-    curved = frozenset(task.name for task in tasks if isinstance(task, Task) and not task.straight)
-    return Settled(inner=inner, period=dt, softness=damping, curved=curved)
 
 def _before(memory: Memory | None, v: ArrayLike | None,
             limits: bool | Task) -> tuple[Array | None, ArrayLike | None]:
@@ -168,7 +158,6 @@ def _before(memory: Memory | None, v: ArrayLike | None,
     return None, v
 
 
-
 def _warn_of_speeds(robot: Robot) -> None:
     """Warn, once for each robot, of joints whose speed `limits=True` does not limit."""
     speeds = list(zip(robot.velocity_names, robot.velocity_limit, strict=True))[robot.actuated:]
@@ -176,4 +165,4 @@ def _warn_of_speeds(robot: Robot) -> None:
     if free and (robot.name, *free) not in _warned:
         _warned.add((robot.name, *free))
         warnings.warn(f"robot {robot.name!r} has no velocity limit for {listed(free)}: limits=True "
-                      "does not limit their speed", stacklevel=4)
+                      "does not limit their speed", stacklevel=3)

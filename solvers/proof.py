@@ -22,6 +22,7 @@ is called zero. Its own least violation does not: to read the data more finely c
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from itertools import product
@@ -101,17 +102,14 @@ def prove(h: Hierarchy, candidates: Iterable[ArrayLike], unclear: float = UNCLEA
         context.prec = DIGITS
         for count, complete in [(levels, True), *((k, False) for k in range(levels, 0, -1))]:
             tried: set[bytes] = set()
-            for x in points:
-                for band in _BANDS:
-                    rows = _Rows.at(h, x, band)
-                    key = rows.key(int(h.offsets[count]))
-                    if key in tried:
-                        continue
-                    tried.add(key)
-                    try:
-                        return _Attempt(h, rows, None if complete else x, count, unclear).proof()
-                    except _NoProofError:
-                        continue
+            for x, band in product(points, _BANDS):
+                rows = _Rows.at(h, x, band)
+                key = rows.key(int(h.offsets[count]))
+                if key in tried:
+                    continue
+                tried.add(key)
+                with suppress(_NoProofError):
+                    return _Attempt(h, rows, None if complete else x, count, unclear).proof()
     return Proof(np.full(h.n, np.nan), np.full(levels, np.nan), 0, levels + 1, 0.0, 0.0)
 
 

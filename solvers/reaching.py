@@ -83,6 +83,18 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
     return search.answer(best[1], iterations + best[2], count)
 
 
+def stacked(robot: Robot, tasks: Sequence[Task], period: float, limits: Sequence[Task],
+            resolver: Resolver, damping: float) -> tuple[Stack, Settled]:
+    """Return tasks below limits and the robot's mechanism as a stack, and what resolves it.
+
+    period [s], for which a velocity will be held; damping as in `solve_ik`.
+    """
+    first = above(model_rows(robot, period), limits, resolver.can_resolve("inequalities"))
+    stack = Stack([*first, *tasks], "velocity")
+    return stack, Settled(inner=resolver, period=period, softness=damping, curved=frozenset(
+        task.name for task in tasks if not task.straight))
+
+
 class _Search:
     """A robot with a stack over one state, and the resolver of its steps."""
 
@@ -95,16 +107,13 @@ class _Search:
         self.period = 1.0 / max([*gains, *rates, 1e-3])
         self.robot, self.until, self.t, self.tasks = robot, until, t, list(tasks)
         self.limits = [StepLimits(robot, self.period, 1.0 / self.period)] if limits else []
-        first = above(model_rows(robot, self.period), self.limits,
-                      resolver.can_resolve("inequalities"))
-        self.stack, self.mechanism = Stack([*first, *tasks], "velocity"), Mechanism(robot)
+        self.stack, self.settled = stacked(robot, tasks, self.period, self.limits, resolver,
+                                           damping)
+        self.mechanism = Mechanism(robot)
         self.deciding = [task for task in tasks if not task.straight]
         if not self.deciding:
             raise HierarchyError("solve_ik: until: only joint tasks are given, which are "
                                  "preferences; give a task of a frame too")
-        curved = frozenset(task.name for task in self.deciding)
-        self.settled = Settled(inner=resolver, period=self.period, softness=damping,
-                               curved=curved)
         self.state, self.status = State(robot), Status.SOLVED
 
     def descend(self, q: Array, most: int, resolver: Resolver,

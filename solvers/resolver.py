@@ -26,7 +26,7 @@ from solvers.workspace import WORKSPACE, entry
 
 Handles = Literal["equalities", "bounds", "inequalities", "activations"]
 _KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities", "activations")
-_CHECK, _KIND, _CHOICES = "check", "kind", "choices"  # what a field says of a setting
+_CHECK, _CHOICES = "check", "choices"  # what a field says of a setting
 _RESOLVED: dict[str, str] = {
     "equalities": "equalities only",
     "bounds": "equalities, and bounds on single unknowns in a first level of their own",
@@ -36,26 +36,49 @@ _RESOLVED: dict[str, str] = {
 def number(default: Any = dataclasses.MISSING, low: float = 0.0, high: float = math.inf, *,
            open_below: bool = False) -> Any:
     """Return a field: a setting >= low, or > low if it is open below, and < high."""
-    def check(value: Any) -> str:
+    def check(resolver: Resolver, name: str, value: Any) -> None:
+        if value is None and default is None:
+            return
         known = isinstance(value, (int, float)) and not isinstance(value, bool)
-        good = known and low <= value < high and not (open_below and value == low)
-        return "" if good else f"a number {'>' if open_below else '>='} {low:g} and < {high:g}"
+        if not known or not low <= value < high or (open_below and value == low):
+            raise HierarchyError(f"{resolver.name}: {name} = {value!r}, expected a number "
+                                 f"{'>' if open_below else '>='} {low:g} and < {high:g}")
+        if type(value) is not float:
+            set_frozen(resolver, **{name: float(value)})
 
-    return dataclasses.field(default=default, metadata={_CHECK: check, _KIND: float})
+    return dataclasses.field(default=default, metadata={_CHECK: check})
 
 
 def whole_number(default: int | None, least: int) -> Any:
     """Return a field: a setting that is a whole number >= least."""
-    def check(value: Any) -> str:
-        good = isinstance(value, int) and not isinstance(value, bool) and least <= value < 2**31
-        return "" if good else f"a whole number >= {least}"
+    def check(resolver: Resolver, name: str, value: Any) -> None:
+        if value is None and default is None:
+            return
+        if not isinstance(value, int) or isinstance(value, bool) or not least <= value < 2**31:
+            raise HierarchyError(f"{resolver.name}: {name} = {value!r}, expected a whole number >= "
+                                 f"{least}")
 
-    return dataclasses.field(default=default, metadata={_CHECK: check, _KIND: int})
+    return dataclasses.field(default=default, metadata={_CHECK: check})
 
 
 def one_of(*allowed: str) -> Any:
     """Return a field: a setting that is one of these, the first by default."""
-    return dataclasses.field(default=allowed[0], metadata={_CHOICES: allowed})
+    def check(resolver: Resolver, name: str, value: Any) -> None:
+        if value not in allowed:
+            raise UnknownNameError(f"{name} of {resolver.name}", value, allowed)
+
+    return dataclasses.field(default=allowed[0], metadata={_CHECK: check, _CHOICES: allowed})
+
+
+@functools.cache
+def _checks(kind: type) -> list[tuple[str, Callable[..., None]]]:
+    """Return the settings that a class declares above, each with its check.
+
+    One that only gets another default in a subclass keeps the check.
+    """
+    return list({field.name: field.metadata[_CHECK] for base in reversed(kind.__mro__)
+                 for field in vars(base).get("__dataclass_fields__", {}).values()
+                 if _CHECK in field.metadata}.items())
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -86,6 +109,10 @@ class Resolver(ABC):
     """Rows with lower < upper that the resolver accepts: none; bounds on single unknowns in a first
     level that has no other rows; or any. It rejects all others. "activations": rows that come with
     an activation, see solvers.resolvers.smooth."""
+    strict: ClassVar[bool] = True
+    """Whether priorities are respected exactly at any rank."""
+    accuracy: ClassVar[float] = 1e-9
+    """Expected error of x on a well-conditioned hierarchy, relative to 1 + |x|."""
     damps: ClassVar[str] = "each level"
     """What is damped in a stack of equalities. Strict resolvers with the same text find the same x.
     """
@@ -99,15 +126,8 @@ class Resolver(ABC):
             cls.solve = _with_checks(solve)  # type: ignore[assignment,method-assign]
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            value, said = getattr(self, field.name), field.metadata
-            if _CHOICES in said and value not in said[_CHOICES]:
-                raise UnknownNameError(f"{field.name} of {self.name}", value, said[_CHOICES])
-            if _CHECK in said and (value is not None or field.default is not None):
-                if expected := said[_CHECK](value):
-                    raise HierarchyError(f"{self.name}: {field.name} = {value!r}, expected "
-                                         f"{expected}")
-                set_frozen(self, **{field.name: said[_KIND](value)})
+        for name, check in _checks(type(self)):
+            check(self, name, getattr(self, name))
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but what is worked out again when it is needed, such as compiled code."""
@@ -125,16 +145,6 @@ class Resolver(ABC):
         return " ".join([self.name, *(
             value for field in dataclasses.fields(self) if _CHOICES in field.metadata
             and (value := getattr(self, field.name)) != field.default)])
-
-    @property
-    def strict(self) -> bool:
-        """Whether priorities are respected exactly at any rank."""
-        return True
-
-    @property
-    def accuracy(self) -> float:
-        """Expected error of x on a well-conditioned hierarchy, relative to 1 + |x|."""
-        return 1e-9
 
     @cached_property
     def _settings(self) -> Array:
@@ -238,20 +248,14 @@ class Around(Resolver):
 
     inner: Resolver
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        set_frozen(self, strict=self.inner.strict, accuracy=self.inner.accuracy)
+
     @property
     def label(self) -> str:
         """The label of the inner resolver."""
         return self.inner.label
-
-    @property
-    def strict(self) -> bool:
-        """Whether the inner resolver is."""
-        return self.inner.strict
-
-    @property
-    def accuracy(self) -> float:
-        """The accuracy of the inner resolver."""
-        return self.inner.accuracy
 
 
 def refuse_inequality(resolver: Resolver, h: Hierarchy, row: int) -> None:

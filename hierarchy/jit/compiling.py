@@ -7,7 +7,7 @@ from typing import Any
 import numba
 
 from hierarchy.jit.dispatching import Cached, OnlyInlined
-from hierarchy.jit.sources import Kernel, constants_behind, files_behind
+from hierarchy.jit.sources import Kernel
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
 _MAKERS = {"empty", "empty_like", "zeros", "zeros_like", "ones", "full", "eye", "copy", "array"}
@@ -43,7 +43,6 @@ def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Ke
     kernel: Any = numba.njit(error_model="numpy", forceinline=inline, nogil=nogil, _nrt=allocates,
                              no_cpython_wrapper=inline, no_cfunc_wrapper=True)(function)
     kernel.__class__ = OnlyInlined if inline else Cached
-    kernel.source_files, kernel.constants = files_behind(function), constants_behind(function)
     kernel.allocates, kernel.ready = allocates, {}
     return kernel  # type: ignore[no-any-return]
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -23,18 +23,22 @@ _OWN = tuple(str(Path(__file__).with_name(f"{name}.py")) for name in (
 _KIND = re.compile(r"(readonly )?array\((\w+), (\d)d, (\w)\)|([\w.]+)(\()?|\)")
 
 
-def files_behind(function: Kernel) -> frozenset[str]:
-    """Return the files of a kernel and of all kernels that its file knows."""
-    behind = (getattr(known, "source_files", ()) for known in function.__globals__.values())
-    return frozenset({function.__code__.co_filename}).union(*behind)
-
-
-def constants_behind(function: Kernel) -> frozenset[str]:
-    """Return the numbers that a kernel's file knows, and those behind all kernels it knows."""
-    known = function.__globals__
-    behind = (getattr(value, "constants", ()) for value in known.values())
-    return frozenset(f"{name} = {value!r}" for name, value in known.items() if name.isupper()
-                     and isinstance(value, (int, float, np.integer))).union(*behind)
+def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
+    """Return the files of functions and of all kernels that they know, and the numbers in these."""
+    files, constants, ahead, seen = set(), set(), list(functions), set()
+    while ahead:
+        function = ahead.pop()
+        files.add(function.__code__.co_filename)
+        known = function.__globals__
+        if id(known) in seen:
+            continue
+        seen.add(id(known))
+        for name, value in known.items():
+            if hasattr(value, "py_func"):
+                ahead.append(value.py_func)
+            elif name.isupper() and isinstance(value, (int, float, np.integer)):
+                constants.add(f"{name} = {value!r}")
+    return files, constants
 
 
 def source_digest(*functions: Any) -> str:
@@ -42,9 +46,7 @@ def source_digest(*functions: Any) -> str:
 
     It is "" if a file is not to be found: that of a cell of a notebook, or in an archive.
     """
-    plain = [getattr(function, "py_func", function) for function in functions]
-    files = frozenset[str]().union(*map(files_behind, plain))
-    constants = frozenset[str]().union(*map(constants_behind, plain))
+    files, constants = behind(getattr(function, "py_func", function) for function in functions)
     try:
         content = "\n".join((*sorted(map(digest_of, (*files, *_OWN))), *sorted(constants)))
     except OSError:

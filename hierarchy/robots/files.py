@@ -16,7 +16,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import RobotError
@@ -31,6 +30,7 @@ from hierarchy.robots.found import (
 )
 from hierarchy.robots.from_table import ROOT
 from hierarchy.robots.joints import without
+from hierarchy.robots.library import pin
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
 from hierarchy.words import some

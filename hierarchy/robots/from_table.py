@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from hierarchy.avoidance.control_points import ControlPoint
 from hierarchy.avoidance.self_collision import Vector
 from hierarchy.problem import Array
 from hierarchy.robots.found import Found
+from hierarchy.robots.library import pin
 from hierarchy.robots.shapes import link_capsules
 from hierarchy.robots.table import Base, DHTable, Link, Table, TreeTable
 

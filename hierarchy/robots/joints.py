@@ -12,12 +12,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, RobotError, UnknownNameError, finite_numbers
 from hierarchy.problem import Array
 from hierarchy.robots.found import Coupled
+from hierarchy.robots.library import pin
 
 UNIT = 1e-6     # off one to which the length of a quaternion or (cos, sin) may be given
 _EXACT = 1e-14  # off one by rounding, which is left

@@ -39,6 +39,9 @@ class Task(Protocol):
         """Return J (k, n)."""
 
 
+Tasks = Iterable[Task | Sequence[Task]]
+
+
 class Pull(NamedTuple):
     """A weight on the length of the step, as pink adds to its cost, and its centre.
 
@@ -48,36 +51,6 @@ class Pull(NamedTuple):
 
     weight: float
     centre: Array
-
-
-def packed(configuration: object, joints: Names, n: int, period: float,
-           limits: Sequence[Limit], constraints: Sequence[Task],
-           tasks: Iterable[Task | Sequence[Task]], pull: Pull | None = None,
-           *, solve: Solve | None = None) -> Packed:
-    """Pack limits, constraints and tasks into levels, without the empty ones.
-
-    n unknowns [rad/s or m/s], and a function that returns their names; period [s]. An entry of
-    `tasks` is a task, or a sequence of tasks that share a level, weighted by their costs.
-    Constraints have no cost, as in pink and mink.
-    Without `pull` a task's lm_damping is refused. With it, a level minimises |A x - b|^2 +
-    weight |x - centre|^2 within the levels above: the last one by n rows more, the others by
-    `solve`, after which they keep the A x that it reaches.
-
-    Raises ContradictionError for limits of a joint that contradict each other.
-    """
-    if not 0.0 < period < np.inf:
-        raise HierarchyError(f"period {period} s must be positive and finite")
-    entries = [constraints, *(one if isinstance(one, Sequence) else (one,) for one in tasks)]
-    read = [[_read(task, configuration, pull is not None) for task in entry] for entry in entries]
-    levels = Packed(n, joints, period, limits, read, pull)
-    levels.keep("limits", levels.limit())
-    levels.keep("constraints", levels.write(read[0], weighted=False))
-    levels.always = levels.count
-    for level in read[1:]:
-        if levels.weight and any(np.any(_costs(task, len(e))) for task, _, e in level):
-            levels.hold(solve)
-        levels.level(level)
-    return levels
 
 
 class ContradictionError(HierarchyError):
@@ -112,26 +85,47 @@ def _names_of(task: Task, J: Array, e: Array) -> list[str]:
 
 
 class Packed:
-    """The levels written so far, and a table of what limits and tasks give, see `packing`.
+    """Limits, constraints and tasks as levels, without the empty ones.
 
-    kept, sizes : what is in each level, without the empty ones, and its rows. A (m, n), sides (2,
-    m): the rows of all, m = `count`, and room for more; the first `always` are limits and
-    constraints.
+    n unknowns [rad/s or m/s], and a function that returns their names; period [s]. An entry of
+    `tasks` is a task, or a sequence of tasks that share a level, weighted by their costs.
+    Constraints have no cost, as in pink and mink.
+    Without `pull` a task's lm_damping is refused. With it, a level minimises |A x - b|^2 +
+    weight |x - centre|^2 within the levels above: the last one by n rows more, the others by
+    `solve`, after which they keep the A x that it reaches.
+
+    kept, sizes : what is in each level, and its rows. A (m, n), sides (2, m): the rows of all, m =
+    `count`, and room for more; the first `always` are limits and constraints. What limits and tasks
+    give stands in a table, see `packing`.
+
+    Raises ContradictionError for limits of a joint that contradict each other.
     """
 
-    def __init__(self, n: int, joints: Names, period: float, limits: Sequence[Limit],
-                 read: Sequence[Sequence[_Read]], pull: Pull | None) -> None:
+    def __init__(self, configuration: object, joints: Names, n: int, period: float,
+                 limits: Sequence[Limit], constraints: Sequence[Task], tasks: Tasks,
+                 pull: Pull | None = None, *, solve: Solve | None = None) -> None:
+        if not 0.0 < period < np.inf:
+            raise HierarchyError(f"period {period} s must be positive and finite")
         self.n, self.joints, self.period, self.pull = n, joints, period, pull
-        self.limits, self.read = limits, read
+        entries = [constraints, *(one if isinstance(one, Sequence) else (one,) for one in tasks)]
+        self.limits, self.read = limits, [[
+            _read(task, configuration, pull is not None) for task in entry] for entry in entries]
         given = sum([len(h) for _, _, h in limits])
-        most = given + sum([len(e) for level in read for _, _, e in level])
+        most = given + sum([len(e) for level in self.read for _, _, e in level])
         self.table = np.zeros((most, n + GIVEN))
         self.A, self.sides = np.empty((most + 2 * n, n)), np.empty((2, most + 2 * n))
-        self.count, self.filled, self.always = 0, 0, 0
+        self.count = self.filled = 0
         self.weight = 0.0  # of the step in the last level, whose rows in the table are `last`
         self.last = (0, 0)
         self.kept: list[str | Sequence[_Read]] = []
         self.sizes: list[int] = []
+        self.keep("limits", self.limit())
+        self.keep("constraints", self.write(self.read[0], weighted=False))
+        self.always = self.count
+        for level in self.read[1:]:
+            if self.weight and any(np.any(_costs(task, len(e))) for task, _, e in level):
+                self.hold(solve)
+            self.level(level)
 
     def keep(self, what: str | Sequence[_Read], last: int) -> None:
         """Make the rows written up to `last` a level, unless there are none."""

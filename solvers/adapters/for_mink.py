@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.adapters.displacements import Task
+from solvers.adapters.displacements import Task, Tasks
 from solvers.adapters.drop_in import answer
 from solvers.adapters.from_mink import packed
 from solvers.resolver import Resolution, Resolver
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from mink import Configuration, Limit
 
 
-def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]], dt: float,
+def solve_ik(configuration: Configuration, tasks: Tasks, dt: float,
              solver: str | Resolver = "hcod", damping: float = 1e-12, safety_break: bool = False,
              limits: Iterable[Limit] | None = None, constraints: Iterable[Task] | None = None, *,
              tolerance: float = 1e-6, **of_the_solver: Any) -> Array:

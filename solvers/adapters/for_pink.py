@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.adapters.displacements import Task
+from solvers.adapters.displacements import Task, Tasks
 from solvers.adapters.drop_in import answer
 from solvers.adapters.from_pink import packed
 from solvers.resolver import Resolution, Resolver
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pink.limits import Limit
 
 
-def solve_ik(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]], dt: float,
+def solve_ik(configuration: Configuration, tasks: Tasks, dt: float,
              solver: str | Resolver = "hcod", damping: float = 1e-12,
              limits: Iterable[Limit] | None = None, barriers: Iterable[Barrier] | None = None,
              constraints: Iterable[Task] | None = None, safety_break: bool = True, *,

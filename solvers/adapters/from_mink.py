@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hierarchy.problem import Hierarchy
-from solvers.adapters import displacements
-from solvers.adapters.displacements import Packed, Pull, Solve, Task
+from solvers.adapters.displacements import Packed, Pull, Solve, Task, Tasks
 
 if TYPE_CHECKING:
     from mink import Configuration, Limit
     from mujoco import MjModel
 
 
-def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]], dt: float,
+def hierarchy(configuration: Configuration, tasks: Tasks, dt: float,
               limits: Iterable[Limit] | None = None,
               constraints: Iterable[Task] | None = None, damping: float | None = None,
               solve: Solve | None = None) -> Hierarchy:
@@ -38,7 +37,7 @@ def hierarchy(configuration: Configuration, tasks: Iterable[Task | Sequence[Task
     return packed(configuration, tasks, dt, limits, constraints, damping, solve).hierarchy()
 
 
-def packed(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]], dt: float,
+def packed(configuration: Configuration, tasks: Tasks, dt: float,
            limits: Iterable[Limit] | None, constraints: Iterable[Task] | None,
            damping: float | None, solve: Solve | None) -> Packed:
     """Return the levels of `hierarchy`, which takes the same arguments, as they were packed."""
@@ -51,8 +50,8 @@ def packed(configuration: Configuration, tasks: Iterable[Task | Sequence[Task]],
     given = [(name, one.G, one.h) for name, one in found if not one.inactive]
     n = configuration.model.nv
     pull = None if damping is None else Pull(damping, np.zeros(n))
-    return displacements.packed(configuration, partial(_joints, configuration.model), n, dt, given,
-                                list(constraints or ()), tasks, pull, solve=solve)
+    return Packed(configuration, partial(_joints, configuration.model), n, dt, given,
+                  list(constraints or ()), tasks, pull, solve=solve)
 
 
 def _joints(model: MjModel) -> list[str]:

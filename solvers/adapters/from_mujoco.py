@@ -23,11 +23,8 @@ KINDS = ("body", "site", "geom")
 
 def frame(model: MjModel, data: MjData, name: str, kind: str = "body") -> tuple[Array, Array]:
     """Return the position (3,) [m] and rotation (3, 3) of a body, site or geom in the world."""
-    which = _index(model, name, kind)
-    # the frame of a body: `xipos` would be its centre of mass
-    position, rotation = {"body": (data.xpos, data.xmat), "site": (data.site_xpos, data.site_xmat),
-                          "geom": (data.geom_xpos, data.geom_xmat)}[kind]
-    return np.array(position[which]), np.array(rotation[which]).reshape(3, 3)
+    at = getattr(data, kind)(_index(model, name, kind))  # of a body not `xipos`, its centre of mass
+    return np.array(at.xpos), np.array(at.xmat).reshape(3, 3)
 
 
 def jacobian(model: MjModel, data: MjData, name: str, kind: str = "body") -> Array:
@@ -37,10 +34,8 @@ def jacobian(model: MjModel, data: MjData, name: str, kind: str = "body") -> Arr
     """
     import mujoco
 
-    write = {"body": mujoco.mj_jacBody, "site": mujoco.mj_jacSite, "geom": mujoco.mj_jacGeom}
-    J = np.zeros((6, model.nv))
-    which = _index(model, name, kind)
-    write[kind](model, data, J[:3], J[3:], which)
+    J, which = np.zeros((6, model.nv)), _index(model, name, kind)
+    getattr(mujoco, f"mj_jac{kind.title()}")(model, data, J[:3], J[3:], which)
     return J
 
 
@@ -113,17 +108,14 @@ def limit_level(model: MjModel, data: MjData, period: float, velocity: float | A
 
 
 def _index(model: MjModel, name: str, kind: str) -> int:
-    import mujoco
-
     if kind not in KINDS:
         raise UnknownNameError("kind of frame", kind, KINDS)
-    which = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
-    index = mujoco.mj_name2id(model, which, name)
-    if index < 0:
-        count = {"body": model.nbody, "site": model.nsite, "geom": model.ngeom}[kind]
-        names = [mujoco.mj_id2name(model, which, i) for i in range(count)]
-        raise UnknownNameError(kind, name, [known for known in names if known])
-    return int(index)
+    named = getattr(model, kind)
+    try:
+        return int(named(name).id)
+    except KeyError:
+        names = [named(i).name for i in range(getattr(model, f"n{kind}"))]
+        raise UnknownNameError(kind, name, [known for known in names if known]) from None
 
 
 def _shaped(what: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from hierarchy.records import set_frozen
 from hierarchy.state import State
 from hierarchy.task import Level, Task
 from solvers.adapters import displacements
+from solvers.adapters.displacements import Packed, Pull, Solve, Tasks
 
 if TYPE_CHECKING:
     from pink import Configuration
@@ -51,7 +52,7 @@ class PinkTask(Task):
         if not 0.0 < self.period < np.inf:
             raise HierarchyError(f"task {self.name!r}: period {self.period} s must be positive "
                                  "and finite")
-        set_frozen(self, rows=len(self._residual()[1]))
+        set_frozen(self, rows=len(displacements.residual(self.task, self.configuration)[1]))
 
     @property
     def gain(self) -> float:  # type: ignore[override]
@@ -65,13 +66,11 @@ class PinkTask(Task):
 
     def error(self, state: State) -> Array:
         """Return minus pink's error, times the costs: (m,)."""
-        self._follow(state)
-        return self._residual()[1]
+        return self._residual(state)[1]
 
     def jacobian(self, state: State) -> Array:
         """Return pink's Jacobian, times the costs: (m, n)."""
-        self._follow(state)
-        return self._residual()[0]
+        return self._residual(state)[0]
 
     def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
                row: int) -> Callable[[], object]:
@@ -81,30 +80,23 @@ class PinkTask(Task):
         own = slice(row, row + self.rows)
 
         def write() -> None:
-            self._follow(state)
-            A[own], r = self._rows()
+            J, r = self._residual(state)
+            if len(r) != self.rows:
+                raise HierarchyError(f"task {self.name!r}: {len(r)} of its rows cost something, "
+                                     f"{self.rows} did when it was created; create it again")
+            A[own] = J
             lower[own] = upper[own] = self.gain * r
             check_rows(f"task {self.name!r}", A[own], lower[own], upper[own])
 
         return write
-
-    def _rows(self) -> tuple[Array, Array]:
-        J, r = self._residual()
-        if len(r) != self.rows:
-            raise HierarchyError(f"task {self.name!r}: {len(r)} of its rows cost something, "
-                                 f"{self.rows} did when it was created; create it again")
-        return J, r
 
     def jacobian_derivative(self, state: State) -> Array:
         """Raise a HierarchyError: pink does not provide it."""
         raise HierarchyError(f"task {self.name!r}: pink does not support accelerations; use "
                              "it in a stack of level 'velocity'")
 
-    def _residual(self) -> tuple[Array, Array]:
-        return displacements.residual(self.task, self.configuration)
-
-    def _follow(self, state: State) -> None:
-        """Update pink's configuration to the joint angles of the state."""
+    def _residual(self, state: State) -> tuple[Array, Array]:
+        """Return the rows with pink's configuration at the joint angles of the state."""
         configuration, robot = self.configuration, state.robot
         theirs = tuple(configuration.model.names)[1:]
         if theirs != robot.joint_names or configuration.model.nq != robot.nq:
@@ -113,14 +105,14 @@ class PinkTask(Task):
                                  f"{', '.join(robot.joint_names)}")
         if not np.array_equal(configuration.q, state.q):
             configuration.update(state.q)
+        return displacements.residual(self.task, configuration)
 
 
 def hierarchy(configuration: Configuration,
-              tasks: Iterable[displacements.Task | Sequence[displacements.Task]], dt: float,
-              limits: Iterable[Limit] | None = None, barriers: Iterable[Barrier] | None = None,
+              tasks: Tasks, dt: float, limits: Iterable[Limit] | None = None,
+              barriers: Iterable[Barrier] | None = None,
               constraints: Iterable[displacements.Task] | None = None,
-              damping: float | None = None,
-              solve: displacements.Solve | None = None) -> Hierarchy:
+              damping: float | None = None, solve: Solve | None = None) -> Hierarchy:
     """Return the problem of `pink.build_ik` as levels: limits, constraints, then the tasks.
 
     The unknown is the velocity (n,); dt [s]. The order of `tasks` is their priority; an entry may
@@ -143,27 +135,28 @@ def hierarchy(configuration: Configuration,
                   solve).hierarchy()
 
 
-def packed(configuration: Configuration,
-           tasks: Iterable[displacements.Task | Sequence[displacements.Task]], dt: float,
-           limits: Iterable[Limit] | None, barriers: Iterable[Barrier] | None,
-           constraints: Iterable[displacements.Task] | None, damping: float | None,
-           solve: displacements.Solve | None) -> displacements.Packed:
+def packed(configuration: Configuration, tasks: Tasks, dt: float, limits: Iterable[Limit] | None,
+           barriers: Iterable[Barrier] | None, constraints: Iterable[displacements.Task] | None,
+           damping: float | None, solve: Solve | None) -> Packed:
     """Return the levels of `hierarchy`, which takes the same arguments, as they were packed."""
     given, n = list(barriers or ()), configuration.model.nv
     found = [(type(one).__name__, one.compute_qp_inequalities(configuration, dt))
              for one in (*(_limits_of_model(configuration) if limits is None else limits), *given)]
-    pull = None if damping is None else displacements.Pull(damping, np.zeros(n))
+    pull = None if damping is None else Pull(damping, np.zeros(n))
     for barrier in given:
-        if barrier.safe_displacement_gain and pull is None:
+        if not barrier.safe_displacement_gain:
+            continue
+        if pull is None:
             raise HierarchyError(f"{type(barrier).__name__}: safe_displacement_gain = "
                                  f"{barrier.safe_displacement_gain:g} weighs a displacement "
                                  "against the tasks; set it to 0")
-        if barrier.safe_displacement_gain and pull is not None:
-            H, c = barrier.compute_qp_objective(configuration)
-            pull = _pulled(pull, H, c, dt)
-    return displacements.packed(configuration, partial(_joints, configuration.model), n, dt,
-                                [(name, *pair) for name, pair in found if pair is not None],
-                                list(constraints or ()), tasks, pull, solve=solve)
+        H, c = barrier.compute_qp_objective(configuration)  # H = weight I, c = -weight dq_safe
+        weight = pull.weight + float(H[0, 0])
+        centre = pull.weight * pull.centre - c / dt
+        pull = Pull(weight, centre / weight if weight > 0.0 else pull.centre)
+    return Packed(configuration, partial(_joints, configuration.model), n, dt,
+                  [(name, *pair) for name, pair in found if pair is not None],
+                  list(constraints or ()), tasks, pull, solve=solve)
 
 
 def _joints(model: Any) -> list[str]:
@@ -171,13 +164,6 @@ def _joints(model: Any) -> list[str]:
     return [f"{name} {i + 1}" if joint.nv > 1 else str(name)
             for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True)
             for i in range(joint.nv)]
-
-
-def _pulled(pull: displacements.Pull, H: Array, c: Array, dt: float) -> displacements.Pull:
-    """Return a pull with that of a barrier's objective, H = weight I and c = -weight dq_safe."""
-    weight = pull.weight + float(H[0, 0])
-    centre = pull.weight * pull.centre - c / dt
-    return displacements.Pull(weight, centre / weight if weight > 0.0 else pull.centre)
 
 
 def _limits_of_model(configuration: Configuration) -> list[Limit]:

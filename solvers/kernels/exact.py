@@ -27,7 +27,7 @@ from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import LARGER, MET, PASS_STEPS, SEARCH_STEPS
+from solvers.kernels.tolerances import LARGER, MET, PASS_STEPS, SOLVE_STEPS
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     COARSE,
@@ -180,7 +180,8 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
         return finish(x, code)
     current, at = matrix(work, at, sizes.size + 1, m)
     saved, at = vector(work, at, n)
-    limit, code, steps = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO
+    most, code, steps = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO
+    limit = min(most, SOLVE_STEPS * (m + 1))
     warm, level, s.count[FINISHED] = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1, 0
     begin = ZERO
     if warm:
@@ -191,7 +192,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     if code == UNPROVED and level < 0:
         t, _ = carve_tableau(s, work, at)
         code, level = pass_through_levels(t, settings[TOLERANCE],
-                                          min(limit - steps, PASS_STEPS * (m + n)))
+                                          min(limit - steps, PASS_STEPS * (m + 1)))
         steps += t.count[STEPS]
         save(s, saved, sizes.size if code == SOLVED else level)
         code = _verified(s, code, NO)
@@ -204,8 +205,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
             s.count[COARSE] = coarse
             restore(s)
             code, tries, level = pivot_one_by_one(
-                s, current, saved, min(limit - steps, SEARCH_STEPS * (m + n)),
-                ZERO if coarse > begin else level)
+                s, current, saved, limit - steps, ZERO if coarse > begin else level)
             steps += tries
             code = _verified(s, code, YES)
     if code == SOLVED and neglects(s):
@@ -215,7 +215,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
         finished = s.count[FINISHED]
         for c in range(n if finished == sizes.size or (code == UNPROVED and finished > 0) else 0):
             x[c] = saved[c]
-        code = ZERO + (ITERATION_LIMIT if steps >= limit else INACCURATE)
+        code = ZERO + (ITERATION_LIMIT if steps >= most else INACCURATE)
     _keep(s, record, blocks, steps - blocks)
     record[3 * m + 2] = -1.0
     if code == ITERATION_LIMIT:
@@ -238,8 +238,7 @@ def _solve_with_light_rows(s, current, saved, limit):
     code, tries = pivot_in_blocks(s, limit, YES)
     if code != SOLVED and tries < limit:
         restore(s)
-        code, steps, _ = pivot_one_by_one(
-            s, current, saved, min(limit - tries, SEARCH_STEPS * (s.A.shape[0] + n)), ZERO)
+        code, steps, _ = pivot_one_by_one(s, current, saved, limit - tries, ZERO)
         code = _verified(s, code, YES)
     if code == SOLVED and length_of(s.x) <= largest:
         return code, tries, steps

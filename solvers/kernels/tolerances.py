@@ -48,9 +48,9 @@ EXACTLY_DEPENDENT, NEARLY_DEPENDENT = 1e-12, 1e-7  # in `weighted`: ill-posed in
 ORTHOGONAL = 1e-30   # squared cosine of two rows: Jacobi rotations stop
 LONGEST = 1e150      # x of `weighted`: squares of longer ones overflow
 
-# Limits. The pass and each search end after their number times rows plus unknowns.
+# Limits. The pass, and the whole solve, end after their number times rows + 1.
 PASS_STEPS = 2
-SEARCH_STEPS = 2
+SOLVE_STEPS = 4
 SPARED = 3           # rows over columns that are left to them: fewer are reflected one by one
 PATIENCE = 2         # block pivots that may not reduce the number of wrong rows
 RELEASED = 3         # times that a row may enter and leave again because nothing holds it

@@ -14,14 +14,17 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
 from hierarchy.jit.exporting import integers_at, numbers_at
-from solvers.kernels.merged import BY_RULE
+from solvers.kernels.exact import work_size as exact_size
+from solvers.kernels.merged import BY_RULE, OWN, merged_size
+from solvers.kernels.merged import record_size as merged_record
 from solvers.kernels.rows import ZERO
 from solvers.kernels.space import View
-from solvers.library.sizes import SETTINGS, in_range, record_size, work_size
 from solvers.resolvers.hcod import Hcod
 from solvers.resolvers.merged import Merged
 from solvers.status import INACCURATE, ITERATION_LIMIT, SOLVED, TOO_SMALL
 
+MOST = 1 << 20  # unknowns, rows or levels: with more the sizes could overflow
+SETTINGS = 6    # of a kernel
 REFUSED = 11  # a row of a kind that the resolver does not handle
 INVALID = 12  # sizes that do not add up, a missing pointer, a setting out of range
 
@@ -81,15 +84,6 @@ class Call(NamedTuple):
 
 
 @compiled
-def judged(problem, settings, record, x, work, size):
-    """Return SOLVED if a call can be opened, else INVALID or TOO_SMALL with x and record reset."""
-    code = can_open(problem, settings, record, x, work, size)
-    if code != SOLVED:
-        _reset(problem, record, x)
-    return code
-
-
-@compiled
 def can_open(problem, settings, record, x, work, size):
     """Return SOLVED if a call can be opened, else INVALID or TOO_SMALL."""
     code = judged_problem(problem)
@@ -136,8 +130,8 @@ def _in_range(settings):
             and 0.0 <= s.regularisation < np.inf and -1 <= s.strict_levels < MOST_ITERATIONS)
 
 
-@inlined
-def _reset(problem, record, x):
+@compiled
+def reset(problem, record, x):
     """Write x = 0 and a record without content, as far as they are there."""
     if record != 0:
         state = integers_at(record, RECORD)
@@ -238,3 +232,44 @@ def squared_violation(a, lower, upper, x):
     if not under <= 0.0:
         squared += under * under
     return squared if lower <= upper else np.inf
+
+
+@inlined
+def in_range(n, m, levels):
+    """Whether these numbers of unknowns, rows and levels are in range."""
+    return 1 <= n <= MOST and 0 <= m <= MOST and 0 <= levels <= MOST
+
+
+@inlined
+def record_size(n, m, levels):
+    """Return the size of the largest record, which is that of `tpm` or of `merged`."""
+    return max(n + levels + 3 * m + 3, merged_record(n, m))
+
+
+@inlined
+def work_size(n, m, levels):
+    """Return the size of a work space that is enough for every resolver.
+
+    What a kernel carves out of it is written in its own file, and a kernel for which it is too
+    small says so. Here are the same sizes as formulas, which tests hold against the kernels.
+    """
+    return SETTINGS + max(exact_size(n, m, levels, True), recursive(n, m), saturation(n, m),
+                          OWN + 3 * levels + merged_size(n, m, levels, False))
+
+
+@inlined
+def recursive(n, m):
+    """Return what the kernel of `recursive` needs."""
+    return 2 * m * n + 2 * n * n + 2 * m + 2 * n + 2 * block(n, m)
+
+
+@inlined
+def saturation(n, m):
+    """Return what the kernel of `sns` needs; the staircase, also below bounds, needs less."""
+    return 3 * n * n + 13 * n + m * (2 * n + 5) + block(n, m)
+
+
+@inlined
+def block(n, m):
+    """Return what the least squares of one level need."""
+    return (m + n) * (n + 1)

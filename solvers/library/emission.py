@@ -9,12 +9,11 @@ same width, translated by the back end of the other.
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import final
 
 from hierarchy.errors import HierarchyError, UnknownNameError
@@ -22,7 +21,8 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 TARGETS = ("native", "x86_64", "aarch64")
 RESOLVERS = ("hcod", "tpm", "recursive", "sns", "merged")
 _TRIPLES = {"x86_64": "x86_64-unknown-linux-gnu", "aarch64": "aarch64-unknown-linux-gnu"}
-_WORKER = "import sys; from solvers.library.emission import work; work(*sys.argv[1:])"
+_WORKER = ("import pickle, sys; from solvers.library.emission import emit; "
+           "pickle.dump(emit(sys.argv[3:], *sys.argv[1:3]), sys.stdout.buffer)")
 _TEXTS = ("th_version", "th_digest")
 
 
@@ -51,17 +51,14 @@ def emitted(resolvers: Sequence[str], target: str, version: str) -> Emitted:
     check(resolvers, target)
     if target == "native":
         return emit(resolvers, target, version)
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "kernels.o"
-        done = subprocess.run(
-            [sys.executable, "-c", _WORKER, target, version, str(out), *resolvers],
-            env={**os.environ, "NUMBA_CPU_NAME": "generic"}, check=False, capture_output=True,
-            text=True)
-        if done.returncode != 0:
-            lines = done.stderr.strip().splitlines()
-            raise HierarchyError(f"no code for {target}: {lines[-1] if lines else 'no reason'}")
-        symbols, machine, digest = done.stdout.splitlines()
-        return Emitted(out.read_bytes(), tuple(symbols.split()), machine, digest)
+    done = subprocess.run([sys.executable, "-c", _WORKER, target, version, *resolvers],
+                          env={**os.environ, "NUMBA_CPU_NAME": "generic"}, check=False,
+                          capture_output=True)
+    if done.returncode != 0:
+        lines = done.stderr.decode().strip().splitlines()
+        raise HierarchyError(f"no code for {target}: {lines[-1] if lines else 'no reason'}")
+    made: Emitted = pickle.loads(done.stdout)
+    return made
 
 
 def check(resolvers: Sequence[str], target: str) -> None:
@@ -129,9 +126,3 @@ def _texts(texts: dict[str, str]) -> str:
         builder.ret(builder.bitcast(constant, byte.as_pointer()))
     return str(module)
 
-
-def work(target: str, version: str, out: str, *resolvers: str) -> None:
-    """Write the object file `out` and print the rest of what `emit` returns, for `emitted`."""
-    made = emit(resolvers, target, version)
-    Path(out).write_bytes(made.content)
-    print(" ".join(made.symbols), made.machine, made.digest, sep="\n")

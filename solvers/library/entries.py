@@ -32,12 +32,14 @@ from solvers.library.calls import (
     can_open,
     closed,
     given,
-    judged,
+    in_range,
     judged_problem,
     opened,
+    record_size,
+    reset,
     violations,
+    work_size,
 )
-from solvers.library.sizes import in_range, record_size, work_size
 from solvers.status import (
     CONTRADICTION,
     INACCURATE,
@@ -51,8 +53,9 @@ from solvers.status import (
 def entry(solve: Callable[..., int]) -> Entry:
     """Return the function of C around a solver of a Call and its settings, which returns a code."""
     def entered(problem, settings, record, x, work, size):
-        code = judged(problem, settings, record, x, work, size)
+        code = can_open(problem, settings, record, x, work, size)
         if code != SOLVED:
+            reset(problem, record, x)
             return np.int32(code)
         call, s = opened(problem, record, x, work, size), given(settings)
         write_exact(call.settings, s)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import struct
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +14,6 @@ from pathlib import Path
 from typing import final
 
 from hierarchy.errors import HierarchyError
-from solvers.library.archive import archive
 from solvers.library.emission import RESOLVERS, Emitted, digest, emitted
 
 _PACKAGE = "task-hierarchy"
@@ -24,6 +24,7 @@ _PLACES = {"task_hierarchy.h": "include", "task_hierarchy.hpp": "include",
 _ARCHIVE, _SHARED = "lib/libtask_hierarchy.a", "lib/libtask_hierarchy.so"
 _HEADER = "include/task_hierarchy.h"
 _COMPILERS = ("cc", "gcc", "clang")
+_MAGIC = b"!<arch>\n"  # of a static library
 
 
 @final
@@ -115,3 +116,22 @@ def _link(folder: Path, target: str) -> str:
         check=False, capture_output=True, text=True)
     lines = done.stderr.strip().splitlines()
     return "" if done.returncode == 0 else f"{compiler} failed: {lines[-1] if lines else ''}"
+
+
+def archive(name: str, content: bytes, symbols: Sequence[str]) -> bytes:
+    """Return a static library of one object, in which a linker finds these symbols.
+
+    Its format is that of `ar` with a symbol table, as GNU and LLVM tools read it. The same object
+    gives the same bytes: no time, no owner. name : at most 15 characters.
+    """
+    table = "".join(f"{symbol}\0" for symbol in symbols).encode()
+    index_size = 4 + 4 * len(symbols) + len(table)
+    at = len(_MAGIC) + 60 + index_size + index_size % 2
+    index = struct.pack(f">{1 + len(symbols)}I", len(symbols), *[at] * len(symbols)) + table
+    return _MAGIC + _member("/", index) + _member(f"{name}/", content)
+
+
+def _member(name: str, content: bytes) -> bytes:
+    """Return a member with its header of 60 bytes; the next one starts at an even offset."""
+    header = f"{name:16}{0:<12}{0:<6}{0:<6}{'100644':8}{len(content):<10}`\n"
+    return header.encode() + content + b"\n" * (len(content) % 2)

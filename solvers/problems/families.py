@@ -16,9 +16,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-
-Random = np.random.Generator
-Level = tuple[Array, Array, Array]
+from solvers.problems.kinds import Level, Random, equal, stacked
 
 HARD = 0.8  # share of hard problems in INEQ7 and HUM38
 _PARALLEL = 1e-9  # angle [rad] of the nearly parallel rows of DEGEN7
@@ -46,7 +44,7 @@ def family(name: str, seed: int, hard: float = HARD) -> Hierarchy:
 def _equalities(n: int, *sizes: int) -> Callable[[Random, float], list[Level]]:
     """Return a maker of rows and targets from the standard normal distribution."""
     def make(rng: Random, _: float) -> list[Level]:
-        return [_equal(rng.normal(size=(size, n)), rng.normal(size=size)) for size in sizes]
+        return [equal(rng.normal(size=(size, n)), rng.normal(size=size)) for size in sizes]
     return make
 
 
@@ -63,7 +61,7 @@ def _singular(rng: Random, _: float) -> list[Level]:
     if rng.random() < 1.0 / 7.0:
         last[1] = 0.0
     third = np.vstack([first[0], rng.normal(size=n)])
-    return [_equal(A, rng.normal(size=len(A))) for A in (first, second, third, last)]
+    return [equal(A, rng.normal(size=len(A))) for A in (first, second, third, last)]
 
 
 def _arm(rng: Random, hard: float) -> list[Level]:
@@ -77,9 +75,9 @@ def _arm(rng: Random, hard: float) -> list[Level]:
     position = rng.uniform(0.4, 1.2) * _unit(rng, 3, n)
     cone = _unit(rng, 1, n)
     return [(np.eye(n), lower, upper), _one_sided(rng, avoidance, side, last=1),
-            _equal(position, position @ (reach * rng.uniform(-8.0, 8.0, n))),
+            equal(position, position @ (reach * rng.uniform(-8.0, 8.0, n))),
             _one_sided(rng, cone, rng.normal(0.0, 1.8 * reach, 1), last=1),
-            _equal(np.eye(n), reach * rng.uniform(-8.0, 8.0, n))]
+            equal(np.eye(n), reach * rng.uniform(-8.0, 8.0, n))]
 
 
 def _humanoid(rng: Random, hard: float) -> list[Level]:
@@ -89,11 +87,11 @@ def _humanoid(rng: Random, hard: float) -> list[Level]:
     reach = 1.3 if tough else 1.0
     rows = [rng.normal(0.0, n**-0.5, (size, n)) for size in (6, 12, 6, 6)]
     middle, half = reach * rng.normal(0.0, 3.0, 6), rng.uniform(0.2, 2.0, 6)
-    return [(np.eye(n), lower, upper), _equal(rows[0], reach * rng.normal(0.0, 2.0, 6)),
-            _equal(rows[1], reach * rng.normal(0.0, 2.0, 12)),
+    return [(np.eye(n), lower, upper), equal(rows[0], reach * rng.normal(0.0, 2.0, 6)),
+            equal(rows[1], reach * rng.normal(0.0, 2.0, 12)),
             (rows[2], middle - half, middle + half),
-            _equal(rows[3], reach * rng.normal(0.0, 4.0, 6)),
-            _equal(np.eye(n), reach * rng.uniform(-8.0, 8.0, n))]
+            equal(rows[3], reach * rng.normal(0.0, 4.0, 6)),
+            equal(np.eye(n), reach * rng.uniform(-8.0, 8.0, n))]
 
 
 def _degenerate(rng: Random, _: float) -> list[Level]:
@@ -101,18 +99,18 @@ def _degenerate(rng: Random, _: float) -> list[Level]:
     box, avoidance, position, cone, posture = _arm(rng, 0.0)
     if rng.random() < 1.0 / 3.0:  # equal boxes, and a posture in their corner
         box = (box[0], np.full(7, -10.0), np.full(7, 10.0))
-        posture = _equal(posture[0], rng.choice([-10.0, 10.0], 7))
+        posture = equal(posture[0], rng.choice([-10.0, 10.0], 7))
     again, negated = rng.integers(7, size=2)
-    box = _stacked(box, _row(box, again), _negative(_row(box, negated)),
+    box = stacked(box, _row(box, again), _negative(_row(box, negated)),
                    (np.zeros((1, 7)), np.array([-1.0]), np.array([1.0])))
     aside, clash = _PARALLEL * rng.normal(size=(2, 1, 7)), rng.integers(5)
-    avoidance = _stacked(avoidance, _moved(_row(avoidance, 0), aside[0], 0.5 * (clash == 0)),
+    avoidance = stacked(avoidance, _moved(_row(avoidance, 0), aside[0], 0.5 * (clash == 0)),
                          _row(avoidance, 1))
     A, b = position[:2]
-    position = _stacked(position, _moved(_row(position, 0), aside[1], 0.3 * (clash == 1)),
-                        _equal(A[1:2] + A[2:], b[1:2] + b[2:] + 0.3 * (clash == 2)))
-    cone = _stacked(cone, (A[:1].copy(), b[:1], b[:1] + 1.0))
-    posture = _stacked(posture, _equal(np.zeros((1, 7)), np.array([0.7])))
+    position = stacked(position, _moved(_row(position, 0), aside[1], 0.3 * (clash == 1)),
+                        equal(A[1:2] + A[2:], b[1:2] + b[2:] + 0.3 * (clash == 2)))
+    cone = stacked(cone, (A[:1].copy(), b[:1], b[:1] + 1.0))
+    posture = stacked(posture, equal(np.zeros((1, 7)), np.array([0.7])))
     return [box, avoidance, position, cone, posture]
 
 
@@ -129,10 +127,6 @@ def _box(rng: Random, n: int, half: tuple[float, float], ratio: tuple[float, flo
 def _unit(rng: Random, size: int, n: int) -> Array:
     rows = rng.normal(size=(size, n))
     return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
-
-
-def _equal(A: Array, b: Array) -> Level:
-    return A, b, b.copy()
 
 
 def _one_sided(rng: Random, A: Array, side: Array, last: int) -> Level:
@@ -158,11 +152,6 @@ def _negative(level: Level) -> Level:
 def _moved(level: Level, aside: Array, by: float) -> Level:
     A, lower, upper = level
     return A + aside, lower + by, upper + by
-
-
-def _stacked(*levels: Level) -> Level:
-    A, lower, upper = zip(*levels, strict=True)
-    return np.vstack(A), np.concatenate(lower), np.concatenate(upper)
 
 
 _MAKERS: dict[str, Callable[[Random, float], list[Level]]] = {

@@ -25,11 +25,10 @@ from numpy.linalg import norm
 from hierarchy.archives import read_arrays
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from solvers.problems.kinds import Random, happens
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
-
-Random = np.random.Generator
 
 
 @final
@@ -90,7 +89,7 @@ def generate(seed: int, recipe: Recipe = ANY) -> Hierarchy:
     n = _whole(rng, recipe.joints)
     count = _whole(rng, recipe.levels)
     rows = (max(recipe.rows[0], min(1, recipe.rows[1])), recipe.rows[1])
-    sizes = [recipe.rows[0] if _happens(rng, recipe.empty) else _whole(rng, rows)
+    sizes = [recipe.rows[0] if happens(rng, recipe.empty) else _whole(rng, rows)
              for _ in range(count)]
     return written(rng, n, sizes, recipe)
 
@@ -111,18 +110,18 @@ def strategy(recipe: Recipe = ANY) -> SearchStrategy[Hierarchy]:
 def written(rng: Random, n: int, sizes: Sequence[int], recipe: Recipe = ANY) -> Hierarchy:
     """Return a hierarchy with n unknowns and levels of these sizes."""
     through = rng.normal(size=n)
-    conflicts = recipe.conflicting * _happens(rng, recipe.conflicting)
+    conflicts = recipe.conflicting * happens(rng, recipe.conflicting)
     above, levels = np.empty((0, n)), []
     for size in sizes:
         unit = _directions(rng, size, above, recipe)
         _repeat_a_row(rng, unit, above, recipe)
-        if size and _happens(rng, recipe.zero_rows):
+        if size and happens(rng, recipe.zero_rows):
             unit[rng.integers(size)] = 0.0
-        sides = _sides(rng, unit @ through, _happens(rng, conflicts), recipe)
+        sides = _sides(rng, unit @ through, happens(rng, conflicts), recipe)
         scale = _scale(rng, size, recipe)
         levels.append((unit * scale[:, None], *(scale * side for side in sides)))
         above = np.vstack([above, unit])
-    reference = rng.normal(size=n) if _happens(rng, recipe.reference) else np.zeros(n)
+    reference = rng.normal(size=n) if happens(rng, recipe.reference) else np.zeros(n)
     return Hierarchy.from_levels(levels, reference)
 
 
@@ -151,13 +150,13 @@ def load(path: str | Path) -> Hierarchy:
 def _directions(rng: Random, size: int, above: Array, recipe: Recipe) -> Array:
     """Return unit rows (size, n): simple bounds, or of a random rank and link to levels above."""
     n = above.shape[1]
-    if _happens(rng, recipe.simple_bounds):
+    if happens(rng, recipe.simple_bounds):
         order = np.resize(rng.permutation(n), size)
         return np.asarray(np.eye(n)[order])
-    lost = size > 1 and _happens(rng, recipe.rank_lost)
+    lost = size > 1 and happens(rng, recipe.rank_lost)
     rank = int(rng.integers(1, size)) if lost else size
     basis = rng.normal(size=(rank, n))
-    if len(above) and rank and _happens(rng, recipe.linked):
+    if len(above) and rank and happens(rng, recipe.linked):
         taken = int(rng.integers(1, rank + 1))
         chosen = above[rng.integers(len(above), size=min(taken + 2, 8))]
         basis[:taken] = rng.normal(size=(taken, len(chosen))) @ chosen
@@ -170,7 +169,7 @@ def _repeat_a_row(rng: Random, unit: Array, above: Array, recipe: Recipe) -> Non
     """Replace one row by a copy of another row of the hierarchy, exact or at an angle."""
     size, n = unit.shape
     choices = np.vstack([above, unit])
-    duplicate, parallel = (_happens(rng, recipe.duplicates), _happens(rng, recipe.near_parallel))
+    duplicate, parallel = (happens(rng, recipe.duplicates), happens(rng, recipe.near_parallel))
     if not size or len(choices) < 2 or not (duplicate or parallel):
         return
     last, other = int(rng.integers(size)), int(rng.integers(len(choices)))
@@ -207,16 +206,12 @@ def _sides(rng: Random, value: Array, conflict: bool, recipe: Recipe) -> tuple[A
 def _scale(rng: Random, size: int, recipe: Recipe) -> Array:
     """Return norms of the rows of a level: all one, with a chance of one half, where allowed."""
     low, high = recipe.scales
-    if _happens(rng, 0.5) and low <= 1.0 <= high:
+    if happens(rng, 0.5) and low <= 1.0 <= high:
         return np.ones(size)
     half = np.sqrt(recipe.spread)
     middle = _between(rng, (low, high))
     around = (1.0 / half, half)
     return np.clip([middle * _between(rng, around) for _ in range(size)], low, high).reshape(size)
-
-
-def _happens(rng: Random, chance: float) -> bool:
-    return bool(rng.random() < chance)
 
 
 def _between(rng: Random, ends: tuple[float, float]) -> float:

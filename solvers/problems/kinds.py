@@ -39,7 +39,7 @@ def structured(seed: int, kinds: Sequence[str] = (), equalities_only: bool = Fal
     if equalities_only:
         levels = [_as_equalities(level) for level in levels]
     n = levels[0][0].shape[1]
-    reference = rng.integers(-1, 2, n).astype(float) if _happens(rng, 0.3) else None
+    reference = rng.integers(-1, 2, n).astype(float) if happens(rng, 0.3) else None
     return Hierarchy.from_levels(levels, reference)
 
 
@@ -66,12 +66,12 @@ def bounded(h: Hierarchy, seed: int) -> Hierarchy:
 def _singular_arm(rng: Random, digits: int = 12) -> Levels:
     """Velocity box, position, orientation and posture of an arm at multiples of 90 degrees."""
     n = int(rng.integers(2, 9))
-    J = np.round(_jacobian(rng, n, planar=_happens(rng, 0.3)), digits)
+    J = np.round(_jacobian(rng, n, planar=happens(rng, 0.3)), digits)
     targets = rng.choice([0.0, 0.0, 1.0, -1.0, 0.5], 6)
-    levels = [_equal(J[:3], targets[:3]), _equal(J[3:], targets[3:]), _posture(rng, n)]
-    if _happens(rng, 0.3):
-        levels = [_equal(J, targets), _posture(rng, n)]
-    return [_box_at_rest(rng, n), *levels] if _happens(rng, 0.7) else levels
+    levels = [equal(J[:3], targets[:3]), equal(J[3:], targets[3:]), _posture(rng, n)]
+    if happens(rng, 0.3):
+        levels = [equal(J, targets), _posture(rng, n)]
+    return [_box_at_rest(rng, n), *levels] if happens(rng, 0.7) else levels
 
 
 def _dusty_arm(rng: Random) -> Levels:
@@ -85,7 +85,7 @@ def _dusty_arm(rng: Random) -> Levels:
 def _tied_box(rng: Random) -> Levels:
     """A velocity box with sides at 0, and tasks that push into its corner."""
     n = int(rng.integers(1, 8))
-    tasks = [_equal(_rows(rng, size, n), _few(rng, size)) for size in rng.integers(1, 4, 2)]
+    tasks = [equal(_rows(rng, size, n), _few(rng, size)) for size in rng.integers(1, 4, 2)]
     return [_box_at_rest(rng, n), *tasks, _posture(rng, n)]
 
 
@@ -95,9 +95,9 @@ def _opposed(rng: Random) -> Levels:
     A = _rows(rng, int(rng.integers(1, 4)), n)
     room = rng.choice([-0.1, 0.0, 0.1, 0.5], len(A))
     one, other = _at_least(A, room), _at_least(-A, room)
-    box, task = _box_at_rest(rng, n), _equal(_rows(rng, 2, n), _few(rng, 2))
-    if _happens(rng, 0.5):
-        return [_stacked(one, other, box), task, _posture(rng, n)]
+    box, task = _box_at_rest(rng, n), equal(_rows(rng, 2, n), _few(rng, 2))
+    if happens(rng, 0.5):
+        return [stacked(one, other, box), task, _posture(rng, n)]
     levels = [one, other, box, task]
     return [levels[i] for i in rng.permutation(4)]
 
@@ -114,11 +114,11 @@ def _contacts(rng: Random) -> Levels:
     moment = np.hstack([[[0.0, 0.0, y], [0.0, 0.0, -x], [-y, x, 0.0]] for x, y in places])
     wrench = np.concatenate([rng.choice([0.0, 0.0, 20.0, 300.0], 2),
                              rng.choice([-50.0, 0.0, 100.0, 600.0], 1)])
-    balance = [_equal(force, wrench), _equal(moment, np.zeros(3))]
-    if _happens(rng, 0.5):
-        balance = [_stacked(*balance)]
+    balance = [equal(force, wrench), equal(moment, np.zeros(3))]
+    if happens(rng, 0.5):
+        balance = [stacked(*balance)]
     inside = (cone, np.full(len(cone), -np.inf), np.zeros(len(cone)))
-    return [_stacked(inside, limits), *balance, _equal(np.eye(n), np.zeros(n))]
+    return [stacked(inside, limits), *balance, equal(np.eye(n), np.zeros(n))]
 
 
 def _nested(rng: Random) -> Levels:
@@ -126,12 +126,12 @@ def _nested(rng: Random) -> Levels:
     n = int(rng.integers(1, 9))
     levels = [_sided(rng, _rows(rng, int(rng.integers(1, 5)), n))]
     for _ in range(int(rng.integers(1, 7))):
-        A, lower, upper = _stacked(*levels)
+        A, lower, upper = stacked(*levels)
         chosen = rng.permutation(len(A))[:int(rng.integers(1, len(A) + 1))]
         again = A[chosen], lower[chosen], upper[chosen]
         sums = rng.integers(-1, 2, (2, len(A))) @ A
         levels.append([again, _sided(rng, A[chosen]), _sided(rng, sums),
-                       _stacked(again, _sided(rng, _rows(rng, 2, n)))][rng.integers(4)])
+                       stacked(again, _sided(rng, _rows(rng, 2, n)))][rng.integers(4)])
     return levels
 
 
@@ -154,9 +154,9 @@ def _chain(rng: Random) -> Levels:
     step = float(rng.choice([0.0, 0.5, 1.0]))
     A = np.eye(n)[:-1] - np.eye(n)[1:]
     differences = (A, np.full(n - 1, -step), np.full(n - 1, step if step else 1.0))
-    ends = _equal(np.eye(n)[[0, -1]], rng.integers(-3, 4, 2).astype(float))
+    ends = equal(np.eye(n)[[0, -1]], rng.integers(-3, 4, 2).astype(float))
     levels = [differences, ends, _posture(rng, n)]
-    return levels if _happens(rng, 0.5) else [ends, differences, _posture(rng, n)]
+    return levels if happens(rng, 0.5) else [ends, differences, _posture(rng, n)]
 
 
 def _signs(rng: Random) -> Levels:
@@ -189,7 +189,7 @@ def _near_ties(rng: Random) -> Levels:
     """Rows repeated in lower levels with sides that differ by about 1e-9."""
     levels = _around(rng, int(rng.integers(2, 8)), int(rng.integers(1, 4)))
     for _ in range(int(rng.integers(1, 4))):
-        A, lower, upper = _stacked(*levels)
+        A, lower, upper = stacked(*levels)
         chosen = rng.permutation(len(A))[:int(rng.integers(1, len(A) + 1))]
         by = 1e-9 * rng.choice([-3.0, -1.0, 0.0, 1.0, 3.0], len(chosen))
         levels.append((A[chosen], lower[chosen] + by, upper[chosen] + by))
@@ -204,7 +204,7 @@ def _nearly_parallel(rng: Random) -> Levels:
         i, angle = int(rng.integers(len(A))), 10.0**rng.uniform(-9.0, -6.0)
         row = A[i:i + 1] + angle * _rows(rng, 1, A.shape[1]) * np.linalg.norm(A[i])
         by = float(rng.choice([0.0, 0.0, 0.3]))
-        levels[k] = _stacked(level, (row, lower[i:i + 1] + by, upper[i:i + 1] + by))
+        levels[k] = stacked(level, (row, lower[i:i + 1] + by, upper[i:i + 1] + by))
     return levels
 
 
@@ -278,10 +278,11 @@ def _box_at_rest(rng: Random, n: int) -> Level:
 
 
 def _posture(rng: Random, n: int) -> Level:
-    return _equal(np.eye(n), rng.choice([0.0, 1.0]) * rng.integers(-2, 3, n).astype(float))
+    return equal(np.eye(n), rng.choice([0.0, 1.0]) * rng.integers(-2, 3, n).astype(float))
 
 
-def _equal(A: Array, b: Array) -> Level:
+def equal(A: Array, b: Array) -> Level:
+    """Return a level of equalities."""
     return A, b, b.copy()
 
 
@@ -294,17 +295,19 @@ def _scaled(level: Level, by: Array) -> Level:
     return A * by[:, None], lower * by, upper * by
 
 
-def _stacked(*levels: Level) -> Level:
+def stacked(*levels: Level) -> Level:
+    """Return the rows of levels as one level."""
     A, lower, upper = zip(*levels, strict=True)
     return np.vstack(A), np.concatenate(lower), np.concatenate(upper)
 
 
 def _as_equalities(level: Level) -> Level:
     A, lower, upper = level
-    return _equal(A, np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper, 0.0)))
+    return equal(A, np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper, 0.0)))
 
 
-def _happens(rng: Random, chance: float) -> bool:
+def happens(rng: Random, chance: float) -> bool:
+    """Draw whether something of this chance happens."""
     return bool(rng.random() < chance)
 
 

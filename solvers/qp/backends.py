@@ -38,20 +38,16 @@ class Backend:
     core: bool = False
 
 
-def _options(**options: Any) -> Mapping[str, Any]:
-    return MappingProxyType(options)
-
-
 BACKENDS: Mapping[str, Backend] = MappingProxyType({backend.name: backend for backend in (
-    Backend("proxqp", "proxsuite", 1e-6, _options(eps_abs=1e-9, eps_rel=0.0, max_iter=1000),
+    Backend("proxqp", "proxsuite", 1e-6, {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000},
             starts=True, core=True),
-    Backend("osqp", "osqp", 1e-5, _options(eps_abs=1e-7, eps_rel=1e-7, max_iter=20000),
+    Backend("osqp", "osqp", 1e-5, {"eps_abs": 1e-7, "eps_rel": 1e-7, "max_iter": 20000},
             sparse=True, starts=True, core=True),
-    Backend("quadprog", "quadprog", 1e-6, _options(), regularisation=1e-9),
-    Backend("daqp", "daqp", 1e-6, _options(primal_tol=1e-9), regularisation=1e-9, starts=True),
-    Backend("piqp", "piqp", 1e-6, _options(eps_abs=1e-9, eps_rel=0.0)),
+    Backend("quadprog", "quadprog", 1e-6, {}, regularisation=1e-9),
+    Backend("daqp", "daqp", 1e-6, {"primal_tol": 1e-9}, regularisation=1e-9, starts=True),
+    Backend("piqp", "piqp", 1e-6, {"eps_abs": 1e-9, "eps_rel": 0.0}),
     Backend("clarabel", "clarabel", 1e-6,
-            _options(tol_gap_abs=1e-10, tol_gap_rel=1e-10, tol_feas=1e-10), sparse=True),
+            {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}, sparse=True),
 )})
 
 

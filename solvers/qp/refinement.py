@@ -106,21 +106,22 @@ def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows, rank_toleran
     conditions; None if no step did. Rows are of order one; directions with singular values up to
     `rank_tolerance` do not move.
     """
-    program = _Refinement(E, e, limits, kept, rank_tolerance)
-    active, excess = kept.sides(z, ACTIVE), limits.excess(z)
-    broken = np.sign(excess) * (abs(excess) > ACTIVE)
+    program, k = _Refinement(E, e, limits, kept, rank_tolerance), len(kept.A)
+    excess = limits.excess(z)
+    sides = np.concatenate([kept.sides(z, ACTIVE), np.sign(excess) * (abs(excess) > ACTIVE)])
     for step in range(REFINEMENTS):
-        new = program.minimiser(z, active, broken)
+        new = program.minimiser(z, sides[:k], sides[k:])
         if not np.isfinite(new).all():
             return None
-        optimal, next_active, next_broken = program.judged(new, active, broken)
+        optimal, wanted = program.judged(new, sides[:k], sides[k:])
         if optimal:
-            return new, next_broken
-        if (next_active == active).all() and (next_broken == broken).all():
+            return new, wanted[k:]
+        changed = np.flatnonzero(wanted != sides)
+        if not len(changed):
             return None
         if step >= AT_ONCE:  # changing all rows at once has cycled
-            next_active, next_broken = _one_change(active, broken, next_active, next_broken)
-        active, broken = next_active, next_broken
+            changed = changed[:1]
+        sides[changed] = wanted[changed]
     return None
 
 
@@ -144,13 +145,14 @@ class _Refinement(NamedTuple):
         others = self.kept.where(~on).and_(self.limits.where(~out))
         return _moved_inside(new + free @ step_in, free @ unseen, others)
 
-    def judged(self, z: Array, active: Array, broken: Array) -> tuple[bool, Array, Array]:
+    def judged(self, z: Array, active: Array, broken: Array) -> tuple[bool, Array]:
         """Return whether z is optimal, and the sides that its rows and multipliers suggest."""
         scale = EXACT * (1.0 + norm(z))
         over, excess = self.kept.excess(z), self.limits.excess(z)
         near = np.where(active != 0, active, self.kept.sides(z, EXACT))
         gradient = self.E.T @ (self.e - self.E @ z) - self.limits.A.T @ excess
-        multipliers, rest = _multipliers(near, self.kept.A, gradient)
+        multipliers, on = np.zeros(len(near)), near != 0  # of rows that may be dependent
+        multipliers[on], rest = _non_negative((near[on, None] * self.kept.A[on]).T, gradient)
         B, c = self._acting(broken)
         next_active = np.where(multipliers > 0.0, near, 0.0)
         next_active = np.where(abs(over) > scale, np.sign(over), next_active)
@@ -160,7 +162,7 @@ class _Refinement(NamedTuple):
         left_out = (next_broken != 0) & (next_broken != broken) & moves
         optimal = (self._within_reach(z) and (abs(over) <= scale).all() and not left_out.any()
                    and rest <= EXACT * (1.0 + norm(B.T @ c)) and self._balanced(z, near, excess))
-        return bool(optimal), next_active, next_broken
+        return bool(optimal), np.concatenate([next_active, next_broken])
 
     def _within_reach(self, z: Array) -> bool:
         """Whether rows that count as independent can require a z as long as this one."""
@@ -197,14 +199,6 @@ class _Refinement(NamedTuple):
                 np.concatenate([self.e, self.limits.at(broken)[out]]))
 
 
-def _one_change(active: Array, broken: Array, next_active: Array, next_broken: Array
-                ) -> tuple[Array, Array]:
-    """Return the sides with only the first row that is to change."""
-    if (next_active != active).any():
-        return _first_change(active, next_active), broken
-    return active, _first_change(broken, next_broken)
-
-
 def _least(M: Array, r: Array, tolerance: float) -> tuple[Array, Array]:
     """Return the shortest y that minimises ||M y - r||, and a basis of the null space of M.
 
@@ -234,24 +228,6 @@ def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:
     if not ACTIVE < rest < np.inf:  # 1 / rest is the length of y: no point, or none nearby
         return z
     return np.asarray(z + D @ (G.T @ u) * (off / (1.0 - g @ u)))
-
-
-def _first_change(old: Array, new: Array) -> Array:
-    """Return `old`, changed only in the first entry where `new` differs."""
-    changed = old.copy()
-    for i in np.flatnonzero(old != new)[:1]:
-        changed[i] = new[i]
-    return changed
-
-
-def _multipliers(side: Array, A: Array, gradient: Array) -> tuple[Array, float]:
-    """Return multipliers >= 0 of the active rows that best balance a gradient, and the residual.
-
-    Rows may be dependent: any multipliers with a zero residual prove the minimum.
-    """
-    found, on = np.zeros(len(side)), side != 0
-    found[on], rest = _non_negative((side[on, None] * A[on]).T, gradient)
-    return found, rest
 
 
 def below_largest(*arrays: Array) -> bool:

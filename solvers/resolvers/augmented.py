@@ -24,11 +24,7 @@ class Augmented(Resolver):
 
     name: ClassVar[str] = "augmented"
     damps: ClassVar[str] = "the whole stack"
-
-    @property
-    def strict(self) -> bool:
-        """False: lower levels can disturb higher ones."""
-        return False
+    strict: ClassVar[bool] = False  # lower levels can disturb higher ones
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""

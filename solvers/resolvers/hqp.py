@@ -2,39 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple, final
+from dataclasses import dataclass
+from typing import ClassVar, final
 
 import numpy as np
 from numpy.linalg import norm
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.qp.backends import Backend, backend_of
+from hierarchy.records import set_frozen
+from solvers.qp.backends import backend_of
 from solvers.qp.programs import null_space_program, slack_program
 from solvers.qp.refinement import EXACT, Rows, below_largest, refined, split
 from solvers.resolver import Handles, Resolution, Resolver, number, one_of, register
 from solvers.status import Status
 
+Mask = NDArray[np.bool_]
 _SHARE = 0.01  # of the declared accuracy: allowed error of one level, which lower levels magnify
 _BROKEN = 1e-4  # excess of a row that must hold, relative to 1 + its side
 _WIDER = (1.0, 100.0)  # multiples of `slack`, tried in turn
-
-
-@final
-class CascadeResolution(Resolution):
-    """A resolution that counts its programs; its memory (k, n) has the step of each of k levels.
-
-    `iterations` counts the programs that were solved; `corrected` of them had an answer that was
-    not accurate enough to be used as it was.
-    """
-
-    __slots__ = ("corrected",)
-
-    def __init__(self, x: Array, status: Status, programs: int, corrected: int,
-                 memory: Array) -> None:
-        super().__init__(x, status, programs, memory)
-        self.corrected = corrected
 
 
 @final
@@ -45,7 +31,8 @@ class Hqp(Resolver):
 
     What upper levels have settled leaves the programs, so that no backend can find it infeasible;
     no answer of a backend is used unchecked. docs/theory/hqp.md has the method and the
-    meaning of each status. The memory warm-starts backends that accept an initial guess.
+    meaning of each status. The memory (k, n), the step of each of k levels, warm-starts backends
+    that accept an initial guess; `iterations` counts programs.
 
     backend : proxqp, osqp, quadprog, daqp, piqp or clarabel.
     form : "null-space", the unknowns are coordinates of the freedom that upper levels leave;
@@ -64,18 +51,13 @@ class Hqp(Resolver):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        backend_of(self.backend)
+        set_frozen(self, accuracy=backend_of(self.backend).accuracy)
 
     @property
     def label(self) -> str:
         """`hqp`, the backend, and the form if it is not the default."""
         form = " slack" if self.form == "slack" else ""
         return f"{self.name} {self.backend}{form}"
-
-    @property
-    def accuracy(self) -> float:
-        """Expected error of x, relative to 1 + |x|: that of the backend."""
-        return backend_of(self.backend).accuracy
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a program that fails ends the cascade with the x of the finished levels.
@@ -89,7 +71,7 @@ class Hqp(Resolver):
         starts = memory if memory is not None and np.shape(memory) == shape else None
         with np.errstate(all="ignore"):
             try:
-                return _Cascade(self, h, backend_of(self.backend), starts).run()
+                return _Cascade(self, h, starts).run()
             except np.linalg.LinAlgError:  # an SVD of numbers whose squares overflow
                 return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
 
@@ -119,24 +101,6 @@ class _StopError(Exception):
         self.status = status
 
 
-class _Level(NamedTuple):
-    """Rows of a level divided by their largest entry `scale`, their norms (m,), and M = A N."""
-
-    rows: Rows
-    equal: NDArray[np.bool_]
-    scale: float
-    norms: Array
-    M: Array
-
-    @staticmethod
-    def of(A: Array, lower: Array, upper: Array, N: Array) -> _Level:
-        """Scale the rows of a level; N (n, p) is the basis of the remaining freedom."""
-        scale = float(abs(A).max())
-        rows = Rows(A / scale, lower / scale, upper / scale)
-        return _Level(rows, lower == upper, scale, norm(rows.A, axis=1), rows.A @ N)
-
-
-@dataclass
 class _Cascade:
     """One run of the cascade.
 
@@ -145,22 +109,11 @@ class _Cascade:
     kept : inequalities of the levels above that must still hold.
     """
 
-    settings: Hqp
-    h: Hierarchy
-    backend: Backend
-    starts: Array | None
-    programs: int = 0
-    corrected: int = 0
-    steps: list[Array] = field(default_factory=list)
-    x: Array = field(init=False)
-    N: Array = field(init=False)
-    F: Array = field(init=False)
-    kept: Rows = field(init=False)
-
-    def __post_init__(self) -> None:
-        n = self.h.n
-        self.x, self.N, self.F = np.zeros(n), np.eye(n), np.empty((0, n))
-        self.kept = Rows.none(n)
+    def __init__(self, settings: Hqp, h: Hierarchy, starts: Array | None) -> None:
+        self.settings, self.h, self.starts = settings, h, starts
+        self.backend, self.programs, self.steps = backend_of(settings.backend), 0, list[Array]()
+        self.x, self.N, self.F = np.zeros(h.n), np.eye(h.n), np.empty((0, h.n))
+        self.kept = Rows.none(h.n)
 
     def run(self) -> Resolution:
         status = Status.SOLVED
@@ -172,7 +125,7 @@ class _Cascade:
         except _StopError as stop:
             status = stop.status
         memory = np.array(self.steps).reshape(-1, self.h.n)
-        return CascadeResolution(self.x, status, self.programs, self.corrected, memory)
+        return Resolution(self.x, status, self.programs, memory)
 
     def _check_kept(self) -> None:
         """Stop, with x = 0, if a row that must still hold does not: its numbers overflowed."""
@@ -193,47 +146,49 @@ class _Cascade:
         if not self.N.shape[1] or not A.any():
             self.steps.append(np.zeros(self.h.n))
             return
-        level = _Level.of(A, lower, upper, self.N)
-        own, free = self._split(level, level.equal)
-        fixed = level.equal.copy()
-        fixed[~level.equal] = self._advance(level, own) != 0
-        if (fixed != level.equal).any():
-            own, free = self._split(level, fixed)
+        scale, equal = float(abs(A).max()), lower == upper
+        rows = Rows(A / scale, lower / scale, upper / scale)
+        own, free = self._split(rows.A[equal])
+        fixed = equal.copy()
+        fixed[~equal] = self._advance(rows, equal, own, scale) != 0
+        if (fixed != equal).any():
+            own, free = self._split(rows.A[fixed])
         self.F = np.vstack([self.F, (self.N @ own).T])
         self.N = self.N @ free
-        self.kept = self.kept.and_(level.rows.where(~fixed).normalised())
+        self.kept = self.kept.and_(rows.where(~fixed).normalised())
 
-    def _advance(self, level: _Level, own: Array) -> Array:
-        """Step to the minimum of a level; return the side on which each inequality is violated."""
-        limits = level.rows.where(~level.equal).from_(self.x)
+    def _advance(self, rows: Rows, equal: Mask, own: Array, scale: float) -> Array:
+        """Step to the minimum of a level; return the side on which each inequality is violated.
+
+        rows : divided by their largest entry, `scale`; `equal` (m,) tells the equalities.
+        """
+        limits = rows.where(~equal).from_(self.x)
         near = EXACT * (1.0 + norm(self.x)) * norm(limits.A, axis=1)
-        if not level.equal.any() and (abs(limits.excess(np.zeros(self.h.n))) <= near).all():
+        if not equal.any() and (abs(limits.excess(np.zeros(self.h.n))) <= near).all():
             self._step(np.zeros(self.N.shape[1]))
             return np.zeros(limits.lower.size)
-        goal = level.rows.where(level.equal).from_(self.x)
-        z, broken = self._minimise(goal, limits, own, self._lambda(level, own))
+        goal = rows.where(equal).from_(self.x)
+        z, broken = self._minimise(goal, limits, own, self._lambda(rows.A, equal, own, scale))
         self._step(z)
         return broken
 
     def _seen(self, rows: Rows) -> Rows:
         return rows.seen(self.N, self.settings.rank_tolerance)
 
-    def _split(self, level: _Level, chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
-        return split(level.M[chosen], level.norms[chosen], self.settings.rank_tolerance)
+    def _split(self, A: Array) -> tuple[Array, Array]:
+        return split(A @ self.N, norm(A, axis=1), self.settings.rank_tolerance)
 
-    def _lambda(self, level: _Level, own: Array) -> float:
+    def _lambda(self, A: Array, equal: Mask, own: Array, scale: float) -> float:
         """Return lambda of a level, in its scaled rows; bounds at the top have none."""
         s, first = self.settings, self.N.shape[1] == self.h.n
-        bounds = not level.equal.all() and (np.count_nonzero(level.rows.A, axis=1) <= 1).all()
+        bounds = not equal.all() and (np.count_nonzero(A, axis=1) <= 1).all()
         if not s.damping or (first and bounds):
             return 0.0
-        everything = np.ones_like(level.equal)
-        seen = own if level.equal.all() else self._split(level, everything)[0]
-        M = level.scale * level.M
-        full = seen.shape[1] == len(M)
-        smallest = np.linalg.svd(M, compute_uv=False)[-1] if full else 0.0
+        seen = own if equal.all() else self._split(A)[0]
+        full = seen.shape[1] == len(A)
+        smallest = np.linalg.svd(scale * (A @ self.N), compute_uv=False)[-1] if full else 0.0
         lam = s.damping * np.sqrt(max(0.0, 1.0 - (smallest / s.threshold) ** 2))
-        return float(lam) / level.scale
+        return float(lam) / scale
 
     def _nearest(self) -> Array:
         """Return the z whose x is nearest to the reference."""
@@ -263,9 +218,11 @@ class _Cascade:
             vouched |= found
             if not kept.lower.size and not limits.lower.size:
                 return self._least_squares(z, E, e, own, lam), np.empty(0)
-            exact = self._exact(z, E, e, self._seen(limits), self._seen(kept))
-            if exact is not None:
-                return exact
+            for start in (z, np.zeros_like(z)):  # at zero all rows held from above hold
+                exact = refined(start, E, e, self._seen(limits), self._seen(kept),
+                                self.settings.rank_tolerance)
+                if exact is not None:
+                    return exact
         raise _StopError(Status.INACCURATE if vouched else Status.BACKEND_FAILURE)
 
     def _target(self, goal: Rows, own: Array, lam: float, last: bool) -> tuple[Array, Array]:
@@ -277,19 +234,6 @@ class _Cascade:
             return np.vstack([goal.A @ N, lam * np.eye(p)]), np.pad(goal.lower, (0, p))
         return goal.A @ N @ own @ own.T, goal.lower
 
-    def _exact(self, z: Array, E: Array, e: Array, limits: Rows, kept: Rows
-               ) -> tuple[Array, Array] | None:
-        """Refine the backend's z; if that fails, zero, at which all rows held from above hold."""
-        for start in (z, np.zeros_like(z)):
-            exact = refined(start, E, e, limits, kept, self.settings.rank_tolerance)
-            if exact is not None:
-                self.corrected += bool(norm(exact[0] - z) > self._allowed())
-                return exact
-        return None
-
-    def _allowed(self) -> float:
-        return float(_SHARE * self.backend.accuracy * (1.0 + norm(self.x)))
-
     def _least_squares(self, z: Array, E: Array, e: Array, own: Array, lam: float) -> Array:
         """Return z if its gradient proves it accurate enough, else the exact least squares."""
         if lam:
@@ -297,10 +241,9 @@ class _Cascade:
         else:
             smallest = float(np.linalg.svd(E @ own, compute_uv=False).min(initial=np.inf))
         z = own.T @ z  # the level cannot see the rest
-        if norm(own.T @ (E.T @ e) - own.T @ (E.T @ (E @ (own @ z)))) <= (
-                self._allowed() * smallest**2):
+        allowed = float(_SHARE * self.backend.accuracy * (1.0 + norm(self.x)))
+        if norm(own.T @ (E.T @ e) - own.T @ (E.T @ (E @ (own @ z)))) <= allowed * smallest**2:
             return np.asarray(own @ z)
-        self.corrected += 1
         return np.asarray(own @ np.linalg.lstsq(E @ own, e, rcond=None)[0])
 
     def _ask(self, goal: Rows, limits: Rows, kept: Rows, lam: float, last: bool

@@ -58,6 +58,7 @@ class Merged(Resolver):
 
     name: ClassVar[str] = "merged"
     handles: ClassVar[Handles] = "inequalities"
+    strict: ClassVar[bool] = False  # a task can disturb one above it, in motion
     damps: ClassVar[str] = "the merged level as a whole"
     damps_with_bounds: ClassVar[str] = damps
     ratio: float = number(4.0, 1.0, 1e6)
@@ -72,11 +73,6 @@ class Merged(Resolver):
     def __post_init__(self) -> None:
         super().__post_init__()
         set_frozen(self, scales=_checked(self.scales))
-
-    @property
-    def strict(self) -> bool:
-        """False: a task can disturb one above it, in motion."""
-        return False
 
     @property
     def label(self) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, final
 
+from hierarchy.records import set_frozen
 from solvers.kernels.reverse import reverse
 from solvers.resolver import Direct, one_of, register
 
@@ -34,7 +35,6 @@ class Reverse(Direct):
     kernel: ClassVar[Callable[..., int]] = staticmethod(reverse)
     form: str = one_of("published", "in-order")
 
-    @property
-    def strict(self) -> bool:
-        """True for the in-order form, which respects priorities exactly at any rank."""
-        return self.form == "in-order"
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        set_frozen(self, strict=self.form == "in-order")

@@ -62,19 +62,11 @@ class Smooth(Resolver):
 
     name: ClassVar[str] = "smooth"
     handles: ClassVar[Handles] = "activations"
-    damping: float = number(1e-4)
-    threshold: float = number(1e-2, open_below=True)
+    strict: ClassVar[bool] = False  # rows that act in part share directions with lower levels
+    accuracy: ClassVar[float] = 1e-6  # errors grow with the square of the condition number
+    damping: float = 1e-4
+    threshold: float = 1e-2
     eta: float = number(10.0, open_below=True)
-
-    @property
-    def strict(self) -> bool:
-        """No: a row that acts in part shares its directions with lower levels."""
-        return False
-
-    @property
-    def accuracy(self) -> float:
-        """Errors grow with the square of the condition number, through X^T A X."""
-        return 1e-6
 
     def can_resolve(self, required: Handles) -> bool:
         """Equalities act fully; for other rows it needs activations."""

@@ -60,12 +60,8 @@ class Tpm(Resolver):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.form == "published":
-            set_frozen(self, handles="equalities", damps="each pivot", damps_with_bounds="")
-
-    @property
-    def strict(self) -> bool:
-        """True for the staircase form, which respects priorities exactly at any rank."""
-        return self.form == "staircase"
+            set_frozen(self, handles="equalities", damps="each pivot", damps_with_bounds="",
+                       strict=False)
 
     @property
     def label(self) -> str:
@@ -163,8 +159,14 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
     targets, zero = np.eye(h.m), np.zeros(h.n)
     G = np.array([_answer(resolver, h, b, zero) for b in targets]).reshape(h.m, h.n).T
     pairs = zip(h.offsets[:-1], h.offsets[1:], strict=True)
+    F = np.empty((h.m, h.m))
+    if resolver.strict:
+        F = h.A @ G
+    else:
+        run(matrix_as_published, *h.rows, F, resolver._settings)
+        F = F.T.copy()  # (10)
     return TaskPriorityMatrix(
-        F=h.A @ G if resolver.strict else _published_matrix(h, resolver), G=G,
+        F=F, G=G,
         contributions=np.array([G[:, i:j] @ h.lower[i:j] for i, j in pairs]).reshape(-1, h.n),
         null_space_term=_answer(resolver, h, np.zeros(h.m), h.reference))
 
@@ -172,8 +174,3 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
 def _answer(resolver: Tpm, h: Hierarchy, b: Array, reference: Array) -> Array:
     return resolver.solve(h.changed(lower=b, upper=b, reference=reference, metric=None)).x
 
-
-def _published_matrix(h: Hierarchy, resolver: Tpm) -> Array:
-    F = np.empty((h.m, h.m))
-    run(matrix_as_published, *h.rows, F, resolver._settings)
-    return F.T.copy()  # (10)

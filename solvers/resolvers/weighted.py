@@ -51,6 +51,7 @@ class Weighted(Resolver):
 
     name: ClassVar[str] = "weighted"
     handles: ClassVar[Handles] = "inequalities"
+    strict: ClassVar[bool] = False  # a lower level can disturb a higher one a little
     damps: ClassVar[str] = "all active soft rows as one level"
     damps_with_bounds: ClassVar[str] = damps
     ratio: float = number(100.0, 1.0)
@@ -69,11 +70,6 @@ class Weighted(Resolver):
             backend_of(self.backend)
         if self.weights is not None:
             set_frozen(self, weights=_checked(self.weights))
-
-    @property
-    def strict(self) -> bool:
-        """False: a lower level can disturb a higher one a little."""
-        return False
 
     @property
     def label(self) -> str:

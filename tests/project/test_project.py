@@ -133,6 +133,14 @@ def test_a_package_of_the_same_name_is_named_in_one_line(name, tmp_path):
     assert len(done.stderr.splitlines()) == 1
 
 
+def test_an_older_pinocchio_that_comes_first_is_named_in_one_line(tmp_path):
+    (tmp_path / "pinocchio.py").write_text("__version__ = '3.9.0'\n")
+    done = subprocess.run([sys.executable, "-c", "from hierarchy import Robot"], text=True,
+                          env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+                          capture_output=True, check=False, cwd=tmp_path)
+    assert f"pinocchio 3.9.0 in {tmp_path / 'pinocchio.py'} is older" in done.stderr
+
+
 @pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])
 def test_the_map_names_every_part_of_a_package_in_the_order_of_the_layers(package):
     told = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from hierarchy.problem import Array
+from hierarchy.robots.library import pin
 from hierarchy.robots.mjcf.model import Built, configuration, to_mujoco
 
 _SAME = 1e-9       # relative to the robot's size, and to the inertias of the two joints of an entry

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from hierarchy.problem import Array
 from hierarchy.robots.from_table import ROOT
+from hierarchy.robots.library import pin
 from hierarchy.robots.mjcf.compiled import WORLD
 from hierarchy.robots.mjcf.part import SIZES, Part, rolled
 
