@@ -21,9 +21,9 @@ from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacles
 from scenarios import load, simulate
 from scenarios.cell.sensors.sensor import make_obstacles
-from scenarios.draw.figures.bodies import outline
 from scenarios.draw.figures.drawing import ALERT, INK, project, style
-from scenarios.recording.tree import capsules, ends
+from scenarios.draw.figures.picture import outline
+from scenarios.recording.facts import capsules, ends
 
 HERE = Path(__file__).parent
 OUT = HERE.parent / "docs" / "images" / "examples"

@@ -146,7 +146,6 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
     from scenarios.cli import robot_check, scenario_check
     from scenarios.loop.first_tick import first_tick
 
-    robot_check.check_known(file)
     if robot_check.is_robot(file):
         robot = robot_check.look_at(file, changes or [])
         data, text = robot_check.as_plain_data(*robot), robot_check.say(*robot)

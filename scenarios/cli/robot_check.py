@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from math import isfinite
 from operator import itemgetter
 from pathlib import Path
@@ -37,23 +38,19 @@ class _OfRobot(Section):
 
 
 def is_robot(text: str) -> bool:
-    """Whether the text names a robot; a name that is also a scenario's means the scenario."""
-    return not _is_scenario(text) and (
-        in_package(text) or is_file_name(text) or text in TABLES
-        or text in plugins.own("robots"))
+    """Whether the text names a robot; a name that is also a scenario's means the scenario.
 
-
-def _is_scenario(text: str) -> bool:
-    return text.endswith(".toml") or ".toml:" in text or is_shipped(text)
-
-
-def check_known(text: str) -> None:
-    """Raise a HierarchyError for what is neither a scenario nor a robot."""
+    Raises a HierarchyError for what is neither.
+    """
     if Path(text).is_dir() or Path(text).suffix == ".py":
         raise no_scenario(text, shipped())
-    if not (_is_scenario(text) or is_robot(text) or text in shipped_groups()):
+    if text.endswith(".toml") or ".toml:" in text or is_shipped(text) or text in shipped_groups():
+        return False
+    if not (in_package(text) or is_file_name(text) or text in TABLES
+            or text in plugins.own("robots")):
         raise UnknownNameError("scenario or robot", text, {*shipped(), *TABLES},
                                f"{elsewhere(text)} {WANTED}")
+    return True
 
 
 def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robot]:
@@ -83,52 +80,46 @@ def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
         "control_points": [{"joint": _carrier(robot, p.joint), "offset": _rounded(p.offset)}
                            for p in robot.control_points],
         "missing": list(_missing(robot)),
-        "coupled": [{"joint": one.joint, "other": one.other,
-                     "coefficients": list(one.coefficients)} for one in robot.coupled],
-        "loops": [{"name": one.name, "frames": list(one.frames), "rigid": one.rigid}
-                  for one in robot.loops],
+        "coupled": [asdict(one) for one in robot.coupled],
+        "loops": [asdict(one) for one in robot.loops],
         "starts": list(robot.starts), "may_touch": [list(pair) for pair in robot.apart]}
 
 
 def say(section: RobotSection, robot: Robot) -> str:
     """Return the summary as text, with a [robot] section to paste."""
-    found = as_plain_data(section, robot)
-    of_table = robot.table is not None
+    found, of_table = as_plain_data(section, robot), robot.table is not None
     listed = "from its table" if of_table else "proposed"
-    capsules = ("none" if not robot.capsules else f"{len(robot.capsules)}, "
-                + ("as listed" if section.capsules is not None or of_table
-                   else "proposed from the collision geometry"))
-    points = "as listed" if section.control_points is not None else listed
     end = "as given" if section.end_effector else listed
+    points = "as listed" if section.control_points is not None else listed
+    links = "as listed" if section.capsules is not None or of_table else (
+        "proposed from the collision geometry")
     source = (f"{section.model} ({file_of(section.model)})" if in_package(section.model) else
               "a table of this package" if section.model in TABLES else section.model)
     moving, joint = 0, robot.frame(robot.end_effector).joint
     while joint > (robot.base == "floating"):
         moving, joint = moving + 1, robot.parents[joint]
-    lines = [f"{robot.name}: {source}",
-             f"  base            {robot.base}, {robot.n} velocities, {robot.nq} positions",
-             f"  mass            {found['mass_kg']:.3g} kg of moving links",
-             f"  joints          {len(found['joints'])} actuated",
-             *_joint_table(found["joints"]),
-             f"  frames          {some(found['frames'])}",
-             f"  end effector    {robot.end_effector}, {end}; {moving} joints move it",
-             *([f"  lowest frames   {some(feet)}; [[contacts]] may be there"]
-               if (feet := found["lowest_frames"]) else []),
-             f"  capsules        {capsules}",
-             f"  control points  {len(robot.control_points)}, {points}"]
-    lines += [f"  missing         {sentence}" for sentence in found["missing"]]
-    lines += [f"  follows         {one} (kept by every scenario)" for one in robot.coupled]
-    lines += [f"  closed chain    {one.name}: {' and '.join(one.frames)} have one "
-              f"{'pose' if one.rigid else 'origin'}" for one in robot.loops]
-    if robot.starts:
-        lines.append(f"  keyframes       {some(list(robot.starts))}; start.keyframe takes one")
-    if robot.apart:
-        pairs = some([f"{one or 'base'} to {other or 'base'}" for one, other in robot.apart])
-        lines.append(f"  may touch       {pairs}")
-    lines += [f"Warning: joint {joint['name']} may turn from {joint['lower']:g} to "
-              f"{joint['upper']:g} rad. Are these degrees?" for joint in found["joints"]
-              if joint["unit"] == "rad" and None not in (joint["lower"], joint["upper"])
-              and joint["upper"] - joint["lower"] > _TURNS]
+    said = [
+        ("base", f"{robot.base}, {robot.n} velocities, {robot.nq} positions"),
+        ("mass", f"{found['mass_kg']:.3g} kg of moving links"),
+        ("joints", "\n".join([f"{len(found['joints'])} actuated", *_joint_table(found["joints"])])),
+        ("frames", some(found["frames"])),
+        ("end effector", f"{robot.end_effector}, {end}; {moving} joints move it"),
+        ("lowest frames", f"{some(feet)}; [[contacts]] may be there"
+         if (feet := found["lowest_frames"]) else ""),
+        ("capsules", f"{len(robot.capsules)}, {links}" if robot.capsules else "none"),
+        ("control points", f"{len(robot.control_points)}, {points}"),
+        *(("missing", sentence) for sentence in found["missing"]),
+        *(("follows", f"{one} (kept by every scenario)") for one in robot.coupled),
+        *(("closed chain", f"{one.name}: {' and '.join(one.frames)} have one "
+           f"{'pose' if one.rigid else 'origin'}") for one in robot.loops),
+        ("keyframes", f"{some(list(robot.starts))}; start.keyframe takes one"
+         if robot.starts else ""),
+        ("may touch", some([f"{one or 'base'} to {other or 'base'}"
+                            for one, other in robot.apart]))]
+    lines = [f"{robot.name}: {source}", *(f"  {what:<14}  {text}" for what, text in said if text)]
+    lines += [f"Warning: joint {name} may turn from {low:g} to {high:g} rad. Are these degrees?"
+              for name, unit, low, high, *_ in map(dict.values, found["joints"])
+              if unit == "rad" and None not in (low, high) and high - low > _TURNS]
     return "\n".join([*lines, "", "For a scenario file:", "", paste(section, robot)])
 
 

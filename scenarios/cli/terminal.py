@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
-from textwrap import fill, wrap
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -82,9 +82,8 @@ def print_samples(name: str, results: Results) -> None:
     from scenarios.measure.runs import Cell, Row
     from scenarios.results.columns import rows, verdict
 
-    shares = [Row(one.label, "", "", "", tuple(Cell(str(results.share(one, label)))
-                                               for label in results.labels))
-              for one in results.criteria()]
+    shares = [Row(what, "", "", "", tuple(Cell(str(share)) for share in by.values()))
+              for what, by in results.shares().items()]
     _print_rows([f"{name}: {results.samples} samples, paired", *verdict(results)],
                 "median [quartiles]", results.labels, [*shares, *rows(results)])
 
@@ -122,9 +121,8 @@ def print_list(what: str, entries: dict[str, str]) -> None:
     print(f"{what}:")
     width = max((len(name) for name in entries), default=0)
     for name, text in entries.items():
-        lines = wrap(text, _WIDTH - width - 4) or [""]
-        print(f"  {name:{width}}  {lines[0]}".rstrip())
-        print(*(f"{'':{width + 4}}{line}\n" for line in lines[1:]), sep="", end="")
+        print(fill(text, _WIDTH, initial_indent=f"  {name:{width}}  ",
+                   subsequent_indent=" " * (width + 4)) or f"  {name}")
 
 
 def print_lists(lists: dict[str, dict[str, str]], as_json: bool) -> None:

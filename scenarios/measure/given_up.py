@@ -72,12 +72,12 @@ def _blocked(recording: Recording, missed: dict[str, NDArray[np.int64]]
     if not missed or scenario.sensor.kind != "exact" or scenario.control.stack == "smooth":
         return {}
     cell = build(scenario)
-    rows, exact, orders = Rows(recording, cell), Hcod(), recording.order_names
+    rows, exact = Rows(recording, cell), Hcod()
     found = {}
     for name, ticks in missed.items():
         held, at, looked = Counter[str](), Counter[str](), 0
         for tick in ticks[np.unique(np.linspace(0, len(ticks) - 1, _LOOKED_AT).astype(int))]:
-            h = rows.hierarchy(int(tick), orders[recording["order"][tick]])
+            h = rows.hierarchy(int(tick))
             if h is not None and name in h.names:
                 names = cell.stack.row_names(h.names)
                 level, solved = h.names.index(name), exact.solve(h)

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hierarchy.problem import Array
 from scenarios.measure.forces import wanted_forces
 from scenarios.measure.metric import norms, passed, shown, true
 from scenarios.recording.listed import errors
 from scenarios.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 # How far off still counts as met, by unit or name. A promise is one that can be kept exactly.
 TOLERANCES = {"m": 1e-3, "deg": 1.0, "rad": 1e-2, "N": 1.0, "N s": 0.1, "N m s": 0.1, "": 1e-3}

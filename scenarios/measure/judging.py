@@ -88,13 +88,12 @@ def judge(recording: Recording, cell: Cell) -> None:
     Adds the signals level_fate, level_violation and saturated. Levels are UNKNOWN in ticks whose
     distances do not follow from the recorded joints, or whose settings were changed by hand.
     """
-    orders, rows = recording.order_names, Rows(recording, cell)
+    rows = Rows(recording, cell)
     fates = Fates(recording.task_names, recording.ticks, cell.robot.n)
     accuracy, commands = recording.facts.resolver.accuracy, rows.meant
     changed = recording.get("changed", np.zeros(recording.ticks, bool))
-    for k, index in enumerate(recording["order"].tolist()):
-        order = orders[index]
-        h = rows.hierarchy(k, order) if order and not changed[k] else None
+    for k in range(recording.ticks):
+        h = None if changed[k] else rows.hierarchy(k)
         if h is not None and not np.isnan(commands[k, 0]):
             fates.judge(k, cell, h, commands[k], accuracy)
     recording.signals.update(fates.signals(recording))
@@ -110,6 +109,7 @@ class Rows:
         self._cell, level = cell, recording.scenario.control.level
         self._t = recording["t"].tolist()
         self._q, self._v, self._command = (recording[name] for name in ("q", "v", "command"))
+        self._orders, self._order = recording.order_names, recording["order"].tolist()
         self._follows = level != "acceleration"  # whether rows depend on the last command
         self._first = self._v[0] if level == "velocity" else None
         self._carried: list[Array | None] = [None]  # by the contacts before each tick
@@ -127,9 +127,11 @@ class Rows:
             self._distance = np.column_stack([recording["control_point_distance"],
                                               recording["ee_distance"]])
 
-    def hierarchy(self, k: int, order: tuple[str, ...]) -> Hierarchy | None:
+    def hierarchy(self, k: int) -> Hierarchy | None:
         """Return the rows of tick k, valid until the next; None if they differ from the run's."""
-        t, q, v, cell = self._t, self._q, self._v, self._cell
+        t, q, v, cell, order = self._t, self._q, self._v, self._cell, self._orders[self._order[k]]
+        if not order:
+            return None
         if cell.state.period > 0.0:  # differences are against the tick before
             cell.state.move(t[max(k - 1, 0)], q[max(k - 1, 0)], v[max(k - 1, 0)])
         if not cell.state.move(t[k], q[k], v[k]):

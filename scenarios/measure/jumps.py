@@ -78,7 +78,7 @@ def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
 
     for k in range(max(ticks) + 1 if isinstance(resolver, Merged) else 0):
         carried[k] = memory
-        if (h := _hierarchy(recording, rows, k)) is not None:
+        if (h := rows.hierarchy(k)) is not None:
             memory = resolver.solve(h, memory).memory
     return {k: partial(answer, carried.get(k)) for k in ticks}
 
@@ -99,13 +99,8 @@ def _causes(recording: Recording, cell: Cell, rows: Rows, k: int, solve: Solve) 
     yield from causes(before, after, solve)
 
 
-def _hierarchy(recording: Recording, rows: Rows, k: int) -> Hierarchy | None:
-    order = recording.order_names[recording["order"][k]]
-    return rows.hierarchy(k, order) if order else None
-
-
 def _tick(recording: Recording, cell: Cell, rows: Rows, k: int) -> Tick | None:
-    h = _hierarchy(recording, rows, k)
+    h = rows.hierarchy(k)
     if h is None or np.isnan(rows.meant[k]).any():
         return None
     h, n = h.copy(), h.n

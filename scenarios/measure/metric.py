@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy import plugins
+from hierarchy.problem import Array
 from scenarios.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 # Display units by SI unit: how many of them make one, what it is called, decimals.
 _SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "share": (100.0, "%", 2),

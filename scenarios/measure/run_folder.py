@@ -86,8 +86,6 @@ def load_run(folder: str | Path) -> Recording:
         raise HierarchyError(f"{path} is not a run folder: it has no run.npz{hint}")
     scenario = load(str(path / "scenario.toml"))
     signals = _arrays(path / "run.npz", "orders", "fault", "events")
-    if not (path / "facts.json").exists():
-        raise HierarchyError(f"{path} was written by an earlier version; run the scenario again")
     orders, fault, events = (signals.pop(name) for name in ("orders", "fault", "events"))
     signals |= _arrays(path / "timings.npz")
     return Recording(signals, tuple(map(str, orders)), scenario, _facts(path / "facts.json"),
@@ -108,7 +106,10 @@ def _arrays(path: Path, *names: str) -> dict[str, NDArray[Any]]:
 
 def _facts(path: Path) -> Facts:
     try:
-        found = TypeAdapter(Facts).validate_python(json.loads(path.read_text(encoding="utf-8")))
+        text = path.read_text(encoding="utf-8") if path.exists() else ""
+        if '"model"' not in text:  # none, or a tree of joints in its place
+            raise HierarchyError("an earlier version wrote it; run the scenario again")
+        found = TypeAdapter(Facts).validate_python(json.loads(text))
         found.robot.placements(np.array(found.robot.rest))  # the model can be read
         return found
     except (OSError, ValueError, RecursionError) as error:

@@ -10,9 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hierarchy.problem import Array
 
 LEVEL = 0.05     # probability of calling a difference real that is chance
 SAME = 1e-3      # relative difference below which two values count as the same

@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy.problem import Array
 from scenarios.measure.metric import (
-    Array,
     Criteria,
     Metric,
     finite,

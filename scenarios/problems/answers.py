@@ -23,19 +23,6 @@ Progress = Callable[[int, int], None]
 _SAME = 1e-9  # relative to 1 + the value
 
 
-def with_answers(collection: Collection, progress: Progress | None = None) -> Collection:
-    """Return the collection with what could be proved of each problem.
-
-    progress : told the number of problems done, and their number.
-    """
-    found = []
-    for done, h in enumerate(collection.problems, 1):
-        found.append(answer(h))
-        if progress is not None:
-            progress(done, len(collection.problems))
-    return replace(collection, answers=tuple(found))
-
-
 def answer(h: Hierarchy) -> Proof:
     """Return the proof that the answer of `hcod` leads to, or else the best of all candidates'."""
     found = prove(h, [make("hcod").solve(h).x])
@@ -57,9 +44,17 @@ def file_of(folder: Path, family: str, seed: int) -> Path:
 
 def export(family: Family, seed: int, count: int | None, answers: bool, folder: Path,
            progress: Progress | None = None) -> Path:
-    """Write a set of a family into the folder, and return the file."""
-    made = family.half(seed, count)
-    return save(with_answers(made, progress) if answers else made, folder)
+    """Write a set of a family into the folder, and return the file.
+
+    answers : whether to prove those that can be. progress : told the number of problems done, and
+        their number.
+    """
+    made, proofs = family.half(seed, count), []
+    for done, h in enumerate(made.problems if answers else (), 1):
+        proofs.append(answer(h))
+        if progress is not None:
+            progress(done, len(made.problems))
+    return save(replace(made, answers=tuple(proofs)) if answers else made, folder)
 
 
 def save(collection: Collection, folder: Path) -> Path:

@@ -82,9 +82,13 @@ def _kind(name: str, seed: int, count: int) -> list[Hierarchy]:
     return [problems.structured(seed * _STRIDE + i, (name,)) for i in range(count)]
 
 
-def _other(make: Callable[[np.random.Generator], Hierarchy], seed: int, count: int
-           ) -> list[Hierarchy]:
+def _other(name: str, seed: int, count: int) -> list[Hierarchy]:
+    make = {"of-soth": others.of_soth, "of-lexls": others.of_lexls, "of-daqp": others.of_daqp}[name]
     return [make(np.random.default_rng([seed, i])) for i in range(count)]
+
+
+def _recipe(name: str, seed: int, count: int) -> list[Hierarchy]:
+    return [problems.generate(seed * _STRIDE + i) for i in range(count)]
 
 
 _REFERENCE = {
@@ -123,9 +127,9 @@ _POSTURES = {
     "singular-romeo": "Romeo on two feet, likewise (extra `descriptions`)"}
 
 _OTHERS = {
-    "of-soth": (others.of_soth, "as soth is tested: ranks, rows of upper levels, all sides"),
-    "of-lexls": (others.of_lexls, "as LexLS is tested: equalities that add a rank each"),
-    "of-daqp": (others.of_daqp, "as DAQP is tested: a program whose acting rows are known")}
+    "of-soth": "as soth is tested: ranks, rows of upper levels, all sides",
+    "of-lexls": "as LexLS is tested: equalities that add a rank each",
+    "of-daqp": "as DAQP is tested: a program whose acting rows are known"}
 _EXAMPLES = {
     "of-pink": "examples of pink: limits, barriers, then each task a level",
     "of-mink": "examples of mink: limits, then each task a level",
@@ -133,28 +137,15 @@ _EXAMPLES = {
     "of-tsid": "examples of tsid: dynamics, contacts and limits above the weighted tasks"}
 
 
-def _all() -> dict[str, Family]:
-    made = [Family(name, "reference", what, partial(_reference, name),
-                   usual=_FEW if name in _SIMULATED else COUNT)
-            for name, what in _REFERENCE.items()]
-    made += [Family(name, "recorded", what, partial(recorded.recorded, name),
-                    recorded.PERIODS[name], _FEW if name in _SIMULATED else _CONSECUTIVE)
-             for name, what in recorded.SCENARIOS.items()]
-    made += [Family(name, "postures", what, partial(postures.posed, name))
-             for name, what in _POSTURES.items()]
-    made += [Family(name, "degenerate", what, partial(_kind, name))
-             for name, what in _KINDS.items()]
-    made += [Family(name, "others", what, partial(_other, make))
-             for name, (make, what) in _OTHERS.items()]
-    made += [Family(name, "others", what, partial(others.of_examples, name))
-             for name, what in _EXAMPLES.items()]
-    made.append(Family("recipe", "random", "random sizes, ranks, ties, scales",
-                       lambda seed, count: [problems.generate(seed * _STRIDE + i)
-                                            for i in range(count)]))
-    return {one.name: one for one in made}
-
-
-FAMILIES = _all()
+FAMILIES = {name: Family(
+    name, group, what, partial(make, name), recorded.PERIODS.get(name, 0.0),
+    _FEW if name in _SIMULATED else _CONSECUTIVE if name in recorded.PERIODS else COUNT)
+    for group, make, named in (
+        ("reference", _reference, _REFERENCE), ("recorded", recorded.recorded, recorded.SCENARIOS),
+        ("postures", postures.posed, _POSTURES), ("degenerate", _kind, _KINDS),
+        ("others", _other, _OTHERS), ("others", others.of_examples, _EXAMPLES),
+        ("random", _recipe, {"recipe": "random sizes, ranks, ties, scales"}))
+    for name, what in named.items()}
 """The families by name."""
 _NEEDS = {**dict.fromkeys(("singular-panda", "singular-romeo"),
                           ("example-robot-data", "descriptions")),

@@ -19,8 +19,6 @@ _TRIALS = 50    # postures tried until one is singular
 _SINGULAR = 1e-12  # smallest singular value of all tasks
 _NEAR = (-7.0, -2.0)  # decimal logarithm of the distance from a singular posture [rad]
 
-Level = tuple[Array, Array, Array]
-
 
 @final
 @dataclass(frozen=True)
@@ -63,12 +61,12 @@ def _problem(asked: Posed, robot: Robot, rng: np.random.Generator, kind: int) ->
     joints = np.arange(robot.actuated, robot.n)
     limit = np.minimum(robot.velocity_limit[joints], _FREE)
     eye = np.eye(robot.n)[joints]
-    levels: list[Level] = [(eye, -limit, limit)]
+    levels: list[tuple[Array, ...]] = [(eye, -limit, limit)]
     tasks = _tasks(asked, robot, _posture(asked, robot, rng, kind))
     still = len(asked.feet)
     for k, J in enumerate(tasks):
-        levels.append(_equal(J, (k >= still) * rng.uniform(-1.0, 1.0, len(J))))
-    levels.append(_equal(eye, rng.uniform(-0.5, 0.5, len(joints))))
+        levels.append((J, (k >= still) * rng.uniform(-1.0, 1.0, len(J))))
+    levels.append((eye, rng.uniform(-0.5, 0.5, len(joints))))
     return Hierarchy.from_levels(levels)
 
 
@@ -109,7 +107,3 @@ def _moved(robot: Robot, angles: Array) -> Array:
     joints, step = np.arange(robot.actuated, robot.n), np.zeros(robot.n)
     step[joints] = angles - robot.rest[robot.coordinates[joints]]
     return robot.integrate(robot.rest, step)
-
-
-def _equal(A: Array, b: Array) -> Level:
-    return A, b, b.copy()

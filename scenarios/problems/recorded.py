@@ -6,12 +6,12 @@ a fresh one.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, final
+from typing import Annotated, Any, final
 
 import numpy as np
+import typer
 
 from hierarchy.problem import Array, Hierarchy
 from scenarios.config import Scenario, ScenarioError, load
@@ -149,21 +149,17 @@ class _Window:
         return {}
 
 
-def main() -> None:
-    """Record the family and write its file."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--count", type=int, default=COUNT, help="problems")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE")
-    asked = parser.parse_args()
+def main(out: Annotated[Path, typer.Option(metavar="FILE")], seed: int = SEED,
+         count: int = COUNT) -> None:
+    """Record problems of the family DYN60 and write its file."""
     problems: list[tuple[Hierarchy, Array]] = []
-    for some in sequences(asked.seed):
+    for some in sequences(seed):
         problems += some
-        print(f"{len(problems)} of {asked.count}", flush=True)
-        if len(problems) >= asked.count:
+        print(f"{len(problems)} of {count}", flush=True)
+        if len(problems) >= count:
             break
-    np.savez_compressed(asked.out, allow_pickle=False, **packed(problems[:asked.count]))
+    np.savez_compressed(out, allow_pickle=False, **packed(problems[:count]))
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

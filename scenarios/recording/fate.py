@@ -75,11 +75,8 @@ class Levels:
 def levels_at(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) -> Levels:
     """Return the recorded fates of the levels in some ticks; UNKNOWN if none were recorded."""
     ticks, names = np.asarray(ticks, dtype=np.int64), recording.task_names
-    units = row_units(recording.scenario, names)
-    if "level_fate" in recording:
-        return Levels(names, units, *(recording[name][ticks] for name in (
-            "level_fate", "level_violation", "saturated")))
-    shape = len(ticks), len(names)
-    return Levels(names, units,
-                  np.int8(Fate.UNKNOWN) * recording.in_stack[ticks], np.full(shape, np.nan),
-                  np.zeros((len(ticks), recording["v"].shape[1]), np.int8))
+    unknown = {"level_fate": np.int8(Fate.UNKNOWN) * recording.in_stack,
+               "level_violation": np.full((recording.ticks, len(names)), np.nan),
+               "saturated": np.zeros(recording["v"].shape, np.int8)}
+    return Levels(names, row_units(recording.scenario, names),
+                  *(recording.get(name, none)[ticks] for name, none in unknown.items()))

@@ -45,14 +45,6 @@ class Share:
 
 
 @dataclass(frozen=True)
-class Criterion:
-    """A success criterion: its name, and whether each run meets it."""
-
-    label: str
-    met: NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
 class Failure:
     """A reason why runs stopped early or failed, the first such run, and their number."""
 
@@ -110,33 +102,32 @@ class Results:
         return statistics.best({label: self.column(metric.name, label) for label in self.labels},
                                metric.lower_is_better)
 
-    def share(self, criterion: Criterion, label: str) -> Share:
-        """Return the share of a resolver's runs that meet a criterion."""
-        return Share(int((criterion.met & self._of[label]).sum()), int(self._of[label].sum()))
+    def shares(self, tolerance: float = _TOLERANCE) -> dict[str, dict[str, Share]]:
+        """Return the share of each resolver's runs that meet a criterion, by criterion and label.
 
-    def criteria(self, tolerance: float = _TOLERANCE) -> list[Criterion]:
-        """Return the criteria that can be judged; a failed run meets none.
-
-        Up to `tolerance` [rad] beyond a joint limit counts as within it.
+        Those are the criteria that can be judged; a failed run meets none. Up to `tolerance` [rad]
+        beyond a joint limit counts as within it.
         """
-        finished = np.array([reason is None for reason in self.reasons])
-        found = [Criterion("Reached the end", finished)]
+        met = {"Reached the end": np.array([reason is None for reason in self.reasons])}
         near = [self.values[name] for name in ("body_distance_min", "ee_distance_min")
                 if name in self.values]
         contacts = [self.values["contact_ticks"]] if "contact_ticks" in self.values else []
         if near or contacts:
-            found.append(Criterion("Touched nothing", np.all(
+            met["Touched nothing"] = np.all(
                 [*(values > 0.0 for values in near), *(values == 0.0 for values in contacts)],
-                axis=0)))
-        found += [Criterion(label, self.values[name] <= most) for label, name, most in (
-            ("Kept the joint limits", "joint_limit_excess", tolerance),
-            ("Every tick solved", "ticks_not_solved", 0.0)) if name in self.values]
+                axis=0)
+        for what, name, most in (("Kept the joint limits", "joint_limit_excess", tolerance),
+                                 ("Every tick solved", "ticks_not_solved", 0.0)):
+            if name in self.values:
+                met[what] = self.values[name] <= most
         below = [self.values[name] for name in ("body_below_share", "ee_below_share")
                  if name in self.values]
         if below:
-            found.append(Criterion("Kept the distance asked for", np.any(
-                np.isfinite(below), axis=0) & ~np.any(np.array(below) > 0.0, axis=0)))
-        return [*found, Criterion("All of the above", np.all([one.met for one in found], axis=0))]
+            met["Kept the distance asked for"] = np.any(np.isfinite(below), axis=0) & ~np.any(
+                np.array(below) > 0.0, axis=0)
+        met["All of the above"] = np.all(list(met.values()), axis=0)
+        return {what: {label: Share(int((runs & of).sum()), int(of.sum()))
+                       for label, of in self._of.items()} for what, runs in met.items()}
 
     def shown(self) -> list[Metric]:
         """Return the metrics to compare: those of any run, except computing times.
@@ -182,8 +173,7 @@ class Results:
 
 def verdict(results: Results) -> list[str]:
     """Return three lines of fixed form: what was not met, what is the same, what is best."""
-    met = {one.label: {label: results.share(one, label) for label in results.labels}
-           for one in results.criteria()[:-1]}
+    met = dict(list(results.shares().items())[:-1])
     missed = [f"{name}: " + ", ".join(f"{label} {share}" for label, share in shares.items())
               for name, shares in met.items()
               if any(share.met < share.of for share in shares.values())]

@@ -181,7 +181,10 @@ def _together(planned: Sequence[Run], folder: Path | None, workers: int,
             if progress is not None:
                 progress("compare", len(made), total)
         for i, run in made.items():
-            yield i, dataclasses.replace(run, timing=_timed(run))
+            timed = dataclasses.replace(run, timing=_timed(run))
+            if "happened" in vars(run):  # a page has worked it out
+                vars(timed)["happened"] = run.happened
+            yield i, timed
     except KeyboardInterrupt:
         for i in range(total):
             if i not in made:

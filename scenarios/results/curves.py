@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from hierarchy.problem import Array
 from scenarios.draw.figures import drawing
-from scenarios.draw.figures.drawing import ALERT, INK, Array
+from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.draw.figures.palette import Look
 from scenarios.draw.figures.panels import Draw, Panel
 from scenarios.measure.metrics import Metric
@@ -24,33 +25,24 @@ def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mappi
 
     Values far beyond those of the other runs are cut, and the panel states their range.
     """
-    drawn = {}
+    drawn, axes = {}, []
     for label, recording in recordings.items():
         if panel.fits(recording):
-            fig, (ax,) = drawing.figure()
+            drawn[label], (ax,) = drawing.figure()
             panel.draw(ax, recording, looks[label].colour)
-            drawn[label] = fig
-    if drawn:
-        _share_limits(list(drawn.values()), [recordings[label]["t"] for label in drawn])
-    return drawn
-
-
-def _share_limits(figures: Sequence[Figure], times: Sequence[Array]) -> None:
-    axes = [fig.axes[0] for fig in figures]
-    logarithmic = axes[0].get_yscale() == "log"
+            axes.append(ax)
     ranges = [ax.get_ylim() for ax in axes]
-    if logarithmic:
-        limits = min(low for low, _ in ranges), max(high for _, high in ranges)
-    else:
-        limits = drawing.shared_limits(ranges)
-    end = max(float(t[-1]) for t in times)
+    end = max((float(recordings[label]["t"][-1]) for label in drawn), default=0.0)
     for ax, (low, high) in zip(axes, ranges, strict=True):
+        limits = drawing.shared_limits(ranges) if ax.get_yscale() != "log" else (
+            min(least for least, _ in ranges), max(most for _, most in ranges))
         ax.set_ylim(limits)
         ax.set_xlim(0.0, end)
         ax.xaxis.set_major_locator(MaxNLocator(4))
         if high - low > 1.1 * (limits[1] - limits[0]):
             ax.text(0.98, 0.96, f"cut: {low:.2g} to {high:.2g}", color=ALERT, fontsize=8,
                     ha="right", va="top", transform=ax.transAxes)
+    return drawn
 
 
 def overlay(draw: Draw, recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
@@ -109,15 +101,14 @@ def _dashed(look: Look) -> Any:
 
 def shares(results: Results) -> Figure:
     """Draw the share of runs that meet each criterion under each resolver, with its interval."""
-    criteria, labels = results.criteria(), results.labels
+    criteria, labels = results.shares(), results.labels
     rows = len(criteria) * (len(labels) + 1)
     fig, (ax,) = drawing.figure(width=5.4, height=0.5 + 0.2 * rows)
     colours = drawing.colours(labels)
-    for i, criterion in enumerate(criteria):
+    for i, (criterion, by) in enumerate(criteria.items()):
         top = i * (len(labels) + 1)
-        ax.text(0.0, top - 0.62, criterion.label, fontweight="bold", va="center", fontsize=9)
-        for j, label in enumerate(labels):
-            share = results.share(criterion, label)
+        ax.text(0.0, top - 0.62, criterion, fontweight="bold", va="center", fontsize=9)
+        for j, (label, share) in enumerate(by.items()):
             y, colour = top + j + 0.15, colours[label]
             ax.hlines(y, 0.0, 1.0, color=drawing.INK, alpha=0.1, lw=5.0)
             ax.hlines(y, *share.interval, color=colour, lw=5.0, alpha=0.4)

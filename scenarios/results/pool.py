@@ -17,7 +17,7 @@ from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event
-from typing import Any
+from typing import Any, final
 
 Process = subprocess.Popen[bytes]
 
@@ -43,46 +43,58 @@ def ended(work: Callable[[Any], Any], jobs: Sequence[Any], workers: int | None =
     salvage : at Ctrl-C, interrupt the work in progress too and yield what it returns before
         KeyboardInterrupt is raised; otherwise it is given up.
     """
-    stop, idle, alive = Event(), SimpleQueue[Process](), list[Process]()
-
-    def made(job: Any) -> Any:
-        for _ in range(_TRIES):
-            try:
-                process = idle.get_nowait()
-            except Empty:
-                alive.append(process := _started())
-            if stop.is_set():
-                break
-            try:
-                pickle.dump((work, job), process.stdin)  # type: ignore[arg-type]
-                process.stdin.flush()  # type: ignore[union-attr]
-                result = pickle.load(process.stdout)  # type: ignore[arg-type]
-            except (EOFError, OSError, pickle.UnpicklingError):
-                _end(process)
-                continue
-            idle.put(process)
-            return result
-        return _GIVEN_UP if stop.is_set() else None
-
+    crew = _Crew(work)
     threads = ThreadPoolExecutor(max(1, min(workers or processors(), len(jobs))))
-    waiting = {threads.submit(made, job): job for job in jobs}
+    waiting = {threads.submit(crew.made, job): job for job in jobs}
     try:
         for future in as_completed(list(waiting)):
             yield waiting.pop(future), future.result()
     except KeyboardInterrupt:
-        stop.set()
+        crew.stop.set()
         threads.shutdown(wait=False, cancel_futures=True)
-        for process in alive if salvage else ():
+        for process in crew.all if salvage else ():
             process.terminate()
         for future, job in waiting.items() if salvage else ():
             if not future.cancelled() and (result := future.result()) is not _GIVEN_UP:
                 yield job, result
         raise
     finally:
-        stop.set()
+        crew.stop.set()
         threads.shutdown(wait=False, cancel_futures=True)
-        for process in alive:
+        for process in crew.all:
             _end(process)
+
+
+@final
+class _Crew:
+    """Processes that each do one job at a time; `all` of them, also those that have died."""
+
+    def __init__(self, work: Callable[[Any], Any]) -> None:
+        self.stop, self.all = Event(), list[Process]()
+        self._work, self._idle = work, SimpleQueue[Process]()
+
+    def made(self, job: Any) -> Any:
+        """Return what an idle process, or a new one, returns, None if it dies of the job twice."""
+        for _ in range(_TRIES):
+            if self.stop.is_set():
+                break
+            try:
+                process = self._idle.get_nowait()
+            except Empty:
+                self.all.append(process := _started())
+            if self.stop.is_set():  # since then, when all others were ended
+                _end(process)
+                break
+            try:
+                pickle.dump((self._work, job), process.stdin)  # type: ignore[arg-type]
+                process.stdin.flush()  # type: ignore[union-attr]
+                result = pickle.load(process.stdout)  # type: ignore[arg-type]
+            except (EOFError, OSError, pickle.UnpicklingError):
+                _end(process)
+                continue
+            self._idle.put(process)
+            return result
+        return _GIVEN_UP if self.stop.is_set() else None
 
 
 def _end(process: Process) -> None:

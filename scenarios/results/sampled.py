@@ -175,10 +175,9 @@ def _plain(plan: Plan, found: Mapping[str, Results], command: str) -> dict[str, 
 
 def _column(results: Results, label: str) -> dict[str, Any]:
     """Return shares and metrics of a column, also beside the first column."""
-    shares, metrics = {}, {}
-    for one in results.criteria():
-        share = results.share(one, label)
-        shares[one.label] = {"met": share.met, "of": share.of, "wilson_95": list(share.interval)}
+    metrics, shares = {}, {what: {"met": by[label].met, "of": by[label].of,
+                                  "wilson_95": list(by[label].interval)}
+                           for what, by in results.shares().items()}
     for metric in results.shown():
         spread, beside = results.spread(metric.name, label), results.paired(metric.name, label)
         metrics[metric.name] = {

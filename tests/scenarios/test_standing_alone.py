@@ -114,9 +114,10 @@ def test_what_is_loaded_is_what_was_run_and_its_scene_is_whole(made):
 def test_facts_that_are_missing_or_damaged_are_named(made, tmp_path):
     folder, run, _ = made
     shutil.copytree(folder, tmp_path / "bad")
-    facts = asdict(run.facts)
-    del facts["robot"]["model"]
-    for text in ("{", json.dumps(facts)):
+    facts, damaged = asdict(run.facts), asdict(run.facts)
+    del facts["robot"]["rest"]
+    damaged["robot"]["model"] = damaged["robot"]["model"].replace("1", "9", 1)
+    for text in ("{", json.dumps(facts), json.dumps(damaged)):
         (tmp_path / "bad" / "facts.json").write_text(text)
         with pytest.raises(HierarchyError, match=r"facts\.json cannot be read"):
             load_run(tmp_path / "bad")
@@ -125,7 +126,7 @@ def test_facts_that_are_missing_or_damaged_are_named(made, tmp_path):
         load_run(tmp_path / "bad")
 
 
-# The kinematic tree.
+# The facts of a robot.
 
 CART = """<robot name="cart"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
 <link name="e"/>

@@ -13,8 +13,8 @@ from scenarios.draw.figures import drawing
 from scenarios.recording.recording import DepthView
 
 _POINT, _NEAREST, _TIP = "#2fb344", "#2f6bff", "#17c3d6"
-_NO_READING = "#000000"
-_SHADES = ListedColormap(np.repeat(np.linspace(1.0, 0.2, 256)[:, None], 3, axis=1))
+_SHADES = ListedColormap(np.repeat(np.linspace(1.0, 0.2, 256)[:, None], 3, axis=1)
+                         ).with_extremes(bad="#000000")
 _CONTRAST = 1.1  # everything farther than the points by this factor is equally dark
 _AROUND = 0.35   # [m] shown around the points
 
@@ -30,7 +30,11 @@ def depth_figure(view: DepthView) -> Figure:
     pinhole = Pinhole(width, height, fx, fy, cx, cy, view.camera[4:7],
                       view.camera[7:].reshape(3, 3))
     pixels = pinhole.project(view.points)
-    _image(ax, np.asarray(view.image, dtype=float), pixels[:, 2])
+    reading = np.asarray(view.image, dtype=float)
+    read = reading[reading > 0.0]
+    near = float(np.quantile(read, 0.001)) if read.size else 0.0
+    ax.imshow(np.where(reading > 0.0, reading, np.nan), cmap=_SHADES, vmin=near,
+              vmax=max(_CONTRAST * float(pixels[:, 2].max()), near + 0.1), interpolation="nearest")
     ends = [divmod(int(at), pinhole.width)[::-1] if at >= 0 else None for at in view.pixel]
     tip = len(pixels) - 1
     for k, end in enumerate(ends):
@@ -53,15 +57,6 @@ def depth_figure(view: DepthView) -> Figure:
                   borderpad=0.0, handlelength=1.4, frameon=False, fontsize=9.0)
     ax.set_title(f"t = {view.t:.2f} s", pad=4.0, loc="left", fontsize=9.0)
     return fig
-
-
-def _image(ax: Axes, reading: Array, depths: Array) -> None:
-    read = reading[reading > 0.0]
-    near = float(np.quantile(read, 0.001)) if read.size else 0.0
-    far = max(_CONTRAST * float(depths.max()), near + 0.1)
-    shades = _SHADES.with_extremes(bad=_NO_READING)
-    ax.imshow(np.where(reading > 0.0, reading, np.nan), cmap=shades, vmin=near, vmax=far,
-              interpolation="nearest")
 
 
 def _show(ax: Axes, pixels: Array, around: float, shape: tuple[int, ...]) -> None:

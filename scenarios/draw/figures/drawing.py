@@ -20,9 +20,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
+from hierarchy.problem import Array
 from scenarios.draw.figures.palette import looks
-
-Array = NDArray[np.float64]
 
 # Text, axes and desired curves. In an inline SVG it becomes the text colour of the page.
 INK = "#0b0c0d"
@@ -49,19 +48,19 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class _Powers(LogFormatter):
-    """Labels of a logarithmic axis as plain text, which takes a tenth of the time of formulas."""
+    """Labels of a logarithmic axis as plain text, which takes a tenth of the time of formulas.
+
+    They are `20`, `10⁻⁸` or `2·10⁵`.
+    """
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        return in_powers(x) if super().__call__(x, pos) else ""
-
-
-def in_powers(x: float) -> str:
-    """Return a positive number as `20`, `10⁻⁸` or `2·10⁵`."""
-    if 1e-2 <= x < 1e4:
-        return f"{x:g}"
-    mantissa, exponent = f"{x:.0e}".split("e")
-    power = "10" + str(int(exponent)).translate(_RAISED)
-    return power if mantissa == "1" else f"{mantissa}·{power}"
+        if not super().__call__(x, pos):
+            return ""
+        if 1e-2 <= x < 1e4:
+            return f"{x:g}"
+        mantissa, exponent = f"{x:.0e}".split("e")
+        power = "10" + str(int(exponent)).translate(_RAISED)
+        return power if mantissa == "1" else f"{mantissa}·{power}"
 
 
 def make_logarithmic(ax: Axes, which: Literal["x", "y"]) -> None:

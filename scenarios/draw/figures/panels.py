@@ -11,8 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hierarchy import plugins
+from hierarchy.problem import Array
 from scenarios.draw.figures import drawing
-from scenarios.draw.figures.drawing import ALERT, INK, MEASURED, Array
+from scenarios.draw.figures.drawing import ALERT, INK, MEASURED
 from scenarios.recording.listed import errors
 from scenarios.recording.recording import Recording
 

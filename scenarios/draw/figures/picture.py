@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from hierarchy.avoidance import Obstacles
+from hierarchy.problem import Array
 from scenarios.cell.sensors.sensor import make_obstacles
 from scenarios.draw.figures import drawing
-from scenarios.draw.figures.drawing import ALERT, INK, Array
+from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.recording.facts import RobotFacts
 from scenarios.recording.recording import Recording
 from scenarios.scene import ends, place

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from email.message import Message
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -87,10 +87,9 @@ class _Handler(BaseHTTPRequestHandler):
             self.close_connection = True
             self._send(HTTPStatus.FORBIDDEN, "", "text/plain")
             return
-        try:
+        asked = None
+        with suppress(ValueError, RecursionError):
             asked = json.loads(self.rfile.read(int(size)))
-        except (ValueError, RecursionError):
-            asked = None
         if isinstance(asked, dict):
             self._send(HTTPStatus.OK, self.answers(asked), "application/json")
         else:
