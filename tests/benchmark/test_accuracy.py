@@ -60,12 +60,3 @@ def test_damped_resolvers_but_reverse_agree_with_the_damped_reference(tables):
     for row in errors:
         if row["case"] == "damped" and row["entrant"] in claims().keys() - {"reverse in-order"}:
             assert row["x_max"] < claims()[row["entrant"]], row
-
-
-def test_the_table_tells_who_is_not_strict(tables):
-    errors, _ = tables
-    found = {(row["case"], row["entrant"]): row for row in errors}
-    assert found["conflict", "augmented"]["task_1_max"] > 0.1
-    assert found["regular", "tpm-published"]["task_3_max"] < 1e-9
-    assert found["crowded", "tpm-published"]["task_4_max"] > 0.1
-    assert found["crowded", "tpm-published"]["certified"] < 1.0

@@ -121,6 +121,21 @@ def test_it_is_the_sum_of_what_each_near_point_asks_for(lever):
     assert 8 < counted < 32, "some points are near, and some are not"
 
 
+@levels
+def test_the_rows_are_the_identity_with_the_box_as_sides(level):
+    for q, v in STATES[:5]:
+        state = state_at(q, v)
+        A, low, up = np.full((9, 7), 5.0), np.full(9, 5.0), np.full(9, 5.0)
+        task().writer(state, level, A, low, up, 1)()
+        np.testing.assert_array_equal(A[1:8], np.eye(7))
+        np.testing.assert_array_equal([low[1:8], up[1:8]], task().box(state, level))
+        assert (A[[0, 8]] == 5.0).all()
+        assert (low[[0, 8]] == up[[0, 8]]).all()
+        assert not task().jacobian_derivative(state).any()
+        np.testing.assert_array_equal(task().jacobian(state), np.eye(7))
+        np.testing.assert_array_equal(task().error(state), LIMITS.error(state))
+
+
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("base", [None, JointDamping(7, 3.0), Posture((0.1,) * 7)])
 def test_a_stack_has_it_as_its_null_space_term_added_to_the_base(level, base):

@@ -246,22 +246,6 @@ def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():
     np.testing.assert_allclose(low, np.clip(least, wide_low, wide_up), rtol=0, atol=1e-9)
 
 
-def test_a_joint_that_is_thrown_at_its_limit_stops_before_it_without_a_jump():
-    rng, one, T, H = np.random.default_rng(2), np.ones(500), 1e-3, 0.05
-    left, v = rng.uniform(5e-3, H, 500), rng.uniform(0.02, 1.2, 500)  # s and rad/s
-    q = 1.0 - v * left
-    limits = Limits(-one, one, 1.0 * one, 300.0 * one, T, H)
-    sides = []
-    for _ in range(300):
-        low, up = limits.box(q, v, "acceleration")
-        sides.append(up)
-        q, v = q + T * v + 0.5 * T**2 * up, v + T * up
-        assert (low <= up).all()
-        assert (q <= 1.0).all()
-    most = 1.5 * (1.0 / left**2 + 2.0 / left * abs(np.array(sides)).max(axis=0)) * T
-    assert (abs(np.diff(sides, axis=0)) <= most).all()
-
-
 @LEVELS
 def test_a_horizon_of_at_most_a_tick_changes_nothing(level):
     for q, v in states(5):

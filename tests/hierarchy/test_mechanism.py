@@ -3,10 +3,11 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from mechanisms import four_bar
 
 from hierarchy import Robot, Stack, State
 from hierarchy.contacts import Contacts
-from hierarchy.robots.found import Coupled, Loop
+from hierarchy.robots.found import Loop
 from hierarchy.tasks import Posture
 from hierarchy.tasks.mechanism import Mechanism, model_rows
 from solvers import make
@@ -15,32 +16,12 @@ PERIOD = 0.001  # [s]
 TILT = pin.exp3(np.array([0.4, -0.3, 0.2]))
 
 
-def four_bar(rigid=False):
-    """A crank that turns on, a coupler and a rocker, and two fingers on the coupler.
-
-    The rocker turns in a ball where it meets the ground, so that the chain is not planar.
-    """
-    model, offsets = pin.Model(), {"crank": 0.0, "coupler": 0.2, "finger": 0.1, "thumb": 0.2,
-                                   "rocker": 0.5}
-    kinds = {"crank": pin.JointModelRUBY(), "rocker": pin.JointModelSpherical()}
-    numbers = {}
-    for name, x in offsets.items():
-        parent = numbers.get({"coupler": "crank", "finger": "coupler", "thumb": "coupler"}.get(
-            name), 0)
-        place = pin.SE3(np.eye(3) if parent else TILT, (np.eye(3) if parent else TILT) @ [x, 0, 0])
-        numbers[name] = model.addJoint(parent, kinds.get(name, pin.JointModelRY()), place, name)
-        model.appendBodyToJoint(numbers[name], pin.Inertia(1.0, np.array([0.1, 0, 0]),
-                                                           0.01 * np.eye(3)), pin.SE3.Identity())
-    for name, joint, x in (("end", "coupler", 0.4), ("tip", "rocker", 0.3)):
-        model.addFrame(pin.Frame(name, numbers[joint], 0, pin.SE3(np.eye(3), np.array([x, 0, 0])),
-                                 pin.FrameType.OP_FRAME))
-    robot = Robot(model, "four-bar")
-    robot.loops = (Loop("pin", ("end", "tip"), rigid),)
-    robot.coupled = (Coupled("thumb", "finger", (0.1, -1.0, 0.5)),)
-    return robot
+def bar(rigid=False):
+    """Four bars whose rocker turns in a ball where it meets the ground: the chain is not planar."""
+    return four_bar(rigid, TILT, pin.JointModelSpherical())
 
 
-ROBOT = four_bar()
+ROBOT = bar()
 GOAL = {"crank": -0.4, "finger": 0.5}
 
 
@@ -60,7 +41,7 @@ def start(robot=ROBOT):
 
 @pytest.mark.parametrize("rigid", [False, True])
 def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
-    robot, h, rng = four_bar(rigid), 1e-6, np.random.default_rng(2)
+    robot, h, rng = bar(rigid), 1e-6, np.random.default_rng(2)
     (task,) = model_rows(robot)
     assert task.dimension == (7 if rigid else 4)
     q = robot.integrate(start(), 0.05 * rng.normal(size=robot.n))

@@ -8,6 +8,7 @@ import pytest
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
 from scenarios.cell.robot import start_of
+from scenarios.cli.main import run_command
 from scenarios.config.robot import StartSection
 
 mujoco = pytest.importorskip("mujoco")
@@ -243,19 +244,6 @@ def test_couplings_are_polynomials_of_positions(written):
     np.testing.assert_allclose(held.coefficients, [np.polyval(one.coefficients[::-1], 0.3)])
 
 
-@pytest.mark.parametrize(("before", "after", "said"), [
-    ('0" size', '0"size', ""), ("<worldbody>", "<!-- a--b --><worldbody>", ""),
-    ("</worldbody>", "", "cannot be read: XML")])
-def test_what_is_not_quite_xml_is_left_to_mujoco(before, after, said, written):
-    path = written(world(link("a")))
-    path.write_text(path.read_text().replace(before, after, 1))
-    if said:
-        with pytest.raises(RobotError, match=said):
-            Robot.load(path)
-    else:
-        assert Robot.load(path).joint_names == ("a_joint",)
-
-
 def test_tendons_that_keep_their_length_couple_their_joints(written):
     tie = ('<fixed name="{0}"><joint joint="{1}" coef=".5"/><joint joint="{2}" coef="-2"/></fixed>'
            '<fixed name="{2}"><joint joint="{2}" coef="3"/></fixed>')
@@ -312,3 +300,29 @@ def test_keyframes_are_starts(written):
     np.testing.assert_allclose(start_of(held, moved)[0], [0.1])
     with pytest.raises(UnknownNameError, match="unknown keyframe 'hom'"):
         robot.start("hom")
+
+
+def test_a_difference_from_mujoco_names_the_body(written, monkeypatch):
+    from hierarchy.robots.mjcf import model
+
+    path, exact = written(world(link("a", more=link("b")))), model.pose
+    monkeypatch.setattr(model, "pose", lambda place, turn: exact(place * (1.0 + 1e-8), turn))
+    with pytest.raises(RobotError, match=r"body 'a' is 3e-09 from where MuJoCo has it"):
+        Robot.load(path)
+    monkeypatch.setattr(model, "pose", exact)
+    monkeypatch.setattr(model, "_turned", lambda _, diagonal: np.diag(diagonal * (1.0 + 1e-6)))
+    with pytest.raises(RobotError, match=r"the inertia at body '[ab]' is "):
+        Robot.load(path)
+
+
+def test_check_shows_what_the_file_has_besides_joints(written, capsys):
+    path = written(world(
+        link("a", more=link("b", more=link("c"))) + TABLE,
+        '<contact><exclude body1="a" body2="c"/></contact><keyframe><key name="home"/></keyframe>'
+        '<equality><connect name="close" body1="a" body2="c" anchor="0 0 0"/></equality>'))
+    assert run_command(["check", str(path), "--set", "robot.root=a"]) == 0
+    said = capsys.readouterr().out
+    for part in ("closed chain    close: close 1 and close 2 have one origin",
+                 "keyframes       home", "may touch       a_joint to c_joint",
+                 "missing         left out, since it is not under root: table", 'root = "a"'):
+        assert part in said, part

@@ -48,12 +48,6 @@ def test_position_velocity_and_acceleration_do_not_jump(name):
         np.testing.assert_allclose(path(t - 1e-9), path(t + 1e-9), atol=1e-6)
 
 
-def test_a_circle_turns_about_its_normal():
-    start, later = (circle((0, 0, 0), 1.0)(t)[0] for t in (0.0, 0.1))
-    np.testing.assert_allclose(start, [1.0, 0.0, 0.0])
-    assert np.cross(start, later)[2] == pytest.approx(np.sin(0.1))
-
-
 def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
     path = PATHS["blended"]
     for i in (1, 2):

@@ -7,7 +7,6 @@ from hierarchy.avoidance import Barrier, Measurement, Obstacle, Obstacles, Pairs
 from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import JointDamping, Position, Separation
 from scenarios.cell.sensors import ExactDistances
-from solvers import make
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 ROUND = Ellipse((0.3, 0.5, 0.2), (0.2, 0.1, 0.0), (0.0, 0.1, 0.3), rate=2.0)
@@ -89,18 +88,6 @@ def test_compiled_rows_equal_those_of_the_plain_methods(level, differences, obst
         _, lower, _ = compiled_rows(task, state, level)
         sided += np.isfinite(lower).sum()
     assert 0 < sided < 5 * task.dimension
-
-
-def test_rows_beyond_the_influence_change_nothing():
-    task = Separation(SENSOR.points, Barrier(0.0, influence=1e-3), len(SHAPES))
-    for level in LEVELS:
-        state = seen_at(*STATES[2])
-        with_rows = Stack([task, Position(FRAME, ROUND)], level).hierarchy(state)
-        assert (with_rows.lower[:54] == -np.inf).all()
-        assert (with_rows.upper[:54] == np.inf).all()
-        without = Stack([Position(FRAME, ROUND)], level).hierarchy(state)
-        np.testing.assert_allclose(make("hcod").solve(with_rows).x,
-                                   make("hcod").solve(without).x, rtol=1e-12)
 
 
 GOAL = tuple(State.at(ROBOT, START).position(FRAME) + np.array([-0.25, 0.05, 0.1]))

@@ -2,10 +2,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scene import FRAME, PATH, ROBOT, TASKS, Elbow, state_at, states
+from scene import FRAME, PATH, ROBOT, TASKS, state_at, states
 
 from hierarchy import HierarchyError, Stack, State
-from hierarchy.errors import ReadingError
 from hierarchy.tasks import JointDamping, JointLimits, LookAt, Position
 
 Q, V = states(1)[0]
@@ -70,33 +69,6 @@ def test_stacks_that_share_a_task_change_nothing_in_it(name):
         np.testing.assert_array_equal(getattr(task, key), value)
 
 
-@dataclass(frozen=True)
-class Slower(Position):
-    """A compiled task of the package, changed in plain numpy."""
-
-    def writer(self, state, level, A, lower, upper, row):
-        write_whole = super().writer(state, level, A, lower, upper, row)
-
-        def write():
-            write_whole()
-            lower[row:row + 3] *= 0.5
-            upper[row:row + 3] *= 0.5
-
-        return write
-
-
-def test_tasks_in_plain_numpy_stand_beside_compiled_ones():
-    s, state = Stack([Slower(FRAME, PATH), Elbow(), TASKS["pointing"]]), state_at(Q, V)
-    whole = Stack([Position(FRAME, PATH), TASKS["pointing"]])
-    for q in (Q, Q + 0.1):
-        state.move(0.7, q, V)
-        h, known = s.hierarchy(state), whole.hierarchy(state)
-        np.testing.assert_array_equal(h.A, np.vstack([known.A[:3], np.eye(7)[3:4], known.A[3:]]))
-        np.testing.assert_array_equal(h.lower[:3], 0.5 * known.lower[:3])
-        assert h.lower[3] == h.upper[3] == 10.0 * (1.0 - q[3])
-        assert h.lower[4] == known.lower[3]
-
-
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("task", [JointDamping(7, 5.0), JointDamping(7, 2.0, "mass"),
                                   TASKS["posture"]], ids=["identity", "mass", "posture"])
@@ -154,12 +126,3 @@ def test_a_task_whose_sides_cross_is_named_with_its_row():
     third = ROBOT.velocity_names[2]
     with pytest.raises(HierarchyError, match=f"task 'joint limits', {third}: no value lies betw"):
         stack.hierarchy(state_at(Q, V))
-
-
-def test_a_state_that_was_moved_to_what_is_not_finite_has_no_rows_until_the_next_move():
-    stack, state = Stack([TASKS["position"]]), state_at(Q, V)
-    assert not state.move(0.0, np.full(7, np.nan), V)
-    with pytest.raises(ReadingError, match="is not finite; stop the robot"):
-        stack.hierarchy(state)
-    assert state.move(0.0, Q, V)
-    stack.hierarchy(state)

@@ -139,21 +139,14 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
 
 @pytest.mark.parametrize(("changed", "said"), [
     ({"arm": INERTIAL.replace("0.4", "-0.4")}, "inertias of arm: a principal moment is negative"),
-    ({"arm": INERTIAL.replace("0.01", "0.9")}, "inertias of arm: a principal moment is negative"),
     ({"arm": '<inertial><mass value="1"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>'
              "</inertial>"}, "inertias of arm: a principal moment is zero, though"),
-    ({"arm": INERTIAL.replace("0.4", "${x}")}, "inertial of arm cannot be read: Inertial: inertia"),
-    ({"arm": '<inertial><mass value="3"/></inertial>'}, "inertial of arm cannot be read: Inertial"),
     ({"arm": '<collision><geometry><box size="1 2"/></geometry></collision>'},
      "collision of arm cannot be read: Parser found 2 elements"),
-    ({"arm": '<collision><geometry><pyramid/></geometry></collision>'}, "type 'pyramid'"),
-    ({"arm": "<visual/>"}, "visual of arm cannot be read"),
     ({"arm": INERTIAL.replace("0.4", "${x}")}, "the macros ${x} stand for is not in the robot"),
     ({"more": '<xacro:gripper side="left"/>'}, "the macros <xacro:gripper> stand for"),
     ({"more": '<x:gripper xmlns:y="" side="left"/>', "root": ' xmlns:x="http://wiki.ros.org/xacro"'},
      "the macros <x:gripper> stand for"),
-    ({"limit": '<limit lower="-1" upper="1" velocity="0" effort="3"/>'},
-     "velocity limits of only: none, or 0, which is no limit"),
     ({"limit": '<limit lower="-1" upper="1" velocity="2" effort="0"/>'}, "effort limits of only:"),
     ({"kind": "planar"}, "limits of only: a floating or planar joint has none"),
     ({"kind": "planar", "axis": ""}, "planar joints only: their planes are normal to x"),
@@ -192,14 +185,11 @@ def test_the_root_element_says_what_a_file_is(load, name):
 
 @pytest.mark.parametrize(("name", "text", "said"), [
     ("a.sdf", "<sdf/>", r"is an SDF \(Gazebo\), which is not read; give the URDF"),
-    ("a.world", '<sdf version="1.6"><world name="w"/></sdf>', "is an SDF"),
-    ("a.urdf", "<sdf/>", "is an SDF"),
     ("a.xacro", "<robot name='r'><xacro:include filename='b'/></robot>",
      r"has macros, such as <xacro:include>; .*xacro in\.xacro > out\.urdf"),
     ("a.urdf", "<robot name='r'><xacro:include filename='b'/></robot>", r"no link.*out\.urdf"),
     ("a.urdf", "<launch/>", r"starts with <launch>; expected a URDF \(<robot>\) or an MJCF"),
     ("a.xml", "<mujocoinclude/>", "give the file that includes it"),
-    ("a.dae", "<COLLADA/>", "is a mesh"),
     ("a.toml", "name = 'a'", r"A scenario is read by scenarios\.load"),
     ("a.urdf", "<robot/>", "its <robot> has no name"),
     ("a.urdf", "<robot name='r'><link name='table'/></robot>", "with base = 'floating'"),

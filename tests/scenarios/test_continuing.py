@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from hierarchy.avoidance import Obstacle, Obstacles
-from hierarchy.paths import Ellipse, Shifted, Waypoints
+from hierarchy.paths import Waypoints
 from scenarios.cell.build import build
-from scenarios.config import ScenarioError, load
+from scenarios.config import load
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 
-ELLIPSE = Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0))
 WAY = Waypoints((0.0, 1.0), ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
 
 
@@ -22,15 +21,6 @@ def drive(controller, recorder, first, ticks):
         recorder.look()
 
 
-@pytest.mark.parametrize("path", [ELLIPSE, WAY], ids=["ellipse", "waypoints"])
-def test_a_shifted_path_differs_by_its_offset_and_moves_alike(path):
-    shifted, out = Shifted(path, (0.1, -0.2, 0.3)), np.empty((3, 3))
-    shifted.writer(out)(0.4)
-    assert (out == shifted(0.4)).all()
-    assert out[0] == pytest.approx(path(0.4)[0] + [0.1, -0.2, 0.3])
-    assert (out[1:] == path(0.4)[1:]).all()
-
-
 def test_an_obstacle_that_was_shifted_keeps_its_offset_while_it_moves():
     obstacles = Obstacles([Obstacle("point", (0.1, 0.2, 0.3)),
                            Obstacle("sphere", (0.0, 0.0, 0.0), (0.1,), path=WAY)])
@@ -40,15 +30,6 @@ def test_an_obstacle_that_was_shifted_keeps_its_offset_while_it_moves():
     assert obstacles.centres[0] == pytest.approx([0.1, 0.3, 0.3])
     for t in (0.0, 0.5, 1.0):
         assert obstacles.at(t)[1, 4:7] == pytest.approx(WAY(t)[0] + [0.0, 0.1, 0.0])
-
-
-def test_a_change_of_a_scenario_is_validated():
-    scenario = load("ellipse")
-    assert scenario.with_changes({"pointing.alpha_d": 35.0}).pointing.alpha_d == 35.0
-    with pytest.raises(ScenarioError, match=r"avoidance.*near = 0.3 m is beyond far = 0.15 m"):
-        scenario.with_changes({"avoidance.near": 0.3})
-    with pytest.raises(ScenarioError, match="alpha"):
-        scenario.with_changes({"pointing.alpha": 35.0})
 
 
 @pytest.mark.slow

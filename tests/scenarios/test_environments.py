@@ -4,13 +4,15 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 
 import pytest
 
-from scenarios import load_run
+from scenarios import load, load_run, simulate
 from scenarios.cli import doctor
 from scenarios.cli.main import run_command
 from scenarios.files import OutputError, claim, slug, whole, write_text
+from scenarios.measure import run_folder
 
 COMMAND = [sys.executable, "-c", "from scenarios.cli.start import main; main()"]
 RUN = [*COMMAND, "run", "ellipse", "--duration", "0.02", "--out", "a"]
@@ -100,3 +102,12 @@ def test_a_missing_package_says_how_to_get_it(monkeypatch):
     assert found["osqp"].remedy == "pip install osqp"
     assert found["export"].remedy == "pip install 'task-hierarchy[export]'"
     assert found["export"].well is None
+
+
+def test_a_run_that_cannot_be_saved_where_it_should_is_saved_elsewhere(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / "file").touch()
+    said = run_folder.kept(simulate(load("ellipse", ["control.duration=0.02"])),
+                           tmp_path / "file")
+    assert "cannot be written" in said
+    assert load_run(said.partition("the run is in ")[2]).ticks == 20

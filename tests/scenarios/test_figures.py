@@ -7,7 +7,7 @@ from hand_made import HandMadeScenario, recording
 from hierarchy import HierarchyError
 from scenarios.config import load
 from scenarios.config.kinds.frames import ListedPosition
-from scenarios.draw.figures import drawing, letter, palette, panels
+from scenarios.draw.figures import letter, palette, panels
 from scenarios.draw.figures.timeline import timeline
 from scenarios.loop.simulation import simulate
 from scenarios.measure.run_folder import save
@@ -26,12 +26,6 @@ def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
     assert looks["tpm-published"].colour == looks["tpm"].colour
     assert looks["hqp proxqp"].dash == palette.SOLID
     assert len(set(looks.values())) == 5
-
-
-def test_shared_limits_leave_out_the_one_run_that_would_flatten_the_others():
-    low, high = drawing.shared_limits([(-1.0, 1.0), (-1.2, 1.1), (-80.0, 90.0)])
-    assert -2.0 < low < -1.2
-    assert 1.1 < high < 2.0
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from hand_made import recording
 
 from scenarios import load, simulate
 from scenarios.measure.given_up import given_up
-from scenarios.measure.goals import goals, percent
+from scenarios.measure.goals import goals
 from scenarios.measure.runs import Run
 from scenarios.measure.verdict import lines, table, verdict, verdicts
 
@@ -73,12 +73,6 @@ def test_three_sentences_say_the_end_the_promises_and_the_targets():
 def test_a_goal_has_a_flag_and_its_worst_distance(signals, name, flag, worst, unit):
     one = goal(name, **signals)
     assert (one.flag, one.worst, one.unit) == (flag, pytest.approx(worst), unit)
-
-
-@pytest.mark.parametrize(("share", "said"), [
-    (0.0012, "0.12 %"), (0.9949, "99 %"), (0.995, "100 %"), (1.0, "100 %")])
-def test_a_share_is_said_in_two_digits_up_to_all(share, said):
-    assert percent(share) == said
 
 
 def run(label, **signals):

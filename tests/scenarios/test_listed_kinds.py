@@ -6,13 +6,15 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, State, plugins
-from hierarchy.tasks import JointCoupling, SelfSeparation, Separation
+from hierarchy import HierarchyError, plugins
+from hierarchy.tasks import JointCoupling, Separation
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import KinematicArm
+from scenarios.cell.sensors import ExactDistances
 from scenarios.config.plant import AnyPlant
 from scenarios.config.sections import Unit
+from scenarios.config.sensor import AnySensor
 from scenarios.config.tasks import Listed
 from scenarios.measure.metrics import measure
 
@@ -60,21 +62,6 @@ def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path)
 def test_a_task_is_made_of_its_keys(task, tmp_path):
     made = build(scenario_of(tmp_path, {**task, "damping": 3.0})).stack[task["kind"]]
     assert made.damping == 3.0
-
-
-@pytest.mark.slow
-def test_self_collision_is_a_task_of_the_list(tmp_path):
-    apart = {"kind": "self-collision", "distance": 0.02, "name": "apart"}
-    home = {"kind": "posture", "target": [0.9, -1.9, 0.9, 2.0, 1.0, 1.9, 0.3]}
-    cell = build(scenario_of(tmp_path, home, apart))
-    assert cell.stack.names == ("posture", "apart")
-    assert isinstance(cell.stack["apart"], SelfSeparation)
-    scenario = scenario_of(tmp_path, apart, home)
-    assert scenario.asks == "inequalities"
-    run = simulate(scenario)
-    task = build(scenario).stack["apart"]
-    robot = build(scenario).robot
-    assert min(task.distances(State.at(robot, q)).min() for q in run["q"]) > 0.0199
 
 
 @pytest.mark.slow
@@ -171,7 +158,7 @@ def test_tasks_over_forces_have_their_rows():
 
 def test_every_kind_has_a_test_here(request):
     text = request.path.read_text(encoding="utf-8")
-    tested = {"pose", "com", "pointing"}  # in test_humanoid.py
+    tested = {"pose", "com", "pointing", "posture"}  # in test_humanoid.py, test_mechanism.py
     assert [kind for kind in plugins.registered("tasks")
             if f'"{kind}"' not in text and kind not in tested] == []
 
@@ -228,3 +215,17 @@ def test_a_new_plant_is_its_class_and_one_section(kinds, tmp_path):
             for plant in ({"kind": "kinematic"}, {"kind": "slow", "share": 0.5})]
     exact, slow = (run["q"][1] - run["q"][0] for run in runs)
     np.testing.assert_allclose(slow, 0.5 * exact)
+
+
+def test_a_new_sensor_is_its_class_and_one_section(kinds, tmp_path):
+    @plugins.register("sensors", "near", shipped=True)
+    class NearSection(AnySensor):
+        foot: ClassVar[float] = 0.0
+        kind: Literal["near"]
+
+        def made(self, robot, **given):
+            return given["exact"]
+
+    avoidance = {"kind": "separation", "obstacles": [[0.1, 0.5, 0.1]]}
+    cell = build(scenario_of(tmp_path, COUPLING, avoidance=avoidance, sensor={"kind": "near"}))
+    assert isinstance(cell.sensor, ExactDistances)

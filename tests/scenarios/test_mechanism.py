@@ -3,12 +3,12 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from mechanisms import four_bar
 
 from hierarchy import Robot, State, plugins
 from hierarchy.contacts import Contacts
 from hierarchy.paths import Still
-from hierarchy.robots.found import Coupled, Loop
-from hierarchy.tasks import Position
+from hierarchy.tasks import Position, Posture
 from hierarchy.tasks.mechanism import Mechanism
 from scenarios import simulate
 from scenarios.cell.build import build
@@ -17,27 +17,6 @@ from scenarios.config import Scenario, ScenarioError
 from scenarios.config.plant import TorqueSection
 from scenarios.loop.first_tick import first_tick
 from solvers import solve_ik
-
-
-def four_bar():
-    """A crank that turns on, a coupler with two fingers and a rocker that are pinned together."""
-    model, numbers = pin.Model(), {"base": 0}
-    for name, parent, x in (("crank", "base", 0.0), ("coupler", "crank", 0.2),
-                            ("finger", "coupler", 0.1), ("thumb", "coupler", 0.2),
-                            ("rocker", "base", 0.5)):
-        kind = pin.JointModelRUBY() if name == "crank" else pin.JointModelRY()
-        joint = numbers[name] = model.addJoint(
-            numbers[parent], kind, pin.SE3(np.eye(3), np.array([x, 0.0, 0.0])), name)
-        model.appendBodyToJoint(joint, pin.Inertia(1.0, np.array([0.1, 0.0, 0.0]),
-                                                   0.01 * np.eye(3)), pin.SE3.Identity())
-    model.effortLimit[:], model.upperVelocityLimit[:] = 100.0, 5.0
-    for name, joint, x in (("end", "coupler", 0.4), ("tip", "rocker", 0.3)):
-        model.addFrame(pin.Frame(name, numbers[joint], 0, pin.SE3(np.eye(3), np.array([x, 0, 0])),
-                                 pin.FrameType.OP_FRAME))
-    robot = Robot(model, "four-bar", "end")
-    robot.loops = (Loop("pin", ("end", "tip"), False),)
-    robot.coupled = (Coupled("thumb", "finger", (0.1, -1.0, 0.5)),)
-    return robot
 
 
 @pytest.fixture(autouse=True)
@@ -248,3 +227,16 @@ def test_limits_hold_for_a_floating_base(level):
     assert np.abs(run["v"][:, :3]).max() == pytest.approx(2.0)
     with pytest.raises(ScenarioError, match="has a fixed base"):
         build(scenario(limits={"acceleration": 5.0, "base_speed": [1.0, 1.0]}))
+
+
+@pytest.mark.parametrize(("rod", "resolver"), [(BALL, "hcod"), (CROSS, "tpm")])
+def test_an_ankle_stays_closed_in_a_loop_of_inverse_kinematics(rod, resolver, tmp_path):
+    path, robot = ankle_at(tmp_path, rod)
+    goal = Posture({"pitch": -0.8, "roll": 0.2}, gain=10.0, robot=robot)
+    q, memory = [robot.rest], None
+    for _ in range(60):
+        step = solve_ik(robot, q[-1], [goal], memory=memory, resolver=resolver, limits=False)
+        memory = step.memory
+        q.append(robot.integrate(q[-1], 0.01 * step.v))
+    assert np.abs(robot.difference(q[0], q[-1])).max() > 0.1, "it moved"
+    assert largest_residual(path, q) < 1e-9

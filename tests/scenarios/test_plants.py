@@ -4,7 +4,6 @@ import sys
 
 import numpy as np
 import pytest
-from pendulum import LIMIT, URDF
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacles
@@ -198,10 +197,14 @@ def test_a_setting_that_does_not_fit_is_named(mujoco, changes, said):
 
 
 def test_only_an_arm_given_as_a_table_has_physics(mujoco, tmp_path):
-    (tmp_path / "arm.urdf").write_text(URDF.format(kind="revolute", limit=LIMIT))
+    (tmp_path / "arm.urdf").write_text(
+        '<robot name="arm"><link name="base"/><link name="hand"/><joint name="hinge" '
+        'type="revolute"><parent link="base"/><child link="hand"/><axis xyz="0 1 0"/>'
+        '<limit lower="-1" upper="2" velocity="3" effort="10"/></joint></robot>')
     with pytest.raises(ScenarioError, match="robot 'arm' is not one of kuka_lwr"):
         build(load("ellipse", ["plant.kind=mujoco", f"robot.model={tmp_path}/arm.urdf",
-                               "robot.end_effector=hand", "start={q=[0.0]}"]))
+                               "robot.end_effector=hand", "start={q=[0.0]}",
+                               "robot.control_points=[{joint='hinge', offset=[0, 0, 1]}]"]))
 
 
 @pytest.mark.parametrize("level", ["acceleration", "velocity"])

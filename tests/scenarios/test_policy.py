@@ -100,16 +100,6 @@ def controller(*changes, name="ellipse"):
     return made, made.cell.plant.q.copy(), made.cell.plant.v.copy()
 
 
-@pytest.mark.parametrize("status", STATUSES)
-def test_the_policy_of_a_status_is_followed(status):
-    kind = status.name.lower()
-    c, q, v = controller(f"control.policy.{kind}=hold")
-    good = c.command(0.0, q, v)
-    c.resolver.status = status
-    np.testing.assert_array_equal(c.command(0.001, q + 0.1, v), good)
-    assert list(c.policy.events) == [(kind, "hold")]
-
-
 @pytest.mark.parametrize("what", ["q", "v"])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_what_is_measured_may_be_nan_at_the_first_tick_already(what, bad):

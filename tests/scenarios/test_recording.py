@@ -58,6 +58,8 @@ def test_a_save_that_breaks_leaves_nothing_behind(tmp_path):
 
 @pytest.mark.usefixtures("hand_made_scenarios")
 def test_a_file_that_is_cut_off_or_has_wrong_bits_is_named(tmp_path):
+    with pytest.raises(HierarchyError, match=r"no run\.npz"):
+        load_run(tmp_path)
     save(recording(), tmp_path)
     whole, rng, refused = (tmp_path / "run.npz").read_bytes(), np.random.default_rng(1), 0
     for trial in range(150):

@@ -68,6 +68,7 @@ def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
         for task, violation, fate in zip(levels.names, found, fates, strict=True):
             assert np.isclose(violation, expected.get(task, np.nan), atol=1e-9, equal_nan=True)
             assert (fate == Fate.ABSENT) == (task not in expected)
+            assert (fate == Fate.MISSED) == (violation > 1e-5) or 1e-9 < violation < 1e-3
 
 
 def test_distances_that_are_not_those_recorded_leave_levels_unknown(runs):

@@ -8,7 +8,7 @@ import scene
 from hierarchy import Hierarchy, Stack
 from hierarchy.tasks import JointLimits
 from scenarios.loop.transition import Blend, Key
-from solvers import Resolution, Status, make
+from solvers import make
 
 A, B, C = Key(("position",)), Key(("position", "pointing")), Key(("pointing", "position"))
 TIME, PERIOD = 0.1, 0.001
@@ -99,23 +99,6 @@ def test_bounds_that_both_stacks_have_on_top_are_kept(level):
         low, up = limits.box(state, level)
         assert (low - 1e-9 <= x).all()
         assert (x <= up + 1e-9).all()
-
-
-def test_a_former_stack_without_an_answer_is_left_out():
-    class OnlyTheHand:
-        def solve(self, h, memory=None):
-            status = Status.SOLVED if h.names == ("position",) else Status.NUMERICAL_FAILURE
-            return Resolution(oracle.solve(h), status)
-
-    stack = Stack([HAND, AXIS], "velocity")
-    blend = Blend(TIME)
-    for t, order in ((0.0, ("pointing",)), (0.05, ("position",)), (0.1, ("position",))):
-        state = scene.state_at(*scene.states(1)[0], t)
-        resolution, x = blend.resolve(OnlyTheHand(), stack, state, order,
-                                      stack.hierarchy(state, order))
-    assert [key.order for key, _ in blend._visits] == [("pointing",), ("position",)]
-    assert blend.weight == 1.0
-    np.testing.assert_array_equal(x, resolution.x)
 
 
 # Closed loop. The first ticks are left out: the start is off the path, and the command jumps there.

@@ -58,20 +58,6 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_
     np.testing.assert_array_equal(live.recording()["q"][0], recording["q"][0])
 
 
-def test_the_resolver_is_switched_in_mid_motion_and_back():
-    live = Live(load("ellipse", ["control.duration=0.6"]))
-    ticks(live, 100)
-    q = live.controller.cell.plant.q.copy()
-    for spec, label in (("tpm", "tpm"), ("hcod", "hcod"), ("tpm-published", "tpm-published")):
-        live.switch(spec)
-        assert live.controller.resolver.label == label
-        assert live.controller.cell.plant.q == pytest.approx(q, abs=0.01)
-        ticks(live, 5)
-    found = live.recording()
-    assert np.abs(np.diff(found["v"], axis=0)).max() < 0.1  # rad/s
-    assert found["changed"].tolist() == [False] * 100 + [True] * 10 + [False] * 5
-
-
 def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
     live = Live(load("ellipse", ["control.duration=0.6"]))
     ticks(live, 10)

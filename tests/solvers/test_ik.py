@@ -68,25 +68,18 @@ def test_any_resolver_may_solve_it():
 
 @pytest.mark.parametrize(("call", "said"), [
     (lambda: solve_ik("kuka_lwr", Q, []), "solve_ik: robot: expected a Robot, got str 'kuka_lwr'"),
-    (lambda: solve_ik(ROBOT, Q[:3], [hand([0, 0, 0])]), "q has shape (3,), expected (7,)"),
     (lambda: solve_ik(ROBOT, Q, hand([0, 0, 0])), "solve_ik: tasks: expected a Sequence"),
-    (lambda: solve_ik(ROBOT, Q, ["hand"]), "a stack: expected a Task, got str 'hand'"),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], dt=0.0), "dt = 0.0 s must be positive"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], resolver="hcodd"), "did you mean 'hcod'"),
-    (lambda: solve_ik(ROBOT, Q, [], limits=False), "the stack is empty"),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], memory="last"),
      "solve_ik: memory: expected a Memory, got str 'last'"),
     (lambda: solve_ik(ROBOT, Q, [hand([0.1, 0, 0], gain=201.0)], dt=0.01),
      "task 'position': gain = 201 1/s times the period of 0.01 s is 2.01"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0.1, 0, 0], gain=21.0)], dt=0.1), "give at most 20 1/s"),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], dt=0.02, limits=SLOW, v=np.zeros(7)),
      "'joint limits': its period is 0.01 s, that of the "),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], limits=SLOW),
      "give v, the velocity of the tick before"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], until=0.0), "until = 0 must be positive"),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], until=1e-6, limits=SLOW),
      "with until, limits are True or"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], damping=-1.0), "solve_ik: damping"),
 ])
 def test_wrong_arguments_are_named(call, said):
     with pytest.raises(HierarchyError) as error:

@@ -1,7 +1,6 @@
 """The resolvers as a C library give the bits of Python, also in warm sequences."""
 
 import sys
-from concurrent.futures import ThreadPoolExecutor
 
 import c_library as c
 import numpy as np
@@ -79,16 +78,6 @@ def test_the_object_loaded_without_a_linker_gives_the_same_bits(folder):
     library = c.Library.unlinked(folder / "lib" / "libtask_hierarchy.a")
     for h in hierarchies(5):
         c.check_same(library, RESOLVERS[0], h)
-
-
-@pytest.mark.slow
-def test_threads_do_not_disturb_each_other(library):
-    h = family("HUM38")[0].h
-    status, alone = library.solve("hcod", h)
-    with ThreadPoolExecutor(4) as pool:
-        together = list(pool.map(lambda _: library.solve("hcod", h), range(400)))
-    assert status == c.SOLVED
-    assert all(left.answer.tobytes() == alone.answer.tobytes() for _, left in together)
 
 
 @pytest.mark.slow

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
-from hierarchy.paths import Still
-from hierarchy.tasks import JointDamping, Position
+from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make, names
 
 STRICT = [make(name) for name in names() if make(name).strict]
@@ -55,24 +53,6 @@ def test_the_answer_is_the_nearest_in_the_metric(resolver):
         assert certify(h, res.x, 1e-6).certified
         without = Hierarchy.from_levels(levels, reference)
         np.testing.assert_allclose(h.violations(res.x), without.violations(expected), atol=1e-7)
-
-
-@every
-def test_the_metric_mass_gives_the_dynamically_consistent_inverse(resolver):
-    """Khatib 1987: J^#_M = M^-1 J^T (J M^-1 J^T)^-1."""
-    robot = Robot.named("kuka_lwr")
-    rng = np.random.default_rng(2)
-    frame = robot.frame("end_effector")
-    stack = Stack([Position(frame, Still([0.1, 0.6, 0.2]))], reference=JointDamping(7, 3.0),
-                  metric="mass")
-    state = State.at(robot, rng.normal(size=7), rng.normal(size=7))
-    for _ in range(3):
-        h, M = stack.hierarchy(state), state.mass_matrix()
-        J, b, nothing = h.A, h.lower, -3.0 * state.v
-        inverse = np.linalg.solve(M, J.T) @ np.linalg.inv(J @ np.linalg.solve(M, J.T))
-        expected = inverse @ b + nothing - inverse @ (J @ nothing)
-        np.testing.assert_allclose(resolver.solve(h).x, expected, atol=100.0 * resolver.accuracy)
-        state.move(0.0, rng.normal(size=7), rng.normal(size=7))
 
 
 @pytest.mark.parametrize("resolver", INEQUALITIES, ids=lambda r: r.label)

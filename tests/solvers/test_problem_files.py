@@ -96,25 +96,22 @@ def small(tmp_path):
 
 
 @pytest.mark.parametrize(("content", "said"), [
-    ({"head": b"{"}, "head.json is not JSON"), ({"head": b"[]"}, 'does not say "format"'),
-    ({"head": b"[" * 100_000}, "head.json is nested too deep"),
+    ({"head": lambda head: head.replace(b'"seed": ', b'"seed": -0.')}, "seed is -0"),
+    ({"head": lambda head: head.replace(b'"family"', b'"famile"')}, "family is missing"),
+    ({"head": b"[]"}, 'does not say "format"'), ({"n": np.array([2, -1])}, "n = -1"),
     ({"head": None}, "not a file of problems: head.json is missing"),
     ({"head": lambda head: head.replace(b'"version": 1', b'"version": 9')},
      "version 9 of the format; known is 1"),
     ({"head": lambda head: head.replace(b'"count": ', b'"count": 1')}, "says 1"),
-    ({"head": lambda head: head.replace(b'"seed": ', b'"seed": -0.')}, "seed is -0"),
-    ({"head": lambda head: head.replace(b'"family"', b'"famile"')}, "family is missing"),
     ({"A": None}, "not a file of problems: A.npy is missing"),
     ({"A": lambda data: data[:-8] + b"\0\0\0\0\0\0\1\0"}, "SHA-256"),
     ({"A": header((10**15,))}, "A: its header says 8000000000000000 bytes, and 0 follow"),
-    ({"A": header((10**15,))[:-9]}, "A: "), ({"A": b""}, "A: "),
     ({"upper": lambda data: data.replace(b"<f8", b"<f4")}, "expected one dimension"),
     ({"sizes": np.array([10**9, 1, 2, 1])}, "problem 0 needs 2000000002 more numbers"),
     ({"levels": np.array([3, 3]), "sizes": np.array([HUGE, HUGE, 5] * 2)}, "A is too short"),
     ({"lower": np.zeros(5)}, "lower is too short: problem 1 needs 3 more numbers, there are 2"),
     ({"upper": np.array([1.0, 2, 9, 1, 2, -np.inf])}, "problem 1, level 2, row 0: no value"),
     ({"reference": np.array([0.0, np.nan, 0, 0])}, "problem 0, reference, entry 1: nan"),
-    ({"n": np.array([2**62, 2])}, "reference is too short"), ({"n": np.array([2, -1])}, "n = -1"),
     ({"n": np.array([2])}, "n is of 1 problems and levels of 2"),
     ({"levels": np.array([HUGE, 2])}, "sizes is too short")])
 def test_a_damaged_file_is_refused_and_the_reason_named(small, content, said):

@@ -69,18 +69,6 @@ def test_near_a_singularity_it_is_regularised_as_in_the_paper():
         assert np.abs(want).max() < 1e4
 
 
-def test_an_inactive_row_is_as_if_it_were_not_there():
-    rng = np.random.default_rng(6)
-    J, rate = rng.normal(size=(3, 6)), rng.normal(size=3)
-    below = (rng.normal(size=(2, 6)), rng.normal(size=2))
-    with_it = solved([(J, rate), below], [np.array([1.0, 0.0, 0.4]), np.ones(2)]).x
-    without = solved([(J[[0, 2]], rate[[0, 2]]), below], [np.array([1.0, 0.4]), np.ones(2)]).x
-    np.testing.assert_allclose(with_it, without, atol=1e-10)
-    free = solved([(J, rate), below], [np.zeros(3), np.ones(2)]).x
-    np.testing.assert_allclose(free, make("recursive").solve(Hierarchy.from_levels([below])).x,
-                               atol=1e-8)
-
-
 def steps(answer, count):
     """The largest change of the answer between neighbours on a path through the buffer."""
     answers = np.array([answer(value) for value in np.linspace(1.4, -0.2, count)])

@@ -132,15 +132,6 @@ def test_the_optimal_form_ends_nearest_to_the_reference():
             assert np.linalg.norm(x - h.reference) <= distance + 1e-8 * (1.0 + distance)
 
 
-def test_bounds_may_be_given_in_any_order_sign_and_number():
-    rows = [[0.0, -2.0], [1.0, 0.0], [0.0, 1.0]]
-    h = Hierarchy.from_levels([(rows, [-1.0, -0.1, -np.inf], [1.0, 0.2, 0.3]),
-                               (np.eye(2), [1.0, -1.0])], names=["limits", "task"])
-    np.testing.assert_allclose(BASIC.solve(h).x, [0.2, -0.2])  # the direction is kept
-    assert BASIC.solve(h).scaling[1] == pytest.approx(0.2)
-    np.testing.assert_array_equal(BASIC.solve(h).saturated, [1, 0])
-
-
 def test_a_level_without_any_scaling_adds_nothing_and_scaling_what_is_missed_helps():
     """Level 1 already moves joint 1 by -1, and 0.5 is all that the box leaves level 2."""
     h = boxed([-2.0, -0.5], [2.0, 0.5], ([[1.0, 0.0]], [-1.0]), ([[1.0, 1.0]], [1.0]))
