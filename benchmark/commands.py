@@ -194,8 +194,8 @@ def open_(family: Family = None,
               "--public", min=1, metavar="N", help="Problems of the public set. Default: that of "
               "--count.")] = None,
           limit: Annotated[float, typer.Option(
-              "--limit", min=0.1, metavar="S", help="Processor time for a problem, also with --check.")
-              ] = 10.0,
+              "--limit", min=0.1, metavar="S",
+              help="Processor time for a problem, also with --check.")] = 10.0,
           python: Annotated[str, typer.Option(
               "--python", metavar="PATH", help="Interpreter that has your entrant's package.")
               ] = "",
