@@ -118,7 +118,7 @@ def shown(claim: Claim, rows: Rows, effect: Effect) -> str:
     if not claim.rival:
         return "{:.1f} [{:.1f}, {:.1f}] % of starts".format(*(100.0 * one for one in numbers))
     if claim.below:
-        numbers = -effect.estimate, -effect.high, -effect.low
+        numbers = 0.0 - effect.estimate, 0.0 - effect.high, 0.0 - effect.low  # no minus before 0
     if claim.percent:
         middle, low, high = (100.0 * np.expm1(one) for one in numbers)
         return f"{_signed(middle)} [{_signed(low)}, {_signed(high)}] %"
