@@ -31,15 +31,6 @@ Family = Annotated[list[str] | None, typer.Option(
     "--family", metavar="NAME", help="Only this family. May be repeated.")]
 
 
-class _Benchmarks(typer.core.TyperGroup):
-    """Suggests the nearest benchmark for an unknown name."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        if args and not args[0].startswith("-"):
-            _known("benchmark", args[0], self.commands)
-        return super().resolve_command(ctx, args)
-
-
 def _known(what: str, name: str | None, names: Any) -> None:
     """Raise UnknownNameError unless a name, if there is one, is among names."""
     if name is not None and name not in names:
@@ -48,7 +39,7 @@ def _known(what: str, name: str | None, names: Any) -> None:
         raise UnknownNameError(what, name, list(names))
 
 
-bench = typer.Typer(cls=_Benchmarks, invoke_without_command=True, rich_markup_mode=None)
+bench = typer.Typer(invoke_without_command=True, rich_markup_mode=None)
 
 
 def _run(out: Path | None, *names: str, **options: Any) -> int:
@@ -203,8 +194,8 @@ def open_(family: Family = None,
               "--public", min=1, metavar="N", help="Problems of the public set. Default: that of "
               "--count.")] = None,
           limit: Annotated[float, typer.Option(
-              "--limit", min=0.1, metavar="S", help="Time limit of a problem, also with --check.")
-              ] = 10.0,
+              "--limit", min=0.1, metavar="S",
+              help="Processor time for a problem, also with --check.")] = 10.0,
           python: Annotated[str, typer.Option(
               "--python", metavar="PATH", help="Interpreter that has your entrant's package.")
               ] = "",

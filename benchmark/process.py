@@ -170,7 +170,7 @@ class Field(ExitStack):
         """Return the answers to questions, or how and why a process ended without one.
 
         An entrant whose process has ended `most` times is not asked the rest, nor is one whose
-        answers say that they took more than `patience` [s] of processor time together.
+        answers took `patience` [s] of processor time together.
         """
         found: dict[str, list[dict[str, Any]]] = {
             label: [] for label in (self.running if labels is None else labels)}
@@ -179,7 +179,7 @@ class Field(ExitStack):
             if ends[label] >= most:
                 answers.append({"ended": LEFT_OUT})
                 continue
-            if spent[label] > patience:
+            if spent[label] >= patience:
                 answers.append({"refused": SLOW})
                 continue
             try:

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 
 from benchmark.packages import OWN, Entrant
-from benchmark.peers.compare import Log, Turns, measure
+from benchmark.peers.compare import Log, measure
 from benchmark.peers.moving import QUESTIONS, judge_step, make_scenes
 from benchmark.peers.ours import arm
 from benchmark.peers.scenes import Arm
@@ -87,7 +87,7 @@ def run(resolvers: Sequence[Entrant] | None = None, duration: float = 2.0) -> Re
 
         ticks = round(duration / scene.period)
         rows, missing = measure(entrants() if resolvers is None else resolvers, QUESTIONS,
-                                (asdict(scene), True), Turns(ticks, 0, ticks, 0), judged)
+                                [("open", asdict(scene), True), ("turn", ticks, 0)], judged)
     title = "Motion of the end effector due to the posture, which has lower priority [m]"
     text = f"strict: at most {AIM:g} m per tick, and no tick without an answer."
     return Report("Strictness at the limits", [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,36 +22,28 @@ Log = dict[str, Array]
 Ask = Callable[[tuple[Any, ...], float], Any]  # as `Process.ask`
 
 
-class Turns(NamedTuple):
-    """Numbers of ticks: before the first turn, of a turn, and at its start for cold caches.
+def turns(ticks: int, warm_up: int, each: int, rehearsed: int) -> list[tuple[str, int, int]]:
+    """Return the questions that make `ticks` ticks in turns of `each`.
 
-    seconds : [s] of processor time after which an entrant has no more turns.
+    Before them are `warm_up` that do not count, nor do `rehearsed` at the start of each turn, which
+    fill caches.
     """
-
-    ticks: int
-    warm_up: int
-    each: int
-    rehearsed: int
-    seconds: float = np.inf
-
-    def questions(self) -> list[tuple[str, int, int]]:
-        """Return the turns: of how many ticks, and how many of them do not count."""
-        return [("turn", self.warm_up, self.warm_up)] + [
-            ("turn", self.rehearsed + min(self.each, self.ticks - first), self.rehearsed)
-            for first in range(0, self.ticks, self.each)]
+    return [("turn", warm_up, warm_up)] + [
+        ("turn", rehearsed + min(each, ticks - first), rehearsed)
+        for first in range(0, ticks, each)]
 
 
-def measure(entrants: Sequence[Entrant], questions: str, scene: tuple[Any, ...], turns: Turns,
-            judge: Callable[[Log, Ask], Row]) -> tuple[list[Row], dict[str, str]]:
+def measure(entrants: Sequence[Entrant], questions: str, asked: Sequence[tuple[Any, ...]],
+            judge: Callable[[Log, Ask], Row], seconds: float = np.inf
+            ) -> tuple[list[Row], dict[str, str]]:
     """Let all entrants take turns; return a judged row for each, and why others are missing.
 
-    questions : MODULE:CLASS of what asks. scene : arguments of its `open`. judge : makes a row of a
-    log, and may ask for more.
+    questions : MODULE:CLASS of what is asked, `open` first. judge : makes a row of a log, and may
+    ask for more. seconds : [s] of processor time after which an entrant has no more turns.
     """
     rows: list[Row] = []
-    asked = [("open", *scene), *turns.questions()]
     with Field(entrants, questions) as field:
-        for label, replies in field.answers(asked, TURN_LIMIT, 1, patience=turns.seconds).items():
+        for label, replies in field.answers(asked, TURN_LIMIT, 1, patience=seconds).items():
             process, ends = field.running[label], [one for one in replies if "ended" in one]
             if ends:
                 field.missing[label] = ends[0]["why"]

@@ -22,7 +22,7 @@ from benchmark.packages import (
     TSID,
     Entrant,
 )
-from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, Turns, joined, measure, times
+from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
 from benchmark.peers.scenes import Arm
 from benchmark.process import START_LIMIT, EndedError
 from benchmark.report import Report, Section
@@ -88,9 +88,9 @@ def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: fl
     """
     with tempfile.TemporaryDirectory() as temporary:
         scenes = make_scenes(Path(temporary))
-        rows, missing = measure(entrants, QUESTIONS, (asdict(scenes["ellipse"]),),
-                                Turns(ticks, 1000, 1000, 50, seconds),
-                                lambda log, ask: _judged(log, ask, scenes))
+        asked = [("open", asdict(scenes["ellipse"])), *turns(ticks, 1000, 1000, 50)]
+        rows, missing = measure(entrants, QUESTIONS, asked,
+                                lambda log, ask: _judged(log, ask, scenes), seconds)
     title = "One tick of inverse kinematics of a KUKA LWR, and its quality"
     return Report("Inverse kinematics beside other packages", [
         Section(title, [Table(title, rows, _COLUMNS)], NOTES, {"peers": figures.bars(rows)}),

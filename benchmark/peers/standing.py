@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from benchmark.packages import OWN, PLACO, TSID, Entrant
-from benchmark.peers.compare import TICK, Log, Turns, measure, times
+from benchmark.peers.compare import TICK, Log, measure, times, turns
 from benchmark.peers.ours import TASKS, robot_of, stack_of
 from benchmark.peers.scenes import Stand
 from benchmark.report import Report, Section
@@ -72,8 +72,9 @@ def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = TICKS) -> Report:
         states = followed(scene, ticks)
         asked = {key: values.tolist() for key, values in states.items()}
         of = Judge(scene, states)
-        rows, missing = measure(entrants, QUESTIONS, (asdict(scene), asked),
-                                Turns(ticks, ticks, 250, 20), lambda log, _: judge(log, of))
+        rows, missing = measure(entrants, QUESTIONS, [("open", asdict(scene), asked),
+                                                      *turns(ticks, ticks, 250, 20)],
+                                lambda log, _: judge(log, of))
     title = "One tick of inverse dynamics of a humanoid on two feet"
     tables = [Table(title, rows, _COLUMNS), Table("Missed by each task", rows, _MISSES)]
     return Report("Inverse dynamics beside other packages", [Section(title, tables, NOTES)],

@@ -118,7 +118,7 @@ def shown(claim: Claim, rows: Rows, effect: Effect) -> str:
     if not claim.rival:
         return "{:.1f} [{:.1f}, {:.1f}] % of starts".format(*(100.0 * one for one in numbers))
     if claim.below:
-        numbers = -effect.estimate, -effect.high, -effect.low
+        numbers = 0.0 - effect.estimate, 0.0 - effect.high, 0.0 - effect.low  # no minus before 0
     if claim.percent:
         middle, low, high = (100.0 * np.expm1(one) for one in numbers)
         return f"{_signed(middle)} [{_signed(low)}, {_signed(high)}] %"
@@ -157,10 +157,5 @@ def blocked(differences: Array, blocks: NDArray[np.int64]) -> Effect:
     above = (ordered > 0.0).sum() + (ordered == 0.0).sum() / 2.0
     p = erfc(max(abs(above - middle) - 0.5, 0.0) / deviation / sqrt(2.0))
     k = max(int(middle - 1.96 * deviation), 0)
-    return Effect(apart.size, _middle(ordered), float(ordered[k]), float(ordered[-1 - k]), p)
-
-
-def _middle(ordered: Array) -> float:
-    """Return the median of sorted values, which may be infinite."""
-    low, high = ordered[(ordered.size - 1) // 2], ordered[ordered.size // 2]
-    return float(low if low == high else (low + high) / 2.0)
+    return Effect(apart.size, float(np.median(ordered)), float(ordered[k]), float(ordered[-1 - k]),
+                  p)

@@ -17,6 +17,7 @@ _SLACK = 1e-7
 _LIMITS = {
     "augmented": "Not strict: levels share one damped system.",
     "weighted": "Weights in place of levels, to a finite ratio.",
+    "merged": "Strict only in levels of limits; the rest is one weighted level.",
     "tpm-published": "Equalities; not strict where upper levels lose rank.",
     "recursive": "Equalities only.", "tpm": "Bounds of single unknowns in the first level only.",
     "reverse": "Equalities; strict in the first level only.",

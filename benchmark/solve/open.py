@@ -27,7 +27,7 @@ from solvers.proof import prove
 
 QUESTIONS = "benchmark.solve.questions:Questions"
 LIMIT = 10.0     # [s] of processor time for one problem with all its repetitions
-PATIENCE = 15.0  # [s] of processor time for a file, after which an entrant is not asked the rest
+PATIENCE = 10.0  # [s] of processor time for a file, after which an entrant is not asked the rest
 BORDERS = tuple(10.0**-k for k in range(12, 4, -1))  # angles and lengths as proof.UNCLEAR
 MOST_ENDS = 5    # crashes and hangs of an entrant on a file, after which the rest is left out
 CHECKED = ("EQ7", "EQ7sing", "INEQ7", "tied_box", "contacts", "mixed_units", "one_unknown")

@@ -28,8 +28,8 @@ class Ours(Solver):
         return f"task-hierarchy {version('task-hierarchy')}"
 
     def refuses(self, problem: Problem) -> str:
-        """Return what the resolver says of rows that it cannot handle, or ""."""
-        if self.resolver.can_resolve("inequalities"):
+        """Return what the resolver says of a problem that it cannot handle, or ""."""
+        if self.resolver.strict and self.resolver.can_resolve("inequalities"):
             return ""
         try:
             self.resolver.solve(self.prepare(problem))

@@ -54,7 +54,8 @@ class Embodik(Solver):
             *prepared[1], refine_partial_scale=self.refine)
 
     def read(self, raw: tuple[Array, Any]) -> Answer:
-        """Return the solution, and whether the status is SUCCESS."""
+        """Return the solution, which is empty without one, and whether the status is SUCCESS."""
         reference, found = raw
-        return Answer(np.array(found.solution, dtype=float) + reference,
+        step = np.array(found.solution, dtype=float)
+        return Answer(step + reference if len(step) else reference,
                       found.status == embodik.SolverStatus.SUCCESS)

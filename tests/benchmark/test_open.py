@@ -13,7 +13,7 @@ import pytest
 
 from benchmark import solve
 from benchmark.packages import OWN, Entrant
-from benchmark.process import CRASHED, HUNG, LEFT_OUT, Field
+from benchmark.process import CRASHED, HUNG, LEFT_OUT, SLOW, Field
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
 from benchmark.solve.entrants import chosen, compiled
@@ -81,6 +81,16 @@ def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
     if expected[4] is None:
         assert second[4]["x"] == pytest.approx([4.0, 1.0])
     assert all("code" in row["why"] for row in first if row.get("ended") == CRASHED)
+
+
+@pytest.mark.slow
+def test_an_entrant_that_works_for_too_long_on_a_file_is_not_asked_the_rest(
+        equalities, monkeypatch):
+    monkeypatch.setattr(opened, "PATIENCE", 1e-9)
+    rows = run_entrant(fake("LeastSquares"), equalities)
+    assert [row.get("refused") for row in rows] == [None, *[SLOW] * 4]
+    found = summary(judge(rows, {(one := read(equalities)).digest: one}))
+    assert (found["asked"], found["slow"], found["ended"]) == (1, 4, 0)
 
 
 @pytest.mark.slow
