@@ -187,6 +187,6 @@ class Field(ExitStack):
                 spent[label] += answers[-1].get("busy_s", 0.0)
             except EndedError as end:
                 ends[label] += 1
-                spent[label] += limit
+                spent[label] += limit if end.kind == HUNG else 0.0
                 answers.append({"ended": end.kind, "why": str(end)})
         return found
