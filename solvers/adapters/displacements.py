@@ -255,7 +255,9 @@ def _read(task: Task, configuration: object, damped: bool) -> _Read:
         raise HierarchyError(f"{label(task)}: lm_damping = {lm:g} weighs the task against its "
                              "own step, which a strict level cannot; set it to 0 and use the "
                              "damping of the resolver")
-    J, e = task.compute_jacobian(configuration), task.compute_error(configuration)
+    both = getattr(task, "_error_and_jacobian", None)  # of mink, where the frame is read once
+    e, J = both(configuration) if both else (task.compute_error(configuration),
+                                             task.compute_jacobian(configuration))
     if J.ndim == 1 and e.ndim == 1:
         J = J.reshape(-1, 1)  # as pinocchio returns the Jacobian of a single joint
     return task, J, e
