@@ -37,6 +37,7 @@ def _arrays(_: Path) -> None:
         result = make("hcod").solve(h)
         explain(h, result)
         certify(h, result.x)
+        result.verified(h)
 
 
 def _hierarchies() -> Iterator[tuple[Any, tuple[str, ...]]]:
