@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from hierarchy.problem import Array
 from scenarios.config.plant import PushSection
@@ -166,6 +165,8 @@ def _hull(points: Array, count: int) -> Array:
 
 def _ring(points: Array) -> Array:
     """Return the corners of the hull in turn, seen from above; the ends of points on a line."""
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         return np.asarray(points[ConvexHull(points[:, :2]).vertices])
     except (QhullError, ValueError):  # ValueError: there are none

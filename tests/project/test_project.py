@@ -89,6 +89,7 @@ def make_set_up(folder, interpreter):
     ("import hierarchy", {"pinocchio"}), ("from hierarchy import Hierarchy", {"pinocchio"}),
     ("import solvers, solvers.qp.backends", {"pinocchio", "qpsolvers", "proxsuite", "osqp"}),
     ("import scenarios.cli.main", {"numpy", "numba", "pinocchio", "scipy", "matplotlib"}),
+    ("import scenarios.cell.build", {"scipy.spatial", "matplotlib"}),
     ("from scenarios.cli.main import run_command; run_command(['--help'])",
      {"numpy", "numba", "pinocchio", "pydantic", "matplotlib"}),
     ("from scenarios.cli.main import run_command; "
