@@ -16,16 +16,16 @@ from scenarios.config.paths import PathSection, WaypointsSection
 
 
 class RepulsionSection(keys.Section):
-    """Magnitude of the repulsion over the distance, eq. (23); see hierarchy.avoidance.Repulsion."""
+    """Magnitude of the repulsion over the distance, eq. (23)."""
 
     maximum: keys.Positive
-    """Magnitude at distance zero, in [m/s^2] at acceleration level, [m/s] at velocity level."""
+    """Magnitude at distance zero, in [m/s^2], or [m/s] at velocity level."""
     reach: keys.Length
-    """Distance at which the magnitude is nearly zero, rho."""
+    """rho: distance at which it is nearly zero."""
     shape: keys.Positive
-    """Steepness of the magnitude over the distance, gamma; it has no unit."""
+    """gamma: its steepness."""
     scale: keys.Positive = 2.0
-    """Factor of the distance; 2 is eq. (23), the authors' code has 3 (body), 1.5 (end effector)."""
+    """Factor of the distance: 2 in (23), in the authors' code 3 (body) and 1.5 (end effector)."""
 
     def make(self) -> Repulsion:
         """Return the law."""
@@ -33,23 +33,23 @@ class RepulsionSection(keys.Section):
 
 
 class ObstacleSection(keys.Section):
-    """An obstacle: a shape at a place, or on a path."""
+    """A shape at a place or on a path."""
 
     tag: ClassVar[str] = "shape"
     shape: Literal["point", "sphere", "capsule", "box"] = "point"
-    """What it is; a list [x, y, z] in place of the table is a point."""
+    """A list [x, y, z] in place of the table is a point."""
     centre: keys.Point | None = None
-    """Its middle, for one that does not move."""
+    """Its middle, if it does not move."""
     radius: keys.Length | None = None
     """Of a sphere or a capsule."""
     half_length: keys.Length | None = None
-    """Of a capsule: half the segment along its z axis, without the round ends."""
+    """Of a capsule: half its segment, along z."""
     half_lengths: tuple[keys.Length, keys.Length, keys.Length] | None = None
-    """Of a box: half its sides along its x, y and z axes."""
+    """Of a box: half its sides."""
     rotation: keys.Rows3 = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
     """Rows of the matrix from its axes to the world's."""
     path: PathSection | None = None
-    """Path of its middle, for one that moves."""
+    """Path of its middle, if it moves."""
 
     def _wrong(self) -> Iterator[str]:
         needs = {"point": (), "sphere": ("radius",), "capsule": ("radius", "half_length"),
@@ -78,16 +78,14 @@ Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(as_table)], ...]
 
 
 class VariationSection(keys.Section):
-    """Random variation of obstacle paths that have waypoints; other obstacles do not change."""
+    """Random variation of the obstacles' waypoints."""
 
     seed: keys.Count
     """Seed of the variation."""
     spread: keys.Distance = 0.05
-    """Largest displacement of a waypoint, in any direction; consecutive equal waypoints, at which
-    an obstacle rests, move together."""
+    """Largest displacement of a waypoint; equal ones in a row move together."""
     timing: Annotated[float, Field(strict=True, ge=0.0, lt=1.0)] = 0.1
-    """Largest shift of each time except the first, as a share of half the shorter interval beside
-    it."""
+    """Largest shift of a time but the first, as a share of half the shorter interval beside it."""
 
 
 def _varied(obstacle: ObstacleSection, variation: VariationSection,
@@ -118,7 +116,7 @@ def _in_ball(random: np.random.Generator, count: int) -> Array:
 
 class _Avoiding(keys.Section):
     obstacles: Obstacles
-    """What is to be avoided: tables, or points [x, y, z]."""
+    """Tables, or points [x, y, z]."""
     variation: VariationSection | None = None
     """Random variation of the obstacles' paths."""
 
@@ -142,28 +140,27 @@ class AvoidanceSection(_Avoiding):
 
     kind: Literal["repulsion"] = "repulsion"
     dimension: Literal[1, 3] = 1
-    """Rows of the body's avoidance: 1 along the direction of the obstacle, or 3."""
+    """Rows of the body's avoidance: along the direction of the obstacle, or all."""
     direction: Literal["nearest", "mean"] = "nearest"
-    """"nearest": away from the nearest obstacle. "mean": along the mean (25)-(26) over the
-    obstacles within `far` of a control point, and within `end_effector` of the end effector."""
+    """Away from the "nearest" obstacle, or along the "mean" (25)-(26) over those within `far` of a
+    control point and within `end_effector` of the end effector."""
     near: keys.Distance
-    """Distance of the body below which its avoidance comes before the position, eps_1."""
+    """Distance, eps_1, below which the body's avoidance comes before the position."""
     far: keys.Distance
-    """Distance of the body below which it avoids at all, eps_2; at least `near`."""
+    """Distance, eps_2, below which the body avoids at all; at least `near`."""
     end_effector: keys.Distance
-    """Distance of the end effector below which it is repelled, eps_ee."""
+    """Distance, eps_ee, below which the end effector is repelled."""
     body: RepulsionSection
     """Repulsion of the body."""
     tip: RepulsionSection
     """Repulsion of the end effector."""
     jacobian: Literal["exact", "published"] = "exact"
-    """"published": that of the published code, with its error."""
+    """"published": with the error of the published code."""
     place: Literal["stack", "null-space"] = "stack"
-    """"null-space": the null-space term is the sum of the repulsion of all control points within
-    `far`, as joint commands, and `near` has no effect, see hierarchy.tasks.CumulatedRepulsion."""
+    """"null-space": the repulsion of all control points within `far` is summed in the null-space
+    term; `near` has no effect."""
     asked: keys.Length | None = None
-    """Distance that metrics check for body and end effector, without effect on the run; by
-    default `near`, for the body."""
+    """Distance that metrics check for body and end effector; by default `near`, for the body."""
 
     def _wrong(self) -> Iterator[str]:
         yield from super()._wrong()
@@ -197,13 +194,13 @@ class BarrierSection(keys.Section):
     distance: keys.Distance = 0.03
     """Clearance to keep."""
     rate: keys.Rate = 10.0
-    """Limit of the approach to the clearance: speed per distance that is left."""
+    """Fastest approach: speed per distance left."""
     influence: keys.Length = 0.3
-    """Distance beyond which there is no effect; above `distance`."""
+    """Distance beyond which nothing acts; above `distance`."""
     recovery: keys.Speed = 0.2
-    """Speed of the retreat below the clearance, at most."""
+    """Largest speed of the retreat below it."""
     limit: Annotated[keys.Positive, keys.Unit("m/s^2")] = 50.0
-    """Acceleration of the retreat, at most."""
+    """Largest acceleration of the retreat."""
 
     def barrier(self, distance: float) -> Barrier:
         """Return the barrier of a distance [m] to keep; HierarchyError if it is out of range."""
@@ -211,18 +208,17 @@ class BarrierSection(keys.Section):
 
 
 class SeparationSection(BarrierSection, _Avoiding):
-    """Keep all control points and the end effector away from all obstacles, as one-sided rows.
+    """All control points and the end effector away from all obstacles, as one-sided rows.
 
-    With control.stack = "set-based" only the clearances apply. With "smooth" the rate of the rows
-    toward the end of `buffer` is `rate` times what is missing, at most `recovery`. See
-    hierarchy.avoidance.Barrier.
+    If control.stack is "set-based" only the clearances apply; if "smooth", rows approach the end of
+    `buffer` by `rate` times what is missing, at most `recovery`.
     """
 
     kind: Literal["separation"]
     self_collision: keys.Distance | None = None
-    """Clearance between links that are not neighbours; without it links may collide."""
+    """Clearance between links that are not neighbours, by default not kept."""
     buffer: keys.Length | None = None
-    """With control.stack = "smooth": width outside the clearance within which rows act."""
+    """Width outside the clearance within which rows act if control.stack is "smooth"."""
     obstacles: Obstacles = ()
 
     def _wrong(self) -> Iterator[str]:

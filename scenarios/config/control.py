@@ -17,40 +17,38 @@ StackKind = Literal["switched", "hierarchical", "set-based", "smooth"]
 
 
 class PolicySection(keys.Section):
-    """The command sent in a tick with a problem, for each kind of problem.
+    """The command in a tick with a problem.
 
-    "brake": decelerate to rest. "hold": repeat the last good command for at most `patience`
-    consecutive ticks, then brake. "stop": decelerate as fast as the limits allow and end the run
-    with a fault. "use": send the answer, if there is one. If a tick has several problems, the most
-    cautious action wins, in the order use, hold, brake, stop. At level "torque" braking sends the
-    last good torques and a damping, the effort limit of a joint at its velocity limit; "stop" ends
-    the run at once. The first four kinds are statuses of a resolver, see solvers.Status.
+    "brake": decelerate to rest. "hold": repeat the last good command for at most `patience` ticks,
+    then brake. "stop": decelerate as fast as the limits allow and end the run with a fault. "use":
+    send the answer, if there is one. Of several actions the last in the order use, hold, brake,
+    stop is taken. At level "torque" braking sends the last good torques and a damping, the effort
+    limit of a joint at its velocity limit; "stop" ends the run at once.
     """
 
     iteration_limit: AnswerPolicy = "brake"
-    """The resolver reached its largest number of iterations."""
+    """Status of the resolver: too many iterations."""
     numerical_failure: BlindPolicy = "brake"
-    """The resolver has no usable answer."""
+    """Status: no usable answer."""
     backend_failure: AnswerPolicy = "brake"
-    """The solver behind the resolver failed."""
+    """Status: the solver behind the resolver failed."""
     inaccurate: AnswerPolicy = "brake"
-    """The answer does not reach the resolver's accuracy."""
+    """Status: an answer below the resolver's accuracy."""
     not_finite: BlindPolicy = "brake"
-    """A measured joint state is not finite or has an invalid quaternion, or a distance is NaN."""
+    """A measured state is not finite, its quaternion invalid, or a distance NaN."""
     stale: BlindPolicy = "brake"
-    """No new measurement for more than `stale_after`; before that, the last one is extrapolated
-    from the commands sent."""
+    """No measurement for more than `stale_after`; until then the last one is extrapolated from the
+    commands."""
     overrun: AnswerPolicy = "brake"
     """The command is not ready at the `deadline`."""
     inside: AnswerPolicy = "brake"
-    """A point of the robot is on or inside an obstacle."""
+    """A point of the robot is in an obstacle."""
     patience: keys.Count = 10
     """Ticks for which "hold" repeats a command."""
     stale_after: keys.Time = 0.02
     """Age from which a measurement is stale."""
     deadline: keys.Span | None = None
-    """Time from the start of a tick until its command must be ready; without it there is no
-    deadline."""
+    """Time in a tick until its command must be ready, by default unlimited."""
 
 
 class ControlSection(keys.Section):
@@ -58,42 +56,39 @@ class ControlSection(keys.Section):
 
     level: Literal["velocity", "acceleration", "torque"] = "acceleration"
     """What the command is. "torque": accelerations and contact forces are resolved together, and
-    the command is the joint torques that they take. The stack has the dynamics and [[contacts]]
-    first, then torque limits and [forces], then the joint limits."""
+    the command is the torques they take; dynamics and [[contacts]] come first, then torque limits
+    and [forces], then joint limits."""
     stack: StackKind = "switched"
-    """"switched": Algorithm 1 selects the tasks in the stack, all as equalities. With
-    avoidance.kind = "separation" only the cone is left to select: limits and avoidance are first.
-    "hierarchical": limits, avoidance, position and pointing are always in it, in this order, and
-    inequalities stay inequalities. "set-based" and "smooth", at velocity level only, have the same
-    tasks in the same order: inequalities are frozen at their bounds, see
-    solvers.resolvers.set_based, or act gradually within a `buffer`, see solvers.resolvers.smooth,
+    """"switched": Algorithm 1 selects tasks, all as equalities; with avoidance.kind = "separation"
+    only the cone, below limits and avoidance. "hierarchical": limits, avoidance, position and
+    pointing, always and in this order, with inequalities. "set-based", "smooth": the same order at
+    velocity level; inequalities are frozen at their bounds, or act gradually within a `buffer`,
     which needs `resolver` = "smooth"."""
     strictness: keys.Flag = False
-    """Whether every tick is also resolved without the levels below the position, to measure
-    whether they move the end effector; this is not part of the measured times."""
+    """Whether every tick is also resolved without the levels below the position, outside the
+    measured times, to see whether they move the end effector."""
     period: Annotated[float, Field(strict=True, gt=0.0, le=1.0), keys.Unit("s")] = 0.001
     """Time from tick to tick."""
     duration: keys.Span
     """How long a run lasts."""
     jacobian_derivative: Literal["exact", "difference"] = "exact"
-    """How dJ/dt is found: "exact", or by the "difference" of two ticks."""
+    """dJ/dt: "exact", or the "difference" of two ticks."""
     resolver: str
-    """Name of a resolver, see `hierarchy list`, or of a plug-in."""
+    """One of `hierarchy list`, or of a plug-in."""
     options: dict[str, Any] = Field(default_factory=dict)
-    """Settings of the resolver. A table in it with a resolver's name, such as
-    `[control.options.tpm]`, applies to that resolver only, so that changing `resolver` is enough to
-    swap it. Plain settings override those from such a table."""
+    """Settings of the resolver. A table with a resolver's name, such as `[control.options.tpm]`, is
+    for that resolver only; plain settings override it."""
     damping: keys.NotNegative = 1.0
-    """Damping, at velocity level, of tasks that cannot be met: near singularities and out of
-    reach, where they come to rest. 0 for none. The damping of a resolver is in `options`."""
+    """Damping, at velocity level, of tasks that cannot be met, near singularities and out of reach.
+    A resolver's damping is in `options`."""
     metric: Literal["identity", "mass"] = "identity"
-    """Measure of the distance to the null-space term: "identity", the sum of squares over the
-    joints; or "mass", the inertia M(q), at acceleration level that of operational-space control."""
+    """Metric of the distance to the null-space term: "identity", or "mass", the inertia M(q), as in
+    operational-space control at acceleration level."""
     policy: PolicySection = PolicySection()
     """The command in a tick with a problem."""
     transition: Literal["none", "blend"] = "none"
-    """"blend": when the order of the stack or the active control point changes, the command moves
-    to that of the new stack within `transition_time`. "none": it changes at once."""
+    """When the order of the stack or the active control point changes, the command changes at once
+    ("none") or within `transition_time` ("blend")."""
     transition_time: keys.Span = 0.02
     """How long "blend" takes."""
 
@@ -129,10 +124,10 @@ class FaultSection(keys.Section):
 
     kind: Literal["nan_position", "nan_velocity", "nan_distance", "stale", "status", "overrun",
                   "obstacle", "no_frames", "dark_frames"]
-    """"nan_position", "nan_velocity": the measurement of `joint` is NaN. "nan_distance": the
-    distance of `point` is NaN. "stale": measured joints and distances are frozen. "status": the
-    resolver reports `status`. "overrun": the tick takes longer. "obstacle": a sphere appears.
-    "no_frames": the camera takes no images. "dark_frames": its images have no readings."""
+    """"nan_position", "nan_velocity": `joint` is measured as NaN. "nan_distance": `point` is.
+    "stale": measurements are frozen. "status": the resolver reports `status`. "overrun": a tick
+    takes longer. "obstacle": a sphere appears. "no_frames": the camera stops. "dark_frames": images
+    have no readings."""
     at: keys.Time
     """When it begins."""
     duration: keys.Span
@@ -140,7 +135,7 @@ class FaultSection(keys.Section):
     joint: Annotated[int, Field(strict=True, ge=1)] | None = None
     """Number of a joint from 1; by default all."""
     point: Annotated[int, Field(strict=True, ge=1)] | None = None
-    """Number of a control point from 1, then of the end effector; by default all."""
+    """Number of a control point from 1, last the end effector; by default all."""
     status: Literal["iteration_limit", "numerical_failure", "backend_failure",
                     "inaccurate"] | None = None
     """What the resolver reports."""
@@ -149,7 +144,7 @@ class FaultSection(keys.Section):
     centre: keys.Point | None = None
     """Middle of the sphere."""
     place: ControlPointSection | None = None
-    """Point of the body, in place of `centre`, where the sphere appears at that time."""
+    """In place of `centre`: point of the body where it appears."""
     radius: keys.Length | None = None
     """Radius of the sphere."""
 

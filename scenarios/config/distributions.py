@@ -22,7 +22,7 @@ class Uniform(Section):
     """A number from a uniform distribution."""
 
     uniform: Annotated[tuple[Finite, Finite], AfterValidator(_in_order)]
-    """Lower and upper bound, in the unit of the key that varies."""
+    """Lower and upper bound."""
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return a number within the bounds."""
@@ -33,10 +33,10 @@ class Uniform(Section):
 
 
 class Normal(Section):
-    """A number from a normal distribution, given by mean and standard deviation."""
+    """A number from a normal distribution."""
 
     normal: tuple[Finite, NotNegative]
-    """Mean and standard deviation, in the unit of the key that varies."""
+    """Mean and standard deviation."""
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return a number; it is not bounded."""
@@ -47,10 +47,10 @@ class Normal(Section):
 
 
 class Choice(Section):
-    """One of several values of any type, each equally likely."""
+    """One of several values of any type."""
 
     choice: Annotated[tuple[Any, ...], Field(min_length=1)]
-    """The values, each equally likely."""
+    """They are equally likely."""
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return one of the values."""
@@ -62,10 +62,10 @@ class Choice(Section):
 
 
 class Around(Section):
-    """The scenario's own value, a number or an array, plus a uniform offset in each entry."""
+    """The scenario's value, a number or an array, plus a uniform offset in each entry."""
 
     around: NotNegative | tuple[NotNegative, ...]
-    """Largest offset, one for all entries or one for each, in the unit of the key that varies."""
+    """Largest offset, of all or of each."""
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return the own value with offsets; raises ValueError if it is not numeric."""
@@ -86,10 +86,10 @@ class Around(Section):
 
 
 class Integers(Section):
-    """An integer from the first to the last, both included; for seeds."""
+    """An integer, for seeds."""
 
     integers: Annotated[tuple[Whole, Whole], AfterValidator(_in_order)]
-    """First and last integer, both included."""
+    """First and last one."""
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
         """Return an integer of the range."""

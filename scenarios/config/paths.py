@@ -14,14 +14,14 @@ from scenarios.config.errors import naming
 
 
 class JitterSection(keys.Section):
-    """A smooth random motion of a path."""
+    """A smooth random motion."""
 
     amplitude: keys.Distance
     """Largest displacement in each axis."""
     rate: Annotated[keys.Positive, keys.Unit("Hz")]
     """Highest frequency of the motion."""
     seed: keys.Count = 0
-    """Seed of the motion; the same one gives the same motion."""
+    """Seed of the motion."""
 
 
 class AnyPath(keys.Section):
@@ -29,9 +29,9 @@ class AnyPath(keys.Section):
 
     of: ClassVar[Callable[..., paths.Path]]
     jitter: JitterSection | None = None
-    """A random motion that is added to the path."""
+    """A random motion added to the path."""
     out_of_reach: tuple[tuple[keys.Time, keys.Time], ...] | None = None
-    """Intervals in which the robot cannot be on the path, for metrics of its return."""
+    """Intervals when the path is out of reach, for metrics of the return."""
 
     def _wrong(self) -> Iterator[str]:
         times = [t for span in self.out_of_reach or () for t in span]
@@ -62,15 +62,15 @@ class StillSection(AnyPath):
 
 
 class EllipseSection(AnyPath):
-    """p(t) = centre + cosine cos(s) + sine sin(s), with s = rate t + phase."""
+    """centre + cosine cos(s) + sine sin(s) with s = rate t + phase."""
 
     kind: Literal["ellipse"]
     centre: keys.Point
     """Middle of the ellipse."""
     cosine: keys.Point
-    """Half axis, from the centre to the point where s = 0."""
+    """Half axis."""
     sine: keys.Point
-    """Half axis, from the centre to the point where s is a quarter turn."""
+    """The other half axis."""
     rate: Annotated[keys.Finite, keys.Unit("rad/s")] = 1.0
     """How fast s grows."""
     phase: keys.Angle = 0.0
@@ -90,12 +90,12 @@ class WaypointsSection(AnyPath):
 
     kind: Literal["waypoints"]
     times: tuple[keys.Time, ...]
-    """Increasing times, one for each point."""
+    """A time for each point."""
     points: tuple[keys.Point, ...]
     """The points."""
     blend: keys.Span | None = None
-    """With it the path does not stop: it rounds each point in a curve of this duration and is
-    nearest to it half that time later, see hierarchy.paths.Blended."""
+    """Instead of stopping, the path rounds each point in a curve of this duration and is nearest to
+    it half that time later."""
 
     def _steady(self) -> paths.Path:
         return (paths.Waypoints(self.times, self.points) if self.blend is None
@@ -103,7 +103,7 @@ class WaypointsSection(AnyPath):
 
 
 class LineSection(AnyPath):
-    """Straight from one point to another, at rest at both."""
+    """Straight from rest to rest."""
 
     of: ClassVar[Callable[..., paths.Path]] = staticmethod(paths.line)
     kind: Literal["line"]
@@ -127,7 +127,7 @@ class CircleSection(AnyPath):
     radius: keys.Distance
     """Its radius."""
     normal: keys.Vector3 = (0.0, 0.0, 1.0)
-    """The direction across its plane, of any length."""
+    """Normal of its plane."""
     rate: Annotated[keys.Finite, keys.Unit("rad/s")] = 1.0
     """How fast the angle grows."""
     phase: keys.Angle = 0.0
@@ -140,7 +140,7 @@ class RecordedSection(AnyPath):
     of: ClassVar[Callable[..., paths.Path]] = paths.Recorded.from_csv
     kind: Literal["recorded"]
     file: str
-    """CSV with the columns t [s], x, y, z [m]; relative to the scenario's file."""
+    """CSV with columns t [s], x, y, z [m], relative to the scenario's file."""
 
 
 PathSection = Annotated[StillSection | LineSection | CircleSection | EllipseSection

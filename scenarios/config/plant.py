@@ -22,7 +22,7 @@ _ROUNDING = 1e-9  # [s] of times
 
 
 class MeasurementSection(keys.Section):
-    """Measurement of the joints; with all values zero it is exact."""
+    """Errors of measured joints."""
 
     position_noise: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
     """Standard deviation of the normal noise of positions."""
@@ -31,14 +31,13 @@ class MeasurementSection(keys.Section):
     quantisation: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
     """Step of measured positions."""
     delay: keys.Time = 0.0
-    """Age of what is measured, a whole number of periods."""
+    """Age of measurements, a whole number of periods."""
     seed: keys.Count = 0
     """Seed of the noise."""
     velocity: Literal["measured", "differenced"] = "measured"
-    """"measured": by a sensor of its own. "differenced": the backward difference of measured
-    positions after a low-pass filter."""
+    """"differenced": the backward difference of measured positions, after a low-pass filter."""
     filter_time: keys.Time = 0.0
-    """Time constant of that filter; 0 for none."""
+    """Time constant of the filter, 0 for none."""
 
     def _wrong(self) -> Iterator[str]:
         key = "velocity_noise" if self.velocity == "differenced" else "filter_time"
@@ -60,8 +59,8 @@ class AnyPlant(PartSection):
     kind: str
     """Which kind it is."""
     feedback: Literal["measured", "commanded"] = "measured"
-    """"measured": the controller receives the measured joints. "commanded": it receives its own
-    commands, integrated to a joint position reference, as through FRI."""
+    """What the controller receives: the "measured" joints, or its own "commanded" ones, integrated,
+    as through FRI."""
     measurement: MeasurementSection = MeasurementSection()
     """Errors of the measured joints."""
 
@@ -80,25 +79,25 @@ class ServoSection(keys.Section):
     """The position servo of each joint of the physics plant.
 
     torque = k (reference - q) + c (its rate - v) + `gravity` times the gravity torque, within the
-    effort limits. k = m `bandwidth`^2 and c = 2 m `bandwidth`, where m is the inertia of the joint
-    at the start, including the drive.
+    effort limits, with k = m `bandwidth`^2, c = 2 m `bandwidth` and the inertia m of the joint at
+    the start, with its drive.
     """
 
     rate: Annotated[float, Field(strict=True, ge=200.0, le=10000.0), keys.Unit("Hz")] = 1000.0
-    """Steps of the servo per second (or slightly more, a whole number per period) on linearly
-    interpolated references."""
+    """Steps per second, rounded up to a whole number per period, on linearly interpolated
+    references."""
     bandwidth: Bandwidth | tuple[Bandwidth, ...] = 80.0
-    """How fast a joint follows, one value for all joints or one each."""
+    """How fast joints follow, all or each."""
     gravity: keys.NotNegative = 1.0
     """Share of the gravity torque that is compensated."""
     feedforward: keys.Flag = True
     """Whether the rate of the reference counts."""
     lead: Annotated[keys.Positive, keys.Unit("rad")] = 0.1
-    """How far the reference may lead its joint, so that a blocked arm does not rush to catch up."""
+    """How far the reference may lead its joint."""
 
 
 class JointsSection(keys.Section):
-    """Joints of the physics plant: one value for all or one each. Plausible, not identified."""
+    """Joints of the physics plant, one value for all or one each; plausible, not identified."""
 
     friction: Friction | tuple[Friction, ...] = 0.5
     """Dry friction."""
@@ -116,7 +115,7 @@ class PhysicsSection(AnyPlant):
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
     kind: Literal["mujoco"]
     beyond_stop: Annotated[keys.Positive, keys.Unit("rad")] = 0.2
-    """How far a joint may pass its position limit; beyond it the run ends with a fault."""
+    """How far a joint may pass its position limit before the run ends with a fault."""
     servo: ServoSection = ServoSection()
     """The servo of each joint."""
     joints: JointsSection = JointsSection()
@@ -124,7 +123,7 @@ class PhysicsSection(AnyPlant):
 
 
 class PushSection(keys.Section):
-    """A horizontal force on a body, at its centre of mass."""
+    """A horizontal force at a body's centre of mass."""
 
     joint: str
     """Joint whose body is pushed."""
@@ -153,8 +152,8 @@ class PushSection(keys.Section):
 class TorqueSection(AnyPlant):
     """A robot with torque motors in a physics simulation (extra `sim`).
 
-    Its [[contacts]] touch a floor, or table. The controller knows nothing of `joint_friction`,
-    `joint_damping`, `armature`, `delay` and `bandwidth`.
+    The controller does not know `joint_friction`, `joint_damping`, `armature`, `delay` and
+    `bandwidth`.
     """
 
     made_by: ClassVar[str] = "scenarios.cell.plants.torque:TorqueRobot"
@@ -169,25 +168,23 @@ class TorqueSection(AnyPlant):
     joint_friction: Friction = 0.0
     """Coulomb friction of every joint."""
     armature: Inertia = 0.0
-    """Inertia of the drive of every joint beyond the robot's own."""
+    """Additional inertia of every joint's drive."""
     joint_damping: Damping = 0.0
     """Viscous friction of every joint."""
     delay: keys.Time = 0.0
-    """Time by which torques arrive late, a whole number of periods."""
+    """Delay of torques, a whole number of periods."""
     bandwidth: Annotated[keys.Positive, keys.Unit("Hz")] | None = None
-    """Bandwidth of the motors' torques; without it they follow at once."""
+    """Bandwidth of the motors' torques, by default infinite."""
     stops: keys.Flag = True
     """Whether joints have a stop at their position limit."""
     self_collision: keys.Flag = False
-    """Whether the robot's capsules touch one another, except neighbours and those that overlap at
-    the start."""
+    """Whether capsules collide, except neighbours and those that overlap at the start."""
     fall: keys.Length = 0.2
-    """How far the centre of mass may sink below its start; beyond it the robot has fallen, which
-    ends the run with a fault."""
+    """How far the centre of mass may sink before the robot has fallen, a fault."""
     tilt: Annotated[keys.Positive, keys.Unit("rad")] = 1.0
-    """How far the base may tilt from its start; beyond it the robot has fallen."""
+    """How far the base may tilt before the robot has fallen."""
     beyond_stop: Annotated[keys.Positive, keys.Unit("rad")] = 0.2
-    """How far a joint may pass its position limit; beyond it the run ends with a fault."""
+    """How far a joint may pass its position limit before the run ends with a fault."""
     pushes: tuple[PushSection, ...] = ()
     """Forces that disturb the robot."""
 

@@ -1,4 +1,4 @@
-"""What every key of a scenario file means: for `hierarchy help`, and for the page of keys.
+"""What every key of a scenario file means: for `hierarchy help` and the page of keys.
 
 Types, bounds, units and defaults are those that files are checked against; the meaning of a key is
 the text below it in its section.
@@ -113,51 +113,6 @@ def sections() -> Iterator[tuple[str, type[Section]]]:
             waiting += [(f"[[{dotted}]]" if key.value.startswith("list") else f"[{dotted}]", one)
                         for one in new]
             met |= set(new)
-
-
-def page() -> str:
-    """Return all keys as Markdown; a key that several sections have is described in the first."""
-    places = {section: place for place, section in sections()}
-    parts: list[str] = []
-    first: dict[tuple[str, ...], tuple[str, str]] = {}
-    for place, section in sections():
-        head = title_of(section, f"`{place}`") if place else "top of the file"
-        parts += [f"## {head[:1].upper()}{head[1:]}", "", _escaped(about(section)), ""]
-        shared: dict[str, list[str]] = {}
-        for key in keys_of(section):
-            above, default = first.setdefault(
-                (key.name, key.value, key.unit, key.meaning), (head, key.default))
-            if above == head:
-                parts.append(_entry(key, places))
-            else:
-                other = f" (default {key.default or 'none'})" if key.default != default else ""
-                shared.setdefault(above.removeprefix(f"`{place}` with "), []).append(
-                    f"`{key.name}`{other}")
-        if shared:
-            as_in = [f"{above}: {', '.join(names)}" for above, names in shared.items()]
-            parts.append(f"- as in {'; '.join(as_in)}")
-        parts.append("")
-    return "\n".join(parts).replace("(default required)", "(required)")
-
-
-def _entry(key: Key, places: dict[type[Section], str]) -> str:
-    """Return a key as an entry of a list: name, default with unit, else type, and meaning."""
-    below = ", ".join(f"`{one}`" for one in dict.fromkeys(places[one] for one in key.below))
-    unit = f" [{key.unit}]" if key.unit else ""
-    value = below or _escaped(key.value)
-    if key.default == "required":
-        value = f"{value}{unit}, required"
-    elif key.default:
-        said = value == "boolean" or all(one in key.meaning for one in value.split(", "))
-        bounds = "" if said else value.removeprefix("number").strip()
-        value = f"`{key.default}`{unit}{bounds and f'; {bounds}'}"
-    else:
-        value += unit
-    return f"- **{key.name}** ({value}): {_escaped(key.meaning)}"
-
-
-def _escaped(text: str) -> str:
-    return text.replace("<", r"\<").replace("*", r"\*").replace("|", r"\|")
 
 
 def _lines(key: Key) -> Iterator[str]:

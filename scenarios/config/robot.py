@@ -41,7 +41,7 @@ class CapsuleSection(keys.Section):
     """All points within a radius of a segment."""
 
     joint: str | None = None
-    """Joint whose frame the capsule is in; without it it is fixed to the base."""
+    """Joint whose frame it is in, by default the base."""
     start: keys.Point
     """First end of the segment."""
     end: keys.Point
@@ -51,11 +51,7 @@ class CapsuleSection(keys.Section):
 
 
 class RobotSection(keys.Section):
-    """Which robot, and what of it the scenario uses.
-
-    What a section omits is that of the robot's table, or for a file what `hierarchy check FILE`
-    proposes.
-    """
+    """The robot; by default as its table says, or for a file as `hierarchy check FILE` proposes."""
 
     model: str
     """A name of `hierarchy list`, a URDF or MJCF file, or "package:name" of example_robot_data or
@@ -65,40 +61,39 @@ class RobotSection(keys.Section):
     end_effector: str | None = None
     """Frame of [position] and [pointing]."""
     control_points: tuple[RobotPointSection, ...] | None = None
-    """Points whose distances to obstacles count, apart from the end effector."""
+    """Points that keep their distance, besides the end effector."""
     capsules: tuple[CapsuleSection, ...] | None = None
-    """Shapes of the links, for self-collision and for removing the robot from images."""
+    """Shapes of the links, for self-collision and the camera."""
     locked: dict[str, keys.JointValue] = Field(default_factory=dict)
-    """Joints of a file that are fixed at a value, as in [start], and removed."""
+    """Joints of a file to fix at a value, as in [start]."""
     root: str | tuple[str, ...] = ()
-    """Body, or bodies, of an MJCF at which the robot begins; by default each that has joints,
-    except those that only float."""
+    """Body or bodies of an MJCF at which the robot begins; by default those with joints, except
+    those that only float."""
 
 
 class StartSection(keys.Section):
     """Where a run starts.
 
-    A value of a joint is a number, the angle of a continuous joint too, [x, y, angle] of a planar
-    one, a rotation vector or quaternion [x, y, z, w] of a ball, location and either of a free one.
-    Joints that follow others, and those of closed chains, are moved to where the named ones let
-    them be.
+    A planar joint takes [x, y, angle], a ball a rotation vector or quaternion [x, y, z, w], a free
+    joint location and either, all others a number. Joints that follow others, and those of closed
+    chains, are moved to fit.
     """
 
     q: tuple[keys.JointPosition, ...] | None = None
-    """Positions of all joints but a floating base, or all coordinates; by default those
-    of the `keyframe`, or the robot's own posture."""
+    """Positions of all joints but a floating base, or all coordinates; by default those of the
+    `keyframe`, or the robot's rest posture."""
     keyframe: str | None = None
     """Keyframe of an MJCF, in place of `q`."""
     joints: dict[str, keys.JointValue] = Field(default_factory=dict)
-    """Positions of joints by name, which override `q`."""
+    """Positions by name, which override `q`."""
     v: tuple[keys.JointVelocity, ...] | None = None
-    """Velocities of all joints; by default zero."""
+    """Velocities of all joints, by default zero."""
     end_effector: keys.Point | None = None
-    """The start is the posture, reached from `q`, that puts the end effector there."""
+    """Where the end effector starts: `q` is moved until it is there."""
     on_floor: keys.Flag = False
-    """Whether a floating base is raised or lowered so that the lowest contact touches the floor."""
+    """Whether the base is moved vertically until the lowest contact touches the floor."""
     allow_outside_limits: keys.Flag = False
-    """Whether joints may start beyond their limits, which is an error otherwise."""
+    """Whether joints may start beyond their limits."""
 
     def _wrong(self) -> Iterator[str]:
         if self.q is not None and self.keyframe is not None:
@@ -106,31 +101,29 @@ class StartSection(keys.Section):
 
 
 class ContactSection(keys.Section):
-    """Points of a frame that push on a rigid surface, see hierarchy.contacts.Contact."""
+    """A point or sole of a frame that pushes on a rigid surface, at level "torque"."""
 
     frame: str
     """Frame of the robot."""
     name: keys.TaskName | None = None
-    """Its name in messages, tables and figures; by default the frame's."""
+    """Its name, by default the frame's."""
     x: tuple[Place, Place] | None = None
-    """Sides of a sole along its x axis, from `offset` on; without `x` and `y` the contact is that
-    point."""
+    """Sides of a sole along its x axis, from `offset`; a point has no `x` and `y`."""
     y: tuple[Place, Place] | None = None
     """The same along its y axis."""
     offset: keys.Point = (0.0, 0.0, 0.0)
-    """The point, or the middle of the sole, in the frame."""
+    """The point, or the sole's middle, in the frame."""
     friction: keys.Positive = 0.7
-    """Coefficient of friction that the controller believes."""
+    """Coefficient of friction that the controller assumes."""
     normal: keys.Vector3 = (0.0, 0.0, 1.0)
-    """Direction in the world in which the surface pushes."""
+    """Normal of the surface in the world."""
     up: keys.Vector3 = (0.0, 0.0, 1.0)
-    """Direction in the frame across the sole: x is the frame's x axis as seen along it, or the
-    frame's y axis if it is along x."""
+    """Normal of the sole in the frame; the sole's x axis is the frame's, projected, or its y axis
+    if x is the normal."""
     open: tuple[tuple[keys.Time, keys.Time], ...] = ()
-    """Intervals in which the contact is lifted."""
+    """Intervals in which it is lifted."""
     ramp: keys.Time = 0.1
-    """Time in which the load falls before such an interval, and rises after it to at most the
-    robot's weight."""
+    """Time in which the load falls before and rises after them, to at most the robot's weight."""
     slides: keys.Flag = False
     """Whether a point may move along its surface."""
 
@@ -142,18 +135,15 @@ class ContactSection(keys.Section):
 
 
 class ForcesSection(keys.Section):
-    """The contact forces that the stack allows, as one level with the torque limits.
-
-    Like the rows of [limits], these are in the stack if `limits.place` says so.
-    """
+    """Bounds of contact forces, in one level with the torque limits, as `limits.place` says."""
 
     faces: Literal[4, 8] = 4
     """Faces of the friction pyramid of each point."""
     least: keys.Force = 0.0
     """Smallest normal force of each point."""
     largest: Annotated[keys.Positive, keys.Unit("N")] | None = None
-    """Largest normal force of each point; without it there is no upper bound."""
+    """Largest normal force of each point, by default infinite."""
     edge: Annotated[float, Field(strict=True, gt=0.0), keys.Unit("m")] | None = None
-    """How far inside a sole its centre of pressure stays; without it just inside."""
+    """How far inside a sole its centre of pressure stays."""
     damping: keys.Gain = 20.0
     """Gain that damps the velocity of contacts."""

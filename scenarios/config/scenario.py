@@ -43,20 +43,20 @@ OWN = "own"  # the spec of the resolver that a scenario names itself
 
 
 class Scenario(Section):
-    """One scenario: a robot, a start, tasks, and how they are resolved.
+    """A robot, a start, tasks, and how they are resolved.
 
     Absent sections add no task.
     """
 
     name: Name
-    """Name of the scenario, in lists and of its folders."""
+    """Its name, in lists and of run folders."""
     title: str = ""
     """One line that says what it shows."""
     description: str = ""
     """A paragraph about it."""
     plugins: tuple[str, ...] | None = None
-    """Modules with the file's own kinds, resolvers and robots; they must be allowed from outside
-    the file, see hierarchy.plugins."""
+    """Modules with kinds, resolvers and robots, to be allowed from outside the file, see
+    hierarchy.plugins."""
     robot: RobotSection
     """Which robot."""
     start: StartSection = StartSection()
@@ -80,7 +80,7 @@ class Scenario(Section):
     posture: PostureSection | None = None
     """Null-space term or last task toward a posture."""
     tasks: tuple[ListedTask, ...] = ()
-    """Further tasks in order of priority, below limits, avoidance, position and pointing."""
+    """Tasks in order of priority, below limits, avoidance, position and pointing."""
     contacts: tuple[ContactSection, ...] = ()
     """What touches the surroundings, at level "torque"."""
     forces: ForcesSection = ForcesSection()
@@ -88,8 +88,8 @@ class Scenario(Section):
     faults: tuple[FaultSection, ...] = ()
     """What goes wrong during a run."""
     variation: Parameters = Field(default_factory=dict)
-    """Distributions of dotted keys, from which `hierarchy compare --starts` samples; a single run
-    ignores them."""
+    """Distributions of dotted keys, in the unit of each, that `hierarchy compare --starts`
+    samples."""
 
     @field_validator("plugins")
     @classmethod

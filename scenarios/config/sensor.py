@@ -51,41 +51,39 @@ class ImageSection(AnySensor):
 
     made_by: ClassVar[str] = "scenarios.cell.sensors.depth_sensor:depth_sensor"
     latency: keys.Time = 0.0
-    """Time from taking a frame until it is available."""
+    """Age of a frame when it arrives."""
     stale_after: keys.Time = 0.2
-    """Time without a new frame after which the camera is blind and `control.policy.stale`
-    applies."""
+    """Time without a frame after which `control.policy.stale` applies."""
     least_readings: keys.Share = 0.1
-    """Share of valid pixels below which a frame does not count."""
+    """Least share of valid pixels of a frame."""
     foot: keys.Distance = FOOT  # type: ignore[misc]
-    """Height of the column below the base that is removed from the image with the robot's
-    capsules."""
+    """Height of the column below the base, removed from images as the robot is."""
     margin: keys.Distance = 0.05
-    """Width around the capsules within which pixels are removed with the robot."""
+    """Width around the robot's capsules within which pixels are removed."""
     region: keys.Length | None = None
-    """Distance from a point within which obstacles are seen; by default the largest at which
-    avoidance acts."""
+    """Distance from a control point within which obstacles are seen; by default the largest at
+    which avoidance acts."""
     thin: keys.Distance | None = None
-    """How far obstacles extend behind their surface; by default without bound."""
+    """Depth of obstacles behind their surface, by default infinite."""
     support: Annotated[int, Field(strict=True, ge=1, le=9)] = 3
-    """Pixels of the nine around one that must agree for it to count."""
+    """Pixels of nine that must agree."""
     band: keys.Distance = 0.05
-    """Difference in depth up to which pixels agree."""
+    """Difference in depth within which they do."""
 
 
 class DepthErrors(keys.Section):
     """Errors of a depth reading z of a simulated camera; the defaults resemble a Kinect."""
 
     noise_floor: keys.Distance = 1.2e-3
-    """Standard deviation of the normal noise of z at `noise_from`, clipped at 3.5 times that."""
+    """Standard deviation of the noise of z at `noise_from`, clipped at 3.5 of them."""
     noise_growth: keys.NotNegative = 1.9e-3
-    """Growth of that deviation with (z - noise_from)^2 [1/m]."""
+    """Its growth with (z - noise_from)^2 [1/m]."""
     noise_from: keys.Distance = 0.4
-    """Depth from which noise grows."""
+    """Depth from which it grows."""
     rounding: Literal["disparity", "step"] = "disparity"
-    """"step" rounds z to multiples of `step`, "disparity" 1 / z, as a triangulating camera does."""
+    """Rounds z ("step") or 1 / z ("disparity") to multiples of `step`."""
     step: keys.NotNegative = 2.85e-3
-    """Step of the rounding, in [m], or [1/m] of a disparity; 0 for none."""
+    """In [m], or [1/m] of a disparity; 0 for none."""
     near: keys.Distance = 0.5
     """Depth below which readings are missing."""
     far: Annotated[float, Field(strict=True, gt=0.0), keys.Unit("m")] = 5.0
@@ -93,11 +91,11 @@ class DepthErrors(keys.Section):
     missing: keys.Share = 0.002
     """Probability of a missing reading."""
     missing_at_edges: keys.Share = 0.3
-    """The same where a neighbour is 5 cm nearer or farther."""
+    """The same beside a step in depth of 5 cm."""
     outliers: keys.Share = 0.02
-    """Probability that a frame has a square with a random depth before the true one."""
+    """Probability of a square with a random, smaller depth in a frame."""
     outlier_size: keys.Count = 2
-    """Largest number of pixels from the middle of that square to its side."""
+    """Largest half side of that square, in pixels."""
 
     def _wrong(self) -> Iterator[str]:
         if self.near >= self.far:
@@ -135,7 +133,7 @@ class DepthErrors(keys.Section):
 
 @register("sensors", "camera", shipped=True)
 class CameraSection(DepthErrors, ImageSection):
-    """A simulated depth camera that sees obstacles and robot; see scenarios.cell.sensors.camera."""
+    """A simulated depth camera that sees obstacles and robot; the defaults resemble a Kinect."""
 
     kind: Literal["camera"]
     width: Pixels = 640
@@ -147,16 +145,16 @@ class CameraSection(DepthErrors, ImageSection):
     fy: Annotated[keys.Positive, keys.Unit("px")] = 525.0
     """Focal length, vertically."""
     cx: Annotated[keys.Finite, keys.Unit("px")] | None = None
-    """Column of the optical axis, by default the middle."""
+    """Column of the optical axis, by default the middle one."""
     cy: Annotated[keys.Finite, keys.Unit("px")] | None = None
-    """Row of the optical axis, by default the middle."""
+    """Row of the optical axis, by default the middle one."""
     position: keys.Point = (0.0, 2.0, 0.7)
     """Where the camera is."""
     look_at: keys.Point = (0.0, 0.3, 0.1)
     """Point that it looks at."""
     rotation: keys.Rows3 | None = None
-    """In place of `look_at`: rows of a matrix whose columns are the camera's axes right, down and
-    forward in the world."""
+    """In place of `look_at`: rows of the matrix from the camera's axes (right, down, forward) to
+    the world's."""
     rate: Annotated[keys.Positive, keys.Unit("Hz")] = 30.0
     """Frames per second."""
     jitter: keys.Time = 0.0
@@ -168,22 +166,19 @@ class CameraSection(DepthErrors, ImageSection):
     far: keys.Length = 5.0
     """Depth above which readings are missing."""
     point_radius: keys.Distance = 0.02
-    """Radius of the balls that stand for obstacles that are points."""
+    """Radius at which obstacles that are points are seen."""
     backdrop: keys.Distance = 4.0
-    """Depth of a wall behind everything, 0 for none, which may leave too few readings."""
+    """Depth of a wall behind everything, 0 for none."""
 
 
 @register("sensors", "frames", shipped=True)
 class FramesSection(ImageSection):
-    """Depth images that were recorded, with their camera and times.
-
-    See scenarios.cell.sensors.frames.
-    """
+    """Recorded depth images, with their camera and times."""
 
     is_recorded: ClassVar[bool] = True
     kind: Literal["frames"]
     folder: str
-    """Folder of the images, relative to the scenario's file, or the name of a shipped set."""
+    """Their folder, relative to the scenario's file, or a shipped set."""
 
 
 class OwnSensor(AnySensor, OwnSection):

@@ -83,7 +83,7 @@ class AlongSection(TaskSection):
     """Follow a path, or stay at the initial position without one."""
 
     path: PathSection | None = None
-    """Where the point is wanted over time."""
+    """Path of the point."""
     offset: keys.Point = (0.0, 0.0, 0.0)
     """Shift of the path, or of the initial position."""
     from_start: keys.Flag = False
@@ -140,13 +140,13 @@ class PointingTask(TaskSection):
     """The z axis of a frame on or in a cone (1 row)."""
 
     axis: keys.Vector3
-    """Axis of the cone in the world, of any length."""
+    """Axis of the cone in the world."""
     alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0), keys.Unit("deg")]
-    """Opening of the cone: angle of the z axis from `axis`."""
+    """Half-angle of the cone."""
     rows: Rows = "inequality"
     """"equality": on the cone. "inequality": within it."""
     buffer: Annotated[keys.Positive, keys.Unit("deg")] | None = None
-    """With control.stack = "smooth": width inside the cone within which an inequality acts."""
+    """Width inside the cone within which an inequality acts if control.stack is "smooth"."""
     stiffness: keys.Stiffness = 5.0
     damping: keys.Gain = 2.0
     gain: keys.Gain = 5.0
@@ -175,10 +175,9 @@ class PostureTask(TaskSection):
     made_by: ClassVar[str] = "hierarchy.tasks:Posture"
     unit: ClassVar[str] = "rad"
     target: tuple[keys.JointPosition, ...] | None = None
-    """Values of all joints, or all coordinates, as in `start.q`; by default the
-    start."""
+    """As `start.q`; by default the start."""
     joints: dict[str, keys.JointValue] = Field(default_factory=dict)
-    """Values of joints by name that override `target`."""
+    """Positions by name, which override `target`."""
     stiffness: keys.Stiffness = 10.0
     damping: keys.Gain = 5.0
     gain: keys.Gain = 1.0
@@ -190,7 +189,7 @@ class PostureTask(TaskSection):
 
 
 class PositionSection(PositionTask):
-    """The end effector's position along a path; without one it stays where it starts."""
+    """The end effector's position along a path, by default where it starts."""
 
     title: ClassVar[str] = "position"
     frame: ClassVar[str | None] = None
@@ -207,7 +206,7 @@ class PointingSection(PointingTask):
 
 
 class PostureSection(PostureTask):
-    """A posture of all joints, below all tasks."""
+    """A posture, below all tasks."""
 
     title: ClassVar[str] = "posture"
     role: Literal["null-space", "task"] = "null-space"
@@ -215,40 +214,36 @@ class PostureSection(PostureTask):
 
 
 class LimitsSection(keys.Section):
-    """The robot's joint limits, as the first level of the stack.
-
-    Position and velocity limits are those of the robot.
-    """
+    """Limits of acceleration, and the position and velocity limits of the robot."""
 
     acceleration: Acceleration | tuple[Acceleration, ...]
-    """Largest acceleration, one value for all joints or one each."""
+    """Largest acceleration, of all joints or of each."""
     place: Literal["stack", "guard", "either", "bounds"] = "stack"
-    """"stack": above all tasks. "guard": not in the stack; each command is clamped to them joint by
-    joint, regardless of the tasks, which works with every resolver. "either": in the stack if the
-    resolver handles bounds, otherwise a guard. "bounds": in the stack, above all else, as far as
-    they bound single unknowns: without torque limits and the limits of contact forces."""
+    """"stack": the first level. "guard": each command is clamped joint by joint, regardless of the
+    tasks, with any resolver. "either": in the stack if the resolver handles bounds, else a guard.
+    "bounds": in the stack, but without torque limits and [forces]."""
     margin: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
-    """Distance by which the position limits shrink on both sides."""
+    """Distance kept from the position limits."""
     horizon: Annotated[keys.NotNegative, keys.Unit("s")] | None = None
-    """Time in which the sides come to a limit, see docs/theory/joint-limits.md; by default 0.05 s
-    at level "torque", and one tick elsewhere and if it is shorter than that."""
+    """Time in which a joint comes to rest at a limit, see docs/theory/joint-limits.md; by default
+    0.05 s at level "torque", elsewhere one tick, which is the least."""
     danger_reach: keys.Length | None = None
-    """Joints that would move a control point toward an obstacle nearer than this are slowed down,
-    see hierarchy.tasks.DangerBounds."""
+    """Distance to an obstacle below which joints that approach it are slowed down, see
+    hierarchy.tasks.DangerBounds."""
     torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None
-    """Usable share of the effort limits; without it torques are not limited."""
+    """Usable share of the effort limits; by default torques are unlimited."""
     torque_step: Annotated[keys.Positive, keys.Unit("N m")] | None = None
-    """At level "torque": change of a torque from one tick to the next, at most."""
+    """Largest change of a torque in a tick, at level "torque"."""
     base_speed: tuple[keys.Positive, keys.Positive] | None = None
-    """Linear [m/s] and angular [rad/s] speed of a floating base; by default 2 m/s and 3 rad/s, and
-    at level "torque", where only forces move it, none."""
+    """Linear [m/s] and angular [rad/s] speed of a floating base; by default 2 and 3, at level
+    "torque" unlimited."""
     base_acceleration: tuple[keys.Positive, keys.Positive] | None = None
-    """Linear [m/s^2] and angular [rad/s^2] acceleration of a floating base; by default the largest
-    `acceleration`, and at level "torque" none."""
+    """The same of its acceleration [m/s^2], [rad/s^2]; by default the largest `acceleration`, at
+    level "torque" unlimited."""
 
 
 class DampingSection(keys.Section):
-    """Null-space term a = -D v, eq. (15)."""
+    """Null-space term a = -D v, eq. (15); not with the null-space [posture]."""
 
     value: keys.NotNegative
     """D [1/s], or with weight = "mass" the factor of M(q)."""
@@ -260,10 +255,10 @@ class Listed(Made):
     """A task of `[[tasks]]`."""
 
     name: keys.TaskName | None = None
-    """Its name in messages, tables and figures; by default its kind."""
+    """Its name, by default its kind."""
     give: keys.NotNegative = 0.0
-    """Additional violation that each row may have, for the benefit of the tasks below, in the unit
-    of the rows: [1/s] or [1/s^2] times that of the task, or [N] of forces."""
+    """Violation that each row may have in favour of the tasks below, in the unit of the rows: that
+    of the task per s or s^2, or [N]."""
     kind: str
     """Which kind it is."""
 

@@ -18,19 +18,19 @@ class _OfForces(Listed):
 
 @register("tasks", "contact-force", shipped=True)
 class ListedForce(_OfForces):
-    """The force of a contact at a value; at level "torque". See hierarchy.tasks.ContactForce."""
+    """A contact's force or wrench at a value, at level "torque"."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:ContactForce"
     kind: Literal["contact-force"]
     contact: str
     """Name of the contact."""
     target: tuple[Finite, ...]
-    """One number, the normal force [N]; three, the force [N]; or six, the wrench [N, N m]."""
+    """Normal force [N], force [N] or wrench [N, N m]: 1, 3 or 6 numbers."""
 
 
 @register("tasks", "least-force", shipped=True)
 class ListedLeastForce(_OfForces):
-    """The smallest contact forces, as a last level; at level "torque"."""
+    """The smallest contact forces, as last level, at level "torque"."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:LeastForce"
     kind: Literal["least-force"]

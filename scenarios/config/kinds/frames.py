@@ -42,8 +42,7 @@ class _AlongPose(Listed, AlongSection):
     frame: str
     """Frame of the robot."""
     rotation: Rows3 | None = None
-    """Rows of the wanted rotation matrix from the frame to the world; by default the initial
-    one."""
+    """Rows of the wanted matrix from the frame to the world, by default the initial one."""
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the path of the frame, and its rotation, by default the initial one."""
@@ -115,9 +114,9 @@ class ListedRelative(Listed, TaskSection):
     to: str
     """The other frame."""
     position: Point | None = None
-    """Origin of `frame` in the axes of `to`; by default the initial one."""
+    """Origin of `frame` in the axes of `to`, by default the initial one."""
     rotation: Rows3 | None = None
-    """Rows of the rotation matrix from `frame` to `to`; by default the initial one."""
+    """Rows of the matrix from `frame` to `to`, by default the initial one."""
     orientation: Flag = True
     """Whether the orientation counts too."""
 

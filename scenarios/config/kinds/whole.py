@@ -25,7 +25,7 @@ class ListedPosture(Listed, PostureTask):
 
 @register("tasks", "coupling", shipped=True)
 class ListedCoupling(Listed, TaskSection):
-    """The sum of factor times position over some joints at a value (1 row)."""
+    """A weighted sum of joint positions at a value (1 row)."""
 
     unit: ClassVar[str] = "rad"
     made_by: ClassVar[str] = "hierarchy.tasks:JointCoupling"
@@ -94,9 +94,6 @@ class ListedSelfCollision(_Apart, BarrierSection):
 
 @register("tasks", "collision", shipped=True)
 class ListedCollision(_Apart):
-    """The place in the list of the rows that [avoidance] with kind = "separation" asks for.
-
-    Without this task they are above all tasks.
-    """
+    """Where the rows of [avoidance] `separation` stand; by default above all tasks."""
 
     kind: Literal["collision"]
