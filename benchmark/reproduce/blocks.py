@@ -127,16 +127,15 @@ def _untested() -> list[str]:
 def _found(rows: Rows, family: str) -> list[str]:
     """Return a table of what was found about the claims of a family; of our own, what decides."""
     own = family == "own"
-    head = ["claim", *(["decided by, smallest effect"] if own else []), "effect [95 % interval]",
-            ", ".join(rows.layouts), "Holm's p", "verdict"]
-    lines = [f"| {' | '.join(head)} |",
-             "|---" * len(head) + "|"]
+    head = ["claim", *(["decided by, smallest effect"] if own else []),
+            f"effect [95 % interval] ({', '.join(rows.layouts)})", "verdict"]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for one in judged(PROTOCOL, rows, family):
         each = ", ".join(shown(one.claim, rows, effect).partition(" [")[0]
                          for effect in one.layouts)
         by = f" | {_decider(one.claim)}, {_least(one.claim)}" if own else ""
-        lines.append(f"| {one.claim.text}{by} | {shown(one.claim, rows, one.effect)} | {each} | "
-                     f"{probability(one.p).removeprefix('p = ')} | {one.decided} |")
+        lines.append(f"| {one.claim.text}{by} | {shown(one.claim, rows, one.effect)} ({each}) | "
+                     f"{one.decided}, {probability(one.p)} |")
     return lines
 
 

@@ -18,7 +18,7 @@ from scenarios.config import load
 from scenarios.config.sampling import drawn
 from scenarios.draw.figures.palette import looks
 from scenarios.files import make_folder, write_json
-from scenarios.measure.metric import shown
+from scenarios.measure.metric import Metric, shown
 from scenarios.results.run import Outcome
 from scenarios.results.sampled import Progress, Workers
 
@@ -73,6 +73,7 @@ class Point:
     units: list[str]
 
 
+_ROWS = 6  # of a method in a table
 GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 FRONTS = {name: Front(**given) for name, given in GIVEN["front"].items()}
 
@@ -144,27 +145,36 @@ def read(path: Path) -> list[Point]:
 def table(points: Sequence[Point], name: str) -> list[str]:
     """Return the table of a front: settings, scenes that did not fail, medians of the test.
 
-    Settings of a method that failed are one line.
+    Of a method it shows at most `_ROWS` settings, and those that failed in one line.
     """
-    front = FRONTS[name]
-    head = [name, "settings", "did not fail", *(f"`{one}`" for one in front.minimised)]
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     own = [one for one in points if one.front == name]
+    units = [Metric("", "", None, unit).shown_unit for unit in own[0].units]
+    heads = [f"{metric} [{unit}]" if unit else metric
+             for metric, unit in zip(FRONTS[name].minimised, units, strict=True)]
+    lines = [[name, f"of {own[0].scenes}", *heads]]
     for method in dict.fromkeys(one.method for one in own):
         tried = [one for one in own if one.method == method]
-        failed = [one.kept for one in tried if None in one.test]
-        for one in (one for one in tried if None not in one.test):
-            settings = ", ".join(f"{'.'.join(key.split('.')[-2:])} = {x:g}"
-                                 for key, x in one.settings.items())
-            cells = [shown(x or 0.0, unit) for x, unit in zip(one.test, one.units, strict=True)]
-            lines.append(f"| {method} | {settings or '–'} | {one.kept} of {one.scenes} | "
-                         f"{' | '.join(cells)} |")
-        if failed:
-            several = f"{len(failed)} others" if len(failed) < len(tried) else f"all {len(tried)}"
-            several = several if len(tried) > 1 else "–"
-            lines.append(f"| {method} | {several} | at most {max(failed)} of {tried[0].scenes} |"
-                         + " failed |" * len(front.minimised))
-    return lines
+        for one in spread([one for one in tried if None not in one.test], _ROWS):
+            settings = (f"{'.'.join(key.split('.')[-2:]).removeprefix('options.')}={x:g}"
+                        for key, x in one.settings.items())
+            values = (shown(x or 0.0, unit).removesuffix(name).strip()
+                      for x, unit, name in zip(one.test, one.units, units, strict=True))
+            lines.append([" ".join([method, *settings]), str(one.kept), *values])
+        if failed := [one.kept for one in tried if None in one.test]:
+            lines.append([f"{method}: {len(failed)} failed", f"≤{max(failed)}",
+                          *("–" for _ in heads)])
+    wide = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return ["```", *("  ".join([one[0].ljust(wide[0]), *map(str.rjust, one[1:], wide[1:])])
+                     for one in lines), "```"]
+
+
+def spread(points: Sequence[Point], most: int) -> list[Point]:
+    """Return at most `most` points that no other one beats in the test, evenly by first metric."""
+    scores = np.array([one.test for one in points], dtype=float)
+    best = sorted((one for k, one in enumerate(points) if not dominated(scores, k)),
+                  key=lambda one: one.test)
+    at = np.linspace(0, len(best) - 1, min(len(best), most)).round().astype(int)
+    return [best[k] for k in at]
 
 
 def figure(points: Sequence[Point]) -> Figure:

@@ -5,9 +5,11 @@
     <!-- measured: hierarchy bench resolvers --fresh 1 | EQ7, fresh .. Times of -->
     <!-- measured: table of hierarchy bench resolvers --seconds 0.2 -->
     <!-- kept: text of open-2026-11 | Fresh problems, seed .. right: -->
+    <!-- measured: hierarchy bench open | Fresh .. Public | without , (tight|slack) -->
 
 all but the first up to `<!-- end of measurement -->`. After `|`, only the lines from one that
-starts with the first text to the last before one that starts with the second. `table of`: in a
+starts with the first text to the last before one that starts with the second; without those that
+the last expression is found in. `table of`: in a
 table whose columns are named after families and whose rows after resolvers, the cells are filled
 with medians. `text of`: the paragraphs as they are. `kept`: a file of outputs that no command makes
 again as it is.
@@ -35,7 +37,8 @@ _COLUMNS = "100"  # of the terminal that a command writes to
 _CODE = ("hierarchy", "solvers", "scenarios", "benchmark")
 _MARK = re.compile(r"(?P<mark>^<!-- (?P<kind>reproduce|measured|kept): "
                    r"(?:(?P<form>table|text) of )?(?P<name>[^|\n]*?)"
-                   r"(?: \| (?P<first>[^\n]+?) \.\. (?P<last>[^\n]+?))? -->\n)"
+                   r"(?: \| (?P<first>[^\n]+?) \.\. (?P<last>[^\n]+?))?"
+                   r"(?: \| without (?P<without>[^\n]+?))? -->\n)"
                    r"(?P<text>.*?)(?P<end><!-- end of [\w-]+ -->)", re.DOTALL | re.MULTILINE)
 
 
@@ -133,7 +136,8 @@ def filled(text: str, root: Path, page: str, stored: Stored) -> str:
         said = output(name)
         if found["form"] == "table":
             return f"{found['mark']}{_with_medians(found['text'], said)}{found['end']}"
-        part = _part(said.splitlines(), found["first"], found["last"])
+        part = [line for line in _part(said.splitlines(), found["first"], found["last"])
+                if not found["without"] or not re.search(found["without"], line)]
         if not part:
             raise HierarchyError(f"{page}: no line of the output of {name!r} starts with "
                                  f"{found['first']!r}")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmark.reproduce import blocks, protocol, verdicts
-from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, dominated
+from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, Point, dominated, spread
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
 from scenarios.config import load
 from scenarios.measure.statistics import holm
@@ -116,6 +116,14 @@ def test_only_what_nothing_else_improves_is_on_the_front():
     scores = np.array([[1.0, 4.0], [2.0, 2.0], [2.0, 3.0], [np.inf, np.inf]])
     assert [dominated(scores, k) for k in range(4)] == [False, False, True, True]
     assert not dominated(np.full((2, 2), np.inf), 0)
+
+
+def test_a_table_has_the_ends_of_a_front_and_what_lies_evenly_between():
+    tests = [[float(k), -float(k)] for k in range(20)] + [[9.5, 0.0]]  # the last one is beaten
+    points = [Point("a", "b", {}, [], test, 1, 1, []) for test in tests]
+    assert [one.test[0] for one in spread(points, 3)] == [0.0, 10.0, 19.0]
+    assert spread(points[:2], 3) == points[:2]
+    assert spread([], 3) == []
 
 
 def test_every_method_can_take_its_settings():

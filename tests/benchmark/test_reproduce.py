@@ -62,6 +62,8 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
     mark = "python a.py | INEQ7 .. Times of"
     assert fill(page(mark, "old\n")) == page(
         mark, "```\nINEQ7\n            median  p95\nhqp proxqp    1443 1945\n```\n")
+    mark += " | without ^hqp|[A-Z]7"
+    assert fill(page(mark)) == page(mark, "```\n            median  p95\n```\n")
     for text, says in ((page("python b.py"), r"page\.md: no output of 'python b\.py' is stored"),
                        (page("python a.py | EQ8 .. EQ9"), r"no line of the output .* with 'EQ8'")):
         with pytest.raises(HierarchyError, match=says):
