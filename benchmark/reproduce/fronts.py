@@ -22,6 +22,8 @@ from scenarios.measure.metric import shown
 from scenarios.results.run import Outcome
 from scenarios.results.sampled import Progress, Workers
 
+GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
 
 @dataclass(frozen=True)
 class Method:
@@ -53,6 +55,7 @@ class Front:
     method: Mapping[str, Mapping[str, Any]]
     needs: str = ""
     plant: str = ""
+    trials: int = GIVEN["trials"]
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,6 @@ class Point:
     units: list[str]
 
 
-GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 FRONTS = {name: Front(**given) for name, given in GIVEN["front"].items()}
 
 
@@ -82,9 +84,10 @@ def run(out: Path, workers: Workers, progress: Progress | None = None) -> list[P
     found = []
     for name, label in ((name, label) for name, front in FRONTS.items() for label in front.method):
         method, where = Method(**FRONTS[name].method[label]), (out / name, workers, progress)
-        trials = method.trials(GIVEN["trials"], GIVEN["seed"])
+        trials = method.trials(FRONTS[name].trials, GIVEN["seed"])
         training, *_ = _scores(name, method, trials, (GIVEN["seed"], GIVEN["training"]), where)
-        best = [k for k in range(len(trials)) if not dominated(training, k)]
+        best = spread([k for k in range(len(trials)) if not dominated(training, k)],
+                      training[:, 0], GIVEN["tested"])
         test, kept, units = _scores(name, method, [trials[k] for k in best],
                                     (GIVEN["seed"] + 1, GIVEN["test"]), where)
         found += [Point(name, label, trials[k], _plain(training[k]), _plain(test[i]), kept[i],
@@ -124,6 +127,13 @@ def dominated(scores: Array, k: int) -> bool:
     """Return whether another row of scores (N, m) is nowhere worse than row k, once better."""
     better = (scores <= scores[k]).all(axis=1) & (scores < scores[k]).any(axis=1)
     return bool(better.any())
+
+
+def spread(best: Sequence[int], first: Array, count: int) -> list[int]:
+    """Return at most `count` rows of `best`, evenly in the order of their first metric."""
+    ordered = sorted(best, key=lambda k: (first[k], k))
+    at = np.linspace(0, len(ordered) - 1, min(count, len(ordered)))
+    return [ordered[int(k)] for k in at]
 
 
 def write(points: Sequence[Point], path: Path) -> None:
