@@ -92,6 +92,11 @@ class Measured(Task):
         """Error p_d - p at a state: (m,), in the task's unit."""
         return self._measured(state)[1].error
 
+    def error_reader(self, state: State) -> Callable[[], Array]:
+        """See `Task.error_reader`; each call overwrites the array of the last."""
+        read = self._reader(state)
+        return lambda: read(state.kinematics)[1].error
+
     def jacobian(self, state: State) -> Array:
         """Jacobian J = dp/dq at a state: (m, n)."""
         return self._measured(state)[0]
@@ -152,17 +157,26 @@ class Measured(Task):
     def _measured(self, state: State, kinematics: Kinematics | None = None
                   ) -> tuple[Array, Motion, Array]:
         """The Jacobian (m, n), the rest of what is measured, and the goal of each row (3, m)."""
+        return self._reader(state)(kinematics or state.kinematics)
+
+    def _reader(self, state: State) -> Callable[[Kinematics], tuple[Array, Motion, Array]]:
+        """Return what `_measured` calls, for a state that moves; each call overwrites the last."""
         task = cast("Measured", self.on(state.robot))
         function, reads = task.measure(state)
         m = task.dimension
         J, sides, motion = np.zeros((m, state.n)), np.zeros((2, m)), np.zeros((8, m))
         asked = task._asked(state, "velocity", motion)
         move_goal = task.follow(state, asked.goal)
-        if move_goal is not None:
-            move_goal(state.t)
-        # Called, not bound: to bind takes 0.5 ms.
-        function(kinematics or state.kinematics, reads, asked, J, *sides, 0)
-        return J, Motion(*motion[:4]), np.hstack([asked.goal, np.zeros((3, 1))])[:, task.columns]
+
+        def read(kinematics: Kinematics) -> tuple[Array, Motion, Array]:
+            if move_goal is not None:
+                move_goal(state.t)
+            # Called, not bound: to bind takes 0.5 ms.
+            function(kinematics, reads, asked, J, *sides, 0)
+            return J, Motion(*motion[:4]), np.hstack([asked.goal, np.zeros((3, 1))])[
+                :, task.columns]
+
+        return read
 
 
 def measured(function: Kernel) -> Kernel:

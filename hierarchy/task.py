@@ -29,7 +29,7 @@ _ROUNDING = 1e-9  # of a period, relative
 _STEP = 2.0**-10  # [s] of the differences that give the derivative of a Jacobian
 _OF_STATE = ("error", "jacobian", "jacobian_derivative", "desired_velocity",
              "desired_acceleration", "reference_velocity", "reference_acceleration", "measure",
-             "writer")
+             "error_reader", "writer")
 # Parts of a task by the type of the field, and how to make one.
 _PARTS: dict[str, tuple[type, str]] = {
     "Robot": (Robot, "Robot.load(NAME)"), "Frame": (Frame, "robot.frame(NAME)"),
@@ -100,6 +100,10 @@ class Task(ABC):
     @abstractmethod
     def error(self, state: State) -> Array:
         """Error p_d - p at a state: (m,), in the task's unit."""
+
+    def error_reader(self, state: State) -> Callable[[], Array]:
+        """Return a function that returns the error at a state as it is when called."""
+        return lambda: self.error(state)
 
     @abstractmethod
     def jacobian(self, state: State) -> Array:

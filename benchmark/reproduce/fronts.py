@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,8 @@ from scenarios.files import make_folder, write_json
 from scenarios.measure.metric import Metric, shown
 from scenarios.results.run import Outcome
 from scenarios.results.sampled import Progress, Workers
+
+GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ class Front:
     method: Mapping[str, Mapping[str, Any]]
     needs: str = ""
     plant: str = ""
+    trials: int = GIVEN["trials"]
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,6 @@ class Point:
 
 
 _ROWS = 6  # of a method in a table
-GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 FRONTS = {name: Front(**given) for name, given in GIVEN["front"].items()}
 
 
@@ -83,9 +85,10 @@ def run(out: Path, workers: Workers, progress: Progress | None = None) -> list[P
     found = []
     for name, label in ((name, label) for name, front in FRONTS.items() for label in front.method):
         method, where = Method(**FRONTS[name].method[label]), (out / name, workers, progress)
-        trials = method.trials(GIVEN["trials"], GIVEN["seed"])
+        trials = method.trials(FRONTS[name].trials, GIVEN["seed"])
         training, *_ = _scores(name, method, trials, (GIVEN["seed"], GIVEN["training"]), where)
-        best = [k for k in range(len(trials)) if not dominated(training, k)]
+        best = spread([k for k in range(len(trials)) if not dominated(training, k)],
+                      training[:, 0], GIVEN["tested"])
         test, kept, units = _scores(name, method, [trials[k] for k in best],
                                     (GIVEN["seed"] + 1, GIVEN["test"]), where)
         found += [Point(name, label, trials[k], _plain(training[k]), _plain(test[i]), kept[i],
@@ -127,6 +130,13 @@ def dominated(scores: Array, k: int) -> bool:
     return bool(better.any())
 
 
+def spread(best: Sequence[int], first: Array, count: int) -> list[int]:
+    """Return at most `count` rows of `best`, evenly in the order of their first metric."""
+    ordered = sorted(best, key=lambda k: (first[k], k))
+    at = np.linspace(0, len(ordered) - 1, min(count, len(ordered)))
+    return [ordered[int(k)] for k in at]
+
+
 def write(points: Sequence[Point], path: Path) -> None:
     """Write points as JSON."""
     make_folder(path.parent)
@@ -145,7 +155,8 @@ def read(path: Path) -> list[Point]:
 def table(points: Sequence[Point], name: str) -> list[str]:
     """Return the table of a front: settings, scenes that did not fail, medians of the test.
 
-    Of a method it shows at most `_ROWS` settings, and those that failed in one line.
+    Of a method it shows at most `_ROWS` settings, evenly of those that no other one beats in the
+    test, and in one line how many failed.
     """
     own = [one for one in points if one.front == name]
     units = [Metric("", "", None, unit).shown_unit for unit in own[0].units]
@@ -153,28 +164,25 @@ def table(points: Sequence[Point], name: str) -> list[str]:
              for metric, unit in zip(FRONTS[name].minimised, units, strict=True)]
     lines = [[name, f"of {own[0].scenes}", *heads]]
     for method in dict.fromkeys(one.method for one in own):
-        tried = [one for one in own if one.method == method]
-        for one in spread([one for one in tried if None not in one.test], _ROWS):
-            settings = (f"{'.'.join(key.split('.')[-2:]).removeprefix('options.')}={x:g}"
-                        for key, x in one.settings.items())
-            values = (shown(x or 0.0, unit).removesuffix(name).strip()
-                      for x, unit, name in zip(one.test, one.units, units, strict=True))
-            lines.append([" ".join([method, *settings]), str(one.kept), *values])
-        if failed := [one.kept for one in tried if None in one.test]:
-            lines.append([f"{method}: {len(failed)} failed", f"≤{max(failed)}",
-                          *("–" for _ in heads)])
+        lines += _rows([one for one in own if one.method == method], units)
     wide = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return ["```", *("  ".join([one[0].ljust(wide[0]), *map(str.rjust, one[1:], wide[1:])])
                      for one in lines), "```"]
 
 
-def spread(points: Sequence[Point], most: int) -> list[Point]:
-    """Return at most `most` points that no other one beats in the test, evenly by first metric."""
-    scores = np.array([one.test for one in points], dtype=float)
-    best = sorted((one for k, one in enumerate(points) if not dominated(scores, k)),
-                  key=lambda one: one.test)
-    at = np.linspace(0, len(best) - 1, min(len(best), most)).round().astype(int)
-    return [best[k] for k in at]
+def _rows(tried: Sequence[Point], units: Sequence[str]) -> Iterator[list[str]]:
+    """Yield the rows of a method."""
+    stood = [one for one in tried if None not in one.test]
+    scores = np.array([one.test for one in stood], dtype=float).reshape(len(stood), len(units))
+    best = [k for k in range(len(stood)) if not dominated(scores, k)]
+    for one in (stood[k] for k in spread(best, scores[:, 0], _ROWS)):
+        settings = (f"{'.'.join(key.split('.')[-2:]).removeprefix('options.')}={x:g}"
+                    for key, x in one.settings.items())
+        values = (shown(x or 0.0, unit).removesuffix(short).strip()
+                  for x, unit, short in zip(one.test, one.units, units, strict=True))
+        yield [" ".join([one.method, *settings]), str(one.kept), *values]
+    if failed := [one.kept for one in tried if None in one.test]:
+        yield [f"{tried[0].method}: {len(failed)} failed", f"≤{max(failed)}", *("–" for _ in units)]
 
 
 def figure(points: Sequence[Point]) -> Figure:

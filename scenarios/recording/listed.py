@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -34,22 +34,25 @@ def signals(robot: Robot, tasks: Iterable[Task], t: Array, q: Array, v: Array) -
     found = {error_of(task.name): np.full((len(t), task.dimension), np.nan) for task in tasks}
     found |= {position_of(task.name): np.full((len(t), 3), np.nan)
               for task in tasks if _position(task, state) is not None}
+    readers = [_error_reader(task, state) for task in tasks]
     for k in range(len(t)):
         if not state.move(t[k], q[k], v[k]):
             continue
-        for task in tasks:
-            found[error_of(task.name)][k] = _error(task, state)
+        for task, read in zip(tasks, readers, strict=True):
+            found[error_of(task.name)][k] = read()
             if (position := _position(task, state)) is not None:
                 found[position_of(task.name)][k] = position
     return found
 
 
-def _error(task: Task, state: State) -> Array | float:
-    """The error of a task, NaN for a plugin's that needs the measurement of its tick."""
+def _error_reader(task: Task, state: State) -> Callable[[], Array | float]:
+    """Return what reads the error of a task; NaN for one that needs the measurement of a tick."""
     try:
-        return task.error(state)
+        read = task.error_reader(state)
+        read()
     except (AttributeError, TypeError, HierarchyError):
-        return np.nan
+        return lambda: np.nan
+    return read
 
 
 def _position(task: Task, state: State) -> Array | None:

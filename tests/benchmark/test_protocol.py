@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmark.reproduce import blocks, protocol, verdicts
-from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, Point, dominated, spread
+from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, Point, dominated, table
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
 from scenarios.config import load
 from scenarios.measure.statistics import holm
@@ -119,11 +119,11 @@ def test_only_what_nothing_else_improves_is_on_the_front():
 
 
 def test_a_table_has_the_ends_of_a_front_and_what_lies_evenly_between():
-    tests = [[float(k), -float(k)] for k in range(20)] + [[9.5, 0.0]]  # the last one is beaten
-    points = [Point("a", "b", {}, [], test, 1, 1, []) for test in tests]
-    assert [one.test[0] for one in spread(points, 3)] == [0.0, 10.0, 19.0]
-    assert spread(points[:2], 3) == points[:2]
-    assert spread([], 3) == []
+    tests = [[1e-3 * k, -1e-3 * k, 1.0] for k in range(20)] + [[9.5, 0.0, 1.0]]  # is beaten
+    points = [Point("stand-push", "a", {}, [], test, 6, 6, ["m", "", ""]) for test in tests]
+    lines = table(points, "stand-push")[2:-1]
+    assert [float(line.split()[2]) for line in lines] == [0.0, 3.0, 7.0, 11.0, 15.0, 19.0]
+    assert len(table(points[:2], "stand-push")) == 5
 
 
 def test_every_method_can_take_its_settings():

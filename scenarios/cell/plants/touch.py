@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 
+_ROUNDING = 1e-9  # [m]
 _LOADED = 1.0  # [N] of normal force from which a contact carries
 _CORNERS = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1)])  # of a box, its bottom
 
@@ -90,12 +91,12 @@ def inside(points: Array, place: Array) -> float:
 
     That is the distance from the nearest edge, negative outside; NaN for points on a line.
     """
-    if len(points) < 3:
+    edge = points - points[:, None]  # (k, k, 2), from each point to each other
+    length = np.hypot(edge[..., 0], edge[..., 1])
+    normal = np.stack([edge[..., 1], -edge[..., 0]], axis=-1)
+    normal /= np.where(length, length, 1.0)[..., None]
+    beyond = np.einsum("ijx,kijx->ijk", normal, points[:, None, None] - points[None, :, None])
+    of_hull = (length > 0.0) & (beyond <= _ROUNDING).all(axis=2)
+    if not (beyond < -_ROUNDING).any():
         return np.nan
-    from scipy.spatial import ConvexHull, QhullError  # only where a robot stands: 0.2 s
-
-    try:
-        edges = ConvexHull(points).equations  # outward normal, and minus its product with the edge
-    except QhullError:
-        return np.nan
-    return float(-(edges[:, :2] @ place + edges[:, 2]).max())
+    return float(-np.einsum("ijx,ijx->ij", normal, place - points[:, None])[of_hull].max())
