@@ -106,12 +106,12 @@ def cell(output: str, asked: Mapping[str, str]) -> str:
 
 def _asked() -> list[str]:
     """Return a table of the quotations: what decides them."""
-    lines = ["| section, quotation | decided by | smallest effect |", "|---|---|---|"]
+    lines = ["| section, quotation | decided by, smallest effect |", "|---|---|"]
     before = ""
     for one in PROTOCOL.claims:
         if one.family == "letter":
             said = f"{one.section}: “{one.quotation}”"
-            lines.append(f"| {'the same' if said == before else said} | {_decider(one)} | "
+            lines.append(f"| {'the same' if said == before else said} | {_decider(one)}, "
                          f"{_least(one)} |")
             before = said
     return lines
