@@ -26,6 +26,7 @@ ITEMS: Mapping[str, Mapping[str, Any]] = tomllib.loads(
 ROWS, POINTS = "docs/results/protocol.json.gz", "docs/results/fronts.json"
 FAMILIES = ("letter", "own")
 _WIDTH = 100     # columns of a page
+_CLEAR = 0.001   # p-value below which a table does not say it
 _NOTHING = "Not run yet: `hierarchy reproduce protocol`."
 _CLAIM = re.compile(r"\{(?P<name>[\w-]+)\}")
 _CELL = re.compile(r"\{(?P<output>[^{}/]+)/(?P<table>[^{}/]+)/(?P<row>[^{}/]+)/(?P<place>\d+)\}")
@@ -125,17 +126,15 @@ def _untested() -> list[str]:
 
 
 def _found(rows: Rows, family: str) -> list[str]:
-    """Return a table of what was found about the claims of a family; of our own, what decides."""
-    own = family == "own"
-    head = ["claim", *(["decided by, smallest effect"] if own else []),
-            f"effect [95 % interval] ({', '.join(rows.layouts)})", "verdict"]
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    """Return a table of what was found about the claims of a family."""
+    lines = [f"| claim | effect [95 % interval] ({', '.join(rows.layouts)}) | verdict |",
+             "|---|---|---|"]
     for one in judged(PROTOCOL, rows, family):
         each = ", ".join(shown(one.claim, rows, effect).partition(" [")[0]
                          for effect in one.layouts)
-        by = f" | {_decider(one.claim)}, {_least(one.claim)}" if own else ""
-        lines.append(f"| {one.claim.text}{by} | {shown(one.claim, rows, one.effect)} ({each}) | "
-                     f"{one.decided}, {probability(one.p)} |")
+        p = f", {probability(one.p)}" if one.p >= _CLEAR else ""
+        lines.append(f"| {one.claim.text} | {shown(one.claim, rows, one.effect)} ({each}) | "
+                     f"{one.decided}{p} |")
     return lines
 
 
