@@ -15,7 +15,7 @@ from typing import Any
 from benchmark.reproduce import fronts, protocol
 from benchmark.reproduce.fronts import Point
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
-from benchmark.reproduce.verdicts import Found, judged, shown
+from benchmark.reproduce.verdicts import DIFFERS, UNDECIDED, Found, judged, shown
 from hierarchy.errors import HierarchyError
 from scenarios.measure.statistics import probability
 
@@ -126,14 +126,15 @@ def _untested() -> list[str]:
 
 
 def _found(rows: Rows, family: str) -> list[str]:
-    """Return a table of what was found about the claims of a family."""
+    """Return a table of what was found about the claims of a family; of each layout if unclear."""
     lines = [f"| claim | effect [95 % interval] ({', '.join(rows.layouts)}) | verdict |",
              "|---|---|---|"]
     for one in judged(PROTOCOL, rows, family):
         each = ", ".join(shown(one.claim, rows, effect).partition(" [")[0]
                          for effect in one.layouts)
+        each = f" ({each})" if one.decided.startswith((DIFFERS, UNDECIDED)) else ""
         p = f", {probability(one.p)}" if one.p >= _CLEAR else ""
-        lines.append(f"| {one.claim.text} | {shown(one.claim, rows, one.effect)} ({each}) | "
+        lines.append(f"| {one.claim.text} | {shown(one.claim, rows, one.effect)}{each} | "
                      f"{one.decided}{p} |")
     return lines
 

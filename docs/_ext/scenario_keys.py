@@ -99,10 +99,11 @@ class _Writer:
         meaning = _escaped(key.meaning)
         if key.below:
             return f"- **{key.name}** {self.linked(key)}: {meaning}"
-        value = re.sub(r"(?<=[≥>≤<]) ", "", _escaped(key.value))
+        value = re.sub(r"(?<=[≥>≤<×]) | (?=×)", "", _escaped(key.value))
         unit = f" [{key.unit}]" if key.unit else ""
         if key.default == "required":
-            value = f"{value}{unit}, required"
+            said = all(one in key.meaning for one in key.value.split(", "))
+            value = "required" if said else f"{value}{unit}, required"
         elif key.default:
             others = [one for one in value.split(", ") if one != key.default]
             said = value == "boolean" or key.default[0] == "[" or all(
