@@ -136,7 +136,7 @@ class _Avoiding(keys.Section):
 
 
 class AvoidanceSection(_Avoiding):
-    """Avoidance for the body and repulsion of the end effector, switched by Algorithm 1."""
+    """Avoidance for the body, repulsion of the end effector, by Algorithm 1."""
 
     kind: Literal["repulsion"] = "repulsion"
     dimension: Literal[1, 3] = 1
@@ -208,9 +208,9 @@ class BarrierSection(keys.Section):
 
 
 class SeparationSection(BarrierSection, _Avoiding):
-    """All control points and the end effector away from all obstacles, as one-sided rows.
+    """One-sided rows between all points and all obstacles.
 
-    If control.stack is "set-based" only the clearances apply; if "smooth", rows approach the end of
+    For control.stack = "set-based" only clearances count; for "smooth" rows approach the end of
     `buffer` by `rate` times what is missing, at most `recovery`.
     """
 

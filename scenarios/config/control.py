@@ -65,8 +65,7 @@ class ControlSection(keys.Section):
     velocity level; inequalities are frozen at their bounds, or act gradually within a `buffer`,
     which needs `resolver` = "smooth"."""
     strictness: keys.Flag = False
-    """Whether every tick is also resolved without the levels below the position, outside the
-    measured times, to see whether they move the end effector."""
+    """Whether to measure, untimed, how far the levels below the position move the end effector."""
     period: Annotated[float, Field(strict=True, gt=0.0, le=1.0), keys.Unit("s")] = 0.001
     """Time from tick to tick."""
     duration: keys.Span
@@ -82,12 +81,11 @@ class ControlSection(keys.Section):
     """Damping, at velocity level, of tasks that cannot be met, near singularities and out of reach.
     A resolver's damping is in `options`."""
     metric: Literal["identity", "mass"] = "identity"
-    """Metric of the distance to the null-space term: "identity", or "mass", the inertia M(q), as in
-    operational-space control at acceleration level."""
+    """Metric of the distance to the null-space term: "identity", or "mass", the inertia M(q)."""
     policy: PolicySection = PolicySection()
     """The command in a tick with a problem."""
     transition: Literal["none", "blend"] = "none"
-    """When the order of the stack or the active control point changes, the command changes at once
+    """After a change of the stack's order or the active control point the command changes at once
     ("none") or within `transition_time` ("blend")."""
     transition_time: keys.Span = 0.02
     """How long "blend" takes."""

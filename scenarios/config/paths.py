@@ -86,7 +86,7 @@ class EllipseSection(AnyPath):
 
 
 class WaypointsSection(AnyPath):
-    """Straight lines between points, at rest at every point."""
+    """Straight lines, at rest at every point."""
 
     kind: Literal["waypoints"]
     times: tuple[keys.Time, ...]
@@ -94,8 +94,7 @@ class WaypointsSection(AnyPath):
     points: tuple[keys.Point, ...]
     """The points."""
     blend: keys.Span | None = None
-    """Instead of stopping, the path rounds each point in a curve of this duration and is nearest to
-    it half that time later."""
+    """Rounds each point in a curve of this duration, nearest to it half that time later."""
 
     def _steady(self) -> paths.Path:
         return (paths.Waypoints(self.times, self.points) if self.blend is None

@@ -59,15 +59,15 @@ class AnyPlant(PartSection):
     kind: str
     """Which kind it is."""
     feedback: Literal["measured", "commanded"] = "measured"
-    """What the controller receives: the "measured" joints, or its own "commanded" ones, integrated,
-    as through FRI."""
+    """The controller receives "measured" joints or its "commanded" ones, integrated, as through
+    FRI."""
     measurement: MeasurementSection = MeasurementSection()
     """Errors of the measured joints."""
 
 
 @register("plants", "kinematic", shipped=True)
 class KinematicSection(AnyPlant):
-    """A robot that follows its commands exactly."""
+    """Follows its commands exactly."""
 
     made_by: ClassVar[str] = "scenarios.cell.plants.plant:KinematicArm"
     follows: ClassVar[bool] = True
@@ -76,11 +76,11 @@ class KinematicSection(AnyPlant):
 
 
 class ServoSection(keys.Section):
-    """The position servo of each joint of the physics plant.
+    """The position servo of each joint.
 
     torque = k (reference - q) + c (its rate - v) + `gravity` times the gravity torque, within the
-    effort limits, with k = m `bandwidth`^2, c = 2 m `bandwidth` and the inertia m of the joint at
-    the start, with its drive.
+    effort limits; k = m `bandwidth`^2, c = 2 m `bandwidth`, m the joint's inertia at the start,
+    with its drive.
     """
 
     rate: Annotated[float, Field(strict=True, ge=200.0, le=10000.0), keys.Unit("Hz")] = 1000.0
@@ -97,7 +97,7 @@ class ServoSection(keys.Section):
 
 
 class JointsSection(keys.Section):
-    """Joints of the physics plant, one value for all or one each; plausible, not identified."""
+    """One value for all joints or one each; plausible, not identified."""
 
     friction: Friction | tuple[Friction, ...] = 0.5
     """Dry friction."""
@@ -109,13 +109,13 @@ class JointsSection(keys.Section):
 
 @register("plants", "mujoco", shipped=True)
 class PhysicsSection(AnyPlant):
-    """A robot in a physics simulation, under position servos (extra `sim`)."""
+    """Physics, with position servos (extra `sim`)."""
 
     made_by: ClassVar[str] = "scenarios.cell.plants.physics:PhysicsArm"
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
     kind: Literal["mujoco"]
     beyond_stop: Annotated[keys.Positive, keys.Unit("rad")] = 0.2
-    """How far a joint may pass its position limit before the run ends with a fault."""
+    """How far a joint may pass its limit before a fault."""
     servo: ServoSection = ServoSection()
     """The servo of each joint."""
     joints: JointsSection = JointsSection()
@@ -150,7 +150,7 @@ class PushSection(keys.Section):
 
 @register("plants", "torque", shipped=True)
 class TorqueSection(AnyPlant):
-    """A robot with torque motors in a physics simulation (extra `sim`).
+    """Physics, with torque motors (extra `sim`).
 
     The controller does not know `joint_friction`, `joint_damping`, `armature`, `delay` and
     `bandwidth`.
@@ -178,13 +178,13 @@ class TorqueSection(AnyPlant):
     stops: keys.Flag = True
     """Whether joints have a stop at their position limit."""
     self_collision: keys.Flag = False
-    """Whether capsules collide, except neighbours and those that overlap at the start."""
+    """Whether capsules collide, except neighbours and those that overlap initially."""
     fall: keys.Length = 0.2
-    """How far the centre of mass may sink before the robot has fallen, a fault."""
+    """How far the centre of mass may sink before a fault."""
     tilt: Annotated[keys.Positive, keys.Unit("rad")] = 1.0
-    """How far the base may tilt before the robot has fallen."""
+    """How far the base may tilt before a fault."""
     beyond_stop: Annotated[keys.Positive, keys.Unit("rad")] = 0.2
-    """How far a joint may pass its position limit before the run ends with a fault."""
+    """How far a joint may pass its limit before a fault."""
     pushes: tuple[PushSection, ...] = ()
     """Forces that disturb the robot."""
 

@@ -23,7 +23,7 @@ class ControlPointSection(keys.Section):
 
 
 class RobotPointSection(keys.Section):
-    """A point on the body of a joint, or fixed to a frame."""
+    """A point of a joint's body or of a frame."""
 
     joint: str | None = None
     """Joint that moves the body."""
@@ -54,8 +54,7 @@ class RobotSection(keys.Section):
     """The robot; by default as its table says, or for a file as `hierarchy check FILE` proposes."""
 
     model: str
-    """A name of `hierarchy list`, a URDF or MJCF file, or "package:name" of example_robot_data or
-    robot_descriptions (extra `descriptions`)."""
+    """A name of `hierarchy list`, a URDF or MJCF file, or "package:name" (extra `descriptions`)."""
     base: Base | None = None
     """Whether the base is "fixed" or "floating"; by default that of the model."""
     end_effector: str | None = None
@@ -67,16 +66,15 @@ class RobotSection(keys.Section):
     locked: dict[str, keys.JointValue] = Field(default_factory=dict)
     """Joints of a file to fix at a value, as in [start]."""
     root: str | tuple[str, ...] = ()
-    """Body or bodies of an MJCF at which the robot begins; by default those with joints, except
-    those that only float."""
+    """Bodies of an MJCF at which the robot begins; by default those with joints that do not only
+    float."""
 
 
 class StartSection(keys.Section):
     """Where a run starts.
 
     A planar joint takes [x, y, angle], a ball a rotation vector or quaternion [x, y, z, w], a free
-    joint location and either, all others a number. Joints that follow others, and those of closed
-    chains, are moved to fit.
+    joint location and either. Coupled joints and closed chains are moved to fit.
     """
 
     q: tuple[keys.JointPosition, ...] | None = None
@@ -89,9 +87,9 @@ class StartSection(keys.Section):
     v: tuple[keys.JointVelocity, ...] | None = None
     """Velocities of all joints, by default zero."""
     end_effector: keys.Point | None = None
-    """Where the end effector starts: `q` is moved until it is there."""
+    """Where the end effector starts; `q` is moved."""
     on_floor: keys.Flag = False
-    """Whether the base is moved vertically until the lowest contact touches the floor."""
+    """Whether the base moves vertically until the lowest contact touches the floor."""
     allow_outside_limits: keys.Flag = False
     """Whether joints may start beyond their limits."""
 
@@ -101,14 +99,14 @@ class StartSection(keys.Section):
 
 
 class ContactSection(keys.Section):
-    """A point or sole of a frame that pushes on a rigid surface, at level "torque"."""
+    """A point or sole on a rigid surface, at level "torque"."""
 
     frame: str
     """Frame of the robot."""
     name: keys.TaskName | None = None
     """Its name, by default the frame's."""
     x: tuple[Place, Place] | None = None
-    """Sides of a sole along its x axis, from `offset`; a point has no `x` and `y`."""
+    """Sides of a sole along its x axis, from `offset`; none for a point."""
     y: tuple[Place, Place] | None = None
     """The same along its y axis."""
     offset: keys.Point = (0.0, 0.0, 0.0)
@@ -118,7 +116,7 @@ class ContactSection(keys.Section):
     normal: keys.Vector3 = (0.0, 0.0, 1.0)
     """Normal of the surface in the world."""
     up: keys.Vector3 = (0.0, 0.0, 1.0)
-    """Normal of the sole in the frame; the sole's x axis is the frame's, projected, or its y axis
+    """Normal of the sole in the frame; its x axis is the frame's, projected, or the frame's y axis
     if x is the normal."""
     open: tuple[tuple[keys.Time, keys.Time], ...] = ()
     """Intervals in which it is lifted."""

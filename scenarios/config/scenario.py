@@ -55,8 +55,7 @@ class Scenario(Section):
     description: str = ""
     """A paragraph about it."""
     plugins: tuple[str, ...] | None = None
-    """Modules with kinds, resolvers and robots, to be allowed from outside the file, see
-    hierarchy.plugins."""
+    """Modules with kinds, resolvers and robots; a command has to allow them."""
     robot: RobotSection
     """Which robot."""
     start: StartSection = StartSection()
@@ -66,7 +65,7 @@ class Scenario(Section):
     plant: PlantKind = KinematicSection()
     """What the commands move."""
     sensor: SensorKind = ExactSection()
-    """What measures the distances to obstacles."""
+    """What measures distances to obstacles."""
     position: PositionSection | None = None
     """The end effector's position."""
     pointing: PointingSection | None = None
@@ -88,8 +87,7 @@ class Scenario(Section):
     faults: tuple[FaultSection, ...] = ()
     """What goes wrong during a run."""
     variation: Parameters = Field(default_factory=dict)
-    """Distributions of dotted keys, in the unit of each, that `hierarchy compare --starts`
-    samples."""
+    """Distributions of dotted keys, in their units, for `hierarchy compare --starts`."""
 
     @field_validator("plugins")
     @classmethod

@@ -35,7 +35,7 @@ class AnySensor(PartSection):
 
 @register("sensors", "exact", shipped=True)
 class ExactSection(AnySensor):
-    """Distances of the known geometry, without errors."""
+    """Exact distances."""
 
     foot: ClassVar[float] = FOOT
     has_frames: ClassVar[bool] = False
@@ -55,14 +55,14 @@ class ImageSection(AnySensor):
     stale_after: keys.Time = 0.2
     """Time without a frame after which `control.policy.stale` applies."""
     least_readings: keys.Share = 0.1
-    """Least share of valid pixels of a frame."""
+    """Least share of valid pixels."""
     foot: keys.Distance = FOOT  # type: ignore[misc]
-    """Height of the column below the base, removed from images as the robot is."""
+    """Height of the column below the base, removed from images."""
     margin: keys.Distance = 0.05
     """Width around the robot's capsules within which pixels are removed."""
     region: keys.Length | None = None
-    """Distance from a control point within which obstacles are seen; by default the largest at
-    which avoidance acts."""
+    """Distance from control points within which obstacles are seen; by default that within which
+    avoidance acts."""
     thin: keys.Distance | None = None
     """Depth of obstacles behind their surface, by default infinite."""
     support: Annotated[int, Field(strict=True, ge=1, le=9)] = 3
@@ -133,7 +133,7 @@ class DepthErrors(keys.Section):
 
 @register("sensors", "camera", shipped=True)
 class CameraSection(DepthErrors, ImageSection):
-    """A simulated depth camera that sees obstacles and robot; the defaults resemble a Kinect."""
+    """A simulated depth camera; the defaults resemble a Kinect."""
 
     kind: Literal["camera"]
     width: Pixels = 640
@@ -153,8 +153,7 @@ class CameraSection(DepthErrors, ImageSection):
     look_at: keys.Point = (0.0, 0.3, 0.1)
     """Point that it looks at."""
     rotation: keys.Rows3 | None = None
-    """In place of `look_at`: rows of the matrix from the camera's axes (right, down, forward) to
-    the world's."""
+    """In place of `look_at`: rows of the matrix from camera (right, down, forward) to world."""
     rate: Annotated[keys.Positive, keys.Unit("Hz")] = 30.0
     """Frames per second."""
     jitter: keys.Time = 0.0

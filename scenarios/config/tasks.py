@@ -214,7 +214,7 @@ class PostureSection(PostureTask):
 
 
 class LimitsSection(keys.Section):
-    """Limits of acceleration, and the position and velocity limits of the robot."""
+    """The robot's position and velocity limits, and those of acceleration."""
 
     acceleration: Acceleration | tuple[Acceleration, ...]
     """Largest acceleration, of all joints or of each."""

@@ -42,7 +42,7 @@ class _AlongPose(Listed, AlongSection):
     frame: str
     """Frame of the robot."""
     rotation: Rows3 | None = None
-    """Rows of the wanted matrix from the frame to the world, by default the initial one."""
+    """Rows of the wanted matrix from frame to world, by default the initial one."""
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the path of the frame, and its rotation, by default the initial one."""
@@ -86,7 +86,7 @@ class ListedPointing(PointingTask, Listed):
 
 @register("tasks", "look-at", shipped=True)
 class ListedLookAt(Listed, TaskSection):
-    """The z axis of a frame toward a point of the world (2 rows)."""
+    """The z axis of a frame toward a point (2 rows)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:LookAt"
     kind: Literal["look-at"]
@@ -105,7 +105,7 @@ class ListedLookAt(Listed, TaskSection):
 
 @register("tasks", "relative", shipped=True)
 class ListedRelative(Listed, TaskSection):
-    """The pose of a frame in the axes of another one (6 rows, or 3)."""
+    """The pose of a frame in another one (6 rows, or 3)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:RelativePose"
     kind: Literal["relative"]
@@ -140,7 +140,7 @@ class ListedRelative(Listed, TaskSection):
 
 @register("tasks", "manipulability", shipped=True)
 class ListedManipulability(Listed, TaskSection):
-    """The manipulability of a frame at a value or above it (1 row)."""
+    """The manipulability of a frame (1 row)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:Manipulability"
     unit: ClassVar[str] = ""

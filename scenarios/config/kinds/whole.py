@@ -25,7 +25,7 @@ class ListedPosture(Listed, PostureTask):
 
 @register("tasks", "coupling", shipped=True)
 class ListedCoupling(Listed, TaskSection):
-    """A weighted sum of joint positions at a value (1 row)."""
+    """A weighted sum of joint positions (1 row)."""
 
     unit: ClassVar[str] = "rad"
     made_by: ClassVar[str] = "hierarchy.tasks:JointCoupling"
@@ -81,7 +81,7 @@ class _Apart(Listed):
 
 @register("tasks", "self-collision", shipped=True)
 class ListedSelfCollision(_Apart, BarrierSection):
-    """Links that are not neighbours, kept apart."""
+    """Links kept apart, except neighbours."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:SelfSeparation"
     kind: Literal["self-collision"]
