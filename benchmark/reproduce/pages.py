@@ -1,15 +1,15 @@
 """The marks of pages, and what is put between them.
 
-    <!-- reproduce: NAME -->  a block, see `blocks`, up to  <!-- end of NAME -->
+    <!-- reproduce: NAME -->  a block, see `blocks`
     <!-- measured: hierarchy bench tick -->  what a command prints
     <!-- measured: hierarchy bench resolvers --fresh 1 | EQ7, fresh .. Times of -->
     <!-- measured: table of hierarchy bench resolvers --seconds 0.2 -->
     <!-- kept: text of open-2026-11 | Fresh problems, seed .. right: -->
     <!-- measured: hierarchy bench open | Fresh .. Public | without , (tight|slack) -->
 
-all but the first up to `<!-- end of measurement -->`. After `|`, only the lines from one that
-starts with the first text to the last before one that starts with the second; without those that
-the last expression is found in. `table of`: in a
+all up to `<!-- end -->`. After each `|`, only the lines from one that starts with the first text to
+the last before one that starts with the second; without those that the last expression is found
+in. `table of`: in a
 table whose columns are named after families and whose rows after resolvers, the cells are filled
 with medians. `text of`: the paragraphs as they are. `kept`: a file of outputs that no command makes
 again as it is.
@@ -24,6 +24,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from itertools import dropwhile, takewhile
 from pathlib import Path
 
@@ -37,9 +38,9 @@ _COLUMNS = "100"  # of the terminal that a command writes to
 _CODE = ("hierarchy", "solvers", "scenarios", "benchmark")
 _MARK = re.compile(r"(?P<mark>^<!-- (?P<kind>reproduce|measured|kept): "
                    r"(?:(?P<form>table|text) of )?(?P<name>[^|\n]*?)"
-                   r"(?: \| (?P<first>[^\n]+?) \.\. (?P<last>[^\n]+?))?"
+                   r"(?P<ranges>(?: \| [^|\n]+? \.\. [^|\n]+?)*)"
                    r"(?: \| without (?P<without>[^\n]+?))? -->\n)"
-                   r"(?P<text>.*?)(?P<end><!-- end of [\w-]+ -->)", re.DOTALL | re.MULTILINE)
+                   r"(?P<text>.*?)(?P<end><!-- end -->)", re.DOTALL | re.MULTILINE)
 
 
 class CommandError(RuntimeError):
@@ -136,23 +137,27 @@ def filled(text: str, root: Path, page: str, stored: Stored) -> str:
         said = output(name)
         if found["form"] == "table":
             return f"{found['mark']}{_with_medians(found['text'], said)}{found['end']}"
-        part = [line for line in _part(said.splitlines(), found["first"], found["last"])
+        ranges = [one.split(" .. ") for one in found["ranges"].split(" | ")[1:]]
+        part = [line for line in _part(said.splitlines(), ranges, f"{page}: the output of {name!r}")
                 if not found["without"] or not re.search(found["without"], line)]
-        if not part:
-            raise HierarchyError(f"{page}: no line of the output of {name!r} starts with "
-                                 f"{found['first']!r}")
         inside = part if found["form"] == "text" else ["```", *part, "```"]
         return "\n".join([found["mark"].rstrip(), *inside, found["end"]])
 
     return _MARK.sub(made, text)
 
 
-def _part(lines: list[str], first: str | None, last: str | None) -> list[str]:
-    """Return the lines from one that starts with `first` to one that starts with `last`."""
-    if first and last:
-        lines = list(dropwhile(lambda line: not line.startswith(first), lines))
-        lines = list(takewhile(lambda line: not line.startswith(last), lines))
-    return "\n".join(lines).rstrip().splitlines()
+def _part(lines: list[str], ranges: Sequence[Sequence[str]], where: str) -> list[str]:
+    """Return the lines from one that starts as a range does to one that starts as its end does."""
+    parts = [_between(lines, first, last) for first, last in ranges] or [lines]
+    for (first, _), part in zip(ranges, parts, strict=False):
+        if not part:
+            raise HierarchyError(f"{where} has no line that starts with {first!r}")
+    return "\n\n".join("\n".join(part).rstrip() for part in parts).splitlines()
+
+
+def _between(lines: list[str], first: str, last: str) -> list[str]:
+    below = dropwhile(lambda line: not line.startswith(first), lines)
+    return list(takewhile(lambda line: not line.startswith(last), below))
 
 
 def _with_medians(table: str, said: str) -> str:
