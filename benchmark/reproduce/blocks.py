@@ -150,11 +150,12 @@ def _progress(rows: Rows) -> str:
 
 def _faults(rows: Rows) -> list[str]:
     """Return how much of the protocol has been run, and which columns have runs with a fault."""
-    total = rows.blocks.size
-    said = [f"`{column}` {total - int(rows.ended(column).sum())} of {total} "
-            f"({'; '.join(reason.partition(':')[0] for reason in reasons)})"
-            for column, reasons in rows.reasons[0].items()]
-    return [f"{_progress(rows)} Runs that ended in a fault: {', '.join(said) or 'none'}."]
+    total, found = rows.blocks.size, dict[str, list[str]]()
+    for column, reasons in rows.reasons[0].items():
+        why = "; ".join(reason.partition(":")[0] for reason in reasons)
+        found.setdefault(why, []).append(f"`{column}` {total - int(rows.ended(column).sum())}")
+    said = [f"{', '.join(columns)} ({why})" for why, columns in found.items()]
+    return [f"{_progress(rows)} Runs of {total} that ended in a fault: {', '.join(said) or 'none'}."]
 
 
 def _decider(claim: Claim) -> str:
