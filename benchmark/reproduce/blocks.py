@@ -155,7 +155,7 @@ def _faults(rows: Rows) -> list[str]:
         why = "; ".join(reason.partition(":")[0] for reason in reasons)
         found.setdefault(why, []).append(f"`{column}` {total - int(rows.ended(column).sum())}")
     said = [f"{', '.join(columns)} ({why})" for why, columns in found.items()]
-    return [f"{_progress(rows)} Runs of {total} that ended in a fault: {', '.join(said) or 'none'}."]
+    return [f"{_progress(rows)} Faults in {total} runs: {', '.join(said) or 'none'}."]
 
 
 def _decider(claim: Claim) -> str:

@@ -56,8 +56,7 @@ def _several(writer, place, group):
             key._replace(meaning=f"{about(one)} {key.meaning}")
             for one in group for key in keys_of(one)))
         return
-    names = ", ".join(f'"{kind}"' for kind in kinds)
-    yield f"- **kind**: {names}{'' if len(kinds) == len(group) else ', or one of a plug-in'}"
+    yield f"- **kind**: one of these{'' if len(kinds) == len(group) else ', or of a plug-in'}"
     common = set.intersection(*({*map(_same, keys_of(one))} for one in kinds.values()))
     yield from writer.entries((place,), (
         key for key in keys_of(group[0]) if _same(key) in common))
