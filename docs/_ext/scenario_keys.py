@@ -91,7 +91,7 @@ class _Writer:
         """Return links to the sections that a key may have, and whether it has to have one."""
         links = (f"[`{one}`](#{one.translate(_SLUG)})"
                  for one in dict.fromkeys(self.places[below] for below in key.below))
-        return f"{', '.join(links)}{' (required)' if key.default == 'required' else ''}"
+        return f"{', '.join(links)}{_star(key)}"
 
     def _entry(self, key):
         """Return name, default with unit and bounds, else type, and meaning of a key."""
@@ -101,8 +101,8 @@ class _Writer:
         value = re.sub(r"(?<=[≥>≤<×]) | (?=×)", "", _escaped(key.value))
         unit = f" [{key.unit}]" if key.unit else ""
         if key.default == "required":
-            said = all(one in key.meaning for one in key.value.split(", "))
-            value = "required" if said else f"{value}{unit}, required"
+            said = '"' in value and all(one in key.meaning for one in value.split(", "))
+            value = "" if said else f"{value}{unit}"
         elif key.default:
             others = [one for one in value.split(", ") if one != key.default]
             said = value == "boolean" or key.default[0] == "[" or all(
@@ -111,11 +111,16 @@ class _Writer:
             value = f"`{key.default}`{unit}{bounds and f', {bounds}'}"
         else:
             value += unit
-        return f"- **{key.name}** ({re.sub('^number (?=[≥>])', '', value)}): {meaning}"
+        value = re.sub(r"^number (?=[≥>])", "", re.sub(r"list: (number|string)", r"\1s", value))
+        return f"- **{key.name}**{_star(key)}{value and f' ({value})'}: {meaning}"
 
 
 def _same(key):
     return key.name, key.value, key.unit, key.meaning
+
+
+def _star(key):
+    return r"\*" if key.default == "required" else ""
 
 
 def _escaped(text):
