@@ -106,14 +106,17 @@ def cell(output: str, asked: Mapping[str, str]) -> str:
 
 
 def _asked() -> list[str]:
-    """Return a table of the quotations: what decides them."""
-    lines = ["| section, quotation | decided by, smallest effect |", "|---|---|"]
+    """Return the quotations, and below each what decides it."""
+    lines: list[str] = []
     before = ""
     for one in PROTOCOL.claims:
         if one.family == "letter":
-            said = f"{one.section}: “{one.quotation}”"
-            lines.append(f"| {'the same' if said == before else said} | {_decider(one)}, "
-                         f"{_least(one)} |")
+            said = f"- {one.section}: “{one.quotation}”: "
+            decides = f"{_decider(one)}, {_least(one)}"
+            if said == before:
+                lines[-1] += f"; {decides}"
+            else:
+                lines.append(said + decides)
             before = said
     return lines
 
