@@ -143,7 +143,7 @@ class AvoidanceSection(_Avoiding):
     """Rows of the body's avoidance: along the direction of the obstacle, or all."""
     direction: Literal["nearest", "mean"] = "nearest"
     """Away from the "nearest" obstacle, or along the "mean" (25)-(26) over those within `far` of a
-    control point and within `end_effector` of the end effector."""
+    control point and `end_effector` of the end effector."""
     near: keys.Distance
     """Distance, eps_1, below which the body's avoidance comes before the position."""
     far: keys.Distance

@@ -19,11 +19,11 @@ StackKind = Literal["switched", "hierarchical", "set-based", "smooth"]
 class PolicySection(keys.Section):
     """The command in a tick with a problem.
 
-    "brake": decelerate to rest. "hold": repeat the last good command for at most `patience` ticks,
-    then brake. "stop": decelerate as fast as the limits allow and end the run with a fault. "use":
-    send the answer, if there is one. Of several actions the last in the order use, hold, brake,
-    stop is taken. At level "torque" braking sends the last good torques and a damping, the effort
-    limit of a joint at its velocity limit; "stop" ends the run at once.
+    "use": send the answer, if any. "hold": repeat the last good command for at most `patience`
+    ticks, then brake. "brake": decelerate to rest. "stop": brake as fast as the limits allow and
+    end the run with a fault. The last in this order wins. At level "torque" braking sends the last
+    good torques and a damping, a joint's effort limit at its velocity limit; "stop" ends the run at
+    once.
     """
 
     iteration_limit: AnswerPolicy = "brake"

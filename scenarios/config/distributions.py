@@ -62,7 +62,7 @@ class Choice(Section):
 
 
 class Around(Section):
-    """The scenario's value, a number or an array, plus a uniform offset in each entry."""
+    """The scenario's value plus a uniform offset in each entry."""
 
     around: NotNegative | tuple[NotNegative, ...]
     """Largest offset, of all or of each."""

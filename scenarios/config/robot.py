@@ -78,8 +78,8 @@ class StartSection(keys.Section):
     """
 
     q: tuple[keys.JointPosition, ...] | None = None
-    """Positions of all joints but a floating base, or all coordinates; by default those of the
-    `keyframe`, or the robot's rest posture."""
+    """Positions of all joints but a floating base, or all coordinates; by default the `keyframe`,
+    or the robot's rest posture."""
     keyframe: str | None = None
     """Keyframe of an MJCF, in place of `q`."""
     joints: dict[str, keys.JointValue] = Field(default_factory=dict)
@@ -91,7 +91,7 @@ class StartSection(keys.Section):
     on_floor: keys.Flag = False
     """Whether the base moves vertically until the lowest contact touches the floor."""
     allow_outside_limits: keys.Flag = False
-    """Whether joints may start beyond their limits."""
+    """Whether joints may start beyond limits."""
 
     def _wrong(self) -> Iterator[str]:
         if self.q is not None and self.keyframe is not None:

@@ -53,7 +53,7 @@ class Scenario(Section):
     title: str = ""
     """One line that says what it shows."""
     description: str = ""
-    """A paragraph about it."""
+    """More about it."""
     plugins: tuple[str, ...] | None = None
     """Modules with kinds, resolvers and robots; a command has to allow them."""
     robot: RobotSection

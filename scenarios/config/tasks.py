@@ -257,8 +257,8 @@ class Listed(Made):
     name: keys.TaskName | None = None
     """Its name, by default its kind."""
     give: keys.NotNegative = 0.0
-    """Violation that each row may have in favour of the tasks below, in the unit of the rows: that
-    of the task per s or s^2, or [N]."""
+    """Violation of each row in favour of the tasks below, in the task's unit per s or s^2, or
+    [N]."""
     kind: str
     """Which kind it is."""
 
