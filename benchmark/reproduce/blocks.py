@@ -54,8 +54,7 @@ def block(name: str, stored: Stored, output: Callable[[str], str]) -> str:
     """
     rows = stored.rows
     if name in ITEMS:
-        return "\n".join(fill(f"- {text}", _WIDTH, subsequent_indent="  ")
-                         for text in _items(ITEMS[name], rows, output))
+        return "\n".join(_item(text) for text in _items(ITEMS[name], rows, output))
     known: dict[str, Callable[[], list[str]]] = {
         "asked-letter": _asked, "untested": _untested,
         **{f"front-{one}": partial(fronts.table, stored.points, one) for one in fronts.FRONTS}}
@@ -64,6 +63,12 @@ def block(name: str, stored: Stored, output: Callable[[str], str]) -> str:
     of_rows: dict[str, Callable[[Rows], list[str]]] = {
         "faults": _faults, **{f"found-{one}": partial(_found, family=one) for one in FAMILIES}}
     return "\n".join(of_rows[name](rows)) if rows is not None else _NOTHING
+
+
+def _item(text: str) -> str:
+    """Return an entry of a list; names in backticks are not broken at hyphens."""
+    return fill(f"- {text}", _WIDTH, subsequent_indent="  ", break_on_hyphens=False,
+                break_long_words=False)
 
 
 def _items(given: Mapping[str, Any], rows: Rows | None, output: Callable[[str], str]) -> list[str]:
@@ -111,21 +116,21 @@ def _asked() -> list[str]:
     before = ""
     for one in PROTOCOL.claims:
         if one.family == "letter":
-            said = f"- {one.section}: “{one.quotation}”: "
+            said = f"{one.section}: “{one.quotation}”: "
             decides = f"{_decider(one)}, {_least(one)}"
             if said == before:
                 lines[-1] += f"; {decides}"
             else:
                 lines.append(said + decides)
             before = said
-    return lines
+    return [_item(line) for line in lines]
 
 
 def _untested() -> list[str]:
     """Return the letter's claims that runs do not decide, with the reason."""
     parts = [(*said.removesuffix(")").rsplit(" (", 1), why)
              for said, why in PROTOCOL.untested.items()]
-    return [f"- {section}: “{quotation}”: {why}." for quotation, section, why in parts]
+    return [_item(f"{section}: “{quotation}”: {why}.") for quotation, section, why in parts]
 
 
 def _found(rows: Rows, family: str) -> list[str]:
