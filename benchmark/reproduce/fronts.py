@@ -62,8 +62,8 @@ class Front:
 class Point:
     """Settings of a method on the front of its training, and what came of them.
 
-    training, test : median of each metric over scenes, None where half of them fail; kept : test
-    scenes that did not fail, of so many `scenes`.
+    training : worst of each metric over scenes, None where one fails; test : their median, None
+    where half of them fail; kept : test scenes that did not fail, of so many `scenes`.
     """
 
     front: str
@@ -86,20 +86,40 @@ def run(out: Path, workers: Workers, progress: Progress | None = None) -> list[P
     for name, label in ((name, label) for name, front in FRONTS.items() for label in front.method):
         method, where = Method(**FRONTS[name].method[label]), (out / name, workers, progress)
         trials = method.trials(FRONTS[name].trials, GIVEN["seed"])
-        training, *_ = _scores(name, method, trials, (GIVEN["seed"], GIVEN["training"]), where)
+        training = _trained(name, method, trials, where)
         best = spread([k for k in range(len(trials)) if not dominated(training, k)],
                       training[:, 0], GIVEN["tested"])
-        test, kept, units = _scores(name, method, [trials[k] for k in best],
-                                    (GIVEN["seed"] + 1, GIVEN["test"]), where)
+        scores, units = _scores(name, method, [trials[k] for k in best],
+                                (GIVEN["seed"] + 1, GIVEN["test"]), where)
+        kept = np.isfinite(scores).all(axis=2).sum(axis=1).tolist()
+        with np.errstate(invalid="ignore"):
+            test = np.sort(scores, axis=1)[:, GIVEN["test"] // 2]
         found += [Point(name, label, trials[k], _plain(training[k]), _plain(test[i]), kept[i],
                         GIVEN["test"], units) for i, k in enumerate(best)]
     return found
 
 
+def _trained(name: str, method: Method, trials: Sequence[Mapping[str, float]],
+             where: tuple[Path, Workers, Progress | None]) -> Array:
+    """Return the worst of the training scenes in each metric, of each trial.
+
+    A trial that is worse than another on the first scene alone is not run on more: infinite.
+    """
+    seed, count = GIVEN["seed"], GIVEN["training"]
+    first = _scores(name, method, trials, (seed, 1), where)[0][:, 0]
+    worst, waiting = np.full_like(first, np.inf), list(range(len(trials)))
+    while waiting := [k for k in waiting if not dominated(np.vstack([worst, first[k]]), -1)]:
+        now = [k for i, k in enumerate(waiting) if not dominated(first[waiting], i)]
+        worst[now] = _scores(name, method, [trials[k] for k in now], (seed, count), where)[0].max(
+            axis=1)
+        waiting = [k for k in waiting if k not in now]
+    return worst
+
+
 def _scores(name: str, method: Method, trials: Sequence[Mapping[str, float]],
             scenes: tuple[int, int], where: tuple[Path, Workers, Progress | None]
-            ) -> tuple[Array, list[int], list[str]]:
-    """Return the medians (trials, metrics), scenes kept by each trial, and units."""
+            ) -> tuple[Array, list[str]]:
+    """Return the metrics (trials, scenes, metrics), infinite in a scene that fails, and units."""
     front, (seed, count), runs = FRONTS[name], scenes, []
     for settings in trials:
         scenario = load(front.scenario, GIVEN["plant"].get(front.plant, {})).with_resolver(
@@ -110,10 +130,7 @@ def _scores(name: str, method: Method, trials: Sequence[Mapping[str, float]],
     outcomes = [kept[one.key] for one in runs]
     values = np.array([_values(front, one) for one in outcomes]).reshape(len(trials), count, -1)
     units = {one.name: one.unit for outcome in outcomes for one in outcome.metrics}
-    with np.errstate(invalid="ignore"):
-        middle = np.sort(values, axis=1)[:, count // 2]
-    return (middle, np.isfinite(values).all(axis=2).sum(axis=1).tolist(),
-            [units.get(name, "") for name in front.minimised])
+    return values, [units.get(name, "") for name in front.minimised]
 
 
 def _values(front: Front, outcome: Outcome) -> list[float]:

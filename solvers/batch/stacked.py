@@ -22,19 +22,13 @@ from hierarchy.errors import HierarchyError, expect
 from hierarchy.gate import checked_sizes, readable, shaped
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
-from solvers.kernels.batch import (
-    batch_exact,
-    batch_merged,
-    batch_saturation,
-    batch_staircase,
-    batch_without_bounds,
-)
+from solvers.kernels.batch import batch_exact, batch_merged, batch_within_bounds
 from solvers.kernels.merged import NOTHING, record_size
 from solvers.resolver import Resolver, make, refuse_inequality
 from solvers.resolvers.hcod import Hcod
 from solvers.resolvers.merged import Merged, refuse_safety_alone
 from solvers.resolvers.tpm import Tpm
-from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
+from solvers.status import Status
 from solvers.workspace import run
 
 Indices = NDArray[np.int64]
@@ -191,33 +185,16 @@ class _Run:
             self.record[:] = before
 
     def by_tpm(self, resolver: Tpm) -> BatchResolution:
-        """Resolve those with a memory exactly; if no bound is active there, and the others, anew.
-
-        Anew: with the staircase, then as if there were no bounds, then exactly.
-        """
-        saturated = self._at_bounds((self.record != 0.0).any(axis=1))
-        anew = np.flatnonzero(~saturated)
-        self.record[anew] = 0.0
-        self.solve(batch_staircase, anew)
-        self.solve(batch_exact, anew[self.codes[anew] == INACCURATE], self.record)
-        self.solve(batch_without_bounds, anew[self.codes[anew] < 0], self.record)
-        saturated |= self._at_bounds(self.codes == UNPROVED)
+        """Resolve all like `Tpm`; those with an unknown at a bound have a memory."""
+        b = self.batch
+        self._call(batch_within_bounds, np.arange(len(b)), self.x, self.codes, self.record,
+                   self.settings, b.reference)
         for p in np.flatnonzero(self.codes < 0)[:1]:
-            refuse_inequality(resolver, self.batch[p], -int(self.codes[p]) - 1)
+            refuse_inequality(resolver, b[p], -int(self.codes[p]) - 1)
         steps = np.maximum(self.record[:, -3] + self.record[:, -2], 1.0)
+        saturated = (self.record[:, :b.A.shape[2]] != 0.0).any(axis=1)
         self.record[~saturated] = 0.0
         return self.answer(steps, self.record if saturated.any() else None)
-
-    def _at_bounds(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Resolve the chosen problems exactly; return those of them with an unknown at a bound."""
-        which, saturated = np.flatnonzero(chosen), np.zeros(len(chosen), dtype=bool)
-        self.solve(batch_exact, which, self.record)
-        named = np.full(len(chosen), NUMERICAL_FAILURE)
-        self._call(batch_saturation, which[self.codes[which] != NUMERICAL_FAILURE], self.x, named,
-                   self.record)
-        self.codes[named < 0] = named[named < 0]
-        saturated[which] = named[which] == SOLVED
-        return saturated
 
     def answer(self, steps: Array, memory: Array | None) -> BatchResolution:
         """Return the answers, with the iterations (B,)."""

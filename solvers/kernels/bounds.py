@@ -13,17 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
+from solvers.kernels.exact import DAMPING, solve, work_size
 from solvers.kernels.rows import ZERO, all_equal, finish
 from solvers.kernels.space import View, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET
-from solvers.status import (
-    NO_LIMITS,
-    NUMERICAL_FAILURE,
-    SOLVED,
-    TOO_SMALL,
-    UNPROVED,
-)
+from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL, UNPROVED
 
 NONE, CONFLICT = 0.0, 2.0  # besides -1 and 1: an unknown at no bound, or at both
 
@@ -38,57 +33,92 @@ class Box(NamedTuple):
 
 
 @compiled
-def solve_without_bounds(A, lower, upper, sizes, x, record, settings, work):
+def solve_within_bounds(A, lower, upper, sizes, reference, x, record, settings, work):
+    """Solve like `Tpm`: from a record at bounds exactly; else, or if none is active there, anew.
+
+    reference (n,), or (0,) for zero. x (n,): the answer, see `closed` for failures. record
+    (n + L + 3 m + 3,): see `_is_at_bound`; that of an earlier solve or zeros on entry, and zeros
+    on return where all rows are equalities. settings: those of `Hcod`. Returns a status, TOO_SMALL,
+    or -(i + 1) if row i is an inequality but not a bound.
+    """
+    (m, n), inner, known = A.shape, record[x.size + sizes.size:], False
+    if work_size(n, m, sizes.size, settings[DAMPING] > 0.0) > work.size:
+        return ZERO + TOO_SMALL
+    for i in range(record.size):
+        known |= record[i] != 0.0
+    if known:
+        _begin(x, reference)
+        code = solve(A, lower, upper, sizes, x, inner, settings, work)
+        if code == NUMERICAL_FAILURE or _is_at_bound(A, lower, upper, sizes, x, record, work):
+            return code
+        _clear(record)
+    _begin(x, reference)
+    code = solve_by_staircase(A, lower, upper, sizes, x, settings, work)
+    if code == INACCURATE:
+        _begin(x, reference)
+        code = solve(A, lower, upper, sizes, x, inner, settings, work)
+        _clear(record)
+    if code >= 0:
+        return code
+    _begin(x, reference)
+    code = _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work)
+    if code == UNPROVED:
+        _begin(x, reference)
+        code = solve(A, lower, upper, sizes, x, inner, settings, work)
+    if code >= 0 and code != NUMERICAL_FAILURE:
+        _is_at_bound(A, lower, upper, sizes, x, record, work)
+    return code
+
+
+@inlined
+def _begin(x, reference):
+    """Write the reference."""
+    for c in range(x.size):
+        x[c] = reference[c] if reference.size > 0 else 0.0
+
+
+@inlined
+def _clear(record):
+    for i in range(record.size):
+        record[i] = 0.0
+
+
+@inlined
+def _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work):
     """Solve as if there were no bounds; return SOLVED if x is within them, otherwise UNPROVED.
 
-    x (n,) is the reference on entry and, if SOLVED, the answer on return. record
-    (n + L + 3 m + 3,): zeros; for its layout see `name_saturation`. settings: those of `Hcod`.
-    Other codes: NUMERICAL_FAILURE, TOO_SMALL, NO_LIMITS, or -(i + 1) if row i is an inequality but
-    not a bound.
+    Other codes: NUMERICAL_FAILURE, or -(i + 1) if row i is an inequality but not a bound.
     """
     n = x.size
-    sides, at = vector(work, ZERO, 3 * n)
-    if at > work.size:
-        return TOO_SMALL
-    if all_equal(lower, upper):
-        return NO_LIMITS
+    sides, at = vector(work, ZERO, 2 * n)
     box = _first_level(sizes, sides, n)
     code = _refused(A, lower, upper, box.end)
     if code != SOLVED:
         return finish(x, code) if code == NUMERICAL_FAILURE else code
-    for c in range(n):
-        sides[2 * n + c] = x[c]
     _intersect(A, lower, upper, box)
     end = box.end
-    code = solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[box.top + 1:], x, settings,
-                              work[at:])
-    if code == TOO_SMALL:
-        return code
-    within = code == SOLVED
+    within = SOLVED == solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[box.top + 1:],
+                                          x, settings, work[at:])
     for c in range(n):
         within &= box.low[c] <= x[c] <= box.high[c]
-    for c in range(n):
-        x[c] = x[c] if within else sides[2 * n + c]
-    record[record.size - 3] = 1.0 if within else 0.0
-    return SOLVED if within else UNPROVED
+    inner[inner.size - 3] = 1.0 if within else 0.0
+    return ZERO + (SOLVED if within else UNPROVED)
 
 
 @compiled
-def name_saturation(A, lower, upper, sizes, x, record, work):
-    """Remove rounding from x where it is at a bound, and write the first part of the record.
+def _is_at_bound(A, lower, upper, sizes, x, record, work):
+    """Whether x has an unknown at a bound; remove rounding there, and write what the record has.
 
-    That part has the state of each unknown (-1 or +1: at its lower or upper bound, 2: both, 0:
-    free) and the scaling of each level. The second part is the record of the exact resolver.
-    Returns SOLVED if an unknown is at a bound and NO_LIMITS if none is or if there are no bounds.
-    With NUMERICAL_FAILURE, or -(i + 1) as `solve_without_bounds`, nothing is written.
+    Its first part has the state of each unknown (-1 or +1: at its lower or upper bound, 2: both, 0:
+    free) and the scaling of each level. The second is the record of the exact resolver.
+    Without bounds in the first level, or with other inequalities, nothing is written.
     """
-    n, end = x.size, ZERO + NO_LIMITS
     if all_equal(lower, upper):
-        return end
+        return False
+    n, found = x.size, False
     inner, box = record[n + sizes.size:], _first_level(sizes, work, n)
-    code = _refused(A, lower, upper, box.end)
-    if code != SOLVED:
-        return code
+    if _refused(A, lower, upper, box.end) != SOLVED:
+        return False
     _intersect(A, lower, upper, box)
     for c in range(n):
         record[c] = CONFLICT if box.low[c] >= box.high[c] else NONE
@@ -101,8 +131,8 @@ def name_saturation(A, lower, upper, sizes, x, record, work):
             x[c] = box.high[c] if record[c] > 0.0 else box.low[c]
     _scale(A, upper, sizes, box, x, record)
     for c in range(n):
-        end = ZERO + SOLVED if record[c] != NONE else end
-    return end
+        found |= record[c] != NONE
+    return found
 
 
 @inlined

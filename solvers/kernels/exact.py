@@ -150,6 +150,14 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
 
 
 @inlined
+def solve(A, lower, upper, sizes, x, record, settings, work):
+    """Solve like `Hcod`: `solve_damped`, or `solve_hierarchy` without damping."""
+    if settings[DAMPING] > 0.0:
+        return solve_damped(A, lower, upper, sizes, x, record, settings, work)
+    return solve_hierarchy(A, lower, upper, sizes, x, record, settings, work)
+
+
+@inlined
 def _add_record(record, inner, lower, upper, d, rows, end, k):
     """Add the result of a level: states of rows, and which rows hold it back."""
     m = lower.size

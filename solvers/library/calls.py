@@ -174,20 +174,14 @@ def begun(call, size):
     Returns whether the record continues an earlier solve.
     """
     state, warm = call.state, call.state[WARM] == 1 and call.state[USED] == size
-    begin_again(call)
+    for c in range(call.x.size):
+        call.x[c] = call.reference[c] if call.reference.size > 0 else 0.0
     if not warm or call.settings[0] > 0.0:
         warm = False
         for i in range(size):
             call.values[i] = 0.0
     state[USED], state[WARM], state[ITERATIONS], state[ROW] = size, 0, 1, -1
     return warm
-
-
-@inlined
-def begin_again(call):
-    """Write x = reference."""
-    for c in range(call.x.size):
-        call.x[c] = call.reference[c] if call.reference.size > 0 else 0.0
 
 
 @inlined

@@ -13,21 +13,19 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from hierarchy.jit.exporting import INTEGER, STATUS, Entry, numbers_at
-from solvers.kernels.bounds import name_saturation, solve_without_bounds
-from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy, verify_answer
+from solvers.kernels.bounds import solve_within_bounds
+from solvers.kernels.exact import solve, verify_answer
 from solvers.kernels.merged import OWN, merged, write_levels
 from solvers.kernels.merged import record_size as merged_record
 from solvers.kernels.recursion import recursion
 from solvers.kernels.rows import ZERO
 from solvers.kernels.sns import sns
-from solvers.kernels.staircase import solve_by_staircase
 from solvers.library.calls import (
     INVALID,
     ITERATIONS,
     ROW,
     USED,
     WARM,
-    begin_again,
     begun,
     can_open,
     closed,
@@ -42,11 +40,8 @@ from solvers.library.calls import (
 )
 from solvers.status import (
     CONTRADICTION,
-    INACCURATE,
     NUMERICAL_FAILURE,
     SOLVED,
-    TOO_SMALL,
-    UNPROVED,
 )
 
 
@@ -76,7 +71,8 @@ def solve_hcod(call, s):
     """Solve like `Hcod`."""
     size = 3 * call.lower.size + 3
     begun(call, size)
-    code = exactly(call, call.values[:size])
+    code = solve(call.A, call.lower, call.upper, call.sizes, call.x, call.values[:size],
+                 call.settings, call.work)
     call.state[ITERATIONS] = np.int64(call.values[size - 3] + call.values[size - 2])
     call.state[WARM] = 1
     return code
@@ -124,52 +120,18 @@ def solve_merged(call, s):
     return code
 
 
-@inlined
-def exactly(call, record):
-    """Solve like `solve_exactly` of `hcod`."""
-    if call.settings[DAMPING] > 0.0:
-        return solve_damped(call.A, call.lower, call.upper, call.sizes, call.x, record,
-                            call.settings, call.work)
-    return solve_hierarchy(call.A, call.lower, call.upper, call.sizes, call.x, record,
-                           call.settings, call.work)
-
-
 @compiled
 def solve_tpm(call, s):
-    """Solve like `Tpm`: warm from the active bounds, cold if none is active any more."""
-    size = call.x.size + call.sizes.size + 3 * call.lower.size + 3
-    warm = begun(call, size)
-    if warm:
-        code = _within_bounds(call, call.values[:size], True)
-        if code == NUMERICAL_FAILURE or call.state[WARM] == 1:
-            return code
-        begun(call, size)
-    code = solve_by_staircase(call.A, call.lower, call.upper, call.sizes, call.x, call.settings,
-                              call.work)
-    if code == INACCURATE:
-        begun(call, size)
-        code = exactly(call, call.values[size - 3 * call.lower.size - 3:size])
-    if code < 0:
-        begin_again(call)
-        return _within_bounds(call, call.values[:size], False)
-    call.state[USED] = 0
-    return code
-
-
-@compiled
-def _within_bounds(call, record, warm):
-    """Solve with bounds in the first level, like `Tpm`; the state is warm if one is active."""
-    inner, code = record[call.x.size + call.sizes.size:], ZERO + UNPROVED
-    if not warm:
-        code = solve_without_bounds(call.A, call.lower, call.upper, call.sizes, call.x, record,
-                                    call.settings, call.work)
-    if code == UNPROVED:
-        code = exactly(call, inner)
-    if code < 0 or code in (NUMERICAL_FAILURE, TOO_SMALL):
-        return code
-    call.state[ITERATIONS] = np.int64(inner[inner.size - 3] + inner[inner.size - 2])
-    named = name_saturation(call.A, call.lower, call.upper, call.sizes, call.x, record, call.work)
-    call.state[WARM] = 1 if named == SOLVED else 0
+    """Solve like `Tpm`."""
+    n, size = call.x.size, call.x.size + call.sizes.size + 3 * call.lower.size + 3
+    begun(call, size)
+    record = call.values[:size]
+    code = solve_within_bounds(call.A, call.lower, call.upper, call.sizes, call.reference, call.x,
+                               record, call.settings, call.work)
+    steps = np.int64(record[size - 3] + record[size - 2])
+    call.state[USED], call.state[ITERATIONS] = size if steps > 0 else 0, max(steps, 1)
+    for c in range(n if steps > 0 else 0):
+        call.state[WARM] = 1 if record[c] != 0.0 else call.state[WARM]
     return code
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
-from solvers.kernels.bounds import name_saturation, solve_without_bounds
+from solvers.kernels.bounds import solve_within_bounds
 from solvers.kernels.published import matrix_as_published, solve_as_published
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.resolution import SaturatedResolution
@@ -25,8 +25,8 @@ from solvers.resolver import (
     register,
     register_variant,
 )
-from solvers.resolvers.hcod import Hcod, solve_exactly, warm_record
-from solvers.status import INACCURATE, NO_LIMITS, NUMERICAL_FAILURE, SOLVED, UNPROVED, Status
+from solvers.resolvers.hcod import Hcod, warm_record
+from solvers.status import SOLVED, Status
 from solvers.workspace import WORKSPACE, entry, run
 
 FORMS = ("staircase", "published")
@@ -74,18 +74,24 @@ class Tpm(Resolver):
         Without bounds a direct method that ignores `memory`; with them it returns a
         `SaturatedResolution`, which has a memory where an unknown is at a bound.
         """
-        if memory is not None and self.strict:
-            return self._within_bounds(h, memory)
-        x = h.start()
-        A, lower, upper, sizes = h.rows
-        code = self._kernel(A, lower, upper, sizes, x, self._settings, WORKSPACE.array)
-        if code == INACCURATE:
+        if memory is None or not self.strict:
             x = h.start()
-            code = solve_exactly(h, x, np.zeros(3 * h.m + 3), self._settings)
-        if code == SOLVED:
-            return Resolution(x)
-        return (self._within_bounds(h, None) if code < 0 and self.strict
-                else self._otherwise(h, x, code, memory))
+            A, lower, upper, sizes = h.rows
+            code = self._kernel(A, lower, upper, sizes, x, self._settings, WORKSPACE.array)
+            if code == SOLVED:
+                return Resolution(x)
+            if not self.strict:
+                return self._otherwise(h, x, code)
+        x, levels = np.empty(h.n), len(h.names)
+        record = warm_record(None if self.damping > 0.0 else memory, h.n + levels + 3 * h.m + 3)
+        code = run(solve_within_bounds, *h.rows, h.start(), x, record, self._settings)
+        if code < 0:
+            refuse_inequality(self, h, -code - 1)
+        steps = int(record.item(-3) + record.item(-2))
+        if steps == 0:
+            return Resolution(x, Status(code))
+        return SaturatedResolution(x, Status(code), steps, record, levels,
+                                   record if record[:h.n].any() else None)
 
     @cached_property
     def _kernel(self) -> Callable[..., int]:
@@ -94,30 +100,6 @@ class Tpm(Resolver):
     @cached_property
     def _settings(self) -> Array:
         return np.array([self.damping, self.threshold, self.rank_tolerance, *_OF_THE_ENGINE])
-
-    def _within_bounds(self, h: Hierarchy, memory: Array | None) -> Resolution:
-        """Resolve h if its first level is bounds; otherwise reject it, or drop the memory.
-
-        With a memory, which only an answer at a bound leaves, the exact resolver starts from it;
-        otherwise, or if no bound is active any more, the staircase is tried first.
-        """
-        x, levels = h.start(), len(h.names)
-        first, code = len(x) + levels, UNPROVED
-        record = warm_record(None if self.damping > 0.0 else memory, first + 3 * h.m + 3)
-        known, inner = bool(record.any()), record[first:]
-        if not known:
-            code = run(solve_without_bounds, *h.rows, x, record, self._settings)
-        if code == NO_LIMITS:
-            return self.solve(h)
-        if code == UNPROVED:
-            code = solve_exactly(h, x, inner, self._settings)
-        if code < 0 or code == NUMERICAL_FAILURE:
-            return self._otherwise(h, x, code)
-        named = run(name_saturation, *h.rows, x, record)
-        if named != SOLVED and known:
-            return self.solve(h)
-        return SaturatedResolution(x, Status(code), int(inner.item(-3) + inner.item(-2)), record,
-                                   levels, record if named == SOLVED else None)
 
 
 register_variant("tpm-published", "tpm", form="published")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmark.reproduce import blocks, protocol, verdicts
+from benchmark.reproduce import blocks, fronts, protocol, verdicts
 from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, Point, dominated, table
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
 from scenarios.config import load
@@ -134,3 +134,20 @@ def test_every_method_can_take_its_settings():
             for settings in method.trials(2, seed=1):
                 scenario.with_resolver(method.resolver).with_changes(
                     {**method.set, **settings}).make_resolver()
+
+
+def test_trials_that_are_left_out_of_the_second_scene_are_not_on_the_front(monkeypatch):
+    rng, ran = np.random.default_rng(5), []
+    scores = rng.exponential(size=(40, 2, 3))
+    scores[rng.random((40, 2)) < 0.3] = np.inf
+
+    def made(name, method, trials, scenes, where):
+        ran.append(len(trials))
+        return scores[[one["k"] for one in trials], :scenes[1]], []
+
+    monkeypatch.setattr(fronts, "_scores", made)
+    found = fronts._trained("", Method("hcod"), [{"k": k} for k in range(40)], ())
+    whole = scores.max(axis=1)
+    assert ([k for k in range(40) if not dominated(found, k)]
+            == [k for k in range(40) if not dominated(whole, k)])
+    assert sum(ran[1:]) < 30
