@@ -61,6 +61,7 @@ def pasted(model, folder, capsys):
     """Return the robot that `check` described, and that of a scenario with what it printed."""
     assert run_command(["check", model]) == 0
     said = capsys.readouterr().out
+    assert said.count("  follows         f") == 3 * ("gripper" in model)
     section, path = said[said.index("[robot]\n"):], folder / "pasted.toml"
     end = next(line for line in section.splitlines() if line.startswith("end_effector = "))
     path.write_text('name = "pasted"\n' + section + CONTROL
@@ -90,12 +91,3 @@ def test_the_section_to_paste_runs_as_it_is(name, tmp_path, monkeypatch, capsys)
 @pytest.mark.parametrize("name", ["pr2", "romeo"])
 def test_the_section_of_a_public_robot_runs_as_it_is(name, tmp_path, capsys):
     expect_the_same(*pasted(f"example_robot_data:{name}", tmp_path, capsys))
-
-
-def test_joints_that_follow_are_named_and_need_no_task(tmp_path, capsys):
-    (tmp_path / "gripper.urdf").write_text(ROBOTS["gripper.urdf"])
-    assert run_command(["check", str(tmp_path / "gripper.urdf")]) == 0
-    said = capsys.readouterr().out
-    for name in ("f2", "f3", "f4"):
-        assert f"  follows         {name} = 1 f1 in the file (kept by every scenario)" in said
-    assert "[[tasks]]" not in said

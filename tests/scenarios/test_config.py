@@ -48,8 +48,8 @@ def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
     assert s.control.settings() == {"damping": 0.05, "threshold": 0.1}
     assert load("ellipse", ["control.resolver=recursive"]) == s, "changing its name is enough"
     assert s.with_resolver("tpm-published") == load("ellipse")
-    t = load("ellipse").with_resolver("tpm:damping=0.01")
-    assert t.control.settings() == {"damping": 0.01, "threshold": 0.1}
+    assert load("ellipse").with_resolver("tpm:damping=0.01").control.settings() == {
+        "damping": 0.01, "threshold": 0.1}
 
 
 def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
