@@ -13,7 +13,6 @@ from benchmark.peers import reaching, standing
 from benchmark.peers.compare import joined
 from benchmark.peers.moving import ENTRANTS, QUESTIONS, START, make_scenes, run
 from benchmark.peers.ours import stand
-from benchmark.peers.scenes import Arm, Stand
 from benchmark.peers.standing import Judge, followed, make_scene
 from benchmark.process import Field
 from benchmark.solve import entrants as solvers_
@@ -169,12 +168,6 @@ def test_every_package_has_an_adapter_that_is_tested():
 
 
 # -- the scenes and their judges -------------------------------------------------------------------
-
-def test_a_scene_arrives_as_it_was_sent(tmp_path):
-    for scene, read in ((make_scenes(tmp_path)["step"], lambda numbers: Arm(**numbers)),
-                        (make_scene(tmp_path), Stand.of)):
-        sent = json.dumps(asdict(scene))
-        assert json.dumps(asdict(read(json.loads(sent)))) == sent
 
 
 @pytest.mark.slow

@@ -32,12 +32,6 @@ def test_every_output_that_is_stored_stands_in_a_page_or_is_linked():
     assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == shown | linked
 
 
-def test_an_unknown_block_is_named(tmp_path):
-    with pytest.raises(HierarchyError, match=r"page\.md: block 'other'"):
-        pages.filled("<!-- reproduce: other -->\n<!-- end of other -->", tmp_path, "page.md",
-                     STORED)
-
-
 BENCH = """\
 EQ7
             median  p95
@@ -66,17 +60,6 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
                        (page("python a.py | EQ8 .. EQ9"), r"no line of the output .* with 'EQ8'")):
         with pytest.raises(HierarchyError, match=says):
             fill(text)
-
-
-def test_a_command_is_run_once_for_the_same_code(tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text("print('one  ')\nprint('Numbers: runs/a')\n")
-    assert pages.run("python script.py", tmp_path, tmp_path / "out") == "one\n"
-    script.write_text("print('two')\n")
-    assert pages.run("python script.py", tmp_path, tmp_path / "out") == "one\n"
-    (tmp_path / "benchmark").mkdir()
-    (tmp_path / "benchmark" / "new.py").write_text("")
-    assert pages.run("python script.py", tmp_path, tmp_path / "out") == "two\n"
 
 
 def test_a_command_that_fails_leaves_the_others(tmp_path, capsys):

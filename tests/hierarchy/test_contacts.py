@@ -84,18 +84,6 @@ def test_base_rows_hold_exactly_where_forward_dynamics_does():
     np.testing.assert_allclose(CONTACTS.torques(state, x), tau[6:], atol=1e-9)
 
 
-def test_torque_rows_hold_up_to_both_limits():
-    state, x = moving_state(6), random_x(6)
-    task = TorqueLimits(ROBOT, 0.5, contacts=CONTACTS)
-    A, lower, upper = written(task, state, "torque", CONTACTS.unknowns)
-    tau, limit = CONTACTS.torques(state, x), 0.5 * ROBOT.effort_limit[6:]
-    np.testing.assert_allclose(upper - A @ x, limit - tau, atol=1e-9)
-    np.testing.assert_allclose(A @ x - lower, tau + limit, atol=1e-9)
-    np.testing.assert_allclose(A, task.jacobian(state), atol=1e-12)
-    np.testing.assert_allclose(task.error(state), np.clip(state.dynamics.h[6:], -limit, limit)
-                               - state.dynamics.h[6:])
-
-
 @pytest.mark.parametrize("faces", [4, 8])
 def test_what_friction_rows_allow_is_in_the_cone_and_their_edges_touch_it(faces):
     contact = CONTACTS["left_hand"]

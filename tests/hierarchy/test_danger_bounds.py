@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scene import ROBOT, SENSOR, place_of, state_at, states
 
-from hierarchy import HierarchyError, Stack, State
+from hierarchy import Stack
 from hierarchy.tasks import CumulatedRepulsion, JointDamping, JointLimits, Posture
 from hierarchy.tasks.danger_bounds import DangerBounds
 
@@ -72,18 +72,6 @@ def test_the_box_is_never_empty_lies_in_that_of_the_limits_and_lets_a_joint_brak
             halt = np.clip(-state.v / PERIOD if level == "acceleration" else 0.0, least, most)
             assert (low <= halt).all()
             assert (halt <= up).all()
-
-
-def test_what_it_cannot_do_without_is_named(monkeypatch):
-    with pytest.raises(HierarchyError, match="needs at least one control point"):
-        DangerBounds(LIMITS, ())
-    with pytest.raises(HierarchyError, match="the state carries no measurement"):
-        task().box(State.at(ROBOT, np.zeros(7)), "velocity")
-    with pytest.raises(HierarchyError, match="18 control points, and distances of 9"):
-        DangerBounds(LIMITS, SENSOR.points * 2).box(state_at(*STATES[0]), "velocity")
-    monkeypatch.setattr(ROBOT, "velocity_limit", np.array([1.0, np.inf, 1, 1, 1, 1, 1]))
-    with pytest.raises(HierarchyError, match="joint joint_2 has no velocity limit"):
-        task()
 
 
 WITHIN = 0.5

@@ -109,15 +109,6 @@ def test_compiled_rows_of_a_posture_are_those_of_its_methods(level, floating):
         np.testing.assert_array_equal(h.lower, h.upper)
 
 
-def test_a_posture_that_fits_no_form_is_refused():
-    with pytest.raises(HierarchyError, match="'posture': 4 values for 9 joint positions or 12"):
-        Posture((0.0,) * 4).error(State(ROBOT))
-    with pytest.raises(HierarchyError, match="'posture': unknown joint 'leg'"):
-        Posture({"leg": 0.0}, robot=ROBOT)
-    with pytest.raises(HierarchyError, match=r"give Posture\(\.\.\., robot=robot\)"):
-        _ = Posture({"arm": 0.0}).dimension
-
-
 @pytest.mark.parametrize(("turn", "values"), [
     ("wheel", {"wheel": -3.0, "arm": 0.2}), ("drive 3", {"drive": (1.0, 2.0, -3.0), "arm": 0.2})])
 def test_joints_that_turn_on_are_coupled_by_their_angles(turn, values):

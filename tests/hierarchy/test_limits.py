@@ -246,15 +246,6 @@ def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():
     np.testing.assert_allclose(low, np.clip(least, wide_low, wide_up), rtol=0, atol=1e-9)
 
 
-@LEVELS
-def test_a_horizon_of_at_most_a_tick_changes_nothing(level):
-    for q, v in states(5):
-        state = state_at(q, v)
-        box, same = (JointLimits(ROBOT, 10.0, 1e-3, horizon=horizon).box(state, level)
-                     for horizon in (0.0, 1e-3))
-        np.testing.assert_array_equal(box, same)
-
-
 # ---- from outside -----------------------------------------------------------------------------
 
 def wide(joints, T, velocity=np.inf):
@@ -391,17 +382,3 @@ def test_torque_rows_hold_exactly_where_inverse_dynamics_does():
         assert (A[[0, 8]] == 5.0).all()
         held.append((np.abs(torque) <= ROBOT.effort_limit / 2).all())
     assert 0 < sum(held) < 200, "the test has cases on one side only"
-
-
-def test_the_other_methods_of_the_torque_task_say_the_same():
-    task = TorqueLimits(ROBOT, fraction=0.2)
-    for q, v in states(5):
-        state = state_at(q, v)
-        bias = pin.rnea(ROBOT.model, ROBOT.model.createData(), q, v, np.zeros(7))
-        error = task.error(state)
-        assert (np.abs(bias + error) <= 0.2 * ROBOT.effort_limit + 1e-12).all()
-        np.testing.assert_array_equal(task.jacobian(state), state.mass_matrix())
-        later, before = (State.at(ROBOT, q + h * v).mass_matrix() for h in (1e-6, -1e-6))
-        np.testing.assert_allclose(task.jacobian_derivative(state), (later - before) / 2e-6,
-                                   atol=1e-7)
-    assert (task.dimension, task.kind) == (7, "inequality")

@@ -8,7 +8,6 @@ import pytest
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
 from scenarios.cell.robot import start_of
-from scenarios.cli.main import run_command
 from scenarios.config.robot import StartSection
 
 mujoco = pytest.importorskip("mujoco")
@@ -88,14 +87,6 @@ def written(tmp_path):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_robot_is_what_mujoco_has(kind, written):
     assert public_robots.of_mjcf(written(KINDS[kind])) == "equal"
-
-
-def test_an_attached_model_is_part_of_the_robot(written, tmp_path):
-    (tmp_path / "hand.xml").write_text(f"<mujoco>{world(link('hand'))}</mujoco>")
-    path = written('<asset><model name="hand" file="hand.xml"/></asset>' + world(
-        link("a", more='<attach model="hand" body="hand" prefix="left_"/>')))
-    assert public_robots.of_mjcf(path) == "equal"
-    assert Robot.load(path).joint_names == ("a_joint", "left_hand_joint")
 
 
 PACKAGES = public_robots.MJCF + public_robots.URDF
@@ -313,16 +304,3 @@ def test_a_difference_from_mujoco_names_the_body(written, monkeypatch):
     monkeypatch.setattr(model, "_turned", lambda _, diagonal: np.diag(diagonal * (1.0 + 1e-6)))
     with pytest.raises(RobotError, match=r"the inertia at body '[ab]' is "):
         Robot.load(path)
-
-
-def test_check_shows_what_the_file_has_besides_joints(written, capsys):
-    path = written(world(
-        link("a", more=link("b", more=link("c"))) + TABLE,
-        '<contact><exclude body1="a" body2="c"/></contact><keyframe><key name="home"/></keyframe>'
-        '<equality><connect name="close" body1="a" body2="c" anchor="0 0 0"/></equality>'))
-    assert run_command(["check", str(path), "--set", "robot.root=a"]) == 0
-    said = capsys.readouterr().out
-    for part in ("closed chain    close: close 1 and close 2 have one origin",
-                 "keyframes       home", "may touch       a_joint to c_joint",
-                 "missing         left out, since it is not under root: table", 'root = "a"'):
-        assert part in said, part

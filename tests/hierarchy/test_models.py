@@ -1,19 +1,14 @@
 """Robots out of files that the tests write: what is read, what is proposed, what is missing."""
 
-import json
 import sys
 from types import ModuleType
 
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance.self_collision import pairs_of_tree
+from hierarchy import Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.tasks import DangerBounds, JointLimits, TorqueLimits
 from scenarios.cell.robot import make_robot
-from scenarios.cli.main import run_command
-from scenarios.cli.robot_check import look_at, paste
 from scenarios.config.references import separable_pairs
 from scenarios.config.robot import RobotSection
 
@@ -132,14 +127,6 @@ def test_an_mjcf_without_the_mesh_of_what_is_only_seen_keeps_its_other_shapes(bo
     assert [capsule.radius for capsule in Robot.from_file(path).capsules][1:] == [0.05]
 
 
-def test_what_cannot_be_said_of_a_floating_base_is_refused(arm):
-    robot = Robot.from_file(arm(), base="floating")
-    with pytest.raises(HierarchyError, match="contact forces"):
-        TorqueLimits(robot)
-    with pytest.raises(HierarchyError, match="floating base"):
-        DangerBounds(JointLimits(robot, 5.0, 0.01), robot.control_points)
-
-
 def test_locked_joints_are_no_joints(arm):
     robot = Robot.load(str(arm()), locked={"elbow": 0.8})
     assert robot.joint_names == ("shoulder", "turn")
@@ -162,37 +149,6 @@ def test_a_section_lists_its_own_points_and_capsules(arm):
     assert [point.joint for point in robot.control_points] == [3, 2]
     np.testing.assert_allclose(robot.control_points[0].offset, [0, 0, 0.2])
     assert [capsule.joint for capsule in robot.capsules] == [0, 2]
-
-
-def test_neighbours_of_the_tree_are_not_kept_apart(arm):
-    robot = Robot.from_file(arm())
-    assert pairs_of_tree(robot.capsules, robot.parents) == [(0, 2)]
-    kuka = Robot.named("kuka_lwr")
-    assert separable_pairs(kuka, 0.01) == [(0, 2)], "as in a chain"
-    humanoid = Robot.named("humanoid")
-    for i, j in separable_pairs(humanoid, 0.01):
-        assert humanoid.capsules[i].joint != humanoid.parents[humanoid.capsules[j].joint]
-
-
-@pytest.mark.parametrize(("name", "feet"), [
-    ("kuka_lwr", set()),
-    ("quadruped", {f"{side}_{end}_foot" for side in ("left", "right")
-                   for end in ("front", "hind")})])
-def test_check_names_the_frames_on_which_a_floating_robot_may_stand(name, feet, capsys):
-    assert run_command(["check", name, "--json"]) == 0
-    assert set(json.loads(capsys.readouterr().out)["lowest_frames"]) == feet
-    assert run_command(["check", name]) == 0
-    assert ("lowest frames" in capsys.readouterr().out) == bool(feet)
-
-
-def test_check_takes_changes_of_the_robot(arm):
-    section, robot = look_at(str(arm()), ["robot.base=floating", "robot.end_effector=fore"])
-    assert robot.base == "floating"
-    assert 'base = "floating"' in paste(section, robot)
-    with pytest.raises(HierarchyError, match=r"robot\.base"):
-        look_at(str(arm()), ["robot.base=flying"])
-    with pytest.raises(HierarchyError, match=r"only keys of \[robot\]"):
-        look_at(str(arm()), ["control.period=0.1"])
 
 
 @pytest.mark.parametrize("package", ["example_robot_data", "robot_descriptions"])
@@ -232,12 +188,6 @@ def test_a_robot_of_robot_descriptions_is_read_from_where_it_was_downloaded(arm,
     assert (robot.name, robot.n) == ("some", 3)
     with pytest.raises(UnknownNameError, match="did you mean 'some_description'"):
         Robot.load("robot_descriptions:sum_description")
-
-
-@pytest.mark.usefixtures("descriptions")
-def test_a_robot_that_cannot_be_downloaded_is_no_crash():
-    with pytest.raises(RobotError, match="could not be downloaded"):
-        Robot.load("robot_descriptions:some_description")
 
 
 @pytest.mark.usefixtures("example_robot_data")

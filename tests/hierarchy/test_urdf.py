@@ -178,11 +178,6 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
 # Which file it is
 
 
-@pytest.mark.parametrize("name", ["r.URDF", "r.xml", "r.xacro", "r.txt"])
-def test_the_root_element_says_what_a_file_is(load, name):
-    assert load(link("a"), link("b"), joint("j", "revolute", "a", "b"), name=name).n == 1
-
-
 @pytest.mark.parametrize(("name", "text", "said"), [
     ("a.sdf", "<sdf/>", r"is an SDF \(Gazebo\), which is not read; give the URDF"),
     ("a.xacro", "<robot name='r'><xacro:include filename='b'/></robot>",
@@ -198,10 +193,3 @@ def test_another_file_is_refused_with_what_to_give(tmp_path, name, text, said):
     (tmp_path / name).write_text(text)
     with pytest.raises(RobotError, match=said):
         Robot.load(tmp_path / name)
-
-
-def test_a_folder_and_a_missing_file_are_no_unknown_robots(tmp_path):
-    with pytest.raises(RobotError, match="is a folder"):
-        Robot.load(tmp_path)
-    with pytest.raises(RobotError, match="does not exist"):
-        Robot.load("nowhere.SDF")

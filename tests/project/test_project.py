@@ -29,11 +29,6 @@ def test_a_document_points_only_at_files_that_exist(document):
     assert missing == []
 
 
-def test_continuous_integration_runs_what_a_developer_runs():
-    assert "make test" in (ROOT / ".ci" / "run").read_text()
-    assert (ROOT / ".ci" / "run").stat().st_mode & 0o100
-
-
 def test_what_is_compiled_ahead_are_kernels_with_types_of_arguments():
     from hierarchy.jit.linking import found
     from hierarchy.jit.sources import kinds_in

@@ -8,7 +8,7 @@ from mechanisms import four_bar
 from hierarchy import Robot, State, plugins
 from hierarchy.contacts import Contacts
 from hierarchy.paths import Still
-from hierarchy.tasks import Position, Posture
+from hierarchy.tasks import Position
 from hierarchy.tasks.mechanism import Mechanism
 from scenarios import simulate
 from scenarios.cell.build import build
@@ -227,16 +227,3 @@ def test_limits_hold_for_a_floating_base(level):
     assert np.abs(run["v"][:, :3]).max() == pytest.approx(2.0)
     with pytest.raises(ScenarioError, match="has a fixed base"):
         build(scenario(limits={"acceleration": 5.0, "base_speed": [1.0, 1.0]}))
-
-
-@pytest.mark.parametrize(("rod", "resolver"), [(BALL, "hcod"), (CROSS, "tpm")])
-def test_an_ankle_stays_closed_in_a_loop_of_inverse_kinematics(rod, resolver, tmp_path):
-    path, robot = ankle_at(tmp_path, rod)
-    goal = Posture({"pitch": -0.8, "roll": 0.2}, gain=10.0, robot=robot)
-    q, memory = [robot.rest], None
-    for _ in range(60):
-        step = solve_ik(robot, q[-1], [goal], memory=memory, resolver=resolver, limits=False)
-        memory = step.memory
-        q.append(robot.integrate(q[-1], 0.01 * step.v))
-    assert np.abs(robot.difference(q[0], q[-1])).max() > 0.1, "it moved"
-    assert largest_residual(path, q) < 1e-9

@@ -11,7 +11,7 @@ import pytest
 from balanced import Balanced
 
 from hierarchy import Hierarchy, HierarchyError
-from hierarchy.notebook import html_table, numbers
+from hierarchy.notebook import html_table
 from scenarios import compare, load, simulate
 
 ROOT = Path(__file__).parents[2]
@@ -37,11 +37,6 @@ def test_a_table_escapes_every_value_marks_the_best_and_says_how_much_is_left_ou
     assert "<td>&lt;i&gt;</td>" in text
     assert "<td><b>2</b></td>" in text
     assert "... and 70 more" in html_table("t", ("n",), [(i,) for i in range(100)])
-
-
-def test_numbers_are_in_one_line_with_four_digits_without_rounding_and_their_middle():
-    assert numbers(np.array([1e-9, 1.23456])) == "[0.     1.2346]"
-    assert numbers(np.arange(100.0)) == "[ 0.  1.  2. ... 97. 98. 99.]"
 
 
 def test_a_hierarchy_shows_its_levels(h):

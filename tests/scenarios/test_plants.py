@@ -1,6 +1,5 @@
 """Plants: exact or simulated physics, and what a controller is told of them."""
 
-import sys
 
 import numpy as np
 import pytest
@@ -10,8 +9,6 @@ from hierarchy.avoidance import Obstacles
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
-from scenarios.cli.main import run_command
-from scenarios.config import ScenarioError
 from scenarios.config.plant import MeasurementSection, PhysicsSection
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
@@ -178,14 +175,6 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
 # Mistakes.
 
 
-def test_without_mujoco_the_extra_is_named(monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    assert run_command(["run", "ellipse", "--set", "plant.kind=mujoco", "--duration", "0.01"]) == 2
-    assert "pip install 'task-hierarchy[sim]'" in capsys.readouterr().err
-    simulate(load("ellipse", SHORT))
-
-
 @pytest.mark.parametrize(("changes", "said"), [
     ([*SHORT, "plant.measurement.delay=0.0025"],
      "delay = 0.0025 s is not a whole number of periods"),
@@ -194,17 +183,6 @@ def test_without_mujoco_the_extra_is_named(monkeypatch, capsys, tmp_path):
 def test_a_setting_that_does_not_fit_is_named(mujoco, changes, said):
     with pytest.raises(HierarchyError, match=said):
         build(load("ellipse", changes))
-
-
-def test_only_an_arm_given_as_a_table_has_physics(mujoco, tmp_path):
-    (tmp_path / "arm.urdf").write_text(
-        '<robot name="arm"><link name="base"/><link name="hand"/><joint name="hinge" '
-        'type="revolute"><parent link="base"/><child link="hand"/><axis xyz="0 1 0"/>'
-        '<limit lower="-1" upper="2" velocity="3" effort="10"/></joint></robot>')
-    with pytest.raises(ScenarioError, match="robot 'arm' is not one of kuka_lwr"):
-        build(load("ellipse", ["plant.kind=mujoco", f"robot.model={tmp_path}/arm.urdf",
-                               "robot.end_effector=hand", "start={q=[0.0]}",
-                               "robot.control_points=[{joint='hinge', offset=[0, 0, 1]}]"]))
 
 
 @pytest.mark.parametrize("level", ["acceleration", "velocity"])

@@ -248,13 +248,6 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
     sys.modules.pop("entry_of_mine")
 
 
-def test_an_entry_point_that_leads_nowhere_is_named(folder):
-    install(folder, "resolvers", "ghost = nowhere_at_all:Ghost")
-    with pytest.raises(HierarchyError, match="entry point 'ghost' of task_hierarchy\\.resolvers "
-                                             "cannot be imported"):
-        make("ghost")
-
-
 def test_two_things_of_one_name_are_refused():
     plugins.register("tasks", "thing")(type("One", (), {}))
     with pytest.raises(HierarchyError, match="tasks: 'thing' is already"):

@@ -32,10 +32,6 @@ def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
     assert (loaded.orders, loaded.fault) == (saved.orders, saved.fault)
 
 
-def test_a_switch_is_the_first_tick_of_the_new_order():
-    assert recording(order=[0, 1, 1, 0, 0]).switches().tolist() == [1, 3]
-
-
 def test_a_run_folder_holds_arrays_metrics_scenario_and_versions(tmp_path):
     save(recording(), tmp_path / "run")
     names = {path.name for path in (tmp_path / "run").iterdir()}

@@ -6,13 +6,11 @@ import pytest
 from hierarchy import HierarchyError
 from hierarchy.tasks import CumulatedRepulsion, DangerBounds, Pointing
 from hierarchy.tasks.together import TangentCone
-from scenarios import load, simulate
+from scenarios import load
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
 from solvers import make
 from tests.helpers.scene import FRAME, ROBOT, state_at, states
-
-RIVALS = ["ellipse-set-based", "ellipse-smooth"]
 
 
 def controller_at(name, q, *changes):
@@ -95,14 +93,6 @@ def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
         np.testing.assert_array_equal(controller.resolution.x, alone)
 
 
-def test_a_frozen_task_is_recorded_as_met_and_one_inside_its_set_as_free():
-    from scenarios.recording.fate import Fate
-    run = simulate(load("ellipse-set-based", ["control.duration=0.3", "avoidance.distance=0.12"]))
-    fates = run["level_fate"][:, run.task_names.index("separation")]
-    assert set(np.unique(fates)) <= {Fate.FREE, Fate.MET}
-    assert Fate.MET in fates
-
-
 @pytest.mark.parametrize(("name", "changes", "says"), [
     ("ellipse-set-based", ["control.level=acceleration"],
      r'needs control.level = "velocity", got "acceleration"'),
@@ -132,13 +122,6 @@ def test_the_smooth_stack_refuses_a_resolver_without_activations():
     scenario = load("ellipse-smooth").with_resolver("tpm")
     with pytest.raises(HierarchyError, match=r'needs control.resolver = "smooth", got "tpm"'):
         Controller(scenario)
-
-
-def test_limits_go_with_both_as_a_guard():
-    for name in RIVALS:
-        scenario = load(name, ["limits={acceleration=10.0, place='either'}"])
-        assert not scenario.limits_in_stack
-        assert build(scenario).tasks.limits is not None
 
 
 # The avoidance of the letter's references [5] and [10].

@@ -65,14 +65,6 @@ def test_what_the_robot_does_not_have_is_named(keys, said):
         build(STANDING.with_changes(keys))
 
 
-def test_a_resolver_for_equalities_gets_the_stack_without_limits():
-    assert (STANDING.asks, STANDING.forces_in_stack) == ("inequalities", True)
-    assert build(STANDING).stack.names == LEVELS
-    plain = STANDING.with_resolver("tpm")
-    assert (plain.asks, plain.forces_in_stack) == ("equalities", False)
-    assert build(plain).stack.names == ("physics", *LEVELS[3:])
-
-
 # What it does.
 
 

@@ -227,7 +227,3 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
 def test_a_wrong_argument_is_refused_and_named(call, said):
     with pytest.raises(HierarchyError, match=re.escape(said)):
         call()
-
-
-def test_one_scenario_is_compared_like_a_list_of_one():
-    assert [run.spec for run in compare(SHORT, ["tpm"]).runs] == ["tpm"]

@@ -67,12 +67,6 @@ def posture_task(target, cost=0.1):
     return task
 
 
-def speed_of(task, configuration, v):
-    """What the task asked for and what v gives it: both (m,)."""
-    asked = -task.gain * task.compute_error(configuration) / DT
-    return asked, task.compute_jacobian(configuration) @ v
-
-
 def arm_scene(configuration, shift=(0.05, 0.02, -0.03), lm_damping=0.0, cost=1e-3, **arguments):
     hand = frame_task(configuration, shift=shift)
     hand.lm_damping = lm_damping
@@ -157,19 +151,6 @@ def test_limits_that_contradict_each_other_are_no_solution_and_named(configurati
     with pytest.raises(NoSolutionFound, match=r"limits cannot all hold; at best these are violated:"
                        r" SimpleNamespace, row 0 by .*joint_1 by"):
         solve_ik(configuration, hand, DT, limits=[slow, sums])
-
-
-def test_of_two_tasks_in_conflict_the_first_is_served_exactly_and_in_pink_neither_is(configuration):
-    import pink
-
-    hand = frame_task(configuration, shift=(0.003, 0.001, -0.002), turn=0.01)
-    posture = posture_task(Q + 0.01, cost=1.0)
-    ours = solve_ik(configuration, [hand, posture], DT)
-    weighted = pink.solve_ik(configuration, [hand, posture], DT, "proxqp")
-    asked, given = speed_of(hand, configuration, ours)
-    np.testing.assert_allclose(given, asked, atol=1e-10)
-    asked, given = speed_of(hand, configuration, weighted)
-    assert np.abs(given - asked).max() > 0.01  # [m/s, rad/s]
 
 
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):
@@ -308,18 +289,6 @@ def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
         mujoco.mj_forward(model, data)
     assert np.abs(adapter.frame(model, data, "tip", "site")[0] - goal).max() < 1e-6
     assert (np.abs(data.qpos) <= 2.0).all()
-
-
-def test_mistakes_with_mujoco_name_what_is_wrong(arm):
-    from solvers.adapters import from_mujoco as adapter
-
-    model, data = arm
-    with pytest.raises(HierarchyError, match="unknown site 'tipp'; did you mean 'tip'"):
-        adapter.jacobian(model, data, "tipp", "site")
-    with pytest.raises(HierarchyError, match="unknown kind of frame 'sites'; did you mean 'site'"):
-        adapter.jacobian(model, data, "tip", "sites")
-    with pytest.raises(HierarchyError, match=r"target must be \(3,\) finite numbers"):
-        adapter.position_level(model, data, "tip", [0.0, np.nan, 0.0], 1.0, "site")
 
 
 # --- qpsolvers ----------------------------------------------------------------------------------

@@ -120,18 +120,6 @@ def test_rank_moves_to_whoever_comes_first():
     assert factored.ranks == (2, 2, 0)
 
 
-def test_the_stack_may_be_empty_and_fill_again():
-    factored = Factorization([], n=3)
-    np.testing.assert_allclose(factored.solve([], [1.0, 2.0, 3.0]).x, [1.0, 2.0, 3.0])
-    assert factored.F.shape == (0, 0)
-    assert factored.G.shape == (3, 0)
-    factored.insert("x", [[1.0, 0.0, 0.0]])
-    np.testing.assert_allclose(factored.solve([[5.0]], [1.0, 2.0, 3.0]).x, [5.0, 2.0, 3.0])
-    factored.delete("x")
-    assert factored.names == factored.sizes == factored.ranks == ()
-    np.testing.assert_allclose(factored.solve({}).x, 0.0)
-
-
 @pytest.mark.filterwarnings("ignore:overflow")  # of the kernels as plain Python
 def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     factored = Factorization([[[1.0, 0.0]], [[1e200, 1e200]]], names=["a", "b"])

@@ -81,13 +81,6 @@ def test_explain_says_what_holds_a_level_back(case):
                      for line, words in zip(lines, said, strict=True)]
 
 
-def test_explain_names_the_rows_that_are_missed_by_most_and_not_those_missed_by_a_little():
-    h = Hierarchy.from_levels([(np.eye(3), [-1.0] * 3, [1.0] * 3),
-                               (np.eye(3), [2.0, 1.5, 1.05], [INF] * 3)], names=["limits", "wish"])
-    said = explain(h, HCOD.solve(h), rows=["a", "b", "c"] * 2).splitlines()[1]
-    assert said.startswith("wish is missed by 1.12, at a and b: held back by limits a at")
-
-
 def test_a_level_that_is_rounding_beside_others_counts_where_limits_hold_x():
     """Recorded in an example of pink: a vertical motion of an arm that moves in a plane."""
     limits, lifted = (np.eye(2), [-2.0] * 2, [2.0] * 2), ([[2.56e-18, 1.8e-18]], [-700.0])

@@ -34,15 +34,6 @@ def follow(tasks, ticks, **settings):
     return q, np.array(v)
 
 
-def test_one_call_gives_velocity_status_and_memory():
-    v, status, memory = solve_ik(ROBOT, Q, [hand([0.01, 0.0, 0.0])], dt=0.01)
-    assert v.shape == (7,)
-    assert status is Status.SOLVED
-    assert memory is not None
-    J = Position(FRAME, Still([0, 0, 0])).jacobian(State.at(ROBOT, Q))
-    np.testing.assert_allclose(J @ v, [0.1, 0.0, 0.0], atol=1e-10)
-
-
 def test_limits_of_the_robot_hold_whatever_is_asked():
     far = Posture(tuple(ROBOT.upper + 1.0), gain=50.0)
     step = solve_ik(ROBOT, Q, [far])

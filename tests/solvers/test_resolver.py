@@ -11,17 +11,10 @@ import pytest
 
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.errors import UnknownNameError
-from solvers import Resolution, Status, make, names
+from solvers import Status, make, names
 from solvers.resolvers.set_based import SetBased
 from solvers.resolvers.settled import Settled
 from solvers.workspace import WORKSPACE
-
-
-def test_names_are_sorted_and_each_makes_its_resolver():
-    assert list(names()) == sorted(names())
-    assert {"recursive", "tpm", "hqp", "augmented"} <= set(names())
-    assert all(make(name).name == name for name in names())
-    assert make("weighted", weights=(10, 1), backend="daqp").label == "weighted 10/1 daqp"
 
 
 @pytest.mark.parametrize("name", [*names(), "tpm-published"])
@@ -52,13 +45,6 @@ def test_the_defaults_are_those_that_recorded_results_were_made_with(name):
     resolver = make(name)
     assert {field.name: getattr(resolver, field.name) for field in dataclasses.fields(resolver)
             if field.init} == {**EVERY, **DEFAULTS[name]}
-
-
-def test_a_resolution_is_solved_unless_it_says_otherwise():
-    res = Resolution(np.zeros(2))
-    assert (res.status, res.iterations, res.memory) == (Status.SOLVED, 1, None)
-    assert not hasattr(res, "__dict__")
-    assert "SOLVED" in repr(res)
 
 
 @pytest.mark.parametrize("resolver", ["hcod", "weighted"])

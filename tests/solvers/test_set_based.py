@@ -87,17 +87,6 @@ def test_with_every_task_at_its_bound_the_mode_and_the_answer_are_those_of_the_p
     assert counts >= {0, 1, 2}, "the problems reach modes with none, one and two frozen tasks"
 
 
-def test_at_the_bound_a_task_that_moves_back_is_left_alone_and_one_that_leaves_is_frozen():
-    def resolved(rate):
-        return SET_BASED.solve(Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [INF]),
-                                                      ([[1.0, 1.0]], [rate])]))
-    back, out = resolved(2.0), resolved(-2.0)
-    np.testing.assert_allclose(back.x, [1.0, 1.0], atol=1e-12)
-    np.testing.assert_allclose(out.x, [0.0, -2.0], atol=1e-12)
-    assert (back.iterations, out.iterations) == (1, 2)
-    assert (back.active.tolist(), out.active.tolist()) == ([0, 2], [-1, 2])
-
-
 def test_after_the_most_modes_everything_at_a_bound_is_frozen():
     rows = np.eye(6)
     h = Hierarchy.from_levels([(rows, np.zeros(6), np.full(6, INF)), (rows, [-1, -1, -1, 1, 1, 1])])

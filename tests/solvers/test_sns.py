@@ -111,15 +111,6 @@ def test_the_basic_form_is_the_algorithm_as_printed():
     assert judged > 15 or not JIT
 
 
-def test_what_saturates_first_is_the_joint_that_leaves_at_the_smallest_scaling():
-    """x = s (1, 1, 1) at first: joint 3 leaves at s = 0.4, though joint 1 is as far out."""
-    h = boxed([-1, -9, -9], [0.8, 9, 0.4], (np.ones((1, 3)), [3.0]))
-    res = BASIC.solve(h)
-    np.testing.assert_allclose(res.x, [0.8, 1.8, 0.4])
-    np.testing.assert_array_equal(res.saturated, [1, 0, 1])
-    np.testing.assert_array_equal(res.scaling, [1.0, 1.0])
-
-
 def test_the_optimal_form_ends_nearest_to_the_reference():
     """hcod, with what the levels have reached as targets, is the judge."""
     for h, _, _ in problems(FEW, 4):

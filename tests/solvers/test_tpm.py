@@ -125,15 +125,6 @@ def test_scaling_is_one_where_a_level_is_met_and_the_share_of_the_target_where_i
     assert res.saturated.dtype == np.int8
 
 
-def test_bounds_on_some_joints_with_any_coefficient_are_intersected():
-    bounds = ([[0.0, -2.0, 0.0], [0.0, 1.0, 0.0], [10.0, 0.0, 0.0]],
-              [-1.0, -np.inf, -np.inf], [np.inf, 0.7, 3.0])
-    h = Hierarchy.from_levels([bounds, (np.eye(3), [1.0, 1.0, 1.0])])
-    res = STAIRCASE.solve(h)
-    np.testing.assert_allclose(res.x, [0.3, 0.5, 1.0])
-    assert res.saturated.tolist() == [1, 1, 0]
-
-
 def test_bounds_that_exclude_each_other_give_the_point_of_least_violation():
     bounds = ([[1.0, 0.0], [2.0, 0.0], [-1.0, 0.0], [0.0, 1.0]], [-5.0, 4.0, -0.5, -1.0],
               [0.0, np.inf, np.inf, 1.0])

@@ -34,12 +34,6 @@ def test_another_x_another_active_set_and_another_problem_are_refused():
     assert not type(res)(res.x, res.status, none).verified(BOX)
 
 
-@pytest.mark.parametrize("name", ["tpm", "recursive"])
-def test_answers_of_other_methods_to_equalities_are_verified(name):
-    h = problems.structured(12, equalities_only=True)
-    assert make(name).solve(h).verified(h)
-
-
 def test_what_reports_no_active_rows_or_has_a_metric_says_who_judges_it():
     with pytest.raises(HierarchyError, match=r"certify\(h, x\)"):
         make("weighted").solve(BOX).verified(BOX.changed(metric=np.eye(3)))
