@@ -32,17 +32,11 @@ ARM = '<robot name="arm">' + "".join([
     JOINT.format("elbow", "revolute", "two", "three", 0.3, "0 0.9 0", "0 0.8 0.6"),
     JOINT.format("wrist", "continuous", "three", "four", 0.3, "0 0 0", "1 0 0"),
     JOINT.format("end", "fixed", "four", "tip", 0.12, "0 0 0", "1 0 0")]) + "</robot>"
-SCENARIO = """
-name = "alone"
-[robot]
-model = "arm.urdf"
-end_effector = "tip"
-[control]
-level = "acceleration"
-period = 0.001
-duration = 0.3
-stack = "hierarchical"
-resolver = "hcod"
+SCENARIO = """name = "alone"
+robot = {model = "arm.urdf", end_effector = "tip"}
+control = {level = "acceleration", duration = 0.3, stack = "hierarchical", resolver = "hcod"}
+limits = {acceleration = 30.0}
+damping = {value = 5.0}
 [position]
 stiffness = 40.0
 damping = 20.0
@@ -52,19 +46,8 @@ kind = "separation"
 distance = 0.02
 influence = 0.3
 rate = 5.0
-[[avoidance.obstacles]]
-shape = "sphere"
-radius = 0.05
-[avoidance.obstacles.path]
-kind = "ellipse"
-centre = [0.3, 0.2, 0.5]
-cosine = [0.1, 0.0, 0.0]
-sine = [0.0, 0.1, 0.0]
-rate = 2.0
-[limits]
-acceleration = 30.0
-[damping]
-value = 5.0
+obstacles = [{shape = "sphere", radius = 0.05, path = {kind = "ellipse", rate = 2.0, \
+centre = [0.3, 0.2, 0.5], cosine = [0.1, 0.0, 0.0], sine = [0.0, 0.1, 0.0]}}]
 """
 
 
@@ -98,13 +81,11 @@ def no_way_back(request, monkeypatch):
 def test_what_is_loaded_is_what_was_run_and_its_scene_is_whole(made):
     folder, run, _ = made
     again = load_run(folder)
-    assert again.facts == run.facts
-    assert again.signals.keys() == run.signals.keys()
+    assert (again.facts, again.signals.keys()) == (run.facts, run.signals.keys())
     assert again.facts.resolver.label == "hcod"
     assert again.facts.robot.position_units == ("rad", "rad", "rad", "1", "1")
     assert again.facts.robot.joint_names == ("turn", "shoulder", "elbow", "wrist")
-    folder, run, _ = made
-    shown = scene(load_run(folder))
+    shown = scene(again)
     assert np.allclose(shown.traced, run["ee_position"][shown.ticks], atol=1e-12)
     assert np.allclose(shown.distance[:, -1], run["ee_distance"][shown.ticks], atol=1e-12)
     assert shown.levels.known.all()

@@ -87,3 +87,5 @@ def test_the_command_names_the_largest_changes_of_a_run(folder, capsys):
     assert sizes == sorted(sizes, reverse=True)
     assert run_command(["why", str(folder), "--tick", str(found[0]["tick"])]) == 0
     assert f"tick {found[0]['tick']} (t = " in capsys.readouterr().out
+    assert run_command(["why", str(folder), "--tick", "999"]) == 2
+    assert "tick 999: the run has ticks 0 to 49" in capsys.readouterr().err
