@@ -83,15 +83,6 @@ def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
     assert all("code" in row["why"] for row in first if row.get("ended") == CRASHED)
 
 
-@pytest.mark.slow
-def test_an_entrant_that_cannot_start_is_missing_with_the_reason():
-    with Field([fake("LeastSquares", no=1), replace(fake("Moody"), python="/no/such/python")],
-               QUESTIONS) as field:
-        assert not field.running
-    assert "takes no arguments" in field.missing["LeastSquares"]
-    assert "No such file" in field.missing["Moody"]
-
-
 CC = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 
 

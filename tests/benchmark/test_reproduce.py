@@ -62,18 +62,6 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
             fill(text)
 
 
-def test_a_command_that_fails_leaves_the_others(tmp_path, capsys):
-    (tmp_path / "good.py").write_text("print('good')\n")
-    (tmp_path / "bad.py").write_text("print('half')\nraise SystemExit(3)\n")
-    (tmp_path / "page.md").write_text(page("python bad.py") + page("python good.py"))
-    assert dict(whole.outputs(["page.md"], tmp_path, tmp_path / "out")) == {
-        "python good.py": "good\n"}
-    said = capsys.readouterr().err
-    assert "left as it is: python bad.py: exit code 3\nhalf" in said
-    assert re.search(r"^  0:0\d min$", said, re.MULTILINE)
-    assert whole.minutes(2467.4) == "41:07 min"
-
-
 @pytest.fixture
 def documents(tmp_path):
     """A checkout that has documents only."""

@@ -53,7 +53,6 @@ def random_x(seed):
 
 # Contacts
 
-
 def test_contact_jacobian_and_drift_are_derivatives_of_the_positions():
     state = moving_state(1)
     J = CONTACTS.jacobian(state)
@@ -68,7 +67,6 @@ def test_contact_jacobian_and_drift_are_derivatives_of_the_positions():
 
 
 # Rows of the tasks
-
 
 def test_base_rows_hold_exactly_where_forward_dynamics_does():
     """aba gives the acceleration that contact forces and joint torques cause."""
@@ -261,7 +259,6 @@ def test_the_momentum_has_its_derivative_and_approaches_its_target():
 
 # Stacks at level "torque"
 
-
 def test_together_has_the_rows_of_its_tasks_in_order():
     state = moving_state(19)
     tasks = [BaseDynamics(CONTACTS), ContactMotion(CONTACTS), Friction(CONTACTS)]
@@ -279,7 +276,6 @@ def test_together_has_the_rows_of_its_tasks_in_order():
 
 
 # Bad input
-
 
 FRAME = ROBOT.frame("left_foot")
 
@@ -302,8 +298,7 @@ FRAME = ROBOT.frame("left_foot")
     (lambda: Stack(level="torque"), "level 'torque' needs contacts, Contacts(robot) for none"),
     (lambda: Stack(contacts=CONTACTS), "contacts need the level 'torque', not 'acceleration'"),
     (lambda: Stack([Friction(CONTACTS)]), "task 'friction': contact forces need the level"),
-    (lambda: Stack([Friction(feet())], "torque", contacts=CONTACTS), "not those of the stack"),
-])
+    (lambda: Stack([Friction(feet())], "torque", contacts=CONTACTS), "not those of the stack")])
 def test_bad_input_is_named(make, said):
     with pytest.raises((HierarchyError, UnknownNameError)) as error:
         make()

@@ -51,8 +51,7 @@ def test_values_of_joints_are_set_and_read_by_name():
     ({"wheel": (1.0, 1.0)}, "joint 'wheel': its (cos, sin) [1.0, 1.0] has length 1.414"),
     ({"neck": 1.0}, "joint 'neck': 1 numbers, expected 3 or 4"),
     ({"arm": np.nan}, "joint 'arm'"), ({"leg": 1.0}, "unknown joint 'leg'"),
-    ((0.0, 0.0), "2 values for 9 joint positions or 12 coordinates"),
-])
+    ((0.0, 0.0), "2 values for 9 joint positions or 12 coordinates")])
 def test_what_is_no_value_of_a_joint_is_refused_by_name(values, said):
     with pytest.raises(HierarchyError) as error:
         ROBOT.configuration(values)

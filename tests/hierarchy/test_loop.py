@@ -88,7 +88,6 @@ def test_the_end_of_a_wait_is_watched_where_that_was_asked_for():
 
 # A tick that takes 0.625 s ends in the middle of the third period.
 
-
 @pytest.mark.parametrize(("overrun", "ticks", "late"), [
     ("skip", [0, 1, 4, 5, 6, 7], [0.0] * 6),
     ("catch up", [0, 1, 2, 3, 4, 5, 6, 7], [0.0, 0.0, 0.375, 0.125, 0.0, 0.0, 0.0, 0.0])])
@@ -144,7 +143,6 @@ def test_a_priority_that_is_not_given_is_said_and_one_that_is_is_given_back():
 
 # --- the watchdog -------------------------------------------------------------------------------
 
-
 def test_a_watchdog_stops_once_when_it_was_not_fed_for_its_time():
     clock, robot = Clock(), Robot()
     dog = Watchdog(1.0, robot.stop, clock)
@@ -190,7 +188,6 @@ def test_a_safe_stop_that_fails_in_the_watchdog_is_reported():
 
 
 # --- commands and readings ----------------------------------------------------------------------
-
 
 @pytest.mark.parametrize(("value", "said"), [
     (np.array([0.0, np.nan]), "the command is not finite"),

@@ -193,8 +193,7 @@ LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"
     ({"more": LOOP}, "joints 'back', 'elbow' are a loop"),
     ({"more": '<link name="alone"/>'}, "links 'base', 'alone' have no parent"),
     ({"more": "<xacro:include>"}, "not valid XML"),
-    ({"mimic": '<mimic joint="elbow"/>'}, "joint 'elbow': it is to follow itself"),
-])
+    ({"mimic": '<mimic joint="elbow"/>'}, "joint 'elbow': it is to follow itself")])
 def test_a_wrong_urdf_is_refused_with_the_name_of_its_joint(changed, said, tmp_path, capfd):
     path = tmp_path / "arm.urdf"
     path.write_text(TWO_JOINTS.format(**{**PLAIN, **changed}))
@@ -231,8 +230,7 @@ def test_an_mjcf_includes_files(tmp_path):
     (f"<mujoco><worldbody>{ONE_BODY.format('a', ONE_BODY.format('a', ''))}</worldbody></mujoco>",
      "repeated name 'a' in "),
     (f"<mujoco><worldbody>{ONE_BODY.format('a', '')}</worldbody></mujoco>".replace("1", "0"),
-     "axis too small in joint Element name 'a'"),
-])
+     "axis too small in joint Element name 'a'")])
 def test_a_wrong_mjcf_is_refused(text, said, tmp_path):
     pytest.importorskip("mujoco")
     path = tmp_path / "it.xml"

@@ -98,7 +98,6 @@ def test_a_wrong_csv_file_is_named_with_its_line(text, said, tmp_path):
 
 # BVH files.
 
-
 TEXT = """HIERARCHY
 ROOT hips
 {

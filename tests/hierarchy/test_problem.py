@@ -26,8 +26,7 @@ def test_a_violation_is_the_distance_to_the_rows_interval():
     ([(np.zeros((0, 0)), [])], "n = 0"),
     ([], "no levels"),
     ([(np.eye(2),)], "expected (A, b) or (A, lower, upper)"),
-    ([("abc", [1])], "level 1: A is not an array of numbers"),
-])
+    ([("abc", [1])], "level 1: A is not an array of numbers")])
 def test_bad_input_is_named(levels, said):
     with pytest.raises(HierarchyError) as error:
         Hierarchy.from_levels(levels)

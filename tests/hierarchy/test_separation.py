@@ -104,8 +104,7 @@ def test_a_hand_driven_into_an_obstacle_stops_at_the_distance(level, period, dif
     (None, 1, "'separation': the state carries no measurement of pairs"),
     (Pairs(9, 2), 1, "9 points are measured against 2 obstacles, expected 9 against 1"),
     (Pairs(8, 1), 1, "8 points .* expected 9"),
-    (Pairs(9, 0), None, "9 points are measured against 0 obstacles, .* one at least"),
-])
+    (Pairs(9, 0), None, "9 points are measured against 0 obstacles, .* one at least")])
 def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
     state = State.at(ROBOT, START)
     task = Separation(SENSOR.points, EVERYWHERE, obstacles)

@@ -93,8 +93,7 @@ def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
     (lambda s: s.reorder(["position", "position", "pointing"]), "each of"),
     (lambda s: s.hierarchy(state_at(Q, V), ("posture",)), "unknown task 'posture'"),
     (lambda s: Stack(level="effort"), "level must be"),
-    (lambda s: Stack([JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot has 7"),
-])
+    (lambda s: Stack([JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot has 7")])
 def test_bad_edits_are_named(edit, said):
     with pytest.raises(HierarchyError) as error:
         edit(stack())

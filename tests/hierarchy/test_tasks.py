@@ -181,8 +181,7 @@ def pose(state):
 @pytest.mark.parametrize(("method", "value", "said"), [
     ("jacobian", np.eye(7), "task 'elbow': jacobian has shape (7, 7), expected (1, 7)"),
     ("jacobian", np.full((1, 7), np.nan), "task 'elbow', row 0: A[0, 0] is nan"),
-    ("error", np.array([np.nan]), "task 'elbow', row 0: lower is nan"),
-])
+    ("error", np.array([np.nan]), "task 'elbow', row 0: lower is nan")])
 def test_a_wrong_task_is_named(method, value, said, monkeypatch):
     monkeypatch.setattr(Elbow, method, lambda self, state: value)
     with pytest.raises(HierarchyError) as error:

@@ -53,7 +53,6 @@ def placement(robot, q, name):
 
 # A free base
 
-
 @pytest.mark.parametrize("base", [None, "floating"])
 def test_a_floating_first_joint_is_the_free_base(load, base):
     robot = load(*two_joints("floating"), base=base)
@@ -79,7 +78,6 @@ def test_a_second_joint_with_the_name_of_a_free_base_is_refused(load):
 
 
 # Planar joints
-
 
 def motion_of(robot, q, along):
     """Pose of the base in the frame of the planar joint's origin, with axes `along` of q 1, 2."""
@@ -136,7 +134,6 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
 
 # What is lost is said
 
-
 @pytest.mark.parametrize(("changed", "said"), [
     ({"arm": INERTIAL.replace("0.4", "-0.4")}, "inertias of arm: a principal moment is negative"),
     ({"arm": '<inertial><mass value="1"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>'
@@ -150,8 +147,7 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
     ({"limit": '<limit lower="-1" upper="1" velocity="2" effort="0"/>'}, "effort limits of only:"),
     ({"kind": "planar"}, "limits of only: a floating or planar joint has none"),
     ({"kind": "planar", "axis": ""}, "planar joints only: their planes are normal to x"),
-    ({"more": link("only") + joint("x", "fixed", "base", "only", "", "")}, "frames called only:"),
-])
+    ({"more": link("only") + joint("x", "fixed", "base", "only", "", "")}, "frames called only:")])
 def test_what_a_robot_is_without_is_said(load, changed, said):
     given = {"arm": INERTIAL, "more": "", "root": "", "limit": LIMIT, "kind": "revolute",
              "axis": "0 1 0", **changed}
@@ -162,7 +158,6 @@ def test_what_a_robot_is_without_is_said(load, changed, said):
 
 
 # Two frames of one name
-
 
 def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
     parts = (*map(link, ("base", "wrist", "tool")), joint("tool", "revolute", "base", "wrist"),
@@ -177,7 +172,6 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
 
 # Which file it is
 
-
 @pytest.mark.parametrize(("name", "text", "said"), [
     ("a.sdf", "<sdf/>", r"is an SDF \(Gazebo\), which is not read; give the URDF"),
     ("a.xacro", "<robot name='r'><xacro:include filename='b'/></robot>",
@@ -187,8 +181,7 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
     ("a.xml", "<mujocoinclude/>", "give the file that includes it"),
     ("a.toml", "name = 'a'", r"A scenario is read by scenarios\.load"),
     ("a.urdf", "<robot/>", "its <robot> has no name"),
-    ("a.urdf", "<robot name='r'><link name='table'/></robot>", "with base = 'floating'"),
-])
+    ("a.urdf", "<robot name='r'><link name='table'/></robot>", "with base = 'floating'")])
 def test_another_file_is_refused_with_what_to_give(tmp_path, name, text, said):
     (tmp_path / name).write_text(text)
     with pytest.raises(RobotError, match=said):

@@ -9,7 +9,7 @@ from hierarchy.avoidance import Barrier, Capsule, Obstacle, Repulsion, Surveilla
 from hierarchy.gate import check_rotation
 from hierarchy.limits import Limits
 from hierarchy.loop import Loop
-from hierarchy.paths import Blended, Still, circle
+from hierarchy.paths import Blended, Jittered, Still, circle
 from hierarchy.robots import TABLES, link_capsules
 from hierarchy.tasks import (
     Avoidance,
@@ -112,6 +112,9 @@ class Own(Task):
        f"fraction {fraction} is not more than 0") for fraction in (0.0, -1.0, 80.0, NAN)),
     (lambda: Blended(TIMES, CORNERS, 0.0), "blend 0.0 s must be positive"),
     (lambda: Blended(TIMES[:1], CORNERS, 0.1), "1 times for 2 points"),
+    *((lambda bad=bad: Jittered(THERE, **{"amplitude": 0.1, "rate": 1.0, "seed": 0} | bad),
+       f"{next(iter(bad))} {next(iter(bad.values()))}")
+      for bad in ({"amplitude": -1.0}, {"rate": 0.0}, {"seed": -1})),
     (lambda: circle((0, 0, 0), -0.1), "circle: radius -0.1"),
     (lambda: circle((0, 0, 0), 0.1, (0, 0, 0)), "normal [0, 0, 0]"),
     (lambda: Loop(0.0), "period 0.0 s must be positive"), (lambda: Loop(0.1, behind=0), "behind"),
@@ -135,8 +138,7 @@ class Own(Task):
     (lambda: check_rotation("R", np.diag([1.0, 1.0, -1.0])), "a reflection, of determinant -1"),
     (lambda: check_rotation("R", np.eye(3) + 1e-5 * np.eye(3, k=1)), "is 1e-05 from the identity"),
     (lambda: Robot.load("nowhere.SDF"), "does not exist"),
-    (lambda: Robot.load("/"), "is a folder"),
-])
+    (lambda: Robot.load("/"), "is a folder")])
 def test_a_wrong_value_is_refused_and_named(make, said):
     with pytest.raises(HierarchyError) as error:
         make()

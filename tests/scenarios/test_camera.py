@@ -138,8 +138,7 @@ def test_jitter_delays_each_frame_by_less_than_its_most_and_by_the_seed():
     (lambda: Pinhole(rotation=np.diag([1, 1, -1])), "rotation"),
     (lambda: Pinhole(position=(0, np.inf, 0)), "position"),
     (lambda: looking_at((1, 2, 3), (1, 2, 3)), "look_at"),
-    (lambda: camera(rate=30.0, jitter=0.05), "jitter = 0.05 s"),
-])
+    (lambda: camera(rate=30.0, jitter=0.05), "jitter = 0.05 s")])
 def test_what_cannot_be_is_refused_by_name(make, said):
     with pytest.raises(HierarchyError, match=said.replace("(", r"\(")):
         make()

@@ -84,7 +84,6 @@ def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_besid
 
 # The reference of keys.
 
-
 EXTENSIONS = Path(__file__).parents[2] / "docs" / "_ext"
 
 

@@ -161,8 +161,7 @@ QUICK = [f"sensor={{{VIEW}, width=160, height=120, fx=131.0, fy=131.0}}",
     (["sensor={kind='camera', position=[1,1,1], look_at=[1,1,1]}"], "look_at"),
     (["sensor.kind=camera", "sensor.rotation=[[1,0,0],[0,1,0],[0,0,-1]]"], "rotation"),
     (["sensor.kind=camera", "sensor.jitter=0.1"], "jitter"),
-    (["sensor={kind='frames', folder='nowhere'}"], "nowhere"),
-])
+    (["sensor={kind='frames', folder='nowhere'}"], "nowhere")])
 def test_a_section_that_does_not_fit_is_refused_when_it_is_built(changes, said):
     with pytest.raises(ScenarioError, match=f"sensor: .*{said}"):
         build(load("human", changes))

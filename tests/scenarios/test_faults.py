@@ -123,8 +123,7 @@ def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
     ("{kind='nan_position', at=1, duration=1, joint=8}", "faults.0.joint = 8: robot 'kuka_lwr'"),
     ("{kind='nan_distance', at=1, duration=1, point=10}", "faults.0.point = 10: robot"),
     ("{kind='obstacle', at=1, duration=1, radius=0.1, place={joint='elbow', offset=[0, 0, 0]}}",
-     "unknown joint 'elbow'"),
-])
+     "unknown joint 'elbow'")])
 def test_a_fault_that_cannot_be_put_in_is_named(fault, said):
     with pytest.raises(HierarchyError, match=re.escape(said)):
         simulate(load("strictness" if "needs" in said else "ellipse", [f"faults=[{fault}]"]))

@@ -42,13 +42,6 @@ def test_the_order_is_fixed_and_limits_come_first():
     assert names_of("posture={role='task', target=[0,0,0,0,0,0,0]}")[-1] == "posture"
 
 
-def test_beside_one_sided_distances_algorithm_1_switches_the_cone_alone():
-    cell = build(load("ellipse-hqp", ["control.stack=switched"]))
-    assert cell.order(None, 1.0).order == ("joint limits", "separation", "position", "pointing")
-    assert cell.order(None, -1.0).order == ("joint limits", "separation", "position")
-    assert cell.tasks.pointing.kind == "equality"
-
-
 @pytest.mark.slow
 def test_the_strictness_scenario_measures_what_a_lower_task_moves():
     scenario = load("strictness", ["control.duration=0.3"])

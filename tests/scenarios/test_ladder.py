@@ -42,8 +42,7 @@ def test_a_group_is_not_a_scenario():
     ("scenarios = ['ellipse']", r"group 'mine': title"),
     ("title = 'x'\nscenarios = []", r"group 'mine': scenarios"),
     ("title = 'x'\nscenarios = ['ellipse']\nresolver = 'hcod'", r"group 'mine': .*'resolver'"),
-    ("title = 'x'\nscenarios = ['elipse']", r"unknown scenario 'elipse'; did you mean 'ellipse'"),
-])
+    ("title = 'x'\nscenarios = ['elipse']", r"unknown scenario 'elipse'; did you mean 'ellipse'")])
 def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch):
     monkeypatch.setattr(groups_of, "LIBRARY", tmp_path)
     (tmp_path / "mine.toml").write_text(text)
@@ -67,7 +66,6 @@ def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_p
 
 
 # Where strict resolvers part: the tick, and what was different before it.
-
 
 LETTER = "tpm-published"
 

@@ -115,8 +115,7 @@ def on_a_circle(**changed):
      "unknown key 'tasks.0.path.radiuss'; did you mean 'tasks.0.path.radius'?"),
     (on_a_circle(times=[1]),
      "tasks.0.path.times: only kind 'waypoints' has it; the kind here is 'circle'"),
-    (on_a_circle(kind="line"), "tasks.0.path.start: Field required"),
-])
+    (on_a_circle(kind="line"), "tasks.0.path.start: Field required")])
 def test_wrong_values_are_named(task, said, tmp_path):
     with pytest.raises(HierarchyError, match=re.escape(said)):
         scenario_of(tmp_path, task)
@@ -129,8 +128,7 @@ def test_wrong_values_are_named(task, said, tmp_path):
       "path": {"kind": "recorded", "file": "none.csv"}}, "none.csv cannot be read"),
     ({"kind": "position", "frame": "end_effector", "path": {
         "kind": "waypoints", "times": [0, 1], "points": [[0, 0, 0], [0, 0, 1]], "blend": 2.0}},
-     "blend 2.0 s must be positive and at most 1 s"),
-])
+     "blend 2.0 s must be positive and at most 1 s")])
 def test_what_does_not_fit_the_robot_is_named(task, said, tmp_path):
     with pytest.raises(HierarchyError, match=re.escape(said)):
         build(scenario_of(tmp_path, task))

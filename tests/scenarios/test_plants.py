@@ -38,7 +38,6 @@ def arm(mujoco, q=START, v=STILL, obstacles=(), level="velocity", period=PERIOD,
 
 # The physics is that of the robot's model.
 
-
 def test_inertia_gravity_and_coriolis_forces_are_those_of_the_robots_model(mujoco):
     plant = arm(mujoco, joints={"armature": 0.0})
     model, data = plant.model, plant.data
@@ -57,7 +56,6 @@ def test_inertia_gravity_and_coriolis_forces_are_those_of_the_robots_model(mujoc
 
 # The servos.
 
-
 def test_a_smooth_motion_is_followed_closely(mujoco):
     plant, exact = (make(ROBOT, START, STILL, PERIOD, "acceleration")
                     for make in (PhysicsArm, KinematicArm))
@@ -74,17 +72,7 @@ def test_a_smooth_motion_is_followed_closely(mujoco):
     assert 1e-6 < apart < 2e-3
 
 
-def test_servos_stay_within_the_effort_limits(mujoco):
-    plant, most = arm(mujoco, servo={"bandwidth": 300.0}), STILL
-    for k in range(40):
-        plant.act(np.full(7, 5.0 if k % 4 < 2 else -5.0))
-        most = np.maximum(most, np.abs(plant.data.qfrc_actuator))
-    assert (most <= ROBOT.effort_limit * (1 + 1e-12)).all()
-    assert (most > 0.99 * ROBOT.effort_limit).any()
-
-
 # Contacts.
-
 
 def forearm(q=START):
     """The middle of the forearm, a capsule along the z axis of the frame of joint 5."""
@@ -93,7 +81,6 @@ def forearm(q=START):
 
 
 # What the controller is told.
-
 
 def told(section, count, level="velocity", command=STILL, q=START):
     """q, v as told and as they are, (count, 7) each, of an arm that follows exactly."""
@@ -136,7 +123,6 @@ def test_a_filtered_velocity_lags_by_the_time_of_its_filter():
 
 # Runs.
 
-
 @pytest.mark.parametrize("changes", [[*SHORT, *NOISY], [*PHYSICS, *NOISY]],
                          ids=["kinematic", "mujoco"])
 def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
@@ -173,7 +159,6 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
 
 
 # Mistakes.
-
 
 @pytest.mark.parametrize(("changes", "said"), [
     ([*SHORT, "plant.measurement.delay=0.0025"],

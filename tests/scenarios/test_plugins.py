@@ -210,8 +210,7 @@ def test_a_scenario_with_own_kinds_is_copied_and_pickled():
     ("tasks.1.path.kind=spiral", "tasks.1.path: unknown kind 'spiral'. Known: circle"),
     ("tasks.0.kind=elbwo", "tasks.0: unknown kind 'elbwo'; did you mean 'elbow'?"),
     ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
-    ("control.options.shar=0.1", "unknown setting of halved 'shar'; did you mean 'share'?"),
-])
+    ("control.options.shar=0.1", "unknown setting of halved 'shar'; did you mean 'share'?")])
 def test_wrong_keys_of_own_kinds_are_named(change, said):
     plugins.allow("doors_of_mine")
     with pytest.raises(HierarchyError, match=re.escape(said)):

@@ -72,7 +72,6 @@ def test_the_data_are_those_of_the_recording(runs, document):
 
 # In a browser.
 
-
 @pytest.fixture(scope="module")
 def browser():
     with chromium() as page:

@@ -111,8 +111,7 @@ def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
     ("ellipse-hqp", ["control.stack=set-based", "control.level=velocity"],
      r'needs limits.place = "guard", got "stack"'),
     ("ellipse-velocity", ["control.stack=set-based"],
-     r'"repulsion" goes with control.stack = "switched", got "set-based"'),
-])
+     r'"repulsion" goes with control.stack = "switched", got "set-based"')])
 def test_what_does_not_go_together_is_said_with_key_and_value(name, changes, says):
     with pytest.raises(HierarchyError, match=says):
         load(name, changes)
@@ -125,7 +124,6 @@ def test_the_smooth_stack_refuses_a_resolver_without_activations():
 
 
 # The avoidance of the letter's references [5] and [10].
-
 
 NEAR = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])  # the start of `ellipse`
 

@@ -71,8 +71,7 @@ def made(folder):
     ("start.q = { around = [0.1, 0.2] }", {}, "parameters.start.q: scenario 'ellipse': around"),
     ("position.gain = { uniform = [2.0, 1.0] }", {}, "parameters.position.gain.uniform: "),
     ("position.gian = { uniform = [1.0, 2.0] }", {}, "unknown key 'position.gian'; did you"),
-    ("position.damping = { normal = [-9.0, 0.0] }", {}, "sample 0 of scenario 'ellipse'"),
-])
+    ("position.damping = { normal = [-9.0, 0.0] }", {}, "sample 0 of scenario 'ellipse'")])
 def test_a_wrong_file_is_refused_before_anything_is_run(parameters, changed, says, tmp_path,
                                                         capsys):
     path = write(tmp_path, parameters, **changed)

@@ -75,8 +75,6 @@ def test_a_push_gives_the_whole_robot_its_momentum():
             PushSection(joint="trunk_pich", force=1.0),)))
 
 
-
-
 def plant(**keys):
     robot = Robot.named("dual_arm")
     q = robot.configuration(np.zeros(robot.n))
@@ -108,13 +106,6 @@ def test_torques_follow_with_the_bandwidth_of_the_motors():
     driven(slow, asked, 1.0 / (2.0 * np.pi * 5.0))
     assert slow.data.ctrl[0] - first == pytest.approx((10.0 - first) * (1.0 - np.exp(-1.0)),
                                                       rel=0.05)
-
-
-def test_links_that_touch_are_pushed_apart_and_those_that_overlap_at_the_start_are_not():
-    _, touching = plant(self_collision=True)
-    _, passing = plant()
-    assert touching.model.npair > passing.model.npair == 0
-    assert touching.data.ncon == 0
 
 
 def recorded(**changes):

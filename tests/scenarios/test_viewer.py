@@ -29,11 +29,7 @@ def recording():
     return simulate(LIMITED)
 
 
-# The frame that is drawn
-
-
 # A live run
-
 
 def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_its_settings(
         recording):
@@ -75,7 +71,6 @@ def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
 
 
 # Pages, without a browser
-
 
 @pytest.mark.slow
 def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses():

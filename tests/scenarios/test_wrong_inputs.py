@@ -36,6 +36,8 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
     ("sensor.width=320", "sensor.width: only kind 'camera' has it; the kind here is 'exact'"),
     ("position.path.times=[1]", "only kind 'waypoints' has it; the kind here is 'ellipse'"),
     ("avoidance.obstacles.0.shape=sphere", "a sphere takes radius"),
+    ("position.path={kind='still', position=[0.0, 0.5, 0.0], out_of_reach=[[2.0, 1.0]]}",
+     "out_of_reach: times must increase"),
     # What goes together.
     ("control.stack=hierarchical", "avoidance.kind = \"repulsion\" goes with"),
     ("limits={acceleration=10, torque=0.5, place='guard'}", "need limits.place = \"stack\""),
@@ -45,8 +47,7 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
     # What it may be.
     ("tasks={kind='pose'}", "tasks: expected a list: for tables write [[tasks]] above each"),
     ("control=[{period=0.1}]", "control: expected one table, as below [control]"),
-    ("name='a b'", "a name has letters, digits"),
-])
+    ("name='a b'", "a name has letters, digits")])
 def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
     with pytest.raises(HierarchyError, match=re.escape(said)):
         load("ellipse", [change])
@@ -62,8 +63,7 @@ def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
     (["avoidance.obstacles=[[5, 5, 5], [0.0, 0.0, 0.0]]", "start.q=[0, 0, 0, 0, 0, 0, 0]",
       "robot.control_points=[{joint='joint_2', offset=[0, 0, 0]}]"],
      "obstacle 2 at [0.0, 0.0, 0.0] m touches control point 1"),
-    (["limits={acceleration=10, margin=3}"], "margin 3 leaves joint_1 no room between"),
-])
+    (["limits={acceleration=10, margin=3}"], "margin 3 leaves joint_1 no room between")])
 def test_what_does_not_fit_the_robot_is_said_by_check_and_run(changes, said, capsys, tmp_path):
     sets = [part for change in changes for part in ("--set", change)]
     assert run_command(["check", "ellipse", *sets]) == 2
@@ -111,8 +111,7 @@ def test_obstacles_are_reached_by_number_or_all_at_once():
     ('extends = "ellipse"\nreplaces = "avoidance"', "expected a list of sections"),
     ('extends = "ellipse"\n[position]\npath = { kind = "still", point = [0.5, 0.0, 0.5] }',
      "did you mean 'position.path.position'"),
-    ('replaces = ["avoidance"]', "goes with extends"),
-])
+    ('replaces = ["avoidance"]', "goes with extends")])
 def test_a_file_that_cannot_be_read_is_named(text, said, tmp_path):
     path = tmp_path / "bad.toml"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
@@ -163,8 +162,7 @@ def test_check_warns_of_what_is_missed_or_doubtful(name, changes, said, capsys):
     ("run ellipse --speed 2", "--speed: needs --live"),
     ("bench [red]nothing[/red]", "[red]nothing[/red]"),
     ("view nowhere --no-browser", "nowhere"),
-    ("run ellipse --live --certify", "--certify"),
-])
+    ("run ellipse --live --certify", "--certify")])
 def test_a_wrong_command_line_says_what_was_given(line, said, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert run_command(shlex.split(line)) == 2
@@ -177,7 +175,6 @@ def test_a_wrong_command_line_says_what_was_given(line, said, capsys, tmp_path, 
 
 
 # Calls from Python.
-
 
 SHORT = load("ellipse", ["control.duration=0.01"])
 ROBOT = Robot.load("kuka_lwr")
@@ -199,8 +196,7 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: certify([], [0.0, 0.0]), "certify: h: expected a Hierarchy, got list"),
     (lambda: explain(H, make("weighted").solve(H)), "hcod"),
     (lambda: explain(H, make("hcod").solve(H), rows="ab"), "rows: expected a list of names"),
-    (lambda: Hierarchy.from_levels([([[10**400]], [1.0])]), "level 1"),
-])
+    (lambda: Hierarchy.from_levels([([[10**400]], [1.0])]), "level 1")])
 def test_a_wrong_argument_is_refused_and_named(call, said):
     with pytest.raises(HierarchyError, match=re.escape(said)):
         call()

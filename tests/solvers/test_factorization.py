@@ -107,19 +107,6 @@ def test_f_and_g_are_those_of_the_matrix_made_from_the_rows(case):
         factored.reorder(factored.names[::-1])
 
 
-def test_rank_moves_to_whoever_comes_first():
-    A = np.eye(4)
-    factored = Factorization([A[:2], A[1:3], A[:3]], names=["a", "b", "c"])
-    assert factored.ranks == (2, 1, 0)
-    factored.reorder(["c", "a", "b"])
-    assert factored.ranks == (3, 0, 0)
-    factored.delete("c")
-    assert factored.ranks == (2, 1)
-    factored.insert("d", A[2:], at=0)
-    assert factored.names == ("d", "a", "b")
-    assert factored.ranks == (2, 2, 0)
-
-
 @pytest.mark.filterwarnings("ignore:overflow")  # of the kernels as plain Python
 def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     factored = Factorization([[[1.0, 0.0]], [[1e200, 1e200]]], names=["a", "b"])
@@ -156,7 +143,6 @@ def test_a_mistake_is_named_and_changes_nothing(mistake, text):
 
 
 # -- any sequence of edits that hypothesis can think of --------------------------------------------
-
 
 def test_nearly_parallel_rows_are_left_to_the_exact_engine():
     rng, unclear = np.random.default_rng(5), 0

@@ -10,7 +10,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Barrier
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Pose, Position, Posture, SelfSeparation
-from solvers import Status, make, solve_ik
+from solvers import Status, solve_ik
 
 ROBOT = Robot.named("kuka_lwr")
 FRAME = ROBOT.frame("end_effector")
@@ -45,18 +45,6 @@ def test_limits_of_the_robot_hold_whatever_is_asked():
     assert (np.abs(free.v) > ROBOT.velocity_limit).any()
 
 
-def test_any_resolver_may_solve_it():
-    tasks = [hand([0.01, 0.0, 0.0])]
-    reference = solve_ik(ROBOT, Q, tasks).v
-    for resolver in ("hqp", "sns", make("tpm", form="staircase")):
-        np.testing.assert_allclose(solve_ik(ROBOT, Q, tasks, resolver=resolver).v, reference,
-                                   atol=1e-5)
-    np.testing.assert_allclose(solve_ik(ROBOT, Q, tasks, resolver="recursive", limits=False).v,
-                               reference, atol=1e-9)
-    with pytest.raises(HierarchyError, match="limits, row 0: an inequality"):
-        solve_ik(ROBOT, Q, tasks, resolver="recursive")
-
-
 @pytest.mark.parametrize(("call", "said"), [
     (lambda: solve_ik("kuka_lwr", Q, []), "solve_ik: robot: expected a Robot, got str 'kuka_lwr'"),
     (lambda: solve_ik(ROBOT, Q, hand([0, 0, 0])), "solve_ik: tasks: expected a Sequence"),
@@ -70,8 +58,7 @@ def test_any_resolver_may_solve_it():
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], limits=SLOW),
      "give v, the velocity of the tick before"),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], until=1e-6, limits=SLOW),
-     "with until, limits are True or"),
-])
+     "with until, limits are True or")])
 def test_wrong_arguments_are_named(call, said):
     with pytest.raises(HierarchyError) as error:
         call()
