@@ -12,7 +12,7 @@ from solvers.resolvers.tpm import task_priority_matrix
 TPM = make("tpm")
 KINDS = ("generic", "combination of rows above", "row repeated inside", "zero row", "one direction",
          "row repeated from above", "whole level repeated")
-every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
+every_case = pytest.mark.parametrize("case", CASES)
 
 
 def rows_of_kind(kind, size, factored, rng):
