@@ -211,7 +211,7 @@ def test_inertia_of_a_tendon_is_refused_by_name(written):
         Robot.load(path)
 
 
-def residual(path, robot, q):
+def residual(path, q):
     """What MuJoCo has left of the equalities at q, of joints with one coordinate."""
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
@@ -230,7 +230,7 @@ def test_couplings_are_polynomials_of_positions(written):
     assert (one.joint, one.other, other.joint, other.other) == ("a_joint", "b_joint", "c_joint", "")
     for b in (-1.0, 0.3, 0.9):
         q = [np.polyval(one.coefficients[::-1], b), b, other.coefficients[0]]
-        np.testing.assert_allclose(residual(path, robot, q), 0.0, atol=1e-12)
+        np.testing.assert_allclose(residual(path, q), 0.0, atol=1e-12)
     held = Robot.load(path, locked={"b_joint": 0.3}).coupled[0]
     np.testing.assert_allclose(held.coefficients, [np.polyval(one.coefficients[::-1], 0.3)])
 
@@ -248,7 +248,7 @@ def test_tendons_that_keep_their_length_couple_their_joints(written):
     assert (one.joint, one.other, other.joint, other.other) == ("b_joint", "a_joint", "d_joint", "")
     for a in (-1.0, 0.4):
         q = [a, np.polyval(one.coefficients[::-1], a), 0.2, other.coefficients[0]]
-        np.testing.assert_allclose(residual(path, robot, q), 0.0, atol=1e-12)
+        np.testing.assert_allclose(residual(path, q), 0.0, atol=1e-12)
     (held, _) = Robot.load(path, locked={"b_joint": q[1]}).coupled
     assert (held.joint, held.coefficients) == ("a_joint", (pytest.approx(0.4),))
 
@@ -269,7 +269,7 @@ def test_closed_chains_join_the_frames_that_mujoco_joins(equality, rigid, writte
     assert (loop.name, loop.rigid) == ("close", rigid)
     assert robot.end_effector not in loop.frames or "site" in equality
     for q in np.random.default_rng(2).uniform(-1.0, 1.0, (3, 3)):
-        state, expected = State.at(robot, q), residual(path, robot, q)
+        state, expected = State.at(robot, q), residual(path, q)
         one, other = (robot.frame(name) for name in loop.frames)
         np.testing.assert_allclose(state.position(one) - state.position(other), expected[:3],
                                    atol=1e-12)

@@ -2,13 +2,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene import ROBOT, compiled_rows, driven, states
+from scene import ROBOT, compiled_rows, states
 
-from hierarchy import Stack, State
+from hierarchy import State
 from hierarchy.avoidance import Barrier, Capsule
 from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules
 from hierarchy.robots import TABLES, link_capsules
-from hierarchy.tasks import Posture
 from hierarchy.tasks.self_separation import SelfSeparation
 
 LEVELS = ["velocity", "acceleration"]
@@ -116,25 +115,3 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
         _, lower, _ = compiled_rows(task, state, level, rtol=1e-11)
         sided += np.isfinite(lower).sum()
     assert 0 < sided < 8 * task.dimension
-
-
-OPEN = (0.3, 0.5, 0.4, -0.9, 0.2, 0.5, 0.0)
-INTO_THE_FOOT = (0.3, 2.05, 0.1, -2.05, 0.2, 1.8, 0.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("level", "period", "differences"), [
-    ("velocity", 1e-2, False), ("acceleration", 4e-3, False), ("acceleration", 4e-3, True)])
-def test_an_arm_driven_into_its_foot_stops_before(level, period, differences):
-    collides = TASKS["arm"].distances(State.at(ROBOT, INTO_THE_FOOT)).min()
-    assert collides < 0
-    task = SelfSeparation(ARM, Barrier(0.02))
-    below = Posture(INTO_THE_FOOT, stiffness=25.0, damping=10.0, gain=5.0)
-    ticks = driven(Stack([task, below], level), round(2.5 / period), period, OPEN,
-                   differences=differences)
-    d, v = zip(*((task.distances(state), state.v.copy()) for state, _, _ in ticks), strict=True)
-    d = np.array(d)
-    assert d[0].min() > 0.1
-    assert d.min() > 0.02 - 1e-6
-    assert d[-1].min() == pytest.approx(0.02, abs=1e-4)
-    assert np.abs(v[-1]).max() < 0.1

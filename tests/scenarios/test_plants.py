@@ -74,12 +74,6 @@ def test_a_smooth_motion_is_followed_closely(mujoco):
 
 # Contacts.
 
-def forearm(q=START):
-    """The middle of the forearm, a capsule along the z axis of the frame of joint 5."""
-    placed = State.at(ROBOT, q).placements[5]
-    return placed[9:] + 0.195 * placed[6:9]
-
-
 # What the controller is told.
 
 def told(section, count, level="velocity", command=STILL, q=START):
@@ -141,18 +135,14 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
         return simulate(load("ellipse", [
             *PHYSICS, f"avoidance.obstacles=[{{shape='sphere', radius=0.05, centre={centre}}}]"]))
 
-    side = State.at(ROBOT, START).placements[5][0:3]
-    run = touching((forearm() + 0.105 * side).tolist())
+    forearm = State.at(ROBOT, START).placements[5]  # a capsule along the z axis
+    run = touching((forearm[9:] + 0.195 * forearm[6:9] + 0.105 * forearm[:3]).tolist())
     found = measure(run)
     assert found["contact_ticks"].value == np.count_nonzero(run["contacts"]) > 0
     assert found["contact_depth_max"].value == run["contact_depth"].max() > 4e-3
     assert found["contact_force_max"].value == run["contact_force"].max() > 1.0
-    assert found["contact_force_max"].shown_unit == "N"
-    assert run["contacts"].shape == (run.ticks,)
     again = load_run(save(run, tmp_path / "run"))
     np.testing.assert_array_equal(again["contact_force"], run["contact_force"])
-    assert again.scenario == run.scenario
-
     away = measure(touching([0.0, -2.0, 0.0]))
     assert away["contact_ticks"].value == away["contact_force_max"].value == 0.0
     assert "contact_ticks" not in measure(simulate(load("ellipse", SHORT)))

@@ -102,26 +102,6 @@ def test_rows_whose_sides_cross_are_all_that_is_said():
     assert explain(h, res) == "box row 1: no value lies between lower 2 and upper 1"
 
 
-def tall(n, m, seed):
-    """Unit half-spaces that can all be met, a target below."""
-    r = np.random.default_rng([n, m, seed])
-    A = r.normal(size=(m, n))
-    A /= np.linalg.norm(A, axis=1)[:, None]
-    inside = A @ r.normal(size=n) + 0.1 * r.random(m)
-    return Hierarchy.from_levels([(A, np.full(m, -INF), inside), (r.normal(size=(1, n)), [5.0])])
-
-
-@pytest.mark.parametrize("n", [4, 12])
-@pytest.mark.parametrize("m", [100, 1000])
-def test_a_tall_level_that_can_be_met_is_met(n, m):
-    for seed in range(10 if m < 1000 else 3):
-        h = tall(n, m, seed)
-        res = HCOD.solve(h)
-        assert res.status is Status.SOLVED
-        assert h.violations(res.x)[0] <= 1e-12
-        assert res.iterations <= 2 * h.m
-
-
 def arm(angle):
     """Velocity limits, the hand of a planar arm that is straight up to an angle, a posture."""
     q = np.array([0.3, angle, -angle, 2 * angle])

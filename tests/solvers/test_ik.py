@@ -1,15 +1,12 @@
 """Inverse kinematics of a bare robot in one call."""
 
-from itertools import product
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import Barrier
 from hierarchy.paths import Still
-from hierarchy.tasks import JointLimits, Pose, Position, Posture, SelfSeparation
+from hierarchy.tasks import JointLimits, Pose, Position, Posture
 from solvers import Status, solve_ik
 
 ROBOT = Robot.named("kuka_lwr")
@@ -132,41 +129,3 @@ def test_what_holds_a_target_out_of_reach_back_is_said():
     both = [Position(FRAME, Still(here)), Position(FRAME, Still(here + 0.1), name="other")]
     assert "other is missed by 0.173, held back by position" in solve_ik(
         ROBOT, Q, both, until=1e-6).verdict
-
-
-ARMS = Robot.named("dual_arm")
-LEFT, RIGHT = ([capsule for capsule in ARMS.capsules if capsule.name.startswith(side)]
-               for side in ("left", "right"))
-APART = SelfSeparation([*LEFT, *RIGHT], Barrier(distance=0.02),
-                       list(product(range(len(LEFT)), range(len(LEFT), len(LEFT + RIGHT)))))
-
-
-def between_the_arms(q):
-    """The least distance [m] of sampled axes less the radii, from pinocchio's placements."""
-    data, axes = ARMS.model.createData(), []
-    pin.forwardKinematics(ARMS.model, data, q)
-    for capsules in (LEFT, RIGHT):
-        ends = [[data.oMi[one.joint].act(np.array(end)) for end in (one.start, one.end)]
-                for one in capsules]
-        axes.append([np.linspace(*pair, 301) for pair in ends])
-    return min(np.linalg.norm(a[:, None] - b, axis=2).min() - one.radius - other.radius
-               for a, one in zip(axes[0], LEFT, strict=True)
-               for b, other in zip(axes[1], RIGHT, strict=True))
-
-
-@pytest.mark.parametrize(("apart", "nearest"), [(0.25, None), (0.0, 0.02)])
-def test_hands_that_would_collide_stop_at_their_distance_and_say_so(apart, nearest):
-    hands = {side: ARMS.frame(f"{side}_hand") for side in ("right", "left")}
-    start = State.at(ARMS, ARMS.rest)
-    middle = (start.position(hands["left"]) + start.position(hands["right"])) / 2
-    aside = np.array([0.0, apart / 2, 0.0])
-    tasks = [Position(hands["right"], Still(middle - aside), name="right"),
-             Position(hands["left"], Still(middle + aside), name="left")]
-    found = solve_ik(ARMS, ARMS.rest, [APART, *tasks], until=1e-6)
-    assert between_the_arms(found.q) > 0.02 - 1e-6
-    assert found.met == (nearest is None)
-    if nearest is not None:
-        assert between_the_arms(found.q) == pytest.approx(nearest, abs=1e-4)
-        assert "nearest found, left is missed by 0.1, held back by" in found.verdict
-        assert found.verdict.endswith("self-separation and right")
-        assert between_the_arms(solve_ik(ARMS, ARMS.rest, tasks, until=1e-6).q) < 0.0

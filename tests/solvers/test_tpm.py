@@ -3,7 +3,7 @@
 import numpy as np
 import oracle
 import pytest
-from rank_cases import CASES, build, rng
+from rank_cases import CASES, build
 from scipy.optimize import lsq_linear
 
 from hierarchy import Hierarchy, HierarchyError
@@ -90,18 +90,6 @@ def test_the_rank_tolerance_decides_what_counts_as_parallel(resolver):
 
 
 # -- limits: bounds always kept, and everything else as well as they allow -------------------------
-
-
-@pytest.mark.parametrize("name", ["tpm", "hcod"])
-@pytest.mark.parametrize("seed", range(3))
-def test_one_level_is_bounded_least_squares(seed, name):
-    """Against scipy; more rows than joints, so that there is one answer."""
-    r = rng(seed)
-    n = int(r.integers(1, 9))
-    A, b, high = r.normal(size=(n + 2, n)), r.normal(size=n + 2), r.exponential(size=n)
-    h = Hierarchy.from_levels([(np.eye(n), -0.5 * high, high), (A, b)])
-    expected = lsq_linear(A, b, (-0.5 * high, high), method="bvls", tol=1e-14).x
-    np.testing.assert_allclose(make(name).solve(h).x, expected, rtol=0, atol=1e-10)
 
 
 def test_scaling_is_one_where_a_level_is_met_and_the_share_of_the_target_where_it_is_not():
