@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmark.solve import resolvers
-from benchmark.solve.entrants import HIERARCHICAL, NUMPY
+from benchmark.solve.entrants import NUMPY
 from benchmark.tick import PlainTick
 from scenarios.cell.build import build
 from scenarios.config import load
@@ -53,18 +53,6 @@ def test_a_row_for_everybody_in_every_family_asked(few, tmp_path, capsys, monkey
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80
     assert "…" not in out
-
-
-def test_fresh_problems_are_timed_and_reported_apart(few):
-    found = resolvers.run(seconds=0.001, families=("EQ7", "INEQ7"), seed=10_000_000, count=4,
-                          resolvers=["hcod"])
-    rows = found.rows["resolvers"]
-    assert {(row["family"], row["origin"], row["problems"]) for row in rows} == {
-        (name, origin, count) for name in ("EQ7", "INEQ7")
-        for origin, count in (("known", 1), ("fresh", 4))}
-    assert {row["entrant"] for row in rows} == {NUMPY, HIERARCHICAL, "hcod", "hcod warm"}
-    assert all(row["wrong"] == 0 for row in rows if row["entrant"] in ("hcod", "hcod warm"))
-    assert [table.title for table in found.sections[1].tables] == ["EQ7, fresh", "INEQ7, fresh"]
 
 
 @pytest.mark.slow

@@ -208,21 +208,6 @@ ONE_BODY = """<body name="{0}"><joint name="{0}" axis="0 0 1" range="-90 90"/><g
 {1}</body>"""
 
 
-def test_an_mjcf_includes_files(tmp_path):
-    pytest.importorskip("mujoco")
-    (tmp_path / "hand.xml").write_text(
-        f"<mujocoinclude>{ONE_BODY.format('hand', '')}</mujocoinclude>")
-    include = '<include file="hand.xml"/>'
-    equal = '<equality><joint joint1="hand" joint2="arm" polycoef="0 0.5 0 0 0"/></equality>'
-    (tmp_path / "arm.xml").write_text(
-        f"<mujoco><worldbody>{ONE_BODY.format('arm', include)}</worldbody>{equal}</mujoco>")
-    (tmp_path / "scene.xml").write_text(
-        '<mujoco><include file="arm.xml"/><worldbody><light pos="0 0 1"/></worldbody></mujoco>')
-    robot = Robot.load(tmp_path / "scene.xml")
-    assert robot.velocity_names == ["arm", "hand"]
-    assert list(map(str, robot.coupled)) == ["hand = 0.5 arm in the file"]
-
-
 @pytest.mark.parametrize(("text", "said"), [
     ('<mujoco><include file="no.xml"/></mujoco>', "Error opening file '.*no.xml'"),
     ('<mujoco><include file="it.xml"/></mujoco>', "'.*it.xml' already included"),

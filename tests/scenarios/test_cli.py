@@ -163,7 +163,6 @@ def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsy
         return capsys.readouterr().out.split()
 
     assert completed("hierarchy", "comp") == ["compare"]
-    assert completed("hierarchy", "run", "human-h") == ["human-hqp"]
     assert completed("hierarchy", "compare", "ladder")[-1] == "ladder"
     assert completed("hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc") == ["tpm,hcod"]
     assert completed("hierarchy", "sweep", "ell") == ["ellipse-starts"]

@@ -85,18 +85,6 @@ def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, capsys):
     assert "RuntimeError: no such kernel" in bad[0]["found"]
 
 
-@pytest.mark.slow
-def test_a_missing_package_says_how_to_get_it(monkeypatch):
-    there = doctor._version
-    monkeypatch.setattr(doctor, "_version", lambda package: (
-        None if package in ("osqp", "mcap") else there(package)))
-    found = {one.what: one for one in [*doctor._versions(), *doctor._extras()]}
-    assert found["osqp"].well is False
-    assert found["osqp"].remedy == "pip install osqp"
-    assert found["export"].remedy == "pip install 'task-hierarchy[export]'"
-    assert found["export"].well is None
-
-
 def test_a_run_that_cannot_be_saved_where_it_should_is_saved_elsewhere(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     (tmp_path / "file").touch()

@@ -185,18 +185,6 @@ def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(capsys):
     assert said(["export", "a", "--plugin", "doors_of_mine"], capsys)[0] == 0
 
 
-@pytest.mark.slow
-def test_workers_of_a_sweep_import_the_plugin(capsys, folder):
-    pytest.importorskip("distributed")
-    (folder / "s.toml").write_text(
-        'name = "s"\nscenarios = ["own.toml"]\nresolvers = ["halved", "hcod"]\nsamples = 2\n'
-        '[parameters]\n"tasks.0.angle" = { uniform = [0.9, 1.1] }\n')
-    code, text = said(["sweep", "s.toml", "--plugin", "doors_of_mine", "--workers", "1",
-                       "--out", "c"], capsys)
-    assert code == 0, text
-    assert "4 runs; 0 did not finish" in text
-
-
 def test_a_scenario_with_own_kinds_is_copied_and_pickled():
     plugins.allow("doors_of_mine")
     scenario = load("own.toml")

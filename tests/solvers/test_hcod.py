@@ -102,30 +102,6 @@ def test_rows_whose_sides_cross_are_all_that_is_said():
     assert explain(h, res) == "box row 1: no value lies between lower 2 and upper 1"
 
 
-def arm(angle):
-    """Velocity limits, the hand of a planar arm that is straight up to an angle, a posture."""
-    q = np.array([0.3, angle, -angle, 2 * angle])
-    tips = np.cumsum(q)[::-1]
-    J = np.cumsum([[-np.sin(t), np.cos(t)] for t in tips], axis=0)[::-1].T
-    return np.eye(4), J
-
-
-@pytest.mark.parametrize("name", ["hcod", "tpm"])
-@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-3])
-def test_damped_x_is_continuous_in_the_targets_under_a_box(name, angle):
-    resolver, r = make(name, damping=0.1), np.random.default_rng(7)
-    box, J = arm(angle)
-    for _ in range(50):
-        target, half = r.normal(size=2), r.uniform(0.05, 1.0, 4)
-        x = []
-        for step in (0.0, 1e-11):
-            h = Hierarchy.from_levels([(box, -half, half), (J, target + step), (box, 0.1 * half)])
-            res = resolver.solve(h)
-            assert res.status is Status.SOLVED
-            x.append(res.x)
-        assert np.abs(x[1] - x[0]).max() <= 1e-6
-
-
 @pytest.mark.parametrize("name", ["hcod", "tpm"])
 def test_damped_x_is_continuous_where_a_bound_begins_to_act(name):
     """A level alone passes the bound, the levels below move x away: it jumped by 3.6."""
