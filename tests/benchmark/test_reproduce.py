@@ -1,15 +1,13 @@
 """Pages that have what came of runs and commands."""
 
 import re
-import shutil
 from functools import partial
 from pathlib import Path
 
 import pytest
 
-from benchmark.reproduce import pages, protocol, whole
-from benchmark.reproduce.blocks import ROWS, Stored
-from benchmark.reproduce.protocol import PROTOCOL, Rows
+from benchmark.reproduce import pages
+from benchmark.reproduce.blocks import Stored
 from hierarchy.errors import HierarchyError
 
 ROOT = Path(__file__).parents[2]
@@ -60,37 +58,3 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
                        (page("python a.py | EQ8 .. EQ9"), r"no line of the output .* with 'EQ8'")):
         with pytest.raises(HierarchyError, match=says):
             fill(text)
-
-
-@pytest.fixture
-def documents(tmp_path):
-    """A checkout that has documents only."""
-    for name in PAGES:
-        (tmp_path / name).parent.mkdir(exist_ok=True, parents=True)
-        shutil.copy(ROOT / name, tmp_path / name)
-    shutil.copytree(ROOT / "docs/results", tmp_path / "docs/results", dirs_exist_ok=True)
-    return tmp_path
-
-
-def ending_with(error, *ended):
-    def run(*_):
-        yield from ended
-        raise error
-    return run
-
-
-@pytest.mark.parametrize(("error", "code", "said"), [
-    (KeyboardInterrupt(), 130, "the same command continues from here"),
-    (OSError(28, "No space left on device", "out/a"), 1, "out/a cannot be written: No space left")])
-def test_a_seed_that_has_ended_is_stored_whatever_ends_the_command(
-        error, code, said, documents, monkeypatch, capsys):
-    column = {name: {"reached_end": [1.0] * 3, **{metric: [1.0] * 3 for metric in PROTOCOL.metrics}}
-              for name in PROTOCOL.columns}
-    metrics = {name: {"label": name, "unit": "", "lower": True} for name in PROTOCOL.metrics}
-    new = Rows([*PROTOCOL.layouts], [1], 1, metrics, [column, column],
-               [{"letter": {"it fell": 1}}, {}])
-    monkeypatch.setattr(whole, "_ran", ending_with(error, new))
-    assert whole.run(["protocol"], documents / "out", root=documents) == code
-    assert said in capsys.readouterr().err
-    assert protocol.read(documents / ROWS) == new
-    assert "it fell" in (documents / "docs/results/loops.md").read_text()

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scene import ROBOT, compiled_rows, states
+from scipy.optimize import lsq_linear
 
 from hierarchy import State
 from hierarchy.avoidance import Barrier, Capsule
@@ -30,22 +31,11 @@ def measured(a, b):
     return measure_capsules(IDENTITY, joints, table, np.array([[0, 1]]))[0]
 
 
-def by_search(a, b):
-    """Least distance of two segments: a fine walk along one, nearest point of the other."""
+def by_least_squares(a, b):
+    """Least distance of two segments: that of the best shares of both, between 0 and 1."""
     (p, q), (r, s) = np.array(a, dtype=float), np.array(b, dtype=float)
-
-    def off(share):
-        points = p + share[:, None] * (q - p)
-        along = s - r
-        t = np.clip((points - r) @ along / max(along @ along, 1e-300), 0, 1)
-        return np.linalg.norm(points - r - t[:, None] * along, axis=1)
-
-    low, high = 0.0, 1.0
-    for _ in range(12):  # the distance is convex along the segment
-        grid = np.linspace(low, high, 41)
-        best = int(np.argmin(off(grid)))
-        low, high = grid[max(best - 1, 0)], grid[min(best + 1, 40)]
-    return off(np.linspace(low, high, 41)).min()
+    found = lsq_linear(np.c_[q - p, r - s], r - p, (0.0, 1.0), "bvls", tol=1e-15)
+    return np.sqrt(2.0 * found.cost)
 
 
 def segments():
@@ -69,7 +59,7 @@ def test_distance_of_segments_is_the_least_there_is():
     for a, b in segments():
         a, b = np.round(a, 12).tolist(), np.round(b, 12).tolist()
         seen = measured((*a, 0.0), (*b, 0.0))
-        assert seen[0] == pytest.approx(by_search(a, b), abs=2e-8)
+        assert seen[0] == pytest.approx(by_least_squares(a, b), abs=2e-8)
         assert 0.0 <= seen[4:].min() <= seen[4:].max() <= 1.0
         on_a, on_b = [np.add(p, share * np.subtract(q, p))
                       for (p, q), share in zip((a, b), seen[4:], strict=True)]

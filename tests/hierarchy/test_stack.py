@@ -32,8 +32,7 @@ def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_bu
     assert s.row_names(("look-at",)) == ("x", "y")
     state = state_at(Q, V)
     h = stack().hierarchy(state, ("avoidance", "position"))
-    assert h.names == ("avoidance", "position")
-    assert h.sizes.tolist() == [3, 3]
+    assert (h.names, h.sizes.tolist()) == (("avoidance", "position"), [3, 3])
     np.testing.assert_array_equal(h.A[:3], TASKS["avoidance 3-D"].jacobian(state))
     np.testing.assert_array_equal(h.A[3:], TASKS["position"].jacobian(state))
     assert h.is_equality
