@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from urdf_text import LIMIT, joint, link, placed, urdf
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
@@ -124,12 +125,11 @@ def test_joints_that_turn_on_are_coupled_by_their_angles(turn, values):
         JointCoupling(ROBOT, {"drive": 1.0})
 
 
-URDF = """<robot name="c"><link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>
-<joint name="a" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>
-<joint name="b" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz=".3 0 0"/>
-<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
-<joint name="c" type="continuous"><parent link="l1"/><child link="l3"/><axis xyz="0 0 1"/>
-<mimic joint="a" multiplier="-2" offset="0.5"/></joint></robot>"""
+URDF = urdf(
+    *(link(f"l{i}", "") for i in range(4)), joint("a", "continuous", "l0", "l1", "", "0 0 1"),
+    joint("b", "revolute", "l1", "l2", LIMIT, "0 0 1", placed(".3 0 0")),
+    joint("c", "continuous", "l1", "l3", '<mimic joint="a" multiplier="-2" offset="0.5"/>',
+          "0 0 1"))
 
 
 def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_path):

@@ -3,31 +3,17 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape
 
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
 
-LIMIT = '<limit lower="-1" upper="1" velocity="2" effort="3"/>'
-INERTIAL = """<inertial><origin xyz="0.1 0.2 0.3"/><mass value="2"/>
-  <inertia ixx="0.3" iyy="0.4" izz="0.5" ixy="0.01" ixz="0.02" iyz="0.03"/></inertial>"""
 CENTRE = np.array([0.1, 0.2, 0.3])
 INERTIA = np.array([[0.3, 0.01, 0.02], [0.01, 0.4, 0.03], [0.02, 0.03, 0.5]])
 ORIGIN = np.array([1.0, 2.0, 3.0]), Rotation.from_euler("xyz", [0.3, -0.4, 0.5])
 
 
-def joint(name, kind, parent, child, inside=LIMIT, axis="0 1 0", origin=""):
-    axis = f'<axis xyz="{axis}"/>' if axis else ""
-    return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-            f"{origin}{axis}{inside}</joint>")
-
-
-def link(name, inside=INERTIAL):
-    return f'<link name="{name}">{inside}</link>'
-
-
-PLACED = '<origin xyz="1 2 3" rpy="0.3 -0.4 0.5"/>'
-BALL = ('<collision><origin xyz="0.1 0.2 0.3"/><geometry><sphere radius="0.1"/></geometry>'
-        "</collision>")
+PLACED, BALL = placed("1 2 3", "0.3 -0.4 0.5"), shape('<sphere radius="0.1"/>', "0.1 0.2 0.3")
 
 
 @pytest.fixture

@@ -1,6 +1,8 @@
 """What `hierarchy check ROBOT` prints to paste makes a scenario that runs, of the same robot."""
 
 import pytest
+import urdf_text
+from urdf_text import INERTIAL, joint, link, placed, shape
 
 from hierarchy import Robot
 from scenarios import load
@@ -22,19 +24,12 @@ kind = "pose"
 LIMIT = '<limit lower="0.5" upper="1" velocity="0" effort="1"/>'
 
 
-def link(name):
-    return (f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" '
-            'ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><sphere radius="0.01"/>'
-            "</geometry></collision></link>")
-
-
 def urdf(*joints):
     """A tree of joints (name, kind, parent, child, inside)."""
     links = dict.fromkeys(end for _, _, *ends, _ in joints for end in ends)
-    return '<robot name="r">' + "".join(map(link, links)) + "".join(
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="0.1 0.2 0.3"/><axis xyz="0 1 0"/>{inside}</joint>'
-        for name, kind, parent, child, inside in joints) + "</robot>"
+    return urdf_text.urdf(
+        *(link(name, INERTIAL + shape('<sphere radius="0.01"/>')) for name in links),
+        *(joint(*one, origin=placed("0.1 0.2 0.3")) for one in joints))
 
 
 FOLLOWING = [("f1", "revolute", "palm", "finger1", LIMIT),

@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from mechanisms import four_bar
+from urdf_text import joint, link, urdf
 
 from hierarchy import Robot, State, plugins
 from hierarchy.contacts import Contacts
@@ -181,11 +182,10 @@ def test_a_start_is_closed_where_it_names_no_joint_and_refused_where_it_cannot_b
         build(scenario(start={"q": [2.0, 0.0, 0.0, 0.0, 0.0, 0.0]}))
 
 
-MOBILE = """<robot name="m"><link name="world"/><link name="body"/><link name="a"/><link name="b"/>
-<joint name="base" type="planar"><parent link="world"/><child link="body"/><axis xyz="0 0 1"/>
-</joint><joint name="turn" type="continuous"><parent link="body"/><child link="a"/>
-<axis xyz="0 0 1"/></joint><joint name="tilt" type="revolute"><parent link="a"/><child link="b"/>
-<axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="3" effort="9"/></joint></robot>"""
+MOBILE = urdf(*(link(name, "") for name in ("world", "body", "a", "b")),
+              joint("base", "planar", "world", "body", "", "0 0 1"),
+              joint("turn", "continuous", "body", "a", "", "0 0 1"),
+              joint("tilt", "revolute", "a", "b"))
 
 
 @pytest.mark.parametrize(("level", "measurement"), [
