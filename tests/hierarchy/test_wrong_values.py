@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scene import Elbow
 
-from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State, Task
+from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.activation import Activation
 from hierarchy.avoidance import Barrier, Capsule, Obstacle, Repulsion, SurveillanceAreas
 from hierarchy.gate import check_rotation
@@ -43,29 +44,10 @@ def limits(**settings):
     return JointLimits(**({"robot": ROBOT, "acceleration": 10.0, "period": 1e-3} | settings))
 
 
-class Own(Task):
-    """A task whose methods return what they should not."""
-
-    name, dimension = "own", 2
-
-    def __init__(self, jacobian):
-        self._jacobian = jacobian
-
-    def error(self, state):
-        return np.zeros(2)
-
-    def jacobian(self, state):
-        return self._jacobian
-
-    def jacobian_derivative(self, state):
-        return np.zeros((2, 7))
-
-
 @pytest.mark.parametrize(("make", "said"), [
     (lambda: Still("a"), "must be three finite numbers [m], got"),
     (lambda: Position(FRAME, None), "task 'position': path: expected a Path, got NoneType None"),
     (lambda: Position(FRAME, THERE, damping=INF), "damping = inf, expected a number >= 0"),
-    (lambda: Stack([Own(np.full((2, 7), NAN))]).hierarchy(STATE), "own"),
     (lambda: ROBOT.integrate(np.zeros(7), np.zeros(6)), "step: expected 7 finite numbers"),
     (lambda: Avoidance(["x"]), "control points[0]: expected a ControlPoint, got str 'x'"),
     (lambda: Hierarchy.from_levels([(A, ["1", "2"])]), "b is not an array of numbers: list ['1'"),
@@ -146,7 +128,7 @@ def test_a_wrong_value_is_refused_and_named(make, said):
 
 
 @pytest.mark.parametrize("given", ["state", None, 3, ROBOT])
-@pytest.mark.parametrize("task", [Position(FRAME, THERE), Posture((0.0,) * 7), Own(np.eye(2, 7))],
+@pytest.mark.parametrize("task", [Position(FRAME, THERE), Posture((0.0,) * 7), Elbow()],
                          ids=lambda task: task.name)
 def test_what_takes_a_state_refuses_anything_else(task, given):
     for method in (task.error, task.jacobian, task.jacobian_derivative, task.reference_velocity,
