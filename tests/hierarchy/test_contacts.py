@@ -44,8 +44,6 @@ def random_x(seed):
     return np.random.default_rng(seed).normal(size=CONTACTS.unknowns)
 
 
-# Contacts
-
 def test_contact_jacobian_and_drift_are_derivatives_of_the_positions():
     state = moving_state(1)
     J = CONTACTS.jacobian(state)
@@ -58,8 +56,6 @@ def test_contact_jacobian_and_drift_are_derivatives_of_the_positions():
     change = CONTACTS.jacobian(moved(state, STEP)) - CONTACTS.jacobian(moved(state, -STEP))
     np.testing.assert_allclose(CONTACTS.drift(state), change @ state.v / (2 * STEP), atol=1e-7)
 
-
-# Rows of the tasks
 
 def test_base_rows_hold_exactly_where_forward_dynamics_does():
     """aba gives the acceleration that contact forces and joint torques cause."""
@@ -241,8 +237,6 @@ def test_momentum_rows_are_the_rate_of_the_momentum(part):
                                5.0 * (target - task.jacobian(state) @ state.v))
 
 
-# Stacks at level "torque"
-
 def test_together_has_the_rows_of_its_tasks_in_order():
     state = moving_state(19)
     tasks = [BaseDynamics(CONTACTS), ContactMotion(CONTACTS), Friction(CONTACTS)]
@@ -256,8 +250,6 @@ def test_together_has_the_rows_of_its_tasks_in_order():
     assert Together(tasks).row_names[0] == "base dynamics force x"
     assert Together([Posture((0.0,) * 30)]).of_forces is False
 
-
-# Bad input
 
 FRAME = ROBOT.frame("left_foot")
 

@@ -78,7 +78,6 @@ def test_the_end_of_a_wait_is_watched_where_that_was_asked_for():
 
 
 # A tick that takes 0.625 s ends in the middle of the third period.
-
 @pytest.mark.parametrize(("durations", "overrun", "ticks", "late", "ended"), [
     ([0.125] * 8, "skip", range(8), [0.0] * 8, "all ticks were run"),
     ([0.0, 0.625], "skip", [0, 1, 4, 5, 6, 7], [0.0] * 6, "all other ticks were run"),
@@ -132,8 +131,6 @@ def test_a_priority_that_is_not_given_is_said_and_one_that_is_is_given_back():
     assert "SCHED_FIFO at priority 10000 was not given" in str(log)
 
 
-# --- the watchdog -------------------------------------------------------------------------------
-
 def test_a_watchdog_stops_once_when_it_was_not_fed_for_its_time():
     clock, robot = Clock(), Robot()
     dog = Watchdog(1.0, robot.stop, clock)
@@ -177,8 +174,6 @@ def test_a_safe_stop_that_fails_in_the_watchdog_is_reported():
         loop.run(lambda t: called.wait(30.0), fails, 1.0, lambda command: None)
     assert any("safe_stop failed in the watchdog" in note for note in loop.log.notes)
 
-
-# --- commands and readings ----------------------------------------------------------------------
 
 @pytest.mark.parametrize(("value", "said"), [
     (np.array([0.0, np.nan]), "the command is not finite"),

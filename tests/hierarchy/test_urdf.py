@@ -37,8 +37,6 @@ def placement(robot, q, name):
     return state.position(frame), state.rotation(frame)
 
 
-# A free base
-
 @pytest.mark.parametrize("base", [None, "floating"])
 def test_a_floating_first_joint_is_the_free_base(load, base):
     robot = load(*two_joints("floating"), base=base)
@@ -62,8 +60,6 @@ def test_a_second_joint_with_the_name_of_a_free_base_is_refused(load):
     with pytest.raises(RobotError, match="root_joint"):
         load(*parts, base="floating")
 
-
-# Planar joints
 
 def motion_of(robot, q, along):
     """Pose of the base in the frame of the planar joint's origin, with axes `along` of q 1, 2."""
@@ -118,8 +114,6 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
                                ORIGIN[0] + ORIGIN[1].apply(bodies(q)[0][0]), atol=1e-12)
 
 
-# What is lost is said
-
 @pytest.mark.parametrize(("changed", "said"), [
     ({"arm": INERTIAL.replace("0.4", "-0.4")}, "inertias of arm: a principal moment is negative"),
     ({"arm": '<inertial><mass value="1"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>'
@@ -143,8 +137,6 @@ def test_what_a_robot_is_without_is_said(load, changed, said):
     assert [sentence for sentence in robot.missing if said in sentence], robot.missing
 
 
-# Two frames of one name
-
 def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
     parts = (*map(link, ("base", "wrist", "tool")), joint("tool", "revolute", "base", "wrist"),
              joint("mount", "fixed", "wrist", "tool", "", "", PLACED))
@@ -155,8 +147,6 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
     assert "tool" not in robot.frame_names
     assert robot.end_effector == "mount", "not the tool, which is two"
 
-
-# Which file it is
 
 @pytest.mark.parametrize(("name", "text", "said"), [
     ("a.sdf", "<sdf/>", r"is an SDF \(Gazebo\), which is not read; give the URDF"),

@@ -79,8 +79,6 @@ def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_besid
     assert np.median(away) == pytest.approx(0.1 * 0.5 ** (1.0 / 3.0), rel=0.05)  # of a ball
 
 
-# The reference of keys.
-
 EXTENSIONS = Path(__file__).parents[2] / "docs" / "_ext"
 
 

@@ -26,8 +26,6 @@ def tilted(degrees):
             "start.joints": {"left_ankle_pitch": angle, "right_ankle_pitch": angle}}
 
 
-# At the start
-
 @pytest.mark.parametrize(("keys", "said"), [
     (tilted(13.5), "'left_foot' is not flat on the floor but tilted by 13.5 deg; its corner "
                    r"\(-0.05, -0.04, 0\) is 49 mm above the floor"),
@@ -51,16 +49,12 @@ def test_what_comes_down_within_a_few_ticks_or_later_is_not_refused(keys):
     build(changed(keys))
 
 
-# In the first tick
-
 def test_a_floor_with_less_friction_than_the_controller_counts_on_is_named():
     found = first_tick(changed({"plant.friction": 0.4, "contacts.1.friction": 0.3})).warnings
     assert [line for line in found if "friction" in line] == [
         "contact 'left_foot': the controller counts on a friction of 0.7, and the plant has 0.4 "
         "(plant.friction): it may slip"]
 
-
-# Faults
 
 def test_a_joint_that_passes_its_stop_ends_the_run_with_a_fault():
     """No torque within the limits stops an elbow at 40 rad/s within the way that it has."""

@@ -117,8 +117,6 @@ def test_the_arm_does_not_avoid_itself():
         assert np.isinf(space.measure(obstacles, state.placements).distance).all()
 
 
-# The sensor in the loop.
-
 def sensor_of(source, stale_after=0.2, region=0.4, least_readings=0.1, **settings):
     """A sensor, and a function that gives a state at a time."""
     points = ExactDistances(ROBOT, Obstacles()).points
@@ -150,8 +148,6 @@ def test_a_camera_that_stops_or_is_covered_is_blind_after_its_time_and_sees_agai
     assert len(distances) == 1  # the last image is kept
 
 
-# Scenarios.
-
 VIEW = "kind='camera', position=[0.3, 2.2, 0.8], look_at=[0.0, 0.3, 0.1]"
 QUICK = [f"sensor={{{VIEW}, width=160, height=120, fx=131.0, fy=131.0}}",
          "control.duration=0.6", "plant={}", "control.resolver=hqp", "control.options={}"]
@@ -166,8 +162,6 @@ def test_a_section_that_does_not_fit_is_refused_when_it_is_built(changes, said):
     with pytest.raises(ScenarioError, match=f"sensor: .*{said}"):
         build(load("human", changes))
 
-
-# Frames.
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):

@@ -36,8 +36,6 @@ def arm(mujoco, q=START, v=STILL, obstacles=(), level="velocity", period=PERIOD,
     return PhysicsArm(ROBOT, np.array(q), np.array(v), period, level, Obstacles(obstacles), section)
 
 
-# The physics is that of the robot's model.
-
 def test_inertia_gravity_and_coriolis_forces_are_those_of_the_robots_model(mujoco):
     plant = arm(mujoco, joints={"armature": 0.0})
     model, data = plant.model, plant.data
@@ -54,8 +52,6 @@ def test_inertia_gravity_and_coriolis_forces_are_those_of_the_robots_model(mujoc
         np.testing.assert_allclose(data.qfrc_bias, state.bias_effort(), rtol=0, atol=1e-9)
 
 
-# The servos.
-
 def test_a_smooth_motion_is_followed_closely(mujoco):
     plant, exact = (make(ROBOT, START, STILL, PERIOD, "acceleration")
                     for make in (PhysicsArm, KinematicArm))
@@ -71,10 +67,6 @@ def test_a_smooth_motion_is_followed_closely(mujoco):
     assert np.abs(exact.q - START).max() > 0.3
     assert 1e-6 < apart < 2e-3
 
-
-# Contacts.
-
-# What the controller is told.
 
 def told(section, count, level="velocity", command=STILL, q=START):
     """q, v as told and as they are, (count, 7) each, of an arm that follows exactly."""
@@ -115,8 +107,6 @@ def test_a_filtered_velocity_lags_by_the_time_of_its_filter():
     np.testing.assert_allclose(true_v[-1] - v[-1], slope * (time + PERIOD / 2), rtol=1e-6)
 
 
-# Runs.
-
 @pytest.mark.parametrize("changes", [[*SHORT, *NOISY], [*PHYSICS, *NOISY]],
                          ids=["kinematic", "mujoco"])
 def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
@@ -147,8 +137,6 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
     assert away["contact_ticks"].value == away["contact_force_max"].value == 0.0
     assert "contact_ticks" not in measure(simulate(load("ellipse", SHORT)))
 
-
-# Mistakes.
 
 @pytest.mark.parametrize(("changes", "said"), [
     ([*SHORT, "plant.measurement.delay=0.0025"],

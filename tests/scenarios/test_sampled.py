@@ -59,8 +59,6 @@ def made(folder):
     return Counter(ends)
 
 
-# What is asked
-
 @pytest.mark.parametrize(("parameters", "changed", "says"), [
     ("", {"sampels": "3"}, "did you mean 'samples'"),
     ("", {"scenarios": '["elipse"]'}, "did you mean 'ellipse'"),
@@ -134,8 +132,6 @@ def test_a_variation_that_cannot_be_drawn_is_refused(variation, says, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-# Runs, wherever they are made
-
 def test_a_run_has_every_metric_of_its_scenario_as_sampled(tmp_path):
     job = plan(load_sweep(write(tmp_path))).runs[1]
     found, expected = outcome(job), metrics.measure(simulate(job.load()))
@@ -178,8 +174,6 @@ def test_a_run_that_kills_its_process_costs_only_itself():
     assert [key for key, one in found.items() if one is None] == ["2"]
 
 
-# What is kept
-
 def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path, monkeypatch):
     store, jobs = Store(tmp_path / "out"), [Job(key, "", "tpm") for key in "abc"]
     speed = metrics.Metric("speed_max", "Joint speed, max", 1.5, "rad/s")
@@ -215,8 +209,6 @@ def test_a_folder_in_use_or_of_something_else_is_refused(tmp_path):
     with pytest.raises(HierarchyError, match="not a sweep's"):
         Store(tmp_path).opened().__enter__()
 
-
-# What it comes to
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):

@@ -23,8 +23,6 @@ LEVELS = ("physics", "limits", "joint limits", "centre of mass", "left hand", "r
           "posture", "least force")
 
 
-# What is asked.
-
 @pytest.mark.parametrize(("keys", "said"), [
     ({"control.level": "acceleration"}, r"\[\[contacts\]\] needs control.level = \"torque\""),
     ({"control.level": "acceleration", "contacts": []},
@@ -61,8 +59,6 @@ def test_what_the_robot_does_not_have_is_named(keys, said):
     with pytest.raises(HierarchyError, match=said):
         build(STANDING.with_changes(keys))
 
-
-# What it does.
 
 @pytest.fixture(scope="module")
 def short():
@@ -120,9 +116,6 @@ def test_a_foot_that_lands_on_its_edge_does_not_make_torques_jump():
     found = measure(run)
     assert found["miss_physics"].value < 1e-9
     assert found["miss_limits"].value < 1e-9
-
-
-# What is sent without an answer.
 
 
 class Failing:

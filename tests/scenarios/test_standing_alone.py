@@ -108,8 +108,6 @@ def test_facts_that_are_missing_or_damaged_are_named(made, tmp_path):
         load_run(tmp_path / "bad")
 
 
-# The facts of a robot.
-
 CART = urdf(
     *(link(name, "") for name in "abcde"),
     joint("slide", "prismatic", "a", "b", LIMIT, "1 1 0", placed("0.1 0.2 0.3", "0.1 0.2 0.3")),

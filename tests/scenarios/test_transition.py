@@ -93,6 +93,3 @@ def test_bounds_that_both_stacks_have_on_top_are_kept(level):
         low, up = limits.box(state, level)
         assert (low - 1e-9 <= x).all()
         assert (x <= up + 1e-9).all()
-
-
-# Closed loop. The first ticks are left out: the start is off the path, and the command jumps there.

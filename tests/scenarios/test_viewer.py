@@ -27,8 +27,6 @@ def recording():
     return simulate(LIMITED)
 
 
-# A live run
-
 def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_its_settings(
         recording):
     live = Live(LIMITED)
@@ -68,8 +66,6 @@ def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
     assert not drawn.levels.known[-1]
 
 
-# Pages, without a browser
-
 @pytest.mark.slow
 def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses():
     page = LivePage(Live(LIMITED))
@@ -103,8 +99,6 @@ def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses():
     assert page.live.t == t
     assert any("cone" in goal for goal in json.loads(page.now)["runs"][0]["goals"])
 
-
-# In a browser
 
 _SECONDS = 180.0  # of patience, which only a page that hangs takes
 

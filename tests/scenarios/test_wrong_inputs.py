@@ -99,8 +99,6 @@ def test_obstacles_are_reached_by_number_or_all_at_once():
     assert [ball.radius for ball in balls] == [0.1] * 3
 
 
-# Files that are no scenario.
-
 @pytest.mark.parametrize(("text", "said"), [
     ('name = "x"\n[robot\n', "line 2"),
     ("a = " + "[" * 5000 + "]" * 5000, "nested too deep"),
@@ -130,8 +128,6 @@ def test_files_that_extend_each_other_a_thousand_deep_are_refused(tmp_path):
     assert load(tmp_path / "20.toml").robot.model == "kuka_lwr"
 
 
-# What check says of a scenario that is valid, and perhaps not meant.
-
 def checked(capsys, *changes, name="ellipse"):
     assert run_command(["check", name, *(p for c in changes for p in ("--set", c))]) == 0
     return " ".join(capsys.readouterr().out.split())
@@ -149,8 +145,6 @@ def test_check_warns_of_what_is_missed_or_doubtful(name, changes, said, capsys):
     assert said in checked(capsys, *changes, name=name)
     assert "Warning" not in checked(capsys)
 
-
-# Command lines.
 
 @pytest.mark.parametrize(("line", "said"), [
     ("run ellipse --duration x", "'--duration'"),
@@ -173,8 +167,6 @@ def test_a_wrong_command_line_says_what_was_given(line, said, capsys, tmp_path, 
     assert "Traceback" not in err
     assert not list(tmp_path.rglob("*.npz"))
 
-
-# Calls from Python.
 
 SHORT = load("ellipse", ["control.duration=0.01"])
 ROBOT = Robot.load("kuka_lwr")

@@ -121,8 +121,6 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     assert factored.solve([[1.0]]).status is Status.SOLVED
 
 
-# -- mistakes --------------------------------------------------------------------------------------
-
 @pytest.mark.parametrize(("mistake", "text"), [
     (lambda f: f.swap("hand", "elbo"), "unknown level 'elbo'; did you mean 'elbow'"),
     (lambda f: f.insert("hand", np.eye(3)), "hand: a level of this name exists"),
@@ -141,8 +139,6 @@ def test_a_mistake_is_named_and_changes_nothing(mistake, text):
     assert factored.names == ("hand", "elbow")
     np.testing.assert_allclose(factored.solve([[1.0, 2.0], [3.0]]).x, [1.0, 2.0, 3.0])
 
-
-# -- any sequence of edits that hypothesis can think of --------------------------------------------
 
 def test_nearly_parallel_rows_are_left_to_the_exact_engine():
     rng, unclear = np.random.default_rng(5), 0

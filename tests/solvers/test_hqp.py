@@ -39,8 +39,6 @@ def test_no_answer_to_a_generated_problem_is_called_solved_without_being_right(h
     assert solved >= 9
 
 
-# Levels, a reference, and the x and violations that are right; x is None where it is not unique.
-
 @pytest.mark.parametrize("name", backends.BACKENDS)
 def test_a_backend_that_is_not_installed_names_what_brings_it(name, monkeypatch):
     backends.installed.cache_clear()

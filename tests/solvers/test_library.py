@@ -94,9 +94,6 @@ def test_the_sizes_that_the_library_states_are_enough(library, n, sizes):
         assert np.isfinite(left.answer).all()
 
 
-if not sys.platform.startswith("linux"):
-    pytest.skip("the C library is made on Linux", allow_module_level=True)
-
 every_resolver = pytest.mark.parametrize("name", c.NAMES)
 
 

@@ -91,9 +91,6 @@ def test_switched_off_each_method_is_the_recursion_at_every_rank(case):
         assert np.abs(x - expected).max() <= 1e-9 * (1.0 + np.abs(expected).max())
 
 
-# -- recursion and staircase are one answer --------------------------------------------------------
-
-
 # Reverse priority.
 
 

@@ -116,8 +116,7 @@ def output_of(code):
     return run.stdout.strip()
 
 
-# Work space: its content never matters.
-
+# The work space of these: its content never matters.
 KERNELS = [make("tpm"), make("sns"), make("tpm-published"), make("recursive"), make("augmented"),
            make("hcod"), make("hcod", damping=0.1), make("tpm", damping=0.1),
            make("tpm-published", damping=0.1)]

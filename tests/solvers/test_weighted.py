@@ -27,8 +27,6 @@ def as_two_levels(h, resolver, hard):
                                  h.reference)
 
 
-# The sum is minimised ----------------------------------------------------------------------------
-
 @pytest.mark.slow
 @every_case
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3])
@@ -47,8 +45,6 @@ def test_a_row_released_by_rounding_alone_is_not_released_for_ever(seed):
     assert res.iterations < 50
 
 
-# What it does to the priorities ------------------------------------------------------------------
-
 @every_case
 def test_with_a_huge_ratio_it_is_the_strict_answer_where_normal_equations_are_destroyed(case):
     """Rows whose dependence is itself a matter of rounding are dependent at any weight."""
@@ -63,8 +59,6 @@ def test_lexicographic_weights_are_the_smallest_that_do():
     assert lexicographic_weights([0.0, 0.0], 0.1) == (1.0, 1.0)
     assert lexicographic_weights([0.0, 0.0], 0.1, regularised=1.0) == (10.0, 1.0)
 
-
-# Constraints -------------------------------------------------------------------------------------
 
 def test_only_levels_of_inequalities_are_constraints_and_as_many_as_asked_for():
     box, wish = (np.eye(2), [-1.0] * 2, [1.0] * 2), ([[1.0, 1.0]], [9.0])
@@ -96,8 +90,6 @@ def test_rows_that_are_nearly_parallel_are_said_to_leave_a_doubt():
     for angle in (0.0, 1e-15, 1e-6, 1.0):
         assert make("weighted").solve(nearly(angle)).status is Status.SOLVED
 
-
-# Settings ----------------------------------------------------------------------------------------
 
 def test_weights_for_another_number_of_levels_are_refused():
     with pytest.raises(HierarchyError, match="2 weights for 3 levels"):
