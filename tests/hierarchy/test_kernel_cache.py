@@ -121,29 +121,23 @@ print(float(njit(lambda x: np.cumsum(x)[-1])(np.arange(3.0))))
 """
 KEPT_KERNELS = """
 from typing import NamedTuple
-
 from hierarchy.jit import compiled
 import numpy as np
-
 class Two(NamedTuple):
     first: np.ndarray
     second: np.ndarray
-
 @compiled
 def hashed(text):
     return hash(text) + np.zeros(1, np.int64)[0]
-
 @compiled
 def last(two):
     return two.first[1:][-1] + two.second[:2][-1]
-
 @compiled
 def squares(x):
     y = np.empty(x.size)
     for i in range(x.size):
         y[i] = x[i] * x[i]
     return y
-
 @compiled
 def halves(x):
     return squares(x / 2.0)

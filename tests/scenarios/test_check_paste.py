@@ -12,12 +12,10 @@ from scenarios.cli.main import run_command
 CONTROL = """
 [damping]
 value = 5.0
-
 [control]
 stack = "hierarchical"
 resolver = "hcod"
 duration = 0.02
-
 [[tasks]]
 kind = "pose"
 """

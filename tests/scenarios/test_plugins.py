@@ -29,7 +29,6 @@ from hierarchy.tasks import Position
 from scenarios.cell.plants import KinematicArm
 from solvers import Resolution, Resolver, make
 
-
 @register("tasks", "elbow")
 @dataclass(frozen=True)
 class Elbow(Task):
@@ -49,11 +48,9 @@ class Elbow(Task):
     def jacobian_derivative(self, state):
         return np.zeros((1, state.n))
 
-
 @register("tasks", "along")
 def along(frame: Frame, path: Path, name: str):
     return Position(frame, path, name=name)
-
 
 @register("resolvers", "halved")
 @dataclass(frozen=True, kw_only=True)
@@ -65,11 +62,9 @@ class Halved(Resolver):
     def solve(self, h, memory=None):
         return Resolution(self.share * make("hcod").solve(h).x)
 
-
 @register("robots", "my_arm")
 def my_arm():
     return Robot.named("kuka_lwr")
-
 
 @register("plants", "weak")
 class Weak(KinematicArm):
@@ -84,34 +79,20 @@ class Weak(KinematicArm):
 SCENARIO = '''
 name = "own"
 plugins = ["doors_of_mine"]
-
-[robot]
-model = "my_arm"
-
-[start]
-q = [0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]
-
-[control]
-level = "velocity"
-stack = "hierarchical"
-period = 0.01
-duration = 0.2
-resolver = "halved"
-
-[plant]
-kind = "weak"
-share = 0.5
-
+robot = {model = "my_arm"}
+start = {q = [0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]}
+control = {level = "velocity", stack = "hierarchical", period = 0.01, duration = 0.2, \
+resolver = "halved"}
+plant = {kind = "weak", share = 0.5}
 [[tasks]]
 kind = "elbow"
 joint = "joint_4"
 angle = 1.0
-
 [[tasks]]
 kind = "along"
 name = "hand"
 frame = "end_effector"
-path = { kind = "still", position = [0.1, 0.6, 0.1] }
+path = {kind = "still", position = [0.1, 0.6, 0.1]}
 '''
 
 
