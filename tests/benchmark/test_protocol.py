@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from benchmark.reproduce import blocks, protocol, verdicts
-from benchmark.reproduce.fronts import dominated
+from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, dominated
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
+from scenarios.config import load
 from scenarios.measure.statistics import holm
 from scenarios.results.sampled import Workers
 
@@ -102,7 +103,26 @@ def test_runs_are_resumed_and_noise_is_small(tmp_path):
     assert protocol.read(tmp_path / "rows.json") == first
 
 
+def test_trials_lie_within_the_bounds_evenly_in_the_logarithm():
+    found = Method("weighted", free={"a": (0.1, 1000.0)}).trials(32, seed=1)
+    values = np.array([one["a"] for one in found])
+    assert values.min() >= 0.1
+    assert values.max() <= 1000.0
+    assert 12 <= (values < 10.0).sum() <= 20
+    assert Method("hcod").trials(32, seed=1) == [{}]
+
+
 def test_only_what_nothing_else_improves_is_on_the_front():
     scores = np.array([[1.0, 4.0], [2.0, 2.0], [2.0, 3.0], [np.inf, np.inf]])
     assert [dominated(scores, k) for k in range(4)] == [False, False, True, True]
     assert not dominated(np.full((2, 2), np.inf), 0)
+
+
+def test_every_method_can_take_its_settings():
+    for front in FRONTS.values():
+        for given in front.method.values():
+            method = Method(**given)
+            scenario = load(front.scenario, GIVEN["plant"].get(front.plant, {}))
+            for settings in method.trials(2, seed=1):
+                scenario.with_resolver(method.resolver).with_changes(
+                    {**method.set, **settings}).make_resolver()
