@@ -30,6 +30,12 @@ def test_every_output_that_is_stored_stands_in_a_page_or_is_linked():
     assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == shown | linked
 
 
+def test_an_unknown_block_is_named(tmp_path):
+    with pytest.raises(HierarchyError, match=r"page\.md: block 'other'"):
+        pages.filled("<!-- reproduce: other -->\n<!-- end of other -->", tmp_path, "page.md",
+                     STORED)
+
+
 BENCH = """\
 EQ7
             median  p95

@@ -1,3 +1,4 @@
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -17,14 +18,24 @@ from scene import (
 from scipy.linalg import expm
 
 from hierarchy import HierarchyError, State
+from hierarchy.avoidance import Barrier
 from hierarchy.paths import Ellipse
+from hierarchy.robots import TABLES as ROBOT_TABLES
+from hierarchy.robots import link_capsules
 from hierarchy.tasks import (
+    DangerBounds,
     FrameLog,
     JointDamping,
+    JointLimits,
     Position,
+    SelfSeparation,
+    Separation,
+    TorqueLimits,
 )
 from hierarchy.tasks.geometric import cross
 from hierarchy.tasks.pose import rotation_vector
+from scenarios.config.kinds.frames import ListedFrame, ListedPointing, ListedPose, ListedPosition
+from scenarios.config.kinds.whole import ListedCentreOfMass, ListedPosture
 
 STEP = 1e-6
 STATES = states(11)
@@ -188,6 +199,30 @@ def test_a_wrong_task_is_named(method, value, said, monkeypatch):
         Elbow().writer(State.at(ROBOT, *STATES[0]), "velocity", np.zeros((1, 7)), np.zeros(1),
                       np.zeros(1), 0)()
     assert said in str(error.value)
+
+
+MADE = [*TASKS.values(), JointLimits(ROBOT, 10.0, 1e-3), TorqueLimits(ROBOT),
+        DangerBounds(JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
+        Separation(ROBOT.control_points, Barrier(0.05)),
+        SelfSeparation(link_capsules(ROBOT_TABLES["kuka_lwr"], foot=0.3), Barrier(0.05))]
+
+
+@pytest.mark.parametrize("task", MADE, ids=lambda task: task.name)
+def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(task):
+    assert replace(task) == task
+    assert replace(task, name="another") != task
+    for field in fields(task):
+        assert (f" {field.name}=" in f" {repr(task).partition('(')[2]}") == field.init
+
+
+@pytest.mark.parametrize(("task", "section"), [
+    (Position(FRAME, PATH), ListedPosition), (TASKS["pose"], ListedPose),
+    (TASKS["frame"], ListedFrame),
+    (TASKS["centre of mass"], ListedCentreOfMass), (TASKS["pointing"], ListedPointing),
+    (TASKS["posture"], ListedPosture)], ids=lambda one: getattr(one, "name", ""))
+def test_a_gain_that_is_left_out_is_the_same_in_python_and_in_a_file(task, section):
+    for gain in ("stiffness", "damping", "gain"):
+        assert getattr(task, gain) == section.model_fields[gain].default
 
 
 def test_manipulability_is_yoshikawas_and_has_no_row_at_a_singular_posture():

@@ -124,15 +124,26 @@ def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
-INTERRUPTED_AFTER_THE_FIRST_RUN = """from scenarios.results.comparing import _Written
-add = _Written.add
-_Written.add = lambda *those: (add(*those), os.kill(os.getpid(), signal.SIGTERM))
+INTERRUPTED_AFTER_THE_FIRST_RUN = """
+import os, signal
+from scenarios.results import comparing
+
+add = comparing._Written.add
+
+def add_and_interrupt(written, i, run):
+    add(written, i, run)
+    os.kill(os.getpid(), signal.SIGTERM)
+
+comparing._Written.add = add_and_interrupt
+from scenarios.cli.start import main
+main()
 """
 
 
 def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(tmp_path):
-    done = ended(INTERRUPTED_AFTER_THE_FIRST_RUN, tmp_path, "compare", "ellipse",
-                 "--resolvers", "tpm,hcod", "--workers", "2", *SHORT, "--out", "b")
+    command = [sys.executable, "-c", INTERRUPTED_AFTER_THE_FIRST_RUN, "compare", "ellipse",
+               "--resolvers", "tpm,hcod", "--workers", "2", *SHORT, "--out", "b"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 130
     assert "the runs made so far are in b\n" in done.stderr
     assert list((tmp_path / "b").rglob("run.npz"))

@@ -8,6 +8,7 @@ from hierarchy.paths import Still
 from hierarchy.tasks import Position, Posture
 from solvers import Status, certify, explain, make, names
 from solvers.batch import Batch
+from solvers.problems import generate
 
 STRICT = [make("hcod"), *(make("hqp", backend=name) for name in ("proxqp", "daqp"))]
 each = pytest.mark.parametrize("resolver", STRICT, ids=lambda one: one.label)
@@ -76,6 +77,18 @@ def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, me
     assert np.array_equal(*cold.witnesses) == met
     for memory in (np.zeros(0), np.full(7, np.nan), hcod.solve(h.changed(give=None)).memory):
         np.testing.assert_allclose(hcod.solve(h, memory).x, cold.x, atol=1e-9)
+
+
+def test_generated_hierarchies_that_give_are_certified_by_hcod():
+    solved = 0
+    for seed in range(40):
+        h = generate(7_000_000 + seed)
+        h.give = 0.1 * np.random.default_rng(seed).random(h.m)
+        res = make("hcod").solve(h)
+        if res.status is Status.SOLVED:
+            assert certify(h, res.x, 1e-6, witnesses=res.witnesses).certified, seed
+            solved += 1
+    assert solved >= 36
 
 
 @pytest.mark.parametrize("wrong", ["x", "witness"])
