@@ -315,8 +315,6 @@ def main() -> None:
     parser.add_argument("--map", action="store_true", help="make the map of tests and end")
     parser.add_argument("--count", type=int, default=10, help="mutants to try")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
-    parser.add_argument("--start", type=int, default=1, metavar="N",
-                        help="leave out what comes before mutant N of the sample")
     parser.add_argument("--limit", type=int, default=300,
                         help="CPU time that the tests of a mutant have [s]")
     options = parser.parse_args()
@@ -330,21 +328,20 @@ def main() -> None:
         every = [mutant for mutant in every if lines_of(mutant.module)[0]]
     sample = random.Random(options.seed).sample(every, min(options.count, len(every)))
     with tempfile.TemporaryDirectory() as folder:
-        alive = _try(sample, options.start, options.tests, Runner(Path(folder), options.limit))
-    tried = len(sample) - options.start + 1
-    print(f"{alive} of {tried} mutants survived: {alive / tried:.0%} "
+        alive = _try(sample, options.tests, Runner(Path(folder), options.limit))
+    print(f"{alive} of {len(sample)} mutants survived: {alive / len(sample):.0%} "
           f"(of {len(every)} possible, seed {options.seed})")
 
 
-def _try(sample: list[Mutant], start: int, tests: list[str] | None, runner: Runner) -> int:
-    """Return how many mutants from `start` on survive, and print them."""
+def _try(sample: list[Mutant], tests: list[str] | None, runner: Runner) -> int:
+    """Return how many mutants survive, and print them."""
     first = tuple(tests or tests_of(sample[0]))
     if not runner.passes(first):
         sys.exit(f"{(runner.folder / 'output').read_text()}\n{first} fails without any change")
     if runner.survives(sample[0].module, compile("raise ImportError", "", "exec"), first):
         sys.exit("the tests pass without the module")
     alive = 0
-    for done, mutant in enumerate(sample[start - 1:], start):
+    for done, mutant in enumerate(sample, 1):
         described, code = mutant.code()
         survived = runner.survives(mutant.module, code, tuple(tests or tests_of(mutant)))
         alive += survived

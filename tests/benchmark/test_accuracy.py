@@ -2,7 +2,6 @@
 
 
 import numpy as np
-import oracle
 import pytest
 
 from benchmark import arms
@@ -38,12 +37,6 @@ def test_regular_arms_are_regular_and_near_singular_ones_lack_one_direction():
     assert near[:, -1].min() >= arms.NEAREST
     assert near[:, -1].max() < 0.02
     assert np.percentile(near[:, -1], 10) < 1e-5
-
-
-def test_the_damped_reference_is_that_of_the_oracle():
-    for h in accuracy.hierarchies(accuracy.CASES[2], 20, 0)[0]:
-        np.testing.assert_allclose(accuracy.damped(h, 0.05, 0.1), oracle.solve(h, 0.05, 0.1),
-                                   atol=1e-9)
 
 
 def test_strict_resolvers_reach_all_that_the_tasks_can_have(tables):

@@ -13,17 +13,17 @@ import pytest
 
 from benchmark import solve
 from benchmark.packages import OWN, Entrant
-from benchmark.process import CRASHED, HUNG, LEFT_OUT, SLOW, Field
+from benchmark.process import CRASHED, HUNG, LEFT_OUT, Field
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
 from benchmark.solve.entrants import chosen, compiled
-from benchmark.solve.judge import judge, judged, summary
+from benchmark.solve.judge import judge, summary
 from benchmark.solve.open import QUESTIONS, asked, improve
 from benchmark.worker import Repeats
 from hierarchy import Hierarchy
 from hierarchy.errors import HierarchyError
 from scenarios.cli.main import run_command
-from solvers import certify, make
+from solvers import make
 from solvers.problems.files import Collection, Head, read
 from solvers.proof import prove
 
@@ -81,25 +81,6 @@ def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
     if expected[4] is None:
         assert second[4]["x"] == pytest.approx([4.0, 1.0])
     assert all("code" in row["why"] for row in first if row.get("ended") == CRASHED)
-
-
-@pytest.mark.slow
-def test_an_entrant_that_works_for_too_long_on_a_file_is_not_asked_the_rest(
-        equalities, monkeypatch):
-    monkeypatch.setattr(opened, "PATIENCE", 1e-9)
-    rows = run_entrant(fake("LeastSquares"), equalities)
-    assert [row.get("refused") for row in rows] == [None, *[SLOW] * 4]
-    found = summary(judge(rows, {(one := read(equalities)).digest: one}))
-    assert (found["asked"], found["slow"], found["ended"]) == (1, 4, 0)
-
-
-@pytest.mark.slow
-def test_an_entrant_that_cannot_start_is_missing_with_the_reason():
-    with Field([fake("LeastSquares", no=1), replace(fake("Moody"), python="/no/such/python")],
-               QUESTIONS) as field:
-        assert not field.running
-    assert "takes no arguments" in field.missing["LeastSquares"]
-    assert "No such file" in field.missing["Moody"]
 
 
 CC = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
@@ -169,14 +150,6 @@ def test_only_x_decides_whether_an_answer_is_right(x, solved, verdict, level):
     ({"raised": "Error"}, judging.RAISED)])
 def test_what_is_not_answered_has_its_own_verdict(more, verdict):
     assert found(None, **more)["verdict"] == verdict
-
-
-def test_a_problem_without_a_proof_is_judged_by_its_certificate():
-    h = simple(3.0)
-    assert judged(raw([3.0, 1.0], collection([h])), h, None)["verdict"] == judging.SOLVED
-    wrong = judged(raw([3.0, 0.5], collection([h])), h, None)
-    assert (wrong["verdict"], wrong["level"]) == (judging.WRONG, 2)
-    assert not certify(h, [3.0, 0.5]).certified
 
 
 def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():

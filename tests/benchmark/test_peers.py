@@ -13,7 +13,6 @@ from benchmark.peers import reaching, standing
 from benchmark.peers.compare import joined
 from benchmark.peers.moving import ENTRANTS, QUESTIONS, START, make_scenes, run
 from benchmark.peers.ours import stand
-from benchmark.peers.scenes import Arm, Stand
 from benchmark.peers.standing import Judge, followed, make_scene
 from benchmark.process import Field
 from benchmark.solve import entrants as solvers_
@@ -170,30 +169,16 @@ def test_every_package_has_an_adapter_that_is_tested():
 
 # -- the scenes and their judges -------------------------------------------------------------------
 
-def test_a_scene_arrives_as_it_was_sent(tmp_path):
-    for scene, read in ((make_scenes(tmp_path)["step"], lambda numbers: Arm(**numbers)),
-                        (make_scene(tmp_path), Stand.of)):
-        sent = json.dumps(asdict(scene))
-        assert json.dumps(asdict(read(json.loads(sent)))) == sent
-
-
 @pytest.mark.slow
 def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
-    found = run([fake("posture"), fake("refuses"), fake("lost"), fake("ends"), NOBODY], ticks=1100)
-    rows = {row["entrant"]: row for row in found.rows["peers"]}
-    assert list(rows) == ["posture", "refuses", "lost"]
-    good, none, lost = rows.values()
-    assert good["ticks"] == none["ticks"] == 1100
+    found = run([fake("posture"), fake("lost"), fake("ends"), NOBODY], ticks=1100)
+    good, lost = found.rows["peers"]
+    assert (good["entrant"], lost["entrant"]) == ("posture", "lost")
     assert good["median_us"] <= good["p95_us"] <= good["p99.9_us"]
-    assert not np.isnan(good["solve_us"])
-    assert good["fails"] == "0/0"
-    assert good["excess_rad_s"] == 0.0
+    assert (good["ticks"], good["fails"], good["excess_rad_s"]) == (1100, "0/0", 0.0)
     assert good["moved_m"] > 1e-4  # a posture with nothing above it moves the end effector
     assert good["nan"] == lost["nan"] == "an answer with NaN"
-    assert none["step_failed"] == lost["step_failed"] == 2000
-    assert np.isnan(none["median_us"])
-    assert none["why"] == "ValueError: no answer"
-    assert none["nan"] == "raises ValueError"
+    assert lost["step_failed"] == 2000
     assert "not finite" in lost["why"]
     assert found.missing["ends"] == "ended with code 7"
     assert "--install" in found.missing["nobody"]
@@ -210,10 +195,9 @@ def test_wrong_answers_to_stand_are_found(tmp_path):
     a, torques, wrenches = answer()
     good = judge.residuals(0, a, torques, wrenches)
     assert max(good[key] for key in ("dynamics", "contact", "torque", "friction")) < 1e-6
-    assert judge.residuals(0, a, torques + 1.0, wrenches)["dynamics"] == pytest.approx(1.0)
-    assert judge.residuals(0, a, 100.0 * torques, wrenches)["torque"] > 100.0
-    sideways = wrenches + 1000.0 * np.eye(6)[0]
-    assert judge.residuals(0, a, torques, sideways)["friction"] > 100.0
-    twisted = wrenches + 100.0 * np.eye(6)[5]
-    assert judge.residuals(0, a, torques, twisted)["friction"] > 10.0
-    assert judge.residuals(0, 2.0 * a, torques, wrenches)["posture"] > good["posture"]
+    for wrong, key, least in (((a, torques + 1.0, wrenches), "dynamics", 0.99),
+                              ((a, 100.0 * torques, wrenches), "torque", 100.0),
+                              ((a, torques, wrenches + 1000.0 * np.eye(6)[0]), "friction", 100.0),
+                              ((a, torques, wrenches + 100.0 * np.eye(6)[5]), "friction", 10.0),
+                              ((2.0 * a, torques, wrenches), "posture", good["posture"])):
+        assert judge.residuals(0, *wrong)[key] > least

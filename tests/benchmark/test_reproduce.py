@@ -1,15 +1,13 @@
 """Pages that have what came of runs and commands."""
 
 import re
-import shutil
 from functools import partial
 from pathlib import Path
 
 import pytest
 
-from benchmark.reproduce import pages, protocol, whole
-from benchmark.reproduce.blocks import ROWS, Stored
-from benchmark.reproduce.protocol import PROTOCOL, Rows
+from benchmark.reproduce import pages
+from benchmark.reproduce.blocks import Stored
 from hierarchy.errors import HierarchyError
 
 ROOT = Path(__file__).parents[2]
@@ -69,60 +67,3 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
                        (page("python a.py | EQ8 .. EQ9"), "has no line that starts with 'EQ8'")):
         with pytest.raises(HierarchyError, match=says):
             fill(text)
-
-
-def test_a_command_is_run_once_for_the_same_code(tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text("print('one  ')\nprint('Numbers: runs/a')\n")
-    assert pages.run("python script.py", tmp_path, tmp_path / "out") == "one\n"
-    script.write_text("print('two')\n")
-    assert pages.run("python script.py", tmp_path, tmp_path / "out") == "one\n"
-    (tmp_path / "benchmark").mkdir()
-    (tmp_path / "benchmark" / "new.py").write_text("")
-    assert pages.run("python script.py", tmp_path, tmp_path / "out") == "two\n"
-
-
-def test_a_command_that_fails_leaves_the_others(tmp_path, capsys):
-    (tmp_path / "good.py").write_text("print('good')\n")
-    (tmp_path / "bad.py").write_text("print('half')\nraise SystemExit(3)\n")
-    (tmp_path / "page.md").write_text(page("python bad.py") + page("python good.py"))
-    assert dict(whole.outputs(["page.md"], tmp_path, tmp_path / "out")) == {
-        "python good.py": "good\n"}
-    said = capsys.readouterr().err
-    assert "left as it is: python bad.py: exit code 3\nhalf" in said
-    assert re.search(r"^  0:0\d min$", said, re.MULTILINE)
-    assert whole.minutes(2467.4) == "41:07 min"
-
-
-@pytest.fixture
-def documents(tmp_path):
-    """A checkout that has documents only."""
-    for name in PAGES:
-        (tmp_path / name).parent.mkdir(exist_ok=True, parents=True)
-        shutil.copy(ROOT / name, tmp_path / name)
-    shutil.copytree(ROOT / "docs/results", tmp_path / "docs/results", dirs_exist_ok=True)
-    return tmp_path
-
-
-def ending_with(error, *ended):
-    def run(*_):
-        yield from ended
-        raise error
-    return run
-
-
-@pytest.mark.parametrize(("error", "code", "said"), [
-    (KeyboardInterrupt(), 130, "the same command continues from here"),
-    (OSError(28, "No space left on device", "out/a"), 1, "out/a cannot be written: No space left")])
-def test_a_seed_that_has_ended_is_stored_whatever_ends_the_command(
-        error, code, said, documents, monkeypatch, capsys):
-    column = {name: {"reached_end": [1.0] * 3, **{metric: [1.0] * 3 for metric in PROTOCOL.metrics}}
-              for name in PROTOCOL.columns}
-    metrics = {name: {"label": name, "unit": "", "lower": True} for name in PROTOCOL.metrics}
-    new = Rows([*PROTOCOL.layouts], [1], 1, metrics, [column, column],
-               [{"letter": {"it fell": 1}}, {}])
-    monkeypatch.setattr(whole, "_ran", ending_with(error, new))
-    assert whole.run(["protocol"], documents / "out", root=documents) == code
-    assert said in capsys.readouterr().err
-    assert protocol.read(documents / ROWS) == new
-    assert "it fell" in (documents / "docs/results/loops.md").read_text()

@@ -97,18 +97,6 @@ def test_what_the_certificate_refuses_is_proved_right_or_wrong(monkeypatch):
     assert stress.outcome(Wrong(stress.WRONG), problem())[0] == stress.WRONG
 
 
-def test_many_processes_count_like_one_and_report_all_kinds_apart(tmp_path, monkeypatch):
-    monkeypatch.setattr(stress, "_CHUNK", 3)
-    monkeypatch.setattr(stress, "KINDS", stress.KINDS[:3])
-    found = stress.run(2 * len(stress.KINDS), "tpm", processes=2, kind=stress.ALL)
-    told = stress.report("tpm", found, tmp_path / "none")
-    assert found == {kind: stress.tally(("tpm", range(2), kind)) for kind in stress.KINDS}
-    assert [row["kind"] for row in told.rows["stress"]] == [*stress.KINDS, stress.ALL]
-    assert told.rows["stress"][-1]["problems"] == 2 * len(stress.KINDS)
-    assert not told.failed
-    assert not (tmp_path / "none").exists()
-
-
 def test_failing_problems_are_listed_and_saved(tmp_path, monkeypatch):
     monkeypatch.setattr(stress, "make", lambda name: Wrong(stress.WRONG))
     monkeypatch.setattr(stress, "_TRIALS", 3)  # every trial is proved wrong, in 120 digits

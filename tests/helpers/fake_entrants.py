@@ -25,28 +25,27 @@ class LeastSquares(Solver):
 class Crashing(LeastSquares):
     """Ends its process at the problem whose first side is 2."""
 
+    def at_two(self):
+        os.kill(os.getpid(), signal.SIGKILL)
+
     def solve(self, prepared):
         if prepared.lower[0] == 2.0:
-            os.kill(os.getpid(), signal.SIGKILL)
+            self.at_two()
         return super().solve(prepared)
 
 
-class Hanging(LeastSquares):
-    """Never comes back from the problem whose first side is 2."""
+class Hanging(Crashing):
+    """Never comes back from it."""
 
-    def solve(self, prepared):
-        while prepared.lower[0] == 2.0:
-            pass
-        return super().solve(prepared)
+    def at_two(self):
+        time.sleep(1000.0)
 
 
 class Slow(LeastSquares):
     """Never comes back from a problem of one unknown."""
 
     def solve(self, prepared):
-        if len(prepared.reference) == 1:
-            time.sleep(1000.0)
-        return super().solve(prepared)
+        return super().solve(prepared) if len(prepared.reference) > 1 else time.sleep(1000.0)
 
 
 class Raising(LeastSquares):
@@ -67,13 +66,10 @@ class Doomed(LeastSquares):
 class Moody(LeastSquares):
     """Never gives the same bits twice, and never calls its answer solved."""
 
-    def __init__(self, scale=1e-12):
-        self.random = np.random.default_rng()
-        self.scale = scale
+    random = np.random.default_rng()
 
     def solve(self, prepared):
-        x = super().solve(prepared)
-        return x + self.scale * self.random.normal(size=len(x))
+        return super().solve(prepared) + 1e-12 * self.random.normal(size=len(prepared.reference))
 
     def read(self, raw):
         return Answer(raw, solved=False)

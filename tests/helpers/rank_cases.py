@@ -15,87 +15,43 @@ def random_levels(n, sizes, seed=7):
     return [(r.normal(size=(m, n)), r.normal(size=m)) for m in sizes]
 
 
-def generic():
-    return random_levels(7, (3, 1, 1))
-
-
-def more_rows_than_joints():
-    return random_levels(6, (3, 2, 3))
-
-
-def rank_lost_inside_the_first_level():
+def cases():
+    """Yield a name and levels (A, b)."""
+    yield "generic", random_levels(7, (3, 1, 1))
+    yield "more_rows_than_joints", random_levels(6, (3, 2, 3))
     levels = random_levels(5, (3, 3))
     levels[0][0][2] = levels[0][0][0] - 2.0 * levels[0][0][1]
-    return levels
-
-
-def middle_level_dependent_on_the_first():
+    yield "rank_lost_inside_the_first_level", levels
     levels = random_levels(6, (3, 2, 3))
     levels[1][0][0] = [0.5, -1.0, 2.0] @ levels[0][0]
-    return levels
-
-
-def last_level_wholly_dependent():
+    yield "middle_level_dependent_on_the_first", levels
     levels = random_levels(8, (3, 2, 2))
     levels[2][0][:] = rng(1).normal(size=(2, 5)) @ np.vstack([levels[0][0], levels[1][0]])
-    return levels
-
-
-def row_repeated_inside_a_level():
+    yield "last_level_wholly_dependent", levels
     levels = random_levels(7, (3, 3, 3, 3))
     levels[0][0][1] = levels[0][0][0]
-    return levels
-
-
-def rows_repeated_in_a_lower_level():
+    yield "row_repeated_inside_a_level", levels
     levels = random_levels(7, (2, 2, 2))
     levels[2][0][:] = levels[0][0]
-    return levels
-
-
-def zero_rows():
+    yield "rows_repeated_in_a_lower_level", levels
     levels = random_levels(6, (2, 2, 2))
-    levels[0][0][1] = 0.0
-    levels[1][0][:] = 0.0
-    return levels
-
-
-def conflicting_targets():
+    levels[0][0][1] = levels[1][0][:] = 0.0
+    yield "zero_rows", levels
     A = rng().normal(size=(2, 4))
-    return [(A, [1.0, 2.0]), (A, [-1.0, 0.0]), (A[:1], [5.0])]
+    yield "conflicting_targets", [(A, [1.0, 2.0]), (A, [-1.0, 0.0]), (A[:1], [5.0])]
+    yield "one_joint", [([[0.0]], [1.0]), ([[2.0]], [1.0]), ([[1.0]], [3.0])]
+    yield "no_freedom_left", random_levels(4, (4, 3, 2))
+    yield "levels_without_rows", random_levels(5, (0, 2, 0, 1, 0))
+    yield "no_levels", []
+    yield "unequal_scales", [(A * scale, b * scale) for (A, b), scale in zip(
+        random_levels(7, (3, 2, 2)), (1e4, 1e-5, 1.0), strict=True)]
 
 
-def one_joint():
-    return [([[0.0]], [1.0]), ([[2.0]], [1.0]), ([[1.0]], [3.0])]
-
-
-def no_freedom_left():
-    return random_levels(4, (4, 3, 2))
-
-
-def levels_without_rows():
-    levels = random_levels(5, (0, 2, 0, 1, 0))
-    return [(A.reshape(-1, 5), b) for A, b in levels]
-
-
-def no_levels():
-    return []
-
-
-def unequal_scales():
-    levels = random_levels(7, (3, 2, 2))
-    return [(A * scale, b * scale) for (A, b), scale in zip(levels, (1e4, 1e-5, 1.0), strict=True)]
-
-
-CASES = (generic, more_rows_than_joints, rank_lost_inside_the_first_level,
-         middle_level_dependent_on_the_first, last_level_wholly_dependent,
-         row_repeated_inside_a_level, rows_repeated_in_a_lower_level, zero_rows,
-         conflicting_targets, one_joint, no_freedom_left, levels_without_rows, no_levels,
-         unequal_scales)
+CASES = dict(cases())
 
 
 def build(case, with_reference):
-    levels = case()
+    levels = CASES[case]
     n = np.shape(levels[0][0])[1] if levels else 3
     reference = rng(3).normal(size=n) if with_reference or not levels else None
     return Hierarchy.from_levels(levels, reference)

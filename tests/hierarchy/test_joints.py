@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from urdf_text import LIMIT, joint, link, placed, urdf
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
@@ -51,8 +52,7 @@ def test_values_of_joints_are_set_and_read_by_name():
     ({"wheel": (1.0, 1.0)}, "joint 'wheel': its (cos, sin) [1.0, 1.0] has length 1.414"),
     ({"neck": 1.0}, "joint 'neck': 1 numbers, expected 3 or 4"),
     ({"arm": np.nan}, "joint 'arm'"), ({"leg": 1.0}, "unknown joint 'leg'"),
-    ((0.0, 0.0), "2 values for 9 joint positions or 12 coordinates"),
-])
+    ((0.0, 0.0), "2 values for 9 joint positions or 12 coordinates")])
 def test_what_is_no_value_of_a_joint_is_refused_by_name(values, said):
     with pytest.raises(HierarchyError) as error:
         ROBOT.configuration(values)
@@ -109,15 +109,6 @@ def test_compiled_rows_of_a_posture_are_those_of_its_methods(level, floating):
         np.testing.assert_array_equal(h.lower, h.upper)
 
 
-def test_a_posture_that_fits_no_form_is_refused():
-    with pytest.raises(HierarchyError, match="'posture': 4 values for 9 joint positions or 12"):
-        Posture((0.0,) * 4).error(State(ROBOT))
-    with pytest.raises(HierarchyError, match="'posture': unknown joint 'leg'"):
-        Posture({"leg": 0.0}, robot=ROBOT)
-    with pytest.raises(HierarchyError, match=r"give Posture\(\.\.\., robot=robot\)"):
-        _ = Posture({"arm": 0.0}).dimension
-
-
 @pytest.mark.parametrize(("turn", "values"), [
     ("wheel", {"wheel": -3.0, "arm": 0.2}), ("drive 3", {"drive": (1.0, 2.0, -3.0), "arm": 0.2})])
 def test_joints_that_turn_on_are_coupled_by_their_angles(turn, values):
@@ -134,12 +125,11 @@ def test_joints_that_turn_on_are_coupled_by_their_angles(turn, values):
         JointCoupling(ROBOT, {"drive": 1.0})
 
 
-URDF = """<robot name="c"><link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>
-<joint name="a" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>
-<joint name="b" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz=".3 0 0"/>
-<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
-<joint name="c" type="continuous"><parent link="l1"/><child link="l3"/><axis xyz="0 0 1"/>
-<mimic joint="a" multiplier="-2" offset="0.5"/></joint></robot>"""
+URDF = urdf(
+    *(link(f"l{i}", "") for i in range(4)), joint("a", "continuous", "l0", "l1", "", "0 0 1"),
+    joint("b", "revolute", "l1", "l2", LIMIT, "0 0 1", placed(".3 0 0")),
+    joint("c", "continuous", "l1", "l3", '<mimic joint="a" multiplier="-2" offset="0.5"/>',
+          "0 0 1"))
 
 
 def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_path):

@@ -45,6 +45,13 @@ def ask(tmp_path):
     return asked
 
 
+@pytest.fixture
+def cache(ask, tmp_path):
+    """The folder of a cache that has the kernels."""
+    ask(XDG_CACHE_HOME=str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
 def files(folder):
     return [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in str(path)]
 
@@ -60,23 +67,21 @@ def test_a_changed_helper_or_number_is_noticed(ask, tmp_path, file, old, new):
 
 @pytest.mark.parametrize("damage", [lambda kept: kept[:50],
                                     lambda kept: kept[:-1] + bytes([kept[-1] ^ 1])])
-def test_a_damaged_cache_is_compiled_again(ask, tmp_path, damage):
-    cache = tmp_path / "cache"
-    ask(XDG_CACHE_HOME=str(cache))
+def test_a_damaged_cache_is_compiled_again(ask, cache, damage):
     (kept,) = (file for file in files(cache) if file.name.startswith("user.g-"))
     kept.write_bytes(damage(kept.read_bytes()))
     assert ask(XDG_CACHE_HOME=str(cache))[0] == ["11.0", "1"]
 
 
-def test_a_helper_that_was_compiled_again_is_found_by_its_callers(ask, tmp_path):
+def test_a_helper_that_was_compiled_again_is_found_by_its_callers(ask, cache):
     """Its symbol has the number of functions that a process compiled before it."""
-    cache = tmp_path / "cache"
-    ask(XDG_CACHE_HOME=str(cache))
     (stored,) = (file for file in files(cache) if file.name.startswith("helper.f-"))
     stored.unlink()
     later = f"import numba; [numba.njit(lambda x: x)(1) for _ in range(9)]; {SOLVE}"
     assert ask(later, XDG_CACHE_HOME=str(cache))[0] == ["11.0", "1"]
-    assert ask(XDG_CACHE_HOME=str(cache))[0] == ["11.0", "0"]
+    for path in cache.rglob("*"):  # which then cannot be written, and is read
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    assert ask(XDG_CACHE_HOME=str(cache)) == (["11.0", "0"], "")
 
 
 @pytest.mark.parametrize("settings", [{"XDG_CACHE_HOME": "here"}, {"HOME": "/proc/nowhere"},
@@ -90,19 +95,9 @@ def test_without_a_usable_folder_nothing_is_written_here_and_one_line_says_so(
     assert files(tmp_path) == before
 
 
-def test_a_cache_that_cannot_be_written_is_read(ask, tmp_path):
-    cache = tmp_path / "cache"
-    ask(XDG_CACHE_HOME=str(cache))
-    for path in cache.rglob("*"):
-        path.chmod(0o555 if path.is_dir() else 0o444)
-    assert ask(XDG_CACHE_HOME=str(cache)) == (["11.0", "0"], "")
-
-
 @pytest.mark.parametrize("change", [lambda path: path.chmod(0o666),
                                     lambda path: os.chown(path, 12345, 12345)])
-def test_a_file_that_another_user_can_have_written_is_not_loaded(ask, tmp_path, change):
-    cache = tmp_path / "cache"
-    ask(XDG_CACHE_HOME=str(cache))
+def test_a_file_that_another_user_can_have_written_is_not_loaded(ask, cache, change):
     try:
         for path in files(cache):
             change(path)
@@ -126,29 +121,23 @@ print(float(njit(lambda x: np.cumsum(x)[-1])(np.arange(3.0))))
 """
 KEPT_KERNELS = """
 from typing import NamedTuple
-
 from hierarchy.jit import compiled
 import numpy as np
-
 class Two(NamedTuple):
     first: np.ndarray
     second: np.ndarray
-
 @compiled
 def hashed(text):
     return hash(text) + np.zeros(1, np.int64)[0]
-
 @compiled
 def last(two):
     return two.first[1:][-1] + two.second[:2][-1]
-
 @compiled
 def squares(x):
     y = np.empty(x.size)
     for i in range(x.size):
         y[i] = x[i] * x[i]
     return y
-
 @compiled
 def halves(x):
     return squares(x / 2.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scene import ROBOT, state_at, states
+from standing import written
 
-from hierarchy import Robot, State
-from hierarchy.errors import RobotError
+from hierarchy import State
 from hierarchy.jit import compiled
 from hierarchy.limits import Limits, write_box
 from hierarchy.tasks import JointLimits, TorqueLimits
@@ -246,15 +246,6 @@ def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():
     np.testing.assert_allclose(low, np.clip(least, wide_low, wide_up), rtol=0, atol=1e-9)
 
 
-@LEVELS
-def test_a_horizon_of_at_most_a_tick_changes_nothing(level):
-    for q, v in states(5):
-        state = state_at(q, v)
-        box, same = (JointLimits(ROBOT, 10.0, 1e-3, horizon=horizon).box(state, level)
-                     for horizon in (0.0, 1e-3))
-        np.testing.assert_array_equal(box, same)
-
-
 # ---- from outside -----------------------------------------------------------------------------
 
 def wide(joints, T, velocity=np.inf):
@@ -341,17 +332,14 @@ def test_the_clamp_answers_anything_with_a_command_of_the_box(level):
 @LEVELS
 def test_the_rows_are_the_identity_and_the_box(level):
     task = JointLimits(ROBOT, 10.0, 1e-3, margin=0.02)
+    limits = Limits(ROBOT.lower + 0.02, ROBOT.upper - 0.02, ROBOT.velocity_limit,
+                    np.full(7, 10.0), 1e-3)
     for q, v in states(10):
         state = state_at(q, v)
-        A, lower, upper = np.full((10, 7), 5.0), np.full(10, 5.0), np.full(10, 5.0)
-        task.writer(state, level, A, lower, upper, 2)()
-        np.testing.assert_array_equal(A[2:9], np.eye(7))
-        limits = Limits(ROBOT.lower + 0.02, ROBOT.upper - 0.02, ROBOT.velocity_limit,
-                        np.full(7, 10.0), 1e-3)
+        A, *sides = written(task, state, level, 7)
+        np.testing.assert_array_equal(A, np.eye(7))
         for box in (task.box(state, level), limits.box(q, v, level)):
-            np.testing.assert_array_equal([lower[2:9], upper[2:9]], box)
-        assert (A[[0, 1, 9]] == 5.0).all()
-        assert (lower[[0, 1, 9]] == 5.0).all()
+            np.testing.assert_array_equal(sides, box)
         x = np.linspace(-50, 50, 7)
         np.testing.assert_array_equal(task.clamp(state, level, x), np.clip(x, *box))
 
@@ -367,41 +355,15 @@ def test_the_error_is_how_far_a_joint_is_from_its_range():
     assert not task.jacobian_derivative(state).any()
 
 
-def test_a_limit_on_coordinates_that_are_no_angles_is_refused():
-    model = pin.Model()
-    model.addJointFrame(model.addJoint(0, pin.JointModelPlanar(), pin.SE3.Identity(), "joint_0"), 0)
-    model.lowerPositionLimit = np.array([-2.0, -np.inf, -1.01, -1.01])
-    with pytest.raises(RobotError, match="joint 'joint_0' has 4 coordinates for 3 velocities"):
-        JointLimits(Robot(model, "cart"), 10.0, 1e-3)
-
-
 def test_torque_rows_hold_exactly_where_inverse_dynamics_does():
     task, rng = TorqueLimits(ROBOT, fraction=0.5), np.random.default_rng(11)
     data, held = ROBOT.model.createData(), []
     for q, v in states(200):
         state = state_at(q, v)
-        A, lower, upper = np.full((9, 7), 5.0), np.full(9, 5.0), np.full(9, 5.0)
-        task.writer(state, "acceleration", A, lower, upper, 1)()
+        A, lower, upper = written(task, state, "acceleration", 7)
         a = rng.normal(0, 30, 7)
         torque = pin.rnea(ROBOT.model, data, q, v, a)
-        np.testing.assert_allclose((A[1:8] @ a - lower[1:8]), torque + ROBOT.effort_limit / 2,
-                                   atol=1e-11)
-        np.testing.assert_allclose((upper[1:8] - A[1:8] @ a), ROBOT.effort_limit / 2 - torque,
-                                   atol=1e-11)
-        assert (A[[0, 8]] == 5.0).all()
+        np.testing.assert_allclose(A @ a - lower, torque + ROBOT.effort_limit / 2, atol=1e-11)
+        np.testing.assert_allclose(upper - A @ a, ROBOT.effort_limit / 2 - torque, atol=1e-11)
         held.append((np.abs(torque) <= ROBOT.effort_limit / 2).all())
     assert 0 < sum(held) < 200, "the test has cases on one side only"
-
-
-def test_the_other_methods_of_the_torque_task_say_the_same():
-    task = TorqueLimits(ROBOT, fraction=0.2)
-    for q, v in states(5):
-        state = state_at(q, v)
-        bias = pin.rnea(ROBOT.model, ROBOT.model.createData(), q, v, np.zeros(7))
-        error = task.error(state)
-        assert (np.abs(bias + error) <= 0.2 * ROBOT.effort_limit + 1e-12).all()
-        np.testing.assert_array_equal(task.jacobian(state), state.mass_matrix())
-        later, before = (State.at(ROBOT, q + h * v).mass_matrix() for h in (1e-6, -1e-6))
-        np.testing.assert_allclose(task.jacobian_derivative(state), (later - before) / 2e-6,
-                                   atol=1e-7)
-    assert (task.dimension, task.kind) == (7, "inequality")

@@ -71,7 +71,7 @@ def test_a_four_bar_closes_from_a_millimetre_off_and_goes_to_its_posture(level, 
     q, v, state, solver = ROBOT.integrate(start(), off), np.zeros(ROBOT.n), State(ROBOT), make(
         resolver)
     assert 1e-3 < distance(ROBOT, q) < 2e-3
-    for _ in range(3000):
+    for _ in range(2000):
         assert state.move(0.0, q, v)
         x = solver.solve(stack.hierarchy(state)).x
         if level == "torque":

@@ -8,7 +8,6 @@ import pytest
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
 from scenarios.cell.robot import start_of
-from scenarios.cli.main import run_command
 from scenarios.config.robot import StartSection
 
 mujoco = pytest.importorskip("mujoco")
@@ -88,14 +87,6 @@ def written(tmp_path):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_robot_is_what_mujoco_has(kind, written):
     assert public_robots.of_mjcf(written(KINDS[kind])) == "equal"
-
-
-def test_an_attached_model_is_part_of_the_robot(written, tmp_path):
-    (tmp_path / "hand.xml").write_text(f"<mujoco>{world(link('hand'))}</mujoco>")
-    path = written('<asset><model name="hand" file="hand.xml"/></asset>' + world(
-        link("a", more='<attach model="hand" body="hand" prefix="left_"/>')))
-    assert public_robots.of_mjcf(path) == "equal"
-    assert Robot.load(path).joint_names == ("a_joint", "left_hand_joint")
 
 
 PACKAGES = public_robots.MJCF + public_robots.URDF
@@ -220,7 +211,7 @@ def test_inertia_of_a_tendon_is_refused_by_name(written):
         Robot.load(path)
 
 
-def residual(path, robot, q):
+def residual(path, q):
     """What MuJoCo has left of the equalities at q, of joints with one coordinate."""
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
@@ -239,7 +230,7 @@ def test_couplings_are_polynomials_of_positions(written):
     assert (one.joint, one.other, other.joint, other.other) == ("a_joint", "b_joint", "c_joint", "")
     for b in (-1.0, 0.3, 0.9):
         q = [np.polyval(one.coefficients[::-1], b), b, other.coefficients[0]]
-        np.testing.assert_allclose(residual(path, robot, q), 0.0, atol=1e-12)
+        np.testing.assert_allclose(residual(path, q), 0.0, atol=1e-12)
     held = Robot.load(path, locked={"b_joint": 0.3}).coupled[0]
     np.testing.assert_allclose(held.coefficients, [np.polyval(one.coefficients[::-1], 0.3)])
 
@@ -257,7 +248,7 @@ def test_tendons_that_keep_their_length_couple_their_joints(written):
     assert (one.joint, one.other, other.joint, other.other) == ("b_joint", "a_joint", "d_joint", "")
     for a in (-1.0, 0.4):
         q = [a, np.polyval(one.coefficients[::-1], a), 0.2, other.coefficients[0]]
-        np.testing.assert_allclose(residual(path, robot, q), 0.0, atol=1e-12)
+        np.testing.assert_allclose(residual(path, q), 0.0, atol=1e-12)
     (held, _) = Robot.load(path, locked={"b_joint": q[1]}).coupled
     assert (held.joint, held.coefficients) == ("a_joint", (pytest.approx(0.4),))
 
@@ -278,7 +269,7 @@ def test_closed_chains_join_the_frames_that_mujoco_joins(equality, rigid, writte
     assert (loop.name, loop.rigid) == ("close", rigid)
     assert robot.end_effector not in loop.frames or "site" in equality
     for q in np.random.default_rng(2).uniform(-1.0, 1.0, (3, 3)):
-        state, expected = State.at(robot, q), residual(path, robot, q)
+        state, expected = State.at(robot, q), residual(path, q)
         one, other = (robot.frame(name) for name in loop.frames)
         np.testing.assert_allclose(state.position(one) - state.position(other), expected[:3],
                                    atol=1e-12)
@@ -313,16 +304,3 @@ def test_a_difference_from_mujoco_names_the_body(written, monkeypatch):
     monkeypatch.setattr(model, "_turned", lambda _, diagonal: np.diag(diagonal * (1.0 + 1e-6)))
     with pytest.raises(RobotError, match=r"the inertia at body '[ab]' is "):
         Robot.load(path)
-
-
-def test_check_shows_what_the_file_has_besides_joints(written, capsys):
-    path = written(world(
-        link("a", more=link("b", more=link("c"))) + TABLE,
-        '<contact><exclude body1="a" body2="c"/></contact><keyframe><key name="home"/></keyframe>'
-        '<equality><connect name="close" body1="a" body2="c" anchor="0 0 0"/></equality>'))
-    assert run_command(["check", str(path), "--set", "robot.root=a"]) == 0
-    said = capsys.readouterr().out
-    for part in ("closed chain    close: close 1 and close 2 have one origin",
-                 "keyframes       home", "may touch       a_joint to c_joint",
-                 "missing         left out, since it is not under root: table", 'root = "a"'):
-        assert part in said, part

@@ -61,23 +61,17 @@ def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
     np.testing.assert_allclose(path(3.8), [POINTS[3], [0] * 3, [0] * 3], atol=1e-12)
 
 
-def test_a_recorded_path_passes_its_points_with_continuous_acceleration():
-    path = PATHS["recorded"]
+@pytest.mark.parametrize("names", ["", "t, x, y, z\n"])
+def test_a_path_of_a_csv_file_passes_its_points_with_continuous_acceleration(names, tmp_path):
+    rows = "\n".join(",".join(map(str, (t, *p))) for t, p in zip(TIMES, POINTS, strict=True))
+    (tmp_path / "a.csv").write_text(f"{names}{rows}\n\n")
+    path = Recorded.from_csv(tmp_path / "a.csv")
     for t, point in zip(TIMES, POINTS, strict=True):
         np.testing.assert_allclose(path(t)[0], point, atol=1e-12)
     for t in TIMES[1:-1]:
         np.testing.assert_allclose(path(t - 1e-9), path(t + 1e-9), atol=1e-6)
     np.testing.assert_allclose(path(TIMES[0] + 1e-9)[1], 0.0, atol=1e-6)
     np.testing.assert_allclose(path(TIMES[-1] - 1e-9)[1], 0.0, atol=1e-6)
-
-
-def test_a_csv_file_is_read_with_or_without_names(tmp_path):
-    rows = "\n".join(",".join(map(str, (t, *p))) for t, p in zip(TIMES, POINTS, strict=True))
-    (tmp_path / "plain.csv").write_text(rows)
-    (tmp_path / "named.csv").write_text(f"t, x, y, z\n{rows}\n\n")
-    for name in ("plain", "named"):
-        np.testing.assert_allclose(Recorded.from_csv(tmp_path / f"{name}.csv")(1.5),
-                                   PATHS["recorded"](1.5))
 
 
 @pytest.mark.parametrize(("text", "said"), [
@@ -98,26 +92,14 @@ def test_a_wrong_csv_file_is_named_with_its_line(text, said, tmp_path):
 
 # BVH files.
 
-
 TEXT = """HIERARCHY
-ROOT hips
-{
-  OFFSET 1 0 0
-  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-  JOINT knee
-  {
-    OFFSET 0 -2 0
-    CHANNELS 1 Xrotation
-    End Site
-    {
-      OFFSET 0 -3 0
-    }
+ROOT hips {
+  OFFSET 1 0 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT knee {
+    OFFSET 0 -2 0 CHANNELS 1 Xrotation
+    End Site { OFFSET 0 -3 0 }
   }
-  JOINT hand
-  {
-    OFFSET 4 0 0
-    CHANNELS 0
-  }
+  JOINT hand { OFFSET 4 0 0 CHANNELS 0 }
 }
 MOTION
 Frames: 2

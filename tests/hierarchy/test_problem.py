@@ -19,15 +19,12 @@ def test_a_violation_is_the_distance_to_the_rows_interval():
     ([([[INF, 0]], [1])], "A[0, 0] is inf"),
     ([(np.eye(2), [1, INF])], "level 1, row 1"),
     ([([[1, 0]], [INF], [INF])], "level 1, row 0"),
-    ([([[1, 0]], [0], [np.nan])], "row 0: upper is nan"),
     ([(np.eye(2), [1])], "b has shape (1,), expected (2,)"),
-    ([([1, 0], [1])], "A has shape (2,)"),
     ([(np.eye(2), [1, 2]), (np.eye(3), [1, 2, 3])], "level 2: A has 3 columns"),
     ([(np.zeros((0, 0)), [])], "n = 0"),
     ([], "no levels"),
     ([(np.eye(2),)], "expected (A, b) or (A, lower, upper)"),
-    ([("abc", [1])], "level 1: A is not an array of numbers"),
-])
+    ([("abc", [1])], "level 1: A is not an array of numbers")])
 def test_bad_input_is_named(levels, said):
     with pytest.raises(HierarchyError) as error:
         Hierarchy.from_levels(levels)

@@ -30,17 +30,6 @@ def test_kinematics_equal_the_table_multiplied_out():
         np.testing.assert_allclose(state.rotation(frame), T[:3, :3], atol=1e-14)
 
 
-def test_a_state_is_moved_without_making_another_and_one_of_another_robot_is_named():
-    state = State.at(ROBOT, np.zeros(7))
-    views = [state.J, state.dJ, state.placements]
-    state.move(1.0, np.ones(7), np.ones(7))
-    fresh = State.at(ROBOT, np.ones(7), np.ones(7))
-    for view, name in zip(views, ("J", "dJ", "placements"), strict=True):
-        np.testing.assert_array_equal(view, getattr(fresh, name))
-    with pytest.raises(RobotError, match=r"q has shape \(6,\), expected \(7,\)"):
-        State.at(ROBOT, [0.0] * 6)
-
-
 @pytest.mark.parametrize(("robot", "what", "entry", "name"), [
     ("kuka_lwr", "q", 2, "joint_3"), ("kuka_lwr", "v", 1, "joint_2"),
     ("humanoid", "q", 0, "root_joint 1"), ("humanoid", "q", 6, "root_joint 7"),

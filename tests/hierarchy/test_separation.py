@@ -45,15 +45,6 @@ def rows(count, n=7):
     return np.full((count, n), 5.0), np.full(count, 5.0), np.full(count, 5.0)
 
 
-def test_pairs_agree_with_what_the_sensor_finds_nearest():
-    for q, v in STATES:
-        seen = seen_at(q, v).measurement
-        np.testing.assert_array_equal(seen.pairs.distance.min(axis=1), seen.distance)
-        np.testing.assert_array_equal(seen.pairs.distance.argmin(axis=1), seen.nearest)
-        nearest = seen.pairs.direction[np.arange(9), seen.nearest]
-        np.testing.assert_array_equal(nearest, seen.direction)
-
-
 def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
     """The least d2h/dt2 is 2 rate (w - dh/dt), with w = min(-rate h / 2, slow), exactly."""
     rate, slow = 10.0, 0.2
@@ -113,8 +104,7 @@ def test_a_hand_driven_into_an_obstacle_stops_at_the_distance(level, period, dif
     (None, 1, "'separation': the state carries no measurement of pairs"),
     (Pairs(9, 2), 1, "9 points are measured against 2 obstacles, expected 9 against 1"),
     (Pairs(8, 1), 1, "8 points .* expected 9"),
-    (Pairs(9, 0), None, "9 points are measured against 0 obstacles, .* one at least"),
-])
+    (Pairs(9, 0), None, "9 points are measured against 0 obstacles, .* one at least")])
 def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
     state = State.at(ROBOT, START)
     task = Separation(SENSOR.points, EVERYWHERE, obstacles)
@@ -124,12 +114,3 @@ def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
     state.measurement.pairs = pairs
     with pytest.raises(HierarchyError, match=said):
         task.writer(state, "velocity", *rows(18), row=0)()
-
-
-def test_without_obstacles_there_are_no_rows():
-    sensor = sensor_of([])
-    state = State.at(ROBOT, START)
-    sensor.measure(state)
-    task = Separation(sensor.points, EVERYWHERE, 0)
-    assert task.dimension == 0
-    task.writer(state, "velocity", *rows(0), row=0)()

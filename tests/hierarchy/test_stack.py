@@ -32,8 +32,7 @@ def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_bu
     assert s.row_names(("look-at",)) == ("x", "y")
     state = state_at(Q, V)
     h = stack().hierarchy(state, ("avoidance", "position"))
-    assert h.names == ("avoidance", "position")
-    assert h.sizes.tolist() == [3, 3]
+    assert (h.names, h.sizes.tolist()) == (("avoidance", "position"), [3, 3])
     np.testing.assert_array_equal(h.A[:3], TASKS["avoidance 3-D"].jacobian(state))
     np.testing.assert_array_equal(h.A[3:], TASKS["position"].jacobian(state))
     assert h.is_equality
@@ -93,8 +92,7 @@ def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
     (lambda s: s.reorder(["position", "position", "pointing"]), "each of"),
     (lambda s: s.hierarchy(state_at(Q, V), ("posture",)), "unknown task 'posture'"),
     (lambda s: Stack(level="effort"), "level must be"),
-    (lambda s: Stack([JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot has 7"),
-])
+    (lambda s: Stack([JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot has 7")])
 def test_bad_edits_are_named(edit, said):
     with pytest.raises(HierarchyError) as error:
         edit(stack())

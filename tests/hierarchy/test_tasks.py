@@ -138,16 +138,6 @@ def test_references_of_position_and_damping_are_those_of_the_letter():
     np.testing.assert_allclose(JointDamping(7).reference_velocity(state), 0)
 
 
-def test_the_cone_asks_for_one_side_and_its_surface_for_both():
-    q, v = STATES[4]
-    state = state_at(q, v)
-    for name, upper in (("pointing", "equal"), ("cone", "infinite")):
-        A, low, up = np.zeros((1, 7)), np.zeros(1), np.zeros(1)
-        TASKS[name].writer(state, "acceleration", A, low, up, 0)()
-        assert (up[0] == low[0]) == (upper == "equal")
-        assert np.isinf(up[0]) == (upper == "infinite")
-
-
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.5, 3.0, np.pi - 1e-9, np.pi])
 def test_rotation_vector_inverts_rodrigues(angle):
     axis = np.array([0.6, -0.48, 0.64])
@@ -202,8 +192,7 @@ def pose(state):
 @pytest.mark.parametrize(("method", "value", "said"), [
     ("jacobian", np.eye(7), "task 'elbow': jacobian has shape (7, 7), expected (1, 7)"),
     ("jacobian", np.full((1, 7), np.nan), "task 'elbow', row 0: A[0, 0] is nan"),
-    ("error", np.array([np.nan]), "task 'elbow', row 0: lower is nan"),
-])
+    ("error", np.array([np.nan]), "task 'elbow', row 0: lower is nan")])
 def test_a_wrong_task_is_named(method, value, said, monkeypatch):
     monkeypatch.setattr(Elbow, method, lambda self, state: value)
     with pytest.raises(HierarchyError) as error:

@@ -3,31 +3,17 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape
 
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
 
-LIMIT = '<limit lower="-1" upper="1" velocity="2" effort="3"/>'
-INERTIAL = """<inertial><origin xyz="0.1 0.2 0.3"/><mass value="2"/>
-  <inertia ixx="0.3" iyy="0.4" izz="0.5" ixy="0.01" ixz="0.02" iyz="0.03"/></inertial>"""
 CENTRE = np.array([0.1, 0.2, 0.3])
 INERTIA = np.array([[0.3, 0.01, 0.02], [0.01, 0.4, 0.03], [0.02, 0.03, 0.5]])
 ORIGIN = np.array([1.0, 2.0, 3.0]), Rotation.from_euler("xyz", [0.3, -0.4, 0.5])
 
 
-def joint(name, kind, parent, child, inside=LIMIT, axis="0 1 0", origin=""):
-    axis = f'<axis xyz="{axis}"/>' if axis else ""
-    return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-            f"{origin}{axis}{inside}</joint>")
-
-
-def link(name, inside=INERTIAL):
-    return f'<link name="{name}">{inside}</link>'
-
-
-PLACED = '<origin xyz="1 2 3" rpy="0.3 -0.4 0.5"/>'
-BALL = ('<collision><origin xyz="0.1 0.2 0.3"/><geometry><sphere radius="0.1"/></geometry>'
-        "</collision>")
+PLACED, BALL = placed("1 2 3", "0.3 -0.4 0.5"), shape('<sphere radius="0.1"/>', "0.1 0.2 0.3")
 
 
 @pytest.fixture
@@ -49,9 +35,6 @@ def two_joints(kind, axis="0 1 0", inside=LIMIT, world=""):
 def placement(robot, q, name):
     state, frame = State.at(robot, q), robot.frame(name)
     return state.position(frame), state.rotation(frame)
-
-
-# A free base
 
 
 @pytest.mark.parametrize("base", [None, "floating"])
@@ -76,9 +59,6 @@ def test_a_second_joint_with_the_name_of_a_free_base_is_refused(load):
     assert load(*parts).n == 1
     with pytest.raises(RobotError, match="root_joint"):
         load(*parts, base="floating")
-
-
-# Planar joints
 
 
 def motion_of(robot, q, along):
@@ -134,9 +114,6 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
                                ORIGIN[0] + ORIGIN[1].apply(bodies(q)[0][0]), atol=1e-12)
 
 
-# What is lost is said
-
-
 @pytest.mark.parametrize(("changed", "said"), [
     ({"arm": INERTIAL.replace("0.4", "-0.4")}, "inertias of arm: a principal moment is negative"),
     ({"arm": '<inertial><mass value="1"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>'
@@ -150,8 +127,7 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
     ({"limit": '<limit lower="-1" upper="1" velocity="2" effort="0"/>'}, "effort limits of only:"),
     ({"kind": "planar"}, "limits of only: a floating or planar joint has none"),
     ({"kind": "planar", "axis": ""}, "planar joints only: their planes are normal to x"),
-    ({"more": link("only") + joint("x", "fixed", "base", "only", "", "")}, "frames called only:"),
-])
+    ({"more": link("only") + joint("x", "fixed", "base", "only", "", "")}, "frames called only:")])
 def test_what_a_robot_is_without_is_said(load, changed, said):
     given = {"arm": INERTIAL, "more": "", "root": "", "limit": LIMIT, "kind": "revolute",
              "axis": "0 1 0", **changed}
@@ -159,9 +135,6 @@ def test_what_a_robot_is_without_is_said(load, changed, said):
                  joint("only", given["kind"], "base", "arm", given["limit"], given["axis"]),
                  given["more"], root=f'<robot name="r"{given["root"]}>')
     assert [sentence for sentence in robot.missing if said in sentence], robot.missing
-
-
-# Two frames of one name
 
 
 def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
@@ -175,14 +148,6 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
     assert robot.end_effector == "mount", "not the tool, which is two"
 
 
-# Which file it is
-
-
-@pytest.mark.parametrize("name", ["r.URDF", "r.xml", "r.xacro", "r.txt"])
-def test_the_root_element_says_what_a_file_is(load, name):
-    assert load(link("a"), link("b"), joint("j", "revolute", "a", "b"), name=name).n == 1
-
-
 @pytest.mark.parametrize(("name", "text", "said"), [
     ("a.sdf", "<sdf/>", r"is an SDF \(Gazebo\), which is not read; give the URDF"),
     ("a.xacro", "<robot name='r'><xacro:include filename='b'/></robot>",
@@ -192,16 +157,8 @@ def test_the_root_element_says_what_a_file_is(load, name):
     ("a.xml", "<mujocoinclude/>", "give the file that includes it"),
     ("a.toml", "name = 'a'", r"A scenario is read by scenarios\.load"),
     ("a.urdf", "<robot/>", "its <robot> has no name"),
-    ("a.urdf", "<robot name='r'><link name='table'/></robot>", "with base = 'floating'"),
-])
+    ("a.urdf", "<robot name='r'><link name='table'/></robot>", "with base = 'floating'")])
 def test_another_file_is_refused_with_what_to_give(tmp_path, name, text, said):
     (tmp_path / name).write_text(text)
     with pytest.raises(RobotError, match=said):
         Robot.load(tmp_path / name)
-
-
-def test_a_folder_and_a_missing_file_are_no_unknown_robots(tmp_path):
-    with pytest.raises(RobotError, match="is a folder"):
-        Robot.load(tmp_path)
-    with pytest.raises(RobotError, match="does not exist"):
-        Robot.load("nowhere.SDF")

@@ -134,10 +134,10 @@ def test_every_resolver_has_a_page_of_theory_with_an_example(name):
     assert f"`{name}`" in (DOCS / "choosing.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", TASKS)
-def test_every_task_has_a_row(name):
+def test_every_task_has_a_row():
     text = (DOCS / "tasks.md").read_text(encoding="utf-8")
-    assert f"\n| {name} | `{TASKS[name].__name__}` |" in text, "add a row to docs/tasks.md"
+    assert [name for name, task in TASKS.items()
+            if f"\n| {name} | `{task.__name__}` |" not in text] == [], "add a row to docs/tasks.md"
 
 
 @pytest.mark.parametrize("name", shipped())

@@ -24,7 +24,6 @@ SHAPES = {
                                ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))),
     "capsule along the axis": Obstacle("capsule", (0.02, 0.01, 2.0), (0.1, 0.4)),
     "box": Obstacle("box", (0.0, 0.1, 2.0), (0.3, 0.2, 0.5), TURNED),
-    "box along the axes": Obstacle("box", (0.2, 0.1, 1.5), (0.3, 0.2, 0.5)),
     "sphere half outside": Obstacle("sphere", (1.1, 0.5, 2.0), (0.3,)),
     "box around the camera's plane": Obstacle("box", (0.4, 0.0, 0.0), (0.1, 0.1, 1.0)),
     "capsule past the camera": Obstacle("capsule", (0.3, 0.1, 0.2), (0.1, 1.0)),
@@ -77,6 +76,17 @@ def test_every_pixel_has_the_depth_at_which_its_ray_meets_the_shape(name):
         assert seen[i, j] == pytest.approx(traced(SHAPES[name], pinhole, j, i), rel=2e-6), (i, j)
 
 
+@pytest.mark.parametrize(("rounding", "step"), [("step", 0.01), ("disparity", 2.85e-3)])
+def test_rounding_is_to_steps_of_the_depth_or_of_its_inverse_and_bounded(rounding, step):
+    errors = EXACT | {"rounding": rounding, "step": step}
+    seen, true = (depths(camera(SHAPES["sphere"], errors=one)) for one in (errors, IDEAL))
+    steps = seen[seen > 0] / step if rounding == "step" else 1.0 / seen[seen > 0] / step
+    np.testing.assert_allclose(steps, np.rint(steps), atol=2e-3)
+    assert len(np.unique(seen)) > 3
+    assert all(abs(a - z) <= bound(DepthErrors(**errors), z) + 1e-6
+               for a, z in zip(seen[true > 0], true[true > 0], strict=True))
+
+
 @pytest.mark.parametrize("depth", [1.0, 3.0])
 def test_noise_has_the_stated_size_and_a_bound(depth):
     errors = {"step": 0.0, "missing": 0.0, "missing_at_edges": 0.0, "outliers": 0.0}
@@ -86,18 +96,6 @@ def test_noise_has_the_stated_size_and_a_bound(depth):
     assert off.std() == pytest.approx(sigma, rel=0.05)
     largest = bound(DepthErrors(**errors), depth)
     assert np.abs(off).max() - 1e-6 <= largest == pytest.approx(3.5 * sigma)
-
-
-@pytest.mark.parametrize(("rounding", "step"), [("step", 0.01), ("disparity", 2.85e-3)])
-def test_rounding_is_to_steps_of_the_depth_or_of_its_inverse(rounding, step):
-    errors = EXACT | {"rounding": rounding, "step": step}
-    seen = depths(camera(SHAPES["sphere"], errors=errors))
-    true = depths(camera(SHAPES["sphere"]))
-    steps = seen[seen > 0] / step if rounding == "step" else 1.0 / seen[seen > 0] / step
-    np.testing.assert_allclose(steps, np.rint(steps), atol=2e-3)
-    assert len(np.unique(seen)) > 3
-    assert all(abs(a - z) <= bound(DepthErrors(**errors), z) + 1e-6
-               for a, z in zip(seen[true > 0], true[true > 0], strict=True))
 
 
 def test_pixels_are_missing_at_random_and_more_so_at_edges():
@@ -114,34 +112,23 @@ def test_pixels_are_missing_at_random_and_more_so_at_edges():
 def test_outliers_are_nearer_and_come_in_their_share_of_frames():
     errors = EXACT | {"outliers": 0.3}
     scene = wall(errors=errors)
-    off = [np.flatnonzero(scene.image(i, STATE)[0] != 2.0) for i in range(200)]
-    assert np.mean([pixels.size > 0 for pixels in off]) == pytest.approx(0.3, abs=0.1)
-    assert max(pixels.size for pixels in off) == 25
-    assert {pixels.size for pixels in off} >= {0, 1, 9, 25}
-    for i in range(200):
-        reading = scene.image(i, STATE)[0]
-        assert ((reading == 2.0) | ((reading >= 0.5) & (reading < 2.0))).all()
-
-
-def test_a_frame_follows_from_seed_and_number_alone():
-    one, other, third = wall(seed=1), wall(seed=1), wall(seed=2)
-    later = one.image(7, STATE)[0].copy()
-    first = one.image(0, STATE)[0].copy()
-    np.testing.assert_array_equal(later, other.image(7, STATE)[0])
-    assert (first != later).mean() > 0.5
-    assert (third.image(7, STATE)[0] != later).mean() > 0.5
+    seen = [scene.image(i, STATE)[0].copy() for i in range(200)]
+    sizes = [np.count_nonzero(reading != 2.0) for reading in seen]
+    assert np.mean(np.array(sizes) > 0) == pytest.approx(0.3, abs=0.1)
+    assert set(sizes) >= {0, 1, 9, 25}
+    assert max(sizes) == 25
+    assert 0.5 <= np.min(seen) <= np.max(seen) == 2.0
 
 
 def test_jitter_delays_each_frame_by_less_than_its_most_and_by_the_seed():
-    late = camera(rate=30.0, jitter=0.02, seed=3)
+    late, same, other = (camera(rate=30.0, jitter=0.02, seed=seed) for seed in (3, 3, 4))
     times = np.array([late.time(i) for i in range(100)])
     waits = times - np.arange(100) / 30.0
     assert waits.min() >= 0.0
     assert 0.015 < waits.max() < 0.02
     assert [late.newest(t) for t in times] == list(range(100))
     assert [late.newest(t - 1e-6) for t in times] == list(range(-1, 99))
-    assert camera(rate=30.0, jitter=0.02, seed=3).time(5) == times[5]
-    assert camera(rate=30.0, jitter=0.02, seed=4).time(5) != times[5]
+    assert same.time(5) == times[5] != other.time(5)
 
 
 @pytest.mark.parametrize(("make", "said"), [
@@ -151,8 +138,7 @@ def test_jitter_delays_each_frame_by_less_than_its_most_and_by_the_seed():
     (lambda: Pinhole(rotation=np.diag([1, 1, -1])), "rotation"),
     (lambda: Pinhole(position=(0, np.inf, 0)), "position"),
     (lambda: looking_at((1, 2, 3), (1, 2, 3)), "look_at"),
-    (lambda: camera(rate=30.0, jitter=0.05), "jitter = 0.05 s"),
-])
+    (lambda: camera(rate=30.0, jitter=0.05), "jitter = 0.05 s")])
 def test_what_cannot_be_is_refused_by_name(make, said):
     with pytest.raises(HierarchyError, match=said.replace("(", r"\(")):
         make()

@@ -1,6 +1,8 @@
 """What `hierarchy check ROBOT` prints to paste makes a scenario that runs, of the same robot."""
 
 import pytest
+import urdf_text
+from urdf_text import INERTIAL, joint, link, placed, shape
 
 from hierarchy import Robot
 from scenarios import load
@@ -10,31 +12,22 @@ from scenarios.cli.main import run_command
 CONTROL = """
 [damping]
 value = 5.0
-
 [control]
 stack = "hierarchical"
 resolver = "hcod"
 duration = 0.02
-
 [[tasks]]
 kind = "pose"
 """
 LIMIT = '<limit lower="0.5" upper="1" velocity="0" effort="1"/>'
 
 
-def link(name):
-    return (f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" '
-            'ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><sphere radius="0.01"/>'
-            "</geometry></collision></link>")
-
-
 def urdf(*joints):
     """A tree of joints (name, kind, parent, child, inside)."""
     links = dict.fromkeys(end for _, _, *ends, _ in joints for end in ends)
-    return '<robot name="r">' + "".join(map(link, links)) + "".join(
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="0.1 0.2 0.3"/><axis xyz="0 1 0"/>{inside}</joint>'
-        for name, kind, parent, child, inside in joints) + "</robot>"
+    return urdf_text.urdf(
+        *(link(name, INERTIAL + shape('<sphere radius="0.01"/>')) for name in links),
+        *(joint(*one, origin=placed("0.1 0.2 0.3")) for one in joints))
 
 
 FOLLOWING = [("f1", "revolute", "palm", "finger1", LIMIT),
@@ -61,6 +54,7 @@ def pasted(model, folder, capsys):
     """Return the robot that `check` described, and that of a scenario with what it printed."""
     assert run_command(["check", model]) == 0
     said = capsys.readouterr().out
+    assert said.count("  follows         f") == 3 * ("gripper" in model)
     section, path = said[said.index("[robot]\n"):], folder / "pasted.toml"
     end = next(line for line in section.splitlines() if line.startswith("end_effector = "))
     path.write_text('name = "pasted"\n' + section + CONTROL
@@ -90,12 +84,3 @@ def test_the_section_to_paste_runs_as_it_is(name, tmp_path, monkeypatch, capsys)
 @pytest.mark.parametrize("name", ["pr2", "romeo"])
 def test_the_section_of_a_public_robot_runs_as_it_is(name, tmp_path, capsys):
     expect_the_same(*pasted(f"example_robot_data:{name}", tmp_path, capsys))
-
-
-def test_joints_that_follow_are_named_and_need_no_task(tmp_path, capsys):
-    (tmp_path / "gripper.urdf").write_text(ROBOTS["gripper.urdf"])
-    assert run_command(["check", str(tmp_path / "gripper.urdf")]) == 0
-    said = capsys.readouterr().out
-    for name in ("f2", "f3", "f4"):
-        assert f"  follows         {name} = 1 f1 in the file (kept by every scenario)" in said
-    assert "[[tasks]]" not in said

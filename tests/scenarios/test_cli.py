@@ -34,9 +34,12 @@ def test_certify_counts_the_ticks_whose_answer_is_right_and_names_the_first_that
     assert all(line in out for line in said)
 
 
-def test_a_saved_run_says_itself_how_to_repeat_it(tmp_path):
-    first = ["run", "ellipse", *SHORT, "--set", "pointing.alpha_d=35", "--out", "a"]
+def test_a_saved_run_says_itself_how_to_repeat_it(tmp_path, capsys):
+    first = ["run", "ellipse", *SHORT, "--set", "pointing.alpha_d=35", "--out", "a", "--json"]
     assert run_command(first) == 0
+    kept = json.loads((tmp_path / "a" / "metrics.json").read_text())
+    assert json.loads(capsys.readouterr().out) == {
+        "scenario": "ellipse", "resolver": "tpm-published", "folder": "a", **kept}
     assert run_command(["run", "a/scenario.toml", "--out", "b"]) == 0
     assert ((tmp_path / "a" / "scenario.toml").read_text()
             == (tmp_path / "b" / "scenario.toml").read_text())
@@ -76,10 +79,8 @@ def simulation_is(stand_in, monkeypatch):
 
 
 def test_a_fault_is_reported_and_the_run_kept(tmp_path, capsys, monkeypatch):
-    def faulty(scenario, progress=None, certified=False):
-        return recording(scenario, fault="interrupted at tick 5")
-
-    simulation_is(faulty, monkeypatch)
+    simulation_is(lambda scenario, **_: recording(scenario, fault="interrupted at tick 5"),
+                  monkeypatch)
     assert run_command(["run", "ellipse", "--out", "a"]) == 1
     assert "fault: interrupted at tick 5" in capsys.readouterr().err
     assert (tmp_path / "a" / "run.npz").exists()
@@ -99,24 +100,22 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, cap
     assert "[bold]no[/bold] answer" in capsys.readouterr().err
 
 
-INTERRUPTED_AT_TICK_500 = """
-import contextlib, os, signal
-import scenarios.cli.progress
+def ended(code, folder, *words):
+    """The process of a command that runs behind a line of code."""
+    code = f"import os, signal; {code}from scenarios.cli.start import main; main()"
+    return subprocess.run([sys.executable, "-c", code, *words], cwd=folder, capture_output=True,
+                          text=True, check=False)
 
-@contextlib.contextmanager
-def bar():
-    yield lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGTERM)
 
-scenarios.cli.progress.bar = bar
-from scenarios.cli.start import main
-main()
+INTERRUPTED_AT_TICK_500 = """import contextlib, scenarios.cli.progress as progress
+progress.bar = lambda: contextlib.nullcontext(
+    lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGTERM))
 """
 
 
 def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
-    command = [sys.executable, "-c", INTERRUPTED_AT_TICK_500, "run", "ellipse", "--duration", "20",
-               "--out", "a"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = ended(INTERRUPTED_AT_TICK_500, tmp_path, "run", "ellipse", "--duration", "20",
+                 "--out", "a")
     assert done.returncode == 1
     run = load_run(tmp_path / "a")
     assert 500 <= run.ticks < 20_000
@@ -164,36 +163,6 @@ def test_runs_side_by_side_are_those_made_one_by_one_and_are_timed_alone(tmp_pat
     assert "first 10 ticks of each repeated" in (tmp_path / "2" / "index.html").read_text()
 
 
-def test_an_error_in_the_page_costs_no_run_and_says_where_they_are(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("scenarios.results.page.comparison_page",
-                        mock.Mock(side_effect=LookupError("no such style")))
-    assert run_command(["compare", "ellipse", "--resolvers", "tpm,hcod", *SHORT, "--workers", "1",
-                        "--out", "b"]) == 1
-    assert "no such style; the runs are in b" in capsys.readouterr().err
-    assert len(list((tmp_path / "b").rglob("run.npz"))) == 2
-
-
-def said(arguments, capsys, code=0):
-    """Run a command with --json and return what it printed, which is one JSON object."""
-    assert run_command([*arguments, "--json"]) == code
-    return json.loads(capsys.readouterr().out)
-
-
-def test_json_of_a_run_is_its_metrics_and_where_it_is(tmp_path, capsys):
-    found = said(["run", "ellipse", *SHORT, "--out", "a"], capsys)
-    kept = json.loads((tmp_path / "a" / "metrics.json").read_text())
-    assert found == {"scenario": "ellipse", "resolver": "tpm-published", "folder": "a", **kept}
-    assert found["ticks"] == 20
-
-
-def test_json_of_a_check_is_the_whole_scenario_and_its_first_tick(capsys):
-    found = said(["check", "ellipse", "--set", "pointing.alpha_d=35"], capsys)
-    assert found["scenario"]["pointing"]["alpha_d"] == 35.0
-    assert found["scenario"]["control"]["resolver"] == "tpm-published"
-    assert found["first_tick"]["levels"] == ["position", "avoidance"]
-    assert (found["first_tick"]["unmet"], found["warnings"]) == ([], [])
-
-
 def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsys):
     def completed(*words):
         """What bash would offer for the last of the words of a command line."""
@@ -205,18 +174,15 @@ def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsy
         return capsys.readouterr().out.split()
 
     assert completed("hierarchy", "comp") == ["compare"]
-    assert completed("hierarchy", "run", "human-h") == ["human-hqp"]
     assert completed("hierarchy", "compare", "ladder")[-1] == "ladder"
     assert completed("hierarchy", "compare", "ellipse", "--resolvers", "tpm,hc") == ["tpm,hcod"]
     assert completed("hierarchy", "sweep", "ell") == ["ellipse-starts"]
 
 
 def test_ctrl_c_while_it_is_starting_ends_the_command_quietly(tmp_path):
-    held = "import os, signal, sys; from scenarios.cli import start; " \
-        "sys.meta_path.insert(0, type('Held', (), {'find_spec': staticmethod(" \
-        "lambda *_: os.kill(os.getpid(), signal.SIGINT))})); start.main()"
-    done = subprocess.run([sys.executable, "-c", held, "list"], cwd=tmp_path,
-                          capture_output=True, text=True, check=False)
+    done = ended("import sys; from scenarios.cli import start; sys.meta_path.insert(0, type("
+                 "'Held', (), {'find_spec': lambda *_: os.kill(os.getpid(), signal.SIGINT)})); ",
+                 tmp_path, "list")
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
 
 

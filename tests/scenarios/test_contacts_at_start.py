@@ -26,9 +26,6 @@ def tilted(degrees):
             "start.joints": {"left_ankle_pitch": angle, "right_ankle_pitch": angle}}
 
 
-# At the start
-
-
 @pytest.mark.parametrize(("keys", "said"), [
     (tilted(13.5), "'left_foot' is not flat on the floor but tilted by 13.5 deg; its corner "
                    r"\(-0.05, -0.04, 0\) is 49 mm above the floor"),
@@ -38,8 +35,7 @@ def tilted(degrees):
     ({"plant.height": -0.05}, "'left_foot' is 50 mm above the floor. start.on_floor"),
     ({"plant.height": 0.02}, "'left_foot' is 20 mm below the floor"),
     ({"contacts.0.x": None, "contacts.0.y": None, "contacts.0.offset": [0.0, 0.0, 0.01]},
-     "'left_foot' is 9 mm above the floor"),
-])
+     "'left_foot' is 9 mm above the floor")])
 def test_a_contact_that_does_not_stand_on_the_floor_is_refused(keys, said):
     with pytest.raises(ScenarioError, match=f"contacts.*: at the start .*{said}"):
         build(changed(keys))
@@ -53,17 +49,11 @@ def test_what_comes_down_within_a_few_ticks_or_later_is_not_refused(keys):
     build(changed(keys))
 
 
-# In the first tick
-
-
 def test_a_floor_with_less_friction_than_the_controller_counts_on_is_named():
     found = first_tick(changed({"plant.friction": 0.4, "contacts.1.friction": 0.3})).warnings
     assert [line for line in found if "friction" in line] == [
         "contact 'left_foot': the controller counts on a friction of 0.7, and the plant has 0.4 "
         "(plant.friction): it may slip"]
-
-
-# Faults
 
 
 def test_a_joint_that_passes_its_stop_ends_the_run_with_a_fault():

@@ -1,6 +1,5 @@
 """A run goes on with other settings: the same robot, plant and obstacles, other tasks."""
 
-import numpy as np
 import pytest
 
 from hierarchy.avoidance import Obstacle, Obstacles
@@ -46,20 +45,3 @@ def test_a_cell_that_is_kept_goes_on_where_it_was():
     one, other = once.finish(scenario, None), twice.finish(scenario, None)
     for name in ("t", "q", "v", "command", "order", "minimal_distance", "desired_position"):
         assert (one[name] == other[name]).all(), name
-
-
-def test_another_resolver_and_threshold_take_over_in_mid_motion():
-    scenario = load("ellipse")
-    controller = Controller(scenario)
-    recorder = Recorder(controller, 40)
-    drive(controller, recorder, 0, 20)
-    nowhere = {"avoidance.near": 0.0, "avoidance.far": 0.0}
-    other = scenario.with_resolver("hcod").with_changes(nowhere)
-    controller = Controller(other, build(other, controller.cell))
-    recorder.follow(controller)
-    drive(controller, recorder, 20, 20)
-    recording = recorder.finish(scenario, None)
-    assert controller.resolver.name == "hcod"
-    assert "avoidance" in recording.orders[recording["order"][0]]
-    assert "avoidance" not in recording.orders[recording["order"][-1]]
-    assert np.abs(np.diff(recording["q"], axis=0)).max() < 2e-3  # rad in 1 ms: nothing jumps

@@ -11,7 +11,7 @@ import pytest
 from scenarios import load, load_run, simulate
 from scenarios.cli import doctor
 from scenarios.cli.main import run_command
-from scenarios.files import OutputError, claim, slug, whole, write_text
+from scenarios.files import OutputError, claim, slug
 from scenarios.measure import run_folder
 
 COMMAND = [sys.executable, "-c", "from scenarios.cli.start import main; main()"]
@@ -41,13 +41,6 @@ def test_a_folder_that_cannot_be_made_is_said_before_the_run(name, tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="cannot be written"):
         claim(tmp_path / name)
-
-
-def test_the_longest_name_that_a_file_system_takes_can_be_written(tmp_path):
-    for name in ("x" * 255, "é" * 127):
-        with whole(claim(tmp_path / name)) as folder:
-            write_text(folder / "a", "a")
-        assert [path.name for path in (tmp_path / name).iterdir()] == ["a"]
 
 
 def test_names_of_settings_that_differ_late_give_different_folders():
@@ -90,18 +83,6 @@ def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, capsys):
     bad = [one for one in said["findings"] if one["well"] is False]
     assert [one["what"] for one in bad] == ["resolvers agree"]
     assert "RuntimeError: no such kernel" in bad[0]["found"]
-
-
-@pytest.mark.slow
-def test_a_missing_package_says_how_to_get_it(monkeypatch):
-    there = doctor._version
-    monkeypatch.setattr(doctor, "_version", lambda package: (
-        None if package in ("osqp", "mcap") else there(package)))
-    found = {one.what: one for one in [*doctor._versions(), *doctor._extras()]}
-    assert found["osqp"].well is False
-    assert found["osqp"].remedy == "pip install osqp"
-    assert found["export"].remedy == "pip install 'task-hierarchy[export]'"
-    assert found["export"].well is None
 
 
 def test_a_run_that_cannot_be_saved_where_it_should_is_saved_elsewhere(tmp_path, monkeypatch):

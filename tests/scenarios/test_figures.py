@@ -73,21 +73,16 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(run_folder
     assert (run_folder / "b.svg").read_text() == "new"
     assert (run_folder / "run.npz").exists()
     assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
-
-
-def test_a_style_or_folder_that_is_not_there_is_an_error_that_names_it(run_folder, tmp_path):
     with pytest.raises(HierarchyError, match="unknown style 'papr'; did you mean 'paper'"):
         letter.redraw([run_folder], "papr")
-    with pytest.raises(HierarchyError, match="nothing"):
-        letter.redraw([tmp_path / "nothing"])
 
 
 def test_tick_times_are_drawn_in_microseconds_beside_the_period():
     (ax,) = letter.tick_times(recording(time_tick=[4e-6, 4e-6, 4e-6, 4e-6, 2e-3])).axes
-    bars = [bar for bar in ax.patches if bar.get_height() > 0.0]
-    assert [bar.get_height() for bar in bars] == [4.0, 1.0]
-    assert [bar.get_x() <= time * (1.0 + 1e-9) <= bar.get_x() + bar.get_width()
-            for bar, time in zip(bars, (4.0, 2000.0), strict=True)] == [True, True]
+    few, one = (bar for bar in ax.patches if bar.get_height() > 0.0)
+    assert (few.get_height(), one.get_height()) == (4.0, 1.0)
+    for bar, time in ((few, 4.0), (one, 2000.0)):
+        assert bar.get_x() <= time * (1.0 + 1e-9) <= bar.get_x() + bar.get_width()
     assert ax.lines[0].get_xdata()[0] == pytest.approx(1000.0)
 
 
@@ -101,14 +96,9 @@ def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event(
     assert "fault" in [text.get_text() for text in ax.texts]
 
 
-def letters(name, **changed):
-    """A run made by hand that passes for the whole run of a shipped scenario."""
-    return recording(load(name), **changed)
-
-
 def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
     names = ("ellipse-35deg-equality", "ellipse", "ellipse-velocity", "ellipse-35deg", "ellipse-3d")
-    runs = [letters(name, v=np.full((5, 7), float(i))) for i, name in enumerate(names)]
+    runs = [recording(load(name), v=np.full((5, 7), float(i))) for i, name in enumerate(names)]
     drawn = dict(letter.figures(runs))
     assert list(drawn) == ["figure-4-joint-velocities", "figure-5-distances",
                            "figure-6-velocities-and-distance", "figure-7-pointing-error"]

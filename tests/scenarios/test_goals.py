@@ -25,28 +25,15 @@ def joint(values):
     return {"q": np.outer(values, np.eye(7)[0])}  # limits are -2 and 2
 
 
+def cone(degrees):
+    return {"pointing_error": np.cos(np.radians(60.0)) - np.cos(np.radians(degrees))}
+
+
 def test_median_worst_and_share_count_from_when_the_target_was_first_reached():
     one = goal("position", **at([90, 0, 0.5, 4, 3]))
     assert (one.reached, one.first) == (1.0, 3.0)
     assert (one.median, one.worst, one.share) == pytest.approx((1.75e-3, 4e-3, 0.5))
     assert (one.flag, one.unit) == ("left", "m")
-
-
-@pytest.mark.parametrize(("q", "flag", "worst"), [
-    ([2.5, 2.2, 1.9, 1.9, 1.9], "kept", 0.0),           # came back
-    ([2.5, 2.7, 1.9, 1.9, 1.9], "broken", 0.2),         # went further first
-    ([2.5, 1.9, 2.1, 1.9, 1.9], "broken", 0.1),         # and out again
-    ([2.5, 2.4, 2.4, 2.4, 2.4], "never kept", 0.5),     # stayed
-    ([0.0, 2.3, -2.1, 0.0, 0.0], "broken", 0.3)])
-def test_who_starts_beyond_a_limit_and_comes_back_has_not_passed_it(q, flag, worst):
-    one = goal("joint limits", **joint(q))
-    assert (one.flag, one.worst) == (flag, pytest.approx(worst))
-
-
-def test_a_cone_is_kept_in_degrees():
-    error = np.cos(np.radians(60.0)) - np.cos(np.radians([60.0, 58.0, 76.0, 60.0, 60.0]))
-    one = goal("pointing", pointing_error=error)
-    assert (one.flag, one.worst, one.unit) == ("broken", pytest.approx(16.0), "deg")
 
 
 def test_three_sentences_say_the_end_the_promises_and_the_targets():
@@ -64,6 +51,12 @@ def test_three_sentences_say_the_end_the_promises_and_the_targets():
     (at([90, 0.5, 0.5, 0.25, 0.5]), "position", "met", 0.5e-3, "m"),
     (at([437] * 5), "position", "never met", 0.437, "m"),
     (joint([0.0] * 5), "joint limits", "kept", 0.0, "rad"),
+    (joint([2.5, 2.2, 1.9, 1.9, 1.9]), "joint limits", "kept", 0.0, "rad"),        # came back
+    (joint([2.5, 2.7, 1.9, 1.9, 1.9]), "joint limits", "broken", 0.2, "rad"),      # after more
+    (joint([2.5, 1.9, 2.1, 1.9, 1.9]), "joint limits", "broken", 0.1, "rad"),      # and out again
+    (joint([2.5, 2.4, 2.4, 2.4, 2.4]), "joint limits", "never kept", 0.5, "rad"),  # stayed
+    (joint([0.0, 2.3, -2.1, 0.0, 0.0]), "joint limits", "broken", 0.3, "rad"),
+    (cone([60.0, 58.0, 76.0, 60.0, 60.0]), "pointing", "broken", 16.0, "deg"),
     ({"v": np.diag([0, 0, 4.0, 0, 0, 0, 0])[:5], "velocity_limit": np.full(7, 3.0)},
      "speed limits", "broken", 1.0, "rad/s"),
     ({"v": np.diag([0, 0, 3.0005, 0, 0, 0, 0])[:5], "velocity_limit": np.full(7, 3.0)},
@@ -118,10 +111,6 @@ def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
     assert "position" in dict(posture.held_by)
     assert str(position).startswith(f"row missed: position in {100 * position.share:.0f} % of its "
                                     f"ticks ({position.seconds:.3g} s); held back by joint limits ")
-
-
-@pytest.mark.slow
-def test_a_run_that_meets_all_gives_nothing_up():
     assert given_up(simulate(load("ellipse-hqp", ["control.duration=0.05"]))) == ()
 
 

@@ -9,7 +9,6 @@ from hierarchy.paths import Ellipse
 from hierarchy.tasks import CentreOfMass, Pointing, Pose, Position
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.config import Scenario
 from scenarios.measure.metrics import measure
 
 pytestmark = pytest.mark.slow
@@ -88,13 +87,3 @@ def test_out_of_reach_strict_resolvers_keep_the_feet(name):
     assert np.linalg.norm(run["task_error_left_hand"][-1]) > 0.3, "nobody can reach that far"
     excess = np.maximum(run["q"] - run["joint_upper"], run["joint_lower"] - run["q"])
     assert excess.max() < 1e-6
-
-
-def test_tasks_stand_behind_limits_position_and_pointing_in_their_order():
-    hand = {"kind": "position", "frame": "left_hand"}
-    cell = build(Scenario.model_validate({
-        "name": "own", "robot": {"model": "dual_arm"}, "limits": {"acceleration": 10.0},
-        "control": {"duration": 0.02, "resolver": "tpm", "stack": "hierarchical"},
-        "position": {"path": {"kind": "still", "position": [0.5, -0.4, 0.8]}},
-        "tasks": [hand | {"name": "b"}, hand | {"name": "a"}, {"kind": "com", "axes": "z"}]}))
-    assert cell.stack.names == ("joint limits", "position", "b", "a", "com")

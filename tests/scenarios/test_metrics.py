@@ -1,6 +1,5 @@
 from types import SimpleNamespace
 
-import hand_made
 import numpy as np
 import pytest
 from hand_made import HandMadeScenario, recording
@@ -56,20 +55,12 @@ SOLVED, FAILED = int(Status.SOLVED), int(Status.NUMERICAL_FAILURE)
     ("acceleration_step_max", {"a": PULSES}, 60.0),
     ("acceleration_step_ticks", {"a": PULSES}, 1.0),  # above 50 rad/s²
     ("velocity_step_ticks", {"a": PULSES}, 0.0),
-    ("joint_limit_excess", {}, 0.0),
+    ("joint_limit_excess", {"q": np.outer(np.eye(5)[1], (2.125, -2.25))}, 0.25),  # beyond 2
     ("ticks_not_solved", {"status": [SOLVED, FAILED, FAILED, SOLVED, SOLVED]}, 2),
     ("active_set_changes", {"active_set": [0, 0, 1, 1, 0]}, 2),
     ("active_set_changes", {"active_set": [2, -1, 2, -1, 0]}, 1)])  # where it is known
 def test_a_signal_has_its_largest_value_step_or_count(name, signals, value):
     assert measure(recording(**signals))[name].value == value
-
-
-def test_joint_limit_excess_names_the_joint_that_is_furthest_out():
-    q = np.zeros((5, 2))
-    q[1] = (2.1, -2.25)  # limits are -2 and 2
-    metric = measure(recording(q=q))["joint_limit_excess"]
-    assert metric.value == pytest.approx(0.25)
-    assert metric.note == "joint 2"
 
 
 @pytest.mark.parametrize(("unit", "shown"), [
@@ -92,13 +83,11 @@ def test_times_are_given_by_median_and_tails_for_each_part():
 
 
 def test_a_scenario_without_a_task_has_no_metric_of_it():
-    full = recording()
-    for signal in ("pointing_error", "minimal_distance", "ee_distance", "position_error"):
+    full = recording(HandMadeScenario(pointing=None))
+    for signal in ("minimal_distance", "ee_distance", "position_error"):
         del full.signals[signal]
-    assert {"cone_violation_max", "body_distance_min", "ee_distance_min", "position_error_rms"
-            }.isdisjoint(measure(full))
-    no_cone = recording(hand_made.HandMadeScenario(pointing=None))
-    assert "cone_violation_max" not in measure(no_cone)
+    assert {"cone_violation_max", "body_distance_min", "ee_distance_min", "position_error_rms",
+            "joint_limit_excess"} & measure(full).keys() == {"joint_limit_excess"}
 
 
 def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_as_one():
@@ -108,24 +97,21 @@ def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_
     assert data["ticks"] == 5
 
 
-def seen_by_a_camera(**signals):
-    asked = hand_made.HandMadeScenario()
-    asked.avoidance.promised = {"body": 0.2, "ee": 0.3}
-    return measure(recording(asked, **signals))
-
-
 def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
-    found = seen_by_a_camera(minimal_distance=[1, 0.05, 1, 1, 1], ee_distance=[1, 1, 1, 0.02, 1],
-                             true_minimal_distance=[1, 0.4, 0.3, 1, 1],
-                             true_ee_distance=[1, 1, 0.35, 1, 1])
+    asked = HandMadeScenario()
+    asked.avoidance.promised = {"body": 0.2, "ee": 0.3}
+    found = measure(recording(asked, minimal_distance=[1, 0.05, 1, 1, 1],
+                              ee_distance=[1, 1, 1, 0.02, 1],
+                              true_minimal_distance=[1, 0.4, 0.3, 1, 1],
+                              true_ee_distance=[1, 1, 0.35, 1, 1]))
     assert found["body_distance_min"].value == 0.3
     assert found["ee_distance_min"].value == 0.35
     measured = found["body_distance_min_measured"], found["ee_distance_min_measured"]
     assert [metric.value for metric in measured] == [0.05, 0.02]
     assert all(metric.detail and metric.lower_is_better is None for metric in measured)
-    found = seen_by_a_camera(minimal_distance=np.zeros(5), ee_distance=np.zeros(5),
-                             true_minimal_distance=[0.2, 0.19995, 0.1998, 0.1, 1.0],
-                             true_ee_distance=[0.3, 0.4, 0.2, 0.4, np.nan])
+    found = measure(recording(asked, minimal_distance=np.zeros(5), ee_distance=np.zeros(5),
+                              true_minimal_distance=[0.2, 0.19995, 0.1998, 0.1, 1.0],
+                              true_ee_distance=[0.3, 0.4, 0.2, 0.4, np.nan]))
     assert found["body_below_share"].value == pytest.approx(2 / 5)  # 0.05 mm is rounding
     assert found["ee_below_share"].value == pytest.approx(1 / 4)    # of the ticks in which known
     assert found["ee_below_share"].note == "nearer than 0.3 m"
@@ -138,7 +124,7 @@ def test_steps_of_the_command_and_of_the_joints_are_told_apart():
     assert found["velocity_step_max"].value == pytest.approx(0.3)
     assert found["velocity_step_max_measured"].value == pytest.approx(0.5)
     assert found["command_step_max"].value == pytest.approx(0.04)
-    asked = hand_made.HandMadeScenario()
+    asked = HandMadeScenario()
     asked.control.level = "velocity"
     command = np.array([[1.0], [1.5], [1.25], [1.25], [1.25]])
     changed = measure(recording(asked, q=command, command=command))

@@ -25,19 +25,16 @@ from hierarchy import Robot, Task
 from hierarchy.paths import Path
 from hierarchy.plugins import register
 from hierarchy.robot import Frame
+from hierarchy.tasks import Position
 from scenarios.cell.plants import KinematicArm
 from solvers import Resolution, Resolver, make
-
 
 @register("tasks", "elbow")
 @dataclass(frozen=True)
 class Elbow(Task):
-    """Bring one joint to an angle [rad]."""
-
     robot: Robot
     joint: str
     angle: float
-    steps: int = 1
     gain: float = 2.0
     name: str = "elbow"
     dimension = 1
@@ -51,20 +48,13 @@ class Elbow(Task):
     def jacobian_derivative(self, state):
         return np.zeros((1, state.n))
 
-
 @register("tasks", "along")
 def along(frame: Frame, path: Path, name: str):
-    """The position of a frame, made by a function."""
-    from hierarchy.tasks import Position
-
     return Position(frame, path, name=name)
-
 
 @register("resolvers", "halved")
 @dataclass(frozen=True, kw_only=True)
 class Halved(Resolver):
-    """Half of hcod."""
-
     name: ClassVar[str] = "halved"
     handles: ClassVar[str] = "inequalities"
     share: float = 0.5
@@ -72,16 +62,12 @@ class Halved(Resolver):
     def solve(self, h, memory=None):
         return Resolution(self.share * make("hcod").solve(h).x)
 
-
 @register("robots", "my_arm")
 def my_arm():
     return Robot.named("kuka_lwr")
 
-
 @register("plants", "weak")
 class Weak(KinematicArm):
-    """Does a share of each command."""
-
     def __init__(self, robot, q, v, period, level, share: float):
         super().__init__(robot, q, v, period, level)
         self.share = share
@@ -93,34 +79,20 @@ class Weak(KinematicArm):
 SCENARIO = '''
 name = "own"
 plugins = ["doors_of_mine"]
-
-[robot]
-model = "my_arm"
-
-[start]
-q = [0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]
-
-[control]
-level = "velocity"
-stack = "hierarchical"
-period = 0.01
-duration = 0.2
-resolver = "halved"
-
-[plant]
-kind = "weak"
-share = 0.5
-
+robot = {model = "my_arm"}
+start = {q = [0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]}
+control = {level = "velocity", stack = "hierarchical", period = 0.01, duration = 0.2, \
+resolver = "halved"}
+plant = {kind = "weak", share = 0.5}
 [[tasks]]
 kind = "elbow"
 joint = "joint_4"
 angle = 1.0
-
 [[tasks]]
 kind = "along"
 name = "hand"
 frame = "end_effector"
-path = { kind = "still", position = [0.1, 0.6, 0.1] }
+path = {kind = "still", position = [0.1, 0.6, 0.1]}
 '''
 
 
@@ -162,15 +134,10 @@ def test_a_file_alone_loads_no_code(command, capsys, folder):
     assert "add --plugin doors_of_mine to the command" in text
     assert "\n" not in text.strip()
     assert "doors_of_mine" not in sys.modules
-
-
-def test_a_plugin_that_cannot_be_imported_says_why(capsys, folder):
-    assert "plugin 'nowhere' cannot be imported: ModuleNotFoundError" in said(
-        ["check", "ellipse", "--plugin", "nowhere"], capsys)[1]
-    (folder / "wrong.py").write_text("1 / 0")
-    code, text = said(["list", "--plugin", "wrong"], capsys)
+    (folder / "doors_of_mine.py").write_text("1 / 0")
+    code, text = said([*command, "own.toml", "--plugin", "doors_of_mine"], capsys)
     assert code == 2
-    assert "plugin 'wrong' cannot be imported: ZeroDivisionError" in text
+    assert "plugin 'doors_of_mine' cannot be imported: ZeroDivisionError" in text
 
 
 @pytest.mark.slow
@@ -199,18 +166,6 @@ def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(capsys):
     assert said(["export", "a", "--plugin", "doors_of_mine"], capsys)[0] == 0
 
 
-@pytest.mark.slow
-def test_workers_of_a_sweep_import_the_plugin(capsys, folder):
-    pytest.importorskip("distributed")
-    (folder / "s.toml").write_text(
-        'name = "s"\nscenarios = ["own.toml"]\nresolvers = ["halved", "hcod"]\nsamples = 2\n'
-        '[parameters]\n"tasks.0.angle" = { uniform = [0.9, 1.1] }\n')
-    code, text = said(["sweep", "s.toml", "--plugin", "doors_of_mine", "--workers", "1",
-                       "--out", "c"], capsys)
-    assert code == 0, text
-    assert "4 runs; 0 did not finish" in text
-
-
 def test_a_scenario_with_own_kinds_is_copied_and_pickled():
     plugins.allow("doors_of_mine")
     scenario = load("own.toml")
@@ -224,8 +179,7 @@ def test_a_scenario_with_own_kinds_is_copied_and_pickled():
     ("tasks.1.path.kind=spiral", "tasks.1.path: unknown kind 'spiral'. Known: circle"),
     ("tasks.0.kind=elbwo", "tasks.0: unknown kind 'elbwo'; did you mean 'elbow'?"),
     ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
-    ("control.options.shar=0.1", "unknown setting of halved 'shar'; did you mean 'share'?"),
-])
+    ("control.options.shar=0.1", "unknown setting of halved 'shar'; did you mean 'share'?")])
 def test_wrong_keys_of_own_kinds_are_named(change, said):
     plugins.allow("doors_of_mine")
     with pytest.raises(HierarchyError, match=re.escape(said)):
@@ -237,22 +191,13 @@ def test_wrong_keys_of_own_kinds_are_named(change, said):
     ("robots", "arm_of_mine = entry_of_mine:TABLE", lambda: Robot.load("arm_of_mine").name)])
 def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, line, use, folder):
     (folder / "entry_of_mine.py").write_text(
-        "from dataclasses import dataclass, replace\nfrom hierarchy.robots import TABLES\n"
-        "from solvers.resolvers.hcod import Hcod\n"
-        "@dataclass(frozen=True, kw_only=True)\nclass Third(type(Hcod()).__mro__[1]):\n"
-        "    name = 'third'\n    def solve(self, h, memory=None): ...\n"
+        "from dataclasses import replace\nfrom hierarchy.robots import TABLES\n"
+        "from solvers import Resolver\nclass Third(Resolver):\n    name, solve = 'third', None\n"
         "TABLE = replace(TABLES['kuka_lwr'], name='arm_of_mine')\n")
     install(folder, group, line)
     assert "entry_of_mine" not in sys.modules
     assert use() == line.partition(" ")[0]
     sys.modules.pop("entry_of_mine")
-
-
-def test_an_entry_point_that_leads_nowhere_is_named(folder):
-    install(folder, "resolvers", "ghost = nowhere_at_all:Ghost")
-    with pytest.raises(HierarchyError, match="entry point 'ghost' of task_hierarchy\\.resolvers "
-                                             "cannot be imported"):
-        make("ghost")
 
 
 def test_two_things_of_one_name_are_refused():

@@ -39,8 +39,6 @@ CASES = {
         {"stale": "hold", "patience": 1}, [([], X, X, []), (["stale"], 9 * X, X, ["hold"])] * 3),
     "nothing to hold": ({"stale": "hold"}, [(["stale"], X, BRAKE, ["brake"])]),
     "an answer in doubt may be used": ({"inaccurate": "use"}, [(["inaccurate"], X, X, ["use"])]),
-    "the graver of two: hold": ({"inaccurate": "use", "overrun": "hold"},
-                                [([], X, X, []), (TWO, 9 * X, X, ["hold"] * 2)]),
     "the graver of two: brake": ({"inaccurate": "brake", "overrun": "hold"},
                                  [([], X, X, []), (TWO, X, BRAKE, ["brake"] * 2)]),
     "the graver of two: stop": ({"inaccurate": "stop", "overrun": "brake"},
@@ -100,13 +98,11 @@ def controller(*changes, name="ellipse"):
     return made, made.cell.plant.q.copy(), made.cell.plant.v.copy()
 
 
-@pytest.mark.parametrize("what", ["q", "v"])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_what_is_measured_may_be_nan_at_the_first_tick_already(what, bad):
+def test_what_is_measured_may_be_nan_at_the_first_tick_already(bad):
     c, q, v = controller()
-    measured = {"q": q.copy(), "v": v.copy()}
-    measured[what][2] = bad
-    np.testing.assert_array_equal(c.command(0.0, **measured), np.zeros(7))
+    v[2] = bad
+    np.testing.assert_array_equal(c.command(0.0, q, v), np.zeros(7))
     assert list(c.policy.events) == [("not_finite", "brake")]
     np.testing.assert_array_equal(c.cell.state.q, q)
     assert not c.answered

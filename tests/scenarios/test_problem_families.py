@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError
 from scenarios.problems import reference as families
 from scenarios.problems.families import FAMILIES as FAMILIES_OF_ALL
 from scenarios.problems.postures import posed
@@ -11,10 +10,6 @@ from solvers import Status, certify, make
 from solvers.problems import FAMILIES, family
 
 SEEDS = range(40)
-
-
-def test_there_is_a_maker_for_every_stored_family():
-    assert set(FAMILIES) | set(families.RECORDED) == set(families.FAMILIES)
 
 
 @pytest.mark.slow
@@ -32,13 +27,6 @@ def test_sizes_equalities_norms_of_rows_and_ranks_are_those_of_the_stored_proble
 
 def ranks(h):
     return tuple(int(np.linalg.matrix_rank(A, tol=1e-7)) for A, *_ in h.levels())
-
-
-def test_a_name_or_a_share_that_does_not_exist_is_refused():
-    with pytest.raises(HierarchyError, match="no family of problems is called 'INEQ8'"):
-        family("INEQ8", 0)
-    with pytest.raises(HierarchyError, match="not a share"):
-        family("INEQ7", 0, hard=1.5)
 
 
 @pytest.mark.parametrize(("name", "count"), [("singular-lwr", 24), ("singular-dual-arm", 24),

@@ -48,12 +48,6 @@ def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
         recorded.recorded("ellipse-limits", 3, 2)
 
 
-def test_list_names_every_family(capsys):
-    assert run_command(["problems", "list", "--json"]) == 0
-    groups = json.loads(capsys.readouterr().out)
-    assert {name for group in groups.values() for name in group} == set(FAMILIES)
-
-
 def test_export_show_and_check(capsys, tmp_path):
     out = ["--seed", "4", "--count", "3"]
     assert run_command(["problems", "export", "integers", *out, "--out", str(tmp_path)]) == 0

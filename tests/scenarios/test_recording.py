@@ -32,10 +32,6 @@ def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
     assert (loaded.orders, loaded.fault) == (saved.orders, saved.fault)
 
 
-def test_a_switch_is_the_first_tick_of_the_new_order():
-    assert recording(order=[0, 1, 1, 0, 0]).switches().tolist() == [1, 3]
-
-
 def test_a_run_folder_holds_arrays_metrics_scenario_and_versions(tmp_path):
     save(recording(), tmp_path / "run")
     names = {path.name for path in (tmp_path / "run").iterdir()}
@@ -61,11 +57,9 @@ def test_a_file_that_is_cut_off_or_has_wrong_bits_is_named(tmp_path):
     with pytest.raises(HierarchyError, match=r"no run\.npz"):
         load_run(tmp_path)
     save(recording(), tmp_path)
-    whole, rng, refused = (tmp_path / "run.npz").read_bytes(), np.random.default_rng(1), 0
+    sound, rng, refused = (tmp_path / "run.npz").read_bytes(), np.random.default_rng(1), 0
     for trial in range(150):
-        damaged = bytearray(whole)
-        if trial < 50:
-            damaged = damaged[:rng.integers(len(whole))]
+        damaged = bytearray(sound)[:rng.integers(len(sound)) if trial < 50 else None]
         for at in rng.integers(len(damaged), size=3) if len(damaged) else ():
             damaged[at] ^= 1 << int(rng.integers(8))
         (tmp_path / "run.npz").write_bytes(damaged)
@@ -76,31 +70,22 @@ def test_a_file_that_is_cut_off_or_has_wrong_bits_is_named(tmp_path):
     assert refused > 100
 
 
-def test_what_is_written_whole_leaves_nothing_else_and_has_the_usual_permissions(tmp_path):
-    with whole(claim(tmp_path / "run")) as partial:
+def write(folder, error=None):
+    with whole(claim(folder)) as partial:
         (partial / "file").touch()
-        assert not (tmp_path / "run").exists()
-    assert [path.name for path in tmp_path.iterdir()] == ["run"]
-    (tmp_path / "usual").mkdir()
-    assert (tmp_path / "run").stat().st_mode == (tmp_path / "usual").stat().st_mode
+        assert not folder.exists()
+        if error:
+            raise error
 
 
-def write_to_a_full_disk(folder):
-    with whole(folder) as partial:
-        (partial / "file").touch()
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-
-def test_a_full_disk_is_named_and_leaves_nothing(tmp_path):
+def test_what_is_written_is_there_as_a_whole_or_not_at_all(tmp_path):
     with pytest.raises(OutputError, match=r"run cannot be written: No space left"):
-        write_to_a_full_disk(tmp_path / "run")
+        write(tmp_path / "run", OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_numbered_folders_fill_the_first_gap(tmp_path):
-    assert next_free(tmp_path / "run") == tmp_path / "run"
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run-3").mkdir()
+    write(next_free(tmp_path / "run"))
+    (tmp_path / "run-3").mkdir()  # with the usual permissions
+    assert {path.name for path in tmp_path.iterdir()} == {"run", "run-3"}
+    assert (tmp_path / "run").stat().st_mode == (tmp_path / "run-3").stat().st_mode
     assert next_free(tmp_path / "run") == tmp_path / "run-2"
 
 

@@ -6,20 +6,11 @@ import pytest
 from hierarchy import HierarchyError
 from hierarchy.tasks import CumulatedRepulsion, DangerBounds, Pointing
 from hierarchy.tasks.together import TangentCone
-from scenarios import load, simulate
+from scenarios import load
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
 from solvers import make
 from tests.helpers.scene import FRAME, ROBOT, state_at, states
-
-RIVALS = ["ellipse-set-based", "ellipse-smooth"]
-
-
-def controller_at(name, q, *changes):
-    """A controller of a scenario that has commanded once, with the joints at q and at rest."""
-    controller = Controller(load(name, changes))
-    controller.command(0.0, q, np.zeros(7))
-    return controller
 
 
 def distances(cell):
@@ -29,29 +20,25 @@ def distances(cell):
     return np.linalg.norm(seen.points[:, None] - centres[None], axis=2).ravel()
 
 
-def near_obstacles(name, count, least):
-    """Joint positions from random ones where some point is nearer than `least` [m]."""
-    controller = Controller(load(name))
-    for q, _ in states(400, seed=5):
+def near_obstacles(name, *changes):
+    """A controller that has commanded at random joint positions with a point nearer than 0.1 m."""
+    for q, _ in states(60, seed=5):
+        controller = Controller(load(name, changes))
         controller.command(0.0, q, np.zeros(7))
-        if 0.0 < distances(controller.cell).min() < least:
-            yield q
-            count -= 1
-            if count == 0:
-                return
+        if 0.0 < distances(controller.cell).min() < 0.1:
+            yield controller
 
 
 def test_rows_ask_nothing_inside_a_set_and_no_worse_at_its_bound():
     found = set()
-    for q in near_obstacles("ellipse-set-based", 5, 0.1):
-        controller = controller_at("ellipse-set-based", q, "avoidance.distance=0.1")
+    for controller in near_obstacles("ellipse-set-based", "avoidance.distance=0.1"):
         h, d = controller.hierarchy, distances(controller.cell)
         np.testing.assert_array_equal(h.lower[:27], np.where(d <= 0.1, 0.0, -np.inf))
         outside = controller.cone_error >= 0.0
         assert h.lower[-1] == (0.0 if outside else -np.inf)
         assert np.isinf(h.upper[[*range(27), -1]]).all()
         found |= {bool((d <= 0.1).any()), outside}
-    assert found == {True, False} or found == {True}
+    assert True in found
 
 
 def test_the_tangent_cone_of_the_letters_cone_has_its_jacobian_and_refuses_accelerations():
@@ -72,9 +59,8 @@ def test_the_tangent_cone_of_the_letters_cone_has_its_jacobian_and_refuses_accel
 
 
 def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
-    for q in near_obstacles("ellipse-smooth", 5, 0.1):
-        controller = controller_at("ellipse-smooth", q, "avoidance.rate=3.0",
-                                   "avoidance.recovery=0.1")
+    for controller in near_obstacles("ellipse-smooth", "avoidance.rate=3.0",
+                                     "avoidance.recovery=0.1"):
         cell, h, d = controller.cell, controller.hierarchy, distances(controller.cell)
         missing = 0.1 - d  # distance 0.05 and buffer 0.05
         seen = d <= 0.3
@@ -95,14 +81,6 @@ def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
         np.testing.assert_array_equal(controller.resolution.x, alone)
 
 
-def test_a_frozen_task_is_recorded_as_met_and_one_inside_its_set_as_free():
-    from scenarios.recording.fate import Fate
-    run = simulate(load("ellipse-set-based", ["control.duration=0.3", "avoidance.distance=0.12"]))
-    fates = run["level_fate"][:, run.task_names.index("separation")]
-    assert set(np.unique(fates)) <= {Fate.FREE, Fate.MET}
-    assert Fate.MET in fates
-
-
 @pytest.mark.parametrize(("name", "changes", "says"), [
     ("ellipse-set-based", ["control.level=acceleration"],
      r'needs control.level = "velocity", got "acceleration"'),
@@ -121,8 +99,7 @@ def test_a_frozen_task_is_recorded_as_met_and_one_inside_its_set_as_free():
     ("ellipse-hqp", ["control.stack=set-based", "control.level=velocity"],
      r'needs limits.place = "guard", got "stack"'),
     ("ellipse-velocity", ["control.stack=set-based"],
-     r'"repulsion" goes with control.stack = "switched", got "set-based"'),
-])
+     r'"repulsion" goes with control.stack = "switched", got "set-based"')])
 def test_what_does_not_go_together_is_said_with_key_and_value(name, changes, says):
     with pytest.raises(HierarchyError, match=says):
         load(name, changes)
@@ -134,15 +111,7 @@ def test_the_smooth_stack_refuses_a_resolver_without_activations():
         Controller(scenario)
 
 
-def test_limits_go_with_both_as_a_guard():
-    for name in RIVALS:
-        scenario = load(name, ["limits={acceleration=10.0, place='either'}"])
-        assert not scenario.limits_in_stack
-        assert build(scenario).tasks.limits is not None
-
-
 # The avoidance of the letter's references [5] and [10].
-
 
 NEAR = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])  # the start of `ellipse`
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hand_made import recording as hand_made
 
-from hierarchy import HierarchyError, Robot, State
+from hierarchy import Robot, State
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
@@ -102,9 +102,3 @@ def test_levels_that_were_not_judged_are_unknown_where_they_are_in_the_stack():
     assert levels.fate.tolist() == [[Fate.UNKNOWN, Fate.ABSENT], [Fate.UNKNOWN, Fate.UNKNOWN],
                                     [Fate.UNKNOWN, Fate.ABSENT]]
     assert levels_at(hand_made(orders=("",)), [0, 4]).fate.shape == (2, 0)  # nothing was stacked
-
-
-@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
-def test_a_rate_that_is_none_is_refused(ellipse, runs, rate):
-    with pytest.raises(HierarchyError, match="rate"):
-        scene(runs["ellipse"], rate)

@@ -33,7 +33,7 @@ def test_row_0_is_the_start_and_the_stack_is_recorded_as_the_measurements_ask(ru
     np.testing.assert_allclose(np.diff(run["t"]), T)
     np.testing.assert_allclose(v[1:], v[:-1] + a[:-1] * T, atol=1e-15)
     np.testing.assert_allclose(q[1:], q[:-1] + v[:-1] * T + a[:-1] * T * T / 2, atol=1e-14)
-    velocity_run = simulate(load("ellipse-velocity"))
+    velocity_run = simulate(load("ellipse-velocity", SHORT))
     np.testing.assert_array_equal(velocity_run["v"][1:], velocity_run["command"][:-1])
     np.testing.assert_allclose(velocity_run["a"][:-1], np.diff(velocity_run["v"], axis=0) / T,
                                atol=1e-9)

@@ -23,17 +23,13 @@ LEVELS = ("physics", "limits", "joint limits", "centre of mass", "left hand", "r
           "posture", "least force")
 
 
-# What is asked.
-
-
 @pytest.mark.parametrize(("keys", "said"), [
     ({"control.level": "acceleration"}, r"\[\[contacts\]\] needs control.level = \"torque\""),
     ({"control.level": "acceleration", "contacts": []},
      "task 'least force' needs control.level = \"torque\""),
     ({"control.stack": "switched"}, "goes with control.stack = \"hierarchical\", got"),
     ({"contacts.0.y": None}, "a sole has x and y, a point neither"),
-    ({"limits.torque_step": 0.0}, "limits.torque_step: .* greater than 0"),
-])
+    ({"limits.torque_step": 0.0}, "limits.torque_step: .* greater than 0")])
 def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
     with pytest.raises(ScenarioError, match=said):
         STANDING.with_changes(keys)
@@ -58,22 +54,10 @@ def test_a_resolver_with_bounds_alone_keeps_those_of_single_joints_above_all_els
     ({"forces.least": 400.0, "forces.largest": 300.0}, "forces: .* no normal force is pushing"),
     ({"start.on_floor": True, "contacts": []}, "start.on_floor needs a floating base and"),
     ({"forces.edge": 0.2}, "forces: .*margin 0.2 m of contact 'left_foot'"),
-    ({"plant.pushes.0.joint": "trunk"}, "plant.pushes: .*'trunk'"),
-])
+    ({"plant.pushes.0.joint": "trunk"}, "plant.pushes: .*'trunk'")])
 def test_what_the_robot_does_not_have_is_named(keys, said):
     with pytest.raises(HierarchyError, match=said):
         build(STANDING.with_changes(keys))
-
-
-def test_a_resolver_for_equalities_gets_the_stack_without_limits():
-    assert (STANDING.asks, STANDING.forces_in_stack) == ("inequalities", True)
-    assert build(STANDING).stack.names == LEVELS
-    plain = STANDING.with_resolver("tpm")
-    assert (plain.asks, plain.forces_in_stack) == ("equalities", False)
-    assert build(plain).stack.names == ("physics", *LEVELS[3:])
-
-
-# What it does.
 
 
 @pytest.fixture(scope="module")
@@ -132,9 +116,6 @@ def test_a_foot_that_lands_on_its_edge_does_not_make_torques_jump():
     found = measure(run)
     assert found["miss_physics"].value < 1e-9
     assert found["miss_limits"].value < 1e-9
-
-
-# What is sent without an answer.
 
 
 class Failing:

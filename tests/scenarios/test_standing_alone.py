@@ -8,6 +8,7 @@ from unittest import mock
 import numpy as np
 import pinocchio as pin
 import pytest
+from urdf_text import INERTIAL, joint, link, placed, shape, urdf
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.robots import TABLES
@@ -18,31 +19,25 @@ from scenarios.scene import scene
 
 pytestmark = pytest.mark.slow
 
-LINK = """<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1"
-  iyz="0" izz="1"/></inertial><collision><origin xyz="0 0 {1}"/><geometry><cylinder radius="0.04"
-  length="{2}"/></geometry></collision></link>"""
-JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>
-  <origin xyz="0 0 {4}" rpy="{5}"/><axis xyz="{6}"/>
-  <limit lower="-2.5" upper="2.5" effort="50" velocity="3"/></joint>"""
-ARM = '<robot name="arm">' + "".join([
-    LINK.format("base", 0.05, 0.1), LINK.format("one", 0.1, 0.2), LINK.format("two", 0.15, 0.3),
-    LINK.format("three", 0.15, 0.3), LINK.format("four", 0.05, 0.1), LINK.format("tip", 0, 0.02),
-    JOINT.format("turn", "revolute", "base", "one", 0.1, "0 0 0.2", "0 0 1"),
-    JOINT.format("shoulder", "revolute", "one", "two", 0.2, "0 0.4 0", "0 1 0"),
-    JOINT.format("elbow", "revolute", "two", "three", 0.3, "0 0.9 0", "0 0.8 0.6"),
-    JOINT.format("wrist", "continuous", "three", "four", 0.3, "0 0 0", "1 0 0"),
-    JOINT.format("end", "fixed", "four", "tip", 0.12, "0 0 0", "1 0 0")]) + "</robot>"
-SCENARIO = """
-name = "alone"
-[robot]
-model = "arm.urdf"
-end_effector = "tip"
-[control]
-level = "acceleration"
-period = 0.001
-duration = 0.3
-stack = "hierarchical"
-resolver = "hcod"
+def tube(name, middle, length):
+    return link(name, INERTIAL + shape(f'<cylinder radius="0.04" length="{length}"/>',
+                                       f"0 0 {middle}"))
+
+
+LIMIT = '<limit lower="-2.5" upper="2.5" effort="50" velocity="3"/>'
+ARM = urdf(
+    tube("base", 0.05, 0.1), tube("one", 0.1, 0.2), tube("two", 0.15, 0.3),
+    tube("three", 0.15, 0.3), tube("four", 0.05, 0.1), tube("tip", 0, 0.02),
+    joint("turn", "revolute", "base", "one", LIMIT, "0 0 1", placed("0 0 0.1", "0 0 0.2")),
+    joint("shoulder", "revolute", "one", "two", LIMIT, "0 1 0", placed("0 0 0.2", "0 0.4 0")),
+    joint("elbow", "revolute", "two", "three", LIMIT, "0 0.8 0.6", placed("0 0 0.3", "0 0.9 0")),
+    joint("wrist", "continuous", "three", "four", LIMIT, "1 0 0", placed("0 0 0.3")),
+    joint("end", "fixed", "four", "tip", "", "", placed("0 0 0.12")))
+SCENARIO = """name = "alone"
+robot = {model = "arm.urdf", end_effector = "tip"}
+control = {level = "acceleration", duration = 0.3, stack = "hierarchical", resolver = "hcod"}
+limits = {acceleration = 30.0}
+damping = {value = 5.0}
 [position]
 stiffness = 40.0
 damping = 20.0
@@ -52,19 +47,8 @@ kind = "separation"
 distance = 0.02
 influence = 0.3
 rate = 5.0
-[[avoidance.obstacles]]
-shape = "sphere"
-radius = 0.05
-[avoidance.obstacles.path]
-kind = "ellipse"
-centre = [0.3, 0.2, 0.5]
-cosine = [0.1, 0.0, 0.0]
-sine = [0.0, 0.1, 0.0]
-rate = 2.0
-[limits]
-acceleration = 30.0
-[damping]
-value = 5.0
+obstacles = [{shape = "sphere", radius = 0.05, path = {kind = "ellipse", rate = 2.0, \
+centre = [0.3, 0.2, 0.5], cosine = [0.1, 0.0, 0.0], sine = [0.0, 0.1, 0.0]}}]
 """
 
 
@@ -98,13 +82,11 @@ def no_way_back(request, monkeypatch):
 def test_what_is_loaded_is_what_was_run_and_its_scene_is_whole(made):
     folder, run, _ = made
     again = load_run(folder)
-    assert again.facts == run.facts
-    assert again.signals.keys() == run.signals.keys()
+    assert (again.facts, again.signals.keys()) == (run.facts, run.signals.keys())
     assert again.facts.resolver.label == "hcod"
     assert again.facts.robot.position_units == ("rad", "rad", "rad", "1", "1")
     assert again.facts.robot.joint_names == ("turn", "shoulder", "elbow", "wrist")
-    folder, run, _ = made
-    shown = scene(load_run(folder))
+    shown = scene(again)
     assert np.allclose(shown.traced, run["ee_position"][shown.ticks], atol=1e-12)
     assert np.allclose(shown.distance[:, -1], run["ee_distance"][shown.ticks], atol=1e-12)
     assert shown.levels.known.all()
@@ -126,19 +108,12 @@ def test_facts_that_are_missing_or_damaged_are_named(made, tmp_path):
         load_run(tmp_path / "bad")
 
 
-# The facts of a robot.
-
-CART = """<robot name="cart"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-<link name="e"/>
-<joint name="slide" type="prismatic"><parent link="a"/><child link="b"/>
-<origin xyz="0.1 0.2 0.3" rpy="0.1 0.2 0.3"/><axis xyz="1 1 0"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="wheel" type="continuous"><parent link="b"/><child link="c"/>
-<origin xyz="0.1 0.2 0.3" rpy="0.1 0.2 0.3"/><axis xyz="0 0.6 0.8"/></joint>
-<joint name="table" type="planar"><parent link="c"/><child link="d"/>
-<origin xyz="0.1 0 0.3" rpy="0.3 0 0.3"/><axis xyz="0 0 1"/></joint>
-<joint name="hinge" type="revolute"><parent link="b"/><child link="e"/><origin xyz="0 0.2 0.3"/>
-<axis xyz="0 -1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+CART = urdf(
+    *(link(name, "") for name in "abcde"),
+    joint("slide", "prismatic", "a", "b", LIMIT, "1 1 0", placed("0.1 0.2 0.3", "0.1 0.2 0.3")),
+    joint("wheel", "continuous", "b", "c", "", "0 0.6 0.8", placed("0.1 0.2 0.3", "0.1 0.2 0.3")),
+    joint("table", "planar", "c", "d", "", "0 0 1", placed("0.1 0 0.3", "0.3 0 0.3")),
+    joint("hinge", "revolute", "b", "e", LIMIT, "0 -1 0", placed("0 0.2 0.3")))
 DOLL = """<mujoco><worldbody><body name="a" pos="0 0 1"><freejoint/><geom size="0.1"/>
 <body name="b" pos="0 0 0.3" euler="10 20 30"><joint name="h1" axis="1 0 0" pos="0 0 0.1"/>
 <joint name="h2" axis="0 1 0" pos="0 0.1 0.1"/><joint name="s" type="slide" axis="0 1 1"/>

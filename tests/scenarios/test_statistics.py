@@ -53,32 +53,22 @@ def test_too_few_pairs_tell_nothing():
     assert str(paired(np.full(3, np.nan), np.ones(3))) == "no pair"
 
 
-def test_the_best_is_marked_with_those_equal_to_it():
-    low = np.linspace(1.0, 1.5, 16)
-    columns = {"a": low, "b": low + 1.0, "c": low * (1.0 + 1e-10), "d": low + 2.0}
-    assert set(best(columns, lower_is_better=True)) == {"a", "c"}
-    assert best(columns, lower_is_better=False) == ("d",)
+LOW, NORMAL = np.linspace(1.0, 1.5, 16), np.random.default_rng(2).normal(size=(2, 16))
+# One pair of 8 against the trend: p = 0.016 alone, too much for ten rivals after Holm.
+APART = np.array([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, -0.5])
 
 
-def test_nothing_is_best_where_one_cannot_be_told_from_it():
-    random = np.random.default_rng(2)
-    low = random.normal(size=16)
-    columns = {"a": low, "b": low + random.normal(size=16), "c": low + 5.0}
-    assert best(columns, lower_is_better=True) == ()
-    assert best({"a": low, "b": low.copy()}, lower_is_better=True) == ()
-    assert best({"a": low, "b": np.full(16, np.nan)}, lower_is_better=True) == ()
-    assert best({"a": low}, lower_is_better=True) == ()
-    skewed = low + np.r_[np.full(12, 1.0), np.full(4, -50.0)]
-    assert best({"a": low, "b": skewed}, lower_is_better=True) == ()
-
-
-def test_many_rivals_need_stronger_evidence():
-    # One pair of 8 against the trend: p = 0.016 alone, too much for ten rivals after Holm.
-    apart = np.array([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, -0.5])
-    low = np.zeros(8)
-    assert best({"a": low, "b": low + apart}, lower_is_better=True) == ("a",)
-    rivals = {f"b{i}": low + apart * (1.0 + 0.01 * i) for i in range(10)}
-    assert best({"a": low, **rivals}, lower_is_better=True) == ()
+@pytest.mark.parametrize(("columns", "lower", "marked"), [
+    ([LOW, LOW + 1.0, LOW * (1.0 + 1e-10), LOW + 2.0], True, (0, 2)),
+    ([LOW, LOW + 1.0, LOW * (1.0 + 1e-10), LOW + 2.0], False, (3,)),
+    ([NORMAL[0], NORMAL[0] + NORMAL[1], NORMAL[0] + 5.0], True, ()),
+    ([LOW, LOW.copy()], True, ()), ([LOW, np.full(16, np.nan)], True, ()), ([LOW], True, ()),
+    ([LOW, LOW + np.r_[np.full(12, 1.0), np.full(4, -50.0)]], True, ()),
+    ([np.zeros(8), APART], True, (0,)),
+    ([np.zeros(8), *(APART * (1.0 + 0.01 * i) for i in range(10))], True, ())])
+def test_the_best_is_marked_with_those_equal_to_it_where_all_others_can_be_told_from_it(
+        columns, lower, marked):
+    assert best(dict(enumerate(columns)), lower_is_better=lower) == marked
 
 
 @pytest.mark.parametrize(("met", "of", "low", "high"), [

@@ -75,8 +75,6 @@ def test_a_push_gives_the_whole_robot_its_momentum():
             PushSection(joint="trunk_pich", force=1.0),)))
 
 
-
-
 def plant(**keys):
     robot = Robot.named("dual_arm")
     q = robot.configuration(np.zeros(robot.n))
@@ -110,43 +108,29 @@ def test_torques_follow_with_the_bandwidth_of_the_motors():
                                                       rel=0.05)
 
 
-def test_links_that_touch_are_pushed_apart_and_those_that_overlap_at_the_start_are_not():
-    _, touching = plant(self_collision=True)
-    _, passing = plant()
-    assert touching.model.npair > passing.model.npair == 0
-    assert touching.data.ncon == 0
-
-
-def recorded(**changes):
+def recorded(fault=None, pushes=(), **changes):
+    """A run of 5 s in which a robot stands still, but for what is changed."""
     t = np.arange(0.0, 5.0, 0.01)
-    signals = {"t": t, "v": np.zeros((t.size, 2)), "q": np.zeros((t.size, 2)),
-               "com": np.tile([0.0, 0.0, 0.8], (t.size, 1)), "support_margin": np.full(t.size, 0.1),
-               "joint_lower": np.full(2, -1.0), "joint_upper": np.full(2, 1.0), **changes}
-    scenario = SimpleNamespace(control=SimpleNamespace(duration=5.0),
-                               plant=SimpleNamespace(pushes=()))
-
-    class Run(dict):
-        pass
-
-    run = Run(signals)
-    run.scenario, run.ticks, run.fault = scenario, t.size, None
-    return run
+    run = type("Run", (dict,), {"ticks": t.size, "fault": fault, "scenario": SimpleNamespace(
+        control=SimpleNamespace(duration=5.0), plant=SimpleNamespace(pushes=pushes))})
+    return run({"t": t, "v": np.zeros((t.size, 2)), "q": np.zeros((t.size, 2)),
+                "com": np.tile([0.0, 0.0, 0.8], (t.size, 1)),
+                "support_margin": np.full(t.size, 0.1), "joint_lower": np.full(2, -1.0),
+                "joint_upper": np.full(2, 1.0), **changes})
 
 
-def test_a_robot_stands_only_at_rest_upright_and_within_its_limits_until_the_end():
-    assert standing(recorded())
-    late = np.zeros((500, 2))
-    late[400] = 0.3
-    assert not standing(recorded(v=late))
-    assert standing(recorded(v=np.roll(late, -300, axis=0)))
-    assert not standing(recorded(q=np.full((500, 2), 1.1)))
-    assert not standing(recorded(support_margin=np.full(500, np.nan)))
-    sunk = recorded()["com"]
-    sunk[300:, 2] -= 0.1
-    assert not standing(recorded(com=sunk))
-    fallen = recorded()
-    fallen.fault = "the robot has fallen"
-    assert not standing(fallen)
-    short = recorded()
-    short.scenario.plant.pushes = (SimpleNamespace(at=2.9, duration=0.2),)
-    assert standing(short) is None
+def from_tick(tick, value, shape=(500, 2)):
+    values = np.zeros(shape)
+    values[tick:] = value
+    return values
+
+
+@pytest.mark.parametrize(("changes", "stands"), [
+    ({}, True), ({"v": from_tick(100, 0.3) - from_tick(101, 0.3)}, True),
+    ({"v": from_tick(400, 0.3) - from_tick(401, 0.3)}, False),
+    ({"q": from_tick(0, 1.1)}, False), ({"support_margin": from_tick(0, np.nan, 500)}, False),
+    ({"com": from_tick(0, [0.0, 0.0, 0.8], (500, 3)) - from_tick(300, [0, 0, 0.1], (500, 3))},
+     False), ({"fault": "the robot has fallen"}, False),
+    ({"pushes": (SimpleNamespace(at=2.9, duration=0.2),)}, None)])
+def test_a_robot_stands_only_at_rest_upright_and_within_its_limits_until_the_end(changes, stands):
+    assert standing(recorded(**changes)) is stands

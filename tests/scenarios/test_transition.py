@@ -47,12 +47,6 @@ def test_however_often_it_changes_weights_are_convex_with_continuous_derivatives
     assert np.abs(np.diff(rate, axis=0)).max() / PERIOD <= 12.0 / TIME**2 * 1.001
 
 
-def test_a_clock_that_begins_anew_is_another_run():
-    blend = Blend(TIME)
-    visited([A] * 50 + [B] * 20, blend)
-    np.testing.assert_array_equal(visited([C] * 3, blend), [[0.0, 0.0, 1.0]] * 3)
-
-
 # One scene: the end effector on its path, the axis to the cone, a posture for the rest.
 
 HAND, AXIS, ELBOW = (scene.TASKS[name] for name in ("position", "pointing", "avoidance 1-D"))
@@ -99,6 +93,3 @@ def test_bounds_that_both_stacks_have_on_top_are_kept(level):
         low, up = limits.box(state, level)
         assert (low - 1e-9 <= x).all()
         assert (x <= up + 1e-9).all()
-
-
-# Closed loop. The first ticks are left out: the start is off the path, and the command jumps there.

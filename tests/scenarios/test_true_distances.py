@@ -51,11 +51,6 @@ def test_true_distances_are_on_record_beside_the_measured(name, changes, centre,
     assert np.abs(run["true_ee_distance"] - run["ee_distance"]).max() > 1e-3
 
 
-def test_an_exact_sensor_measures_the_true_distances_and_nothing_is_recorded_twice():
-    run = simulate(load("ellipse", ["control.duration=0.01"]))
-    assert not [name for name in run.signals if name.startswith("true_")]
-
-
 def noted(sets, hierarchies, resolver="hcod"):
     return [sets.number(h, make(resolver).solve(h)) for h in hierarchies]
 

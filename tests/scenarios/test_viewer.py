@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 from headless import chromium
 
-from scenarios.cli.main import run_command
 from scenarios.config import load
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.live_page import LivePage
 from scenarios.draw.viewer.server import served
 from scenarios.loop.simulation import simulate
-from scenarios.measure.run_folder import load_run
 from scenarios.scene import scene
 
 LIMITED = load("ellipse-limits", ["control.duration=0.6"])
@@ -27,12 +25,6 @@ def ticks(live, count):
 @pytest.fixture(scope="module")
 def recording():
     return simulate(LIMITED)
-
-
-# The frame that is drawn
-
-
-# A live run
 
 
 def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_its_settings(
@@ -74,9 +66,6 @@ def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
     assert not drawn.levels.known[-1]
 
 
-# Pages, without a browser
-
-
 @pytest.mark.slow
 def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses():
     page = LivePage(Live(LIMITED))
@@ -110,23 +99,6 @@ def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses():
     assert page.live.t == t
     assert any("cone" in goal for goal in json.loads(page.now)["runs"][0]["goals"])
 
-
-@pytest.mark.slow
-def test_a_live_run_is_kept_at_ctrl_c(tmp_path, monkeypatch, capsys):
-    def interrupted(page, seconds):
-        ticks(page.live, 20)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(LivePage, "step", interrupted)
-    line = ["run", "ellipse", "--live", "--no-wait", "--no-browser", "--port", "0", "--out"]
-    assert run_command([*line, str(tmp_path / "a")]) == 1
-    assert load_run(tmp_path / "a").ticks == 21
-    out, err = capsys.readouterr()
-    assert "21 ticks in" in out
-    assert "fault: interrupted at tick 21" in err
-
-
-# In a browser
 
 _SECONDS = 180.0  # of patience, which only a page that hangs takes
 

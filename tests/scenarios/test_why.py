@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from hierarchy import Hierarchy, HierarchyError
+from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.cli.main import run_command
 from scenarios.measure.causes import Tick, causes
@@ -87,10 +87,5 @@ def test_the_command_names_the_largest_changes_of_a_run(folder, capsys):
     assert sizes == sorted(sizes, reverse=True)
     assert run_command(["why", str(folder), "--tick", str(found[0]["tick"])]) == 0
     assert f"tick {found[0]['tick']} (t = " in capsys.readouterr().out
-
-
-def test_a_tick_that_the_run_does_not_have_is_an_error(folder, capsys):
     assert run_command(["why", str(folder), "--tick", "999"]) == 2
     assert "tick 999: the run has ticks 0 to 49" in capsys.readouterr().err
-    with pytest.raises(HierarchyError, match="the run has ticks"):
-        jumps(simulate(load("ellipse-hqp").with_changes({"control.duration": 0.002})), tick=0)

@@ -33,7 +33,6 @@ POSE = np.array([0.3, 0.4, 0.5, -0.2])
 
 # --- pink ---------------------------------------------------------------------------------------
 
-
 @pytest.fixture
 def robot():
     pytest.importorskip("pink")
@@ -65,12 +64,6 @@ def posture_task(target, cost=0.1):
     task = PostureTask(cost=cost)
     task.set_target(np.asarray(target))
     return task
-
-
-def speed_of(task, configuration, v):
-    """What the task asked for and what v gives it: both (m,)."""
-    asked = -task.gain * task.compute_error(configuration) / DT
-    return asked, task.compute_jacobian(configuration) @ v
 
 
 def arm_scene(configuration, shift=(0.05, 0.02, -0.03), lm_damping=0.0, cost=1e-3, **arguments):
@@ -159,30 +152,17 @@ def test_limits_that_contradict_each_other_are_no_solution_and_named(configurati
         solve_ik(configuration, hand, DT, limits=[slow, sums])
 
 
-def test_of_two_tasks_in_conflict_the_first_is_served_exactly_and_in_pink_neither_is(configuration):
-    import pink
-
-    hand = frame_task(configuration, shift=(0.003, 0.001, -0.002), turn=0.01)
-    posture = posture_task(Q + 0.01, cost=1.0)
-    ours = solve_ik(configuration, [hand, posture], DT)
-    weighted = pink.solve_ik(configuration, [hand, posture], DT, "proxqp")
-    asked, given = speed_of(hand, configuration, ours)
-    np.testing.assert_allclose(given, asked, atol=1e-10)
-    asked, given = speed_of(hand, configuration, weighted)
-    assert np.abs(given - asked).max() > 0.01  # [m/s, rad/s]
-
-
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):
     import inspect
 
     import pink
 
-    theirs = [one for one in inspect.signature(pink.solve_ik).parameters.values()
+    theirs = [(one.name, one.name == "solver" or one.default)
+              for one in inspect.signature(pink.solve_ik).parameters.values()
               if one.kind is one.POSITIONAL_OR_KEYWORD]
-    ours = list(inspect.signature(solve_ik).parameters.values())[:len(theirs)]
-    assert [one.name for one in ours] == [one.name for one in theirs]
-    assert {one.name: one.default for one in ours if one.name != "solver"} == {
-        one.name: one.default for one in theirs if one.name != "solver"}
+    ours = [(one.name, one.name == "solver" or one.default)
+            for one in inspect.signature(solve_ik).parameters.values()]
+    assert ours[:len(theirs)] == theirs
     hand = [frame_task(configuration, turn=0.0)]
     given = solve_ik(configuration, hand, DT, "hcod", 1e-12, [], None, None, True)
     np.testing.assert_array_equal(given, solve_ik(configuration, hand, DT, limits=[]))
@@ -259,7 +239,6 @@ def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, c
 
 # --- MuJoCo and mink ----------------------------------------------------------------------------
 
-
 @pytest.fixture
 def arm():
     mujoco = pytest.importorskip("mujoco")
@@ -310,20 +289,7 @@ def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
     assert (np.abs(data.qpos) <= 2.0).all()
 
 
-def test_mistakes_with_mujoco_name_what_is_wrong(arm):
-    from solvers.adapters import from_mujoco as adapter
-
-    model, data = arm
-    with pytest.raises(HierarchyError, match="unknown site 'tipp'; did you mean 'tip'"):
-        adapter.jacobian(model, data, "tipp", "site")
-    with pytest.raises(HierarchyError, match="unknown kind of frame 'sites'; did you mean 'site'"):
-        adapter.jacobian(model, data, "tip", "sites")
-    with pytest.raises(HierarchyError, match=r"target must be \(3,\) finite numbers"):
-        adapter.position_level(model, data, "tip", [0.0, np.nan, 0.0], 1.0, "site")
-
-
 # --- qpsolvers ----------------------------------------------------------------------------------
-
 
 def made_hierarchy(seed):
     """Seven joints in their box, then equalities, inequalities that contradict each other, more."""

@@ -54,18 +54,6 @@ def test_resolvers_that_name_another_meaning_find_another_x():
                        for h in near_singular()) > 1e-3, resolver.label
 
 
-def test_the_published_form_damps_its_pivots_which_is_the_same_while_no_rank_is_lost():
-    published, staircase = make("tpm-published", **SETTINGS), make("tpm", **SETTINGS)
-    assert published.damps == "each pivot"
-    for h, _, _ in family("EQ7"):
-        assert gap(published.solve(h).x, staircase.solve(h).x) < 1e-9
-    r = rng(2)
-    A = r.normal(size=(3, 4))
-    A[2] = A[0] + A[1]
-    lost = Hierarchy.from_levels([(A, r.normal(size=3)), (r.normal(size=(2, 4)), r.normal(size=2))])
-    assert gap(published.solve(lost).x, staircase.solve(lost).x) > 1e-3
-
-
 def test_with_bounds_tpm_and_hcod_are_one_controller():
     tpm, hcod = make("tpm", **SETTINGS), make("hcod", **SETTINGS)
     assert tpm.damps_with_bounds == hcod.damps_with_bounds

@@ -12,7 +12,7 @@ from solvers.resolvers.tpm import task_priority_matrix
 TPM = make("tpm")
 KINDS = ("generic", "combination of rows above", "row repeated inside", "zero row", "one direction",
          "row repeated from above", "whole level repeated")
-every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
+every_case = pytest.mark.parametrize("case", CASES)
 
 
 def rows_of_kind(kind, size, factored, rng):
@@ -107,31 +107,6 @@ def test_f_and_g_are_those_of_the_matrix_made_from_the_rows(case):
         factored.reorder(factored.names[::-1])
 
 
-def test_rank_moves_to_whoever_comes_first():
-    A = np.eye(4)
-    factored = Factorization([A[:2], A[1:3], A[:3]], names=["a", "b", "c"])
-    assert factored.ranks == (2, 1, 0)
-    factored.reorder(["c", "a", "b"])
-    assert factored.ranks == (3, 0, 0)
-    factored.delete("c")
-    assert factored.ranks == (2, 1)
-    factored.insert("d", A[2:], at=0)
-    assert factored.names == ("d", "a", "b")
-    assert factored.ranks == (2, 2, 0)
-
-
-def test_the_stack_may_be_empty_and_fill_again():
-    factored = Factorization([], n=3)
-    np.testing.assert_allclose(factored.solve([], [1.0, 2.0, 3.0]).x, [1.0, 2.0, 3.0])
-    assert factored.F.shape == (0, 0)
-    assert factored.G.shape == (3, 0)
-    factored.insert("x", [[1.0, 0.0, 0.0]])
-    np.testing.assert_allclose(factored.solve([[5.0]], [1.0, 2.0, 3.0]).x, [5.0, 2.0, 3.0])
-    factored.delete("x")
-    assert factored.names == factored.sizes == factored.ranks == ()
-    np.testing.assert_allclose(factored.solve({}).x, 0.0)
-
-
 @pytest.mark.filterwarnings("ignore:overflow")  # of the kernels as plain Python
 def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     factored = Factorization([[[1.0, 0.0]], [[1e200, 1e200]]], names=["a", "b"])
@@ -145,8 +120,6 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     factored.delete("b")
     assert factored.solve([[1.0]]).status is Status.SOLVED
 
-
-# -- mistakes --------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize(("mistake", "text"), [
     (lambda f: f.swap("hand", "elbo"), "unknown level 'elbo'; did you mean 'elbow'"),
@@ -165,9 +138,6 @@ def test_a_mistake_is_named_and_changes_nothing(mistake, text):
         mistake(factored)
     assert factored.names == ("hand", "elbow")
     np.testing.assert_allclose(factored.solve([[1.0, 2.0], [3.0]]).x, [1.0, 2.0, 3.0])
-
-
-# -- any sequence of edits that hypothesis can think of --------------------------------------------
 
 
 def test_nearly_parallel_rows_are_left_to_the_exact_engine():

@@ -1,16 +1,13 @@
 """Inverse kinematics of a bare robot in one call."""
 
-from itertools import product
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import Barrier
 from hierarchy.paths import Still
-from hierarchy.tasks import JointLimits, Pose, Position, Posture, SelfSeparation
-from solvers import Status, make, solve_ik
+from hierarchy.tasks import JointLimits, Pose, Position, Posture
+from solvers import Status, solve_ik
 
 ROBOT = Robot.named("kuka_lwr")
 FRAME = ROBOT.frame("end_effector")
@@ -34,15 +31,6 @@ def follow(tasks, ticks, **settings):
     return q, np.array(v)
 
 
-def test_one_call_gives_velocity_status_and_memory():
-    v, status, memory = solve_ik(ROBOT, Q, [hand([0.01, 0.0, 0.0])], dt=0.01)
-    assert v.shape == (7,)
-    assert status is Status.SOLVED
-    assert memory is not None
-    J = Position(FRAME, Still([0, 0, 0])).jacobian(State.at(ROBOT, Q))
-    np.testing.assert_allclose(J @ v, [0.1, 0.0, 0.0], atol=1e-10)
-
-
 def test_limits_of_the_robot_hold_whatever_is_asked():
     far = Posture(tuple(ROBOT.upper + 1.0), gain=50.0)
     step = solve_ik(ROBOT, Q, [far])
@@ -52,18 +40,6 @@ def test_limits_of_the_robot_hold_whatever_is_asked():
     np.testing.assert_allclose(q, ROBOT.upper, atol=1e-9)
     free = solve_ik(ROBOT, Q, [far], limits=False)
     assert (np.abs(free.v) > ROBOT.velocity_limit).any()
-
-
-def test_any_resolver_may_solve_it():
-    tasks = [hand([0.01, 0.0, 0.0])]
-    reference = solve_ik(ROBOT, Q, tasks).v
-    for resolver in ("hqp", "sns", make("tpm", form="staircase")):
-        np.testing.assert_allclose(solve_ik(ROBOT, Q, tasks, resolver=resolver).v, reference,
-                                   atol=1e-5)
-    np.testing.assert_allclose(solve_ik(ROBOT, Q, tasks, resolver="recursive", limits=False).v,
-                               reference, atol=1e-9)
-    with pytest.raises(HierarchyError, match="limits, row 0: an inequality"):
-        solve_ik(ROBOT, Q, tasks, resolver="recursive")
 
 
 @pytest.mark.parametrize(("call", "said"), [
@@ -79,8 +55,7 @@ def test_any_resolver_may_solve_it():
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], limits=SLOW),
      "give v, the velocity of the tick before"),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], until=1e-6, limits=SLOW),
-     "with until, limits are True or"),
-])
+     "with until, limits are True or")])
 def test_wrong_arguments_are_named(call, said):
     with pytest.raises(HierarchyError) as error:
         call()
@@ -154,41 +129,3 @@ def test_what_holds_a_target_out_of_reach_back_is_said():
     both = [Position(FRAME, Still(here)), Position(FRAME, Still(here + 0.1), name="other")]
     assert "other is missed by 0.173, held back by position" in solve_ik(
         ROBOT, Q, both, until=1e-6).verdict
-
-
-ARMS = Robot.named("dual_arm")
-LEFT, RIGHT = ([capsule for capsule in ARMS.capsules if capsule.name.startswith(side)]
-               for side in ("left", "right"))
-APART = SelfSeparation([*LEFT, *RIGHT], Barrier(distance=0.02),
-                       list(product(range(len(LEFT)), range(len(LEFT), len(LEFT + RIGHT)))))
-
-
-def between_the_arms(q):
-    """The least distance [m] of sampled axes less the radii, from pinocchio's placements."""
-    data, axes = ARMS.model.createData(), []
-    pin.forwardKinematics(ARMS.model, data, q)
-    for capsules in (LEFT, RIGHT):
-        ends = [[data.oMi[one.joint].act(np.array(end)) for end in (one.start, one.end)]
-                for one in capsules]
-        axes.append([np.linspace(*pair, 301) for pair in ends])
-    return min(np.linalg.norm(a[:, None] - b, axis=2).min() - one.radius - other.radius
-               for a, one in zip(axes[0], LEFT, strict=True)
-               for b, other in zip(axes[1], RIGHT, strict=True))
-
-
-@pytest.mark.parametrize(("apart", "nearest"), [(0.25, None), (0.0, 0.02)])
-def test_hands_that_would_collide_stop_at_their_distance_and_say_so(apart, nearest):
-    hands = {side: ARMS.frame(f"{side}_hand") for side in ("right", "left")}
-    start = State.at(ARMS, ARMS.rest)
-    middle = (start.position(hands["left"]) + start.position(hands["right"])) / 2
-    aside = np.array([0.0, apart / 2, 0.0])
-    tasks = [Position(hands["right"], Still(middle - aside), name="right"),
-             Position(hands["left"], Still(middle + aside), name="left")]
-    found = solve_ik(ARMS, ARMS.rest, [APART, *tasks], until=1e-6)
-    assert between_the_arms(found.q) > 0.02 - 1e-6
-    assert found.met == (nearest is None)
-    if nearest is not None:
-        assert between_the_arms(found.q) == pytest.approx(nearest, abs=1e-4)
-        assert "nearest found, left is missed by 0.1, held back by" in found.verdict
-        assert found.verdict.endswith("self-separation and right")
-        assert between_the_arms(solve_ik(ARMS, ARMS.rest, tasks, until=1e-6).q) < 0.0

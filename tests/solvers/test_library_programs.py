@@ -23,8 +23,7 @@ from hierarchy.tasks import JointLimits, Position
 from scenarios.cli.main import run_command
 from scenarios.problems.reference import family
 from solvers import make, problems
-from solvers.library import differs, entries, write
-from solvers.library.emission import RESOLVERS
+from solvers.library import differs, write
 
 if not sys.platform.startswith("linux"):
     pytest.skip("the C library is made on Linux", allow_module_level=True)
@@ -215,10 +214,6 @@ def test_a_wrong_name_is_an_error_that_names_it(tmp_path, capsys, options, words
     assert run_command(["library", "--out", str(tmp_path / "lib"), *options]) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "lib").exists()
-
-
-def test_every_resolver_that_the_command_names_has_a_function():
-    assert tuple(entries.RESOLVERS) == RESOLVERS == c.NAMES
 
 
 def test_a_folder_without_a_library_is_an_error(tmp_path):

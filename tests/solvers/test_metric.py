@@ -70,16 +70,6 @@ def test_inequalities_are_resolved_in_a_metric(resolver):
         np.testing.assert_allclose(warm.x, exact.x, atol=1e-6)
 
 
-def test_the_certificate_tells_metrics_apart():
-    rng = np.random.default_rng(5)
-    levels, W = three_levels(rng), metric(rng, 7)
-    x = make("tpm").solve(Hierarchy.from_levels(levels)).x
-    h = Hierarchy.from_levels(levels, metric=W)
-    assert certify(h, x).optimal
-    assert not certify(h, x).is_nearest
-    assert not certify(h, np.full(7, 10.0)).optimal
-
-
 @pytest.mark.parametrize("resolver", BOUNDS, ids=lambda r: r.label)
 def test_resolvers_of_bounds_take_them_with_a_diagonal_metric_alone(resolver):
     rng = np.random.default_rng(6)

@@ -71,12 +71,6 @@ def test_rows_at_a_tiny_angle_make_the_levels_below_ill_posed():
     np.testing.assert_array_equal(found.least, [0.0, 5.0])
 
 
-def test_sides_that_nearly_agree_make_the_levels_below_ill_posed():
-    rows = [([[1.0]], [-np.inf], [1.0]), ([[1.0]], [1.0 + 1e-9], [np.inf]), ([[1.0]], [0.0])]
-    found = prove(Hierarchy.from_levels(rows), [[1.0]])
-    assert found.posed == 2
-
-
 def test_a_metric_is_refused():
     h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0])], metric=np.diag([1.0, 2.0]))
     with pytest.raises(HierarchyError, match="metric"):

@@ -11,17 +11,10 @@ import pytest
 
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.errors import UnknownNameError
-from solvers import Resolution, Status, make, names
+from solvers import Status, make, names
 from solvers.resolvers.set_based import SetBased
 from solvers.resolvers.settled import Settled
 from solvers.workspace import WORKSPACE
-
-
-def test_names_are_sorted_and_each_makes_its_resolver():
-    assert list(names()) == sorted(names())
-    assert {"recursive", "tpm", "hqp", "augmented"} <= set(names())
-    assert all(make(name).name == name for name in names())
-    assert make("weighted", weights=(10, 1), backend="daqp").label == "weighted 10/1 daqp"
 
 
 @pytest.mark.parametrize("name", [*names(), "tpm-published"])
@@ -54,22 +47,6 @@ def test_the_defaults_are_those_that_recorded_results_were_made_with(name):
             if field.init} == {**EVERY, **DEFAULTS[name]}
 
 
-def test_a_resolution_is_solved_unless_it_says_otherwise():
-    res = Resolution(np.zeros(2))
-    assert (res.status, res.iterations, res.memory) == (Status.SOLVED, 1, None)
-    assert not hasattr(res, "__dict__")
-    assert "SOLVED" in repr(res)
-
-
-@pytest.mark.parametrize("resolver", ["hcod", "weighted"])
-def test_a_count_is_a_whole_number_that_a_kernel_can_hold(resolver):
-    assert make(resolver, max_iterations=1).max_iterations == 1
-    assert make(resolver, max_iterations=2**31 - 1).max_iterations == 2147483647
-    for wrong in (0, 2**31, 1.5, True):
-        with pytest.raises(HierarchyError, match=r"max_iterations = .*, expected a whole number"):
-            make(resolver, max_iterations=wrong)
-
-
 @pytest.mark.parametrize("name", [*names(), "smooth"])
 def test_settings_of_every_resolver_are_checked_by_name(name):
     assert isinstance(make(name, damping=1).damping, float)
@@ -87,6 +64,7 @@ def test_settings_of_every_resolver_are_checked_by_name(name):
 
 @pytest.mark.parametrize(("name", "settings"), [
     ("hcod", {"tolerance": 0.0}), ("smooth", {"eta": 0.0}),
+    *(("hcod", {"max_iterations": wrong}) for wrong in (0, 2**31, 1.5, True)),
     ("recursive", {"largest": 1.0}), ("recursive", {"method": "selective", "largest": 0.0}),
     ("recursive", {"method": "nakamura", "isotropic": 0.1}), ("merged", {"scales": 3.0}),
     *(("weighted", {setting: value}) for setting, value in [
@@ -97,11 +75,14 @@ def test_a_setting_that_makes_no_sense_is_named_with_its_value(name, settings):
     setting, value = list(settings.items())[-1]
     with pytest.raises(HierarchyError, match=re.escape(f"{name}: {setting} = {value!r}")):
         make(name, **settings)
+    with pytest.raises(UnknownNameError, match="unknown form of hqp 'slak'; did you mean 'slack'"):
+        make("hqp", form="slak")
 
 
 def test_settings_of_parts_are_named():
     with pytest.raises(HierarchyError, match="merged: scales: 'hand'"):
         make("merged", scales={"hand": 0.0})
+    assert make("hcod", max_iterations=2**31 - 1).max_iterations == 2147483647
     for wrong in ({"tolerance": -1.0}, {"most": 0}):
         with pytest.raises(HierarchyError, match=next(iter(wrong))):
             SetBased(inner=make("tpm"), **wrong)
@@ -109,14 +90,6 @@ def test_settings_of_parts_are_named():
         with pytest.raises(HierarchyError, match=next(iter(wrong))):
             Settled(inner=make("tpm"), **{"period": 0.1, **wrong})
     assert Settled(inner=make("tpm"), period=0.1, softness=0.0).softness == 0.0
-
-
-@pytest.mark.parametrize(("name", "setting", "value"), [
-    ("hqp", "backend", "daqpp"), ("hqp", "form", "slak"), ("reverse", "form", "in-oder"),
-    ("recursive", "method", "nakamora")])
-def test_an_unknown_choice_names_the_nearest(name, setting, value):
-    with pytest.raises(UnknownNameError, match=f"unknown {setting} of {name} '{value}'; did you"):
-        make(name, **{setting: value})
 
 
 FIRST_SOLVE = """
@@ -143,9 +116,7 @@ def output_of(code):
     return run.stdout.strip()
 
 
-# Work space: its content never matters.
-
-
+# The work space of these: its content never matters.
 KERNELS = [make("tpm"), make("sns"), make("tpm-published"), make("recursive"), make("augmented"),
            make("hcod"), make("hcod", damping=0.1), make("tpm", damping=0.1),
            make("tpm-published", damping=0.1)]

@@ -87,17 +87,6 @@ def test_with_every_task_at_its_bound_the_mode_and_the_answer_are_those_of_the_p
     assert counts >= {0, 1, 2}, "the problems reach modes with none, one and two frozen tasks"
 
 
-def test_at_the_bound_a_task_that_moves_back_is_left_alone_and_one_that_leaves_is_frozen():
-    def resolved(rate):
-        return SET_BASED.solve(Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [INF]),
-                                                      ([[1.0, 1.0]], [rate])]))
-    back, out = resolved(2.0), resolved(-2.0)
-    np.testing.assert_allclose(back.x, [1.0, 1.0], atol=1e-12)
-    np.testing.assert_allclose(out.x, [0.0, -2.0], atol=1e-12)
-    assert (back.iterations, out.iterations) == (1, 2)
-    assert (back.active.tolist(), out.active.tolist()) == ([0, 2], [-1, 2])
-
-
 def test_after_the_most_modes_everything_at_a_bound_is_frozen():
     rows = np.eye(6)
     h = Hierarchy.from_levels([(rows, np.zeros(6), np.full(6, INF)), (rows, [-1, -1, -1, 1, 1, 1])])
@@ -147,15 +136,6 @@ def test_one_level_takes_the_minimum_that_scipy_finds(smallest, box):
     assert (np.abs(x) <= box + 1e-9).all()
 
 
-@pytest.mark.parametrize("inner", ["hcod", "tpm", "sns"])
-def test_a_level_that_can_be_met_is_met_as_by_the_inner_resolver(inner):
-    rng = np.random.default_rng(5)
-    h = Hierarchy.from_levels([(np.eye(6), np.full(6, -9.0), np.full(6, 9.0)),
-                               (nearly_singular(rng, 0.4), 0.1 * rng.normal(size=3)),
-                               (np.eye(6), rng.normal(size=6))], names=["limits", "a", "b"])
-    np.testing.assert_array_equal(settled("a", inner=inner).solve(h).x, make(inner).solve(h).x)
-
-
 @pytest.mark.parametrize("inner", ["hcod", "tpm", "hqp"])
 def test_levels_below_do_not_move_what_a_level_settled_on(inner):
     rng = np.random.default_rng(6)
@@ -167,15 +147,3 @@ def test_levels_below_do_not_move_what_a_level_settled_on(inner):
         [limits, (A, b), (np.eye(6), np.ones(6))], names=["limits", "a", "posture"])).x
     np.testing.assert_allclose(A @ both, A @ alone, atol=1e-5)
     assert np.linalg.norm(both - alone) > 1e-3
-
-
-def test_rows_of_its_resolution_are_those_of_the_hierarchy():
-    rng = np.random.default_rng(7)
-    h = Hierarchy.from_levels([(np.eye(6), np.full(6, -0.2), np.full(6, 0.2)),
-                               (nearly_singular(rng, 1e-6), rng.normal(size=3)),
-                               (np.eye(6), np.ones(6))], names=["limits", "a", "posture"])
-    found = settled("a").solve(h)
-    assert found.active.shape == found.holds_back.shape == (h.m,)
-    assert found.holds_back.max() <= 3
-    at = np.flatnonzero(found.active[:6])
-    np.testing.assert_allclose(np.abs(found.x[at]), 0.2, atol=1e-9)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from hierarchy import Hierarchy, HierarchyError
-from hierarchy.activation import Activation, activation
-from solvers import Status, make, names
+from hierarchy.activation import activation
+from solvers import Status, make
 from solvers.resolvers.set_based import SetBased
 
 LAMBDA, THRESHOLD, ETA = 1e-4, 1e-2, 10.0
@@ -88,8 +88,8 @@ def test_the_command_is_continuous_where_that_of_the_set_based_task_jumps():
         least = 0.0 if value <= 0.0 else -INF
         return set_based.solve(Hierarchy.from_levels([(J, [least], [INF]), (tip, rate)])).x
 
-    assert steps(smooth, 2001) < 0.15 * steps(smooth, 201), "it falls with the step taken"
-    assert steps(switched, 2001) > 0.9 * steps(switched, 201) > 0.1, "a jump stays a jump"
+    assert steps(smooth, 801) < 0.15 * steps(smooth, 81), "it falls with the step taken"
+    assert steps(switched, 801) > 0.9 * steps(switched, 81) > 0.1, "a jump stays a jump"
 
 
 def test_the_activation_is_one_at_the_bound_zero_beyond_the_buffer_and_has_no_kink():
@@ -100,12 +100,6 @@ def test_the_activation_is_one_at_the_bound_zero_beyond_the_buffer_and_has_no_ki
     step = 1e-5
     slopes = np.diff(activation(np.array([-step, 0.0, step, 0.4 - step, 0.4, 0.4 + step]), 0.4))
     np.testing.assert_allclose(slopes[[0, 1, 3, 4]] / step, 0.0, atol=1e-3)
-
-
-@pytest.mark.parametrize("width", [0.0, -0.1, INF])
-def test_a_buffer_without_a_width_is_refused(width):
-    with pytest.raises(HierarchyError, match="must be positive and finite"):
-        Activation(None, (), {"wall": width})
 
 
 def test_what_has_no_answer_is_refused_or_has_a_status():
@@ -129,12 +123,3 @@ def test_what_has_no_answer_is_refused_or_has_a_status():
         found = SMOOTH.solve_activated(spoilt, np.ones(1))
         assert found.status is Status.NUMERICAL_FAILURE
         assert (found.x == 0.0).all()
-
-
-def test_it_is_made_by_name_but_not_listed_since_a_hierarchy_is_not_enough():
-    assert SMOOTH.name == "smooth"
-    assert "smooth" not in names()
-    assert SMOOTH.can_resolve("equalities")
-    assert SMOOTH.can_resolve("activations")
-    assert not SMOOTH.can_resolve("inequalities")
-    assert not any(make(name).can_resolve("activations") for name in names())

@@ -1,21 +1,18 @@
 """Priorities as weights: the sum is minimised exactly, and what that does to the priorities."""
 
-import os
 
 import numpy as np
 import oracle
 import pytest
-from rank_cases import CASES, boxed, build, family, gap, generic
+from rank_cases import CASES, boxed, build, gap
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make, problems
 from solvers.resolvers.weighted import lexicographic_weights
 
 EXACT = 1e-9
-every_case = pytest.mark.parametrize("case", CASES, ids=lambda c: c.__name__)
+every_case = pytest.mark.parametrize("case", CASES)
 LIMIT = 0.7
-PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"  # everything some hundred times slower
-HUMANOIDS = 1 if PLAIN else 3
 
 
 def as_two_levels(h, resolver, hard):
@@ -30,9 +27,6 @@ def as_two_levels(h, resolver, hard):
                                  h.reference)
 
 
-# The sum is minimised ----------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @every_case
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3])
@@ -43,33 +37,12 @@ def test_within_limits_it_is_the_minimiser_and_shown_to_be(case, ratio):
     assert certify(as_two_levels(h, weighted, 1), res.x).optimal
 
 
-@pytest.mark.parametrize("ratio", [10.0, 1e3])
-def test_humanoids_are_solved_step_by_step(ratio):
-    weighted = make("weighted", ratio=ratio, guesses=1)
-    for h, _, _ in list(family("HUM38"))[:HUMANOIDS]:
-        res = weighted.solve(h)
-        assert res.status is Status.SOLVED
-        assert res.iterations > 5
-        assert certify(as_two_levels(h, weighted, 1), res.x).optimal
-
-
-@pytest.mark.parametrize("limit", [1, 4])
-def test_at_its_iteration_limit_it_says_how_many_it_made(limit):
-    h = next(iter(family("HUM38")))[0]
-    res = make("weighted", guesses=1, max_iterations=limit).solve(h)
-    assert res.status is Status.ITERATION_LIMIT
-    assert limit <= res.iterations <= limit + 1
-
-
 @pytest.mark.parametrize("seed", [3, 4, 5])
 def test_a_row_released_by_rounding_alone_is_not_released_for_ever(seed):
     res = make("weighted", ratio=1e8, guesses=1, max_iterations=200).solve(
         problems.family("DEGEN7", seed))
     assert res.status is not Status.ITERATION_LIMIT
     assert res.iterations < 50
-
-
-# What it does to the priorities ------------------------------------------------------------------
 
 
 @every_case
@@ -80,29 +53,11 @@ def test_with_a_huge_ratio_it_is_the_strict_answer_where_normal_equations_are_de
     assert gap(weighted.solve(h).x, oracle.solve(h)) < EXACT
 
 
-def test_weights_that_overflow_give_a_status_and_a_finite_answer():
-    with np.errstate(all="ignore"):  # without compilation numpy warns
-        res = make("weighted", ratio=1e200).solve(build(generic, True))
-    assert res.status is Status.NUMERICAL_FAILURE
-    assert not res.x.any()
-
-
 def test_lexicographic_weights_are_the_smallest_that_do():
     assert lexicographic_weights([5.0, 3.0, 4.0], 0.1) == pytest.approx((
         np.hypot(4.0, 40.0 * 3.0) / 0.1, 40.0, 1.0))
     assert lexicographic_weights([0.0, 0.0], 0.1) == (1.0, 1.0)
     assert lexicographic_weights([0.0, 0.0], 0.1, regularised=1.0) == (10.0, 1.0)
-
-
-@pytest.mark.parametrize(("violations", "tolerance", "regularised"), [
-    ([1.0, -1.0], 0.1, 0.0), ([np.nan], 0.1, 0.0), ([[1.0]], 0.1, 0.0), ([1.0], 0.0, 0.0),
-    ([1.0], np.inf, 0.0), ([1.0], 0.1, -1.0)])
-def test_lexicographic_weights_refuse_what_is_no_bound(violations, tolerance, regularised):
-    with pytest.raises(HierarchyError, match="expected"):
-        lexicographic_weights(violations, tolerance, regularised)
-
-
-# Constraints -------------------------------------------------------------------------------------
 
 
 def test_only_levels_of_inequalities_are_constraints_and_as_many_as_asked_for():
@@ -136,9 +91,6 @@ def test_rows_that_are_nearly_parallel_are_said_to_leave_a_doubt():
         assert make("weighted").solve(nearly(angle)).status is Status.SOLVED
 
 
-# Settings ----------------------------------------------------------------------------------------
-
-
 def test_weights_for_another_number_of_levels_are_refused():
     with pytest.raises(HierarchyError, match="2 weights for 3 levels"):
-        make("weighted", weights=(2.0, 1.0)).solve(build(generic, True))
+        make("weighted", weights=(2.0, 1.0)).solve(build("generic", True))

@@ -13,15 +13,7 @@ from standing import (
     standing_stack,
 )
 
-from hierarchy import Robot, Stack, State
-from hierarchy.contacts import Contact, Contacts
-from hierarchy.paths import Ellipse
-from hierarchy.tasks import (
-    ContactForce,
-    Position,
-    Posture,
-    TorqueLimits,
-)
+from hierarchy import State
 from solvers import Status, certify, explain, make, problems
 
 CONTACTS = feet()
@@ -89,27 +81,6 @@ def test_torques_that_cannot_hold_the_weight_stay_within_limits_and_the_knees_ar
     said = explain(h, res, rows=stack.row_names()).splitlines()[2]
     assert said.startswith("centre of mass is missed by")
     assert "torque limits left_knee at its" in said
-
-
-def test_an_arm_presses_on_a_table_while_its_tip_moves_along_it():
-    """Force across the table and motion along it, on a fixed base and without friction."""
-    arm = Robot.named("kuka_lwr")
-    tip = arm.frame("end_effector")
-    contacts = Contacts(arm, [Contact(tip, normal=(0.0, 0.0, 1.0))])
-    state = State.at(arm, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0], np.full(7, 0.1))
-    table = state.position(tip)[2]
-    along = Ellipse((0.0, 0.6, table), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0))
-    stack = Stack([TorqueLimits(arm, contacts=contacts),
-                   ContactForce(contacts, "end_effector", (0.0, 0.0, 20.0)),
-                   Position(tip, along), Posture((0.0,) * 7)], "torque", contacts=contacts)
-    h, res = solved(stack, state)
-    np.testing.assert_allclose(h.violations(res.x)[:3], 0.0, atol=1e-8)
-    wrenches = [pin.Force.Zero() for _ in range(arm.model.njoints)]
-    push = state._placement(tip.joint)[0].T @ [0.0, 0.0, 20.0]
-    wrenches[tip.joint] = pin.Force(push, np.cross(tip.offset, push))
-    efforts = pin.rnea(arm.model, arm.model.createData(), state.q, state.v,
-                       contacts.accelerations(res.x), wrenches)
-    np.testing.assert_allclose(contacts.torques(state, res.x), efforts, atol=1e-9)
 
 
 IN_DOUBT = sorted((Path(__file__).parents[1] / "data/regressions/whole-body").glob("*.npz"))
