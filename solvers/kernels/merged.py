@@ -148,13 +148,16 @@ def _carve(work, m, n, levels):
 @compiled
 def _merge(s, A, lower, upper, sizes, strict, options, y):
     """Write the rows of all levels, those to merge times their weights and at moved sides."""
-    first = ZERO
+    first, hard = ZERO, ZERO
     for c in range(s.own.size):
         s.own[c] = 0.0
     for k in range(sizes.size):
-        weight = options.weights[k] if k >= strict else 1.0
+        hard = first if k == strict else hard
         for i in range(first, first + sizes[k]):
             moved, last, entries = y[i] if k >= strict else 0.0, ZERO, ZERO
+            weight = options.weights[k] if k >= strict else 1.0
+            if k >= strict and _repeats(A, lower, upper, i, hard):
+                weight = 0.0
             for c in range(A.shape[1]):
                 s.A[i, c] = weight * A[i, c]
                 if A[i, c] != 0.0:
@@ -166,6 +169,21 @@ def _merge(s, A, lower, upper, sizes, strict, options, y):
         if k > strict:
             s.sizes[strict] += sizes[k]
         first += sizes[k]
+
+
+@inlined
+def _repeats(A, lower, upper, i, hard):
+    """Whether equality i is one of the first `hard` rows too, which alone decide its value.
+
+    As of a foot that stands and is a task: weighed, its miss would drown the light rows.
+    """
+    for j in range(hard if lower[i] == upper[i] else 0):
+        c = 0
+        while lower[j] == upper[j] and c < A.shape[1] and A[i, c] == A[j, c]:
+            c += 1
+        if c == A.shape[1]:
+            return True
+    return False
 
 
 @compiled
