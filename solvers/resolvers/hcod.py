@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy
+from solvers.kernels.give import solve_giving
 from solvers.resolver import Handles, Resolution, Resolver, number, register, whole_number
 from solvers.status import SOLVED, TOO_SMALL, Status
-from solvers.workspace import WORKSPACE, entry
+from solvers.workspace import WORKSPACE, entry, run
 
 
 @final
@@ -96,6 +97,25 @@ class Hcod(Resolver):
         x, record = h.start(), warm_record(memory, 3 * h.m + 3)
         code = solve_exactly(h, x, record, self._settings)
         return ActiveSetResolution(x, _SOLVED if code == SOLVED else Status(code), record)
+
+    def _solve_giving(self, h: Hierarchy, memory: Array | None) -> Resolution:
+        """Resolve h, some levels of which give, in one call of a kernel.
+
+        The memory is that of all solves; there is none where one of the witnesses was not found.
+        """
+        if h.metric is not None:
+            return super()._solve_giving(h, memory)
+        levels, give, size = h.giving, h.give, 3 * h.m + 3
+        assert give is not None
+        part = 3 * int(h.offsets[levels[-1] + 1]) + 3
+        x = np.concatenate((h.start(), give, np.full(len(levels) * h.n, np.nan)))
+        record = warm_record(memory, len(levels) * part + size)
+        code = run(entry(solve_giving), *h.rows, x, record, self._settings)
+        found: Resolution = ActiveSetResolution(x[:h.n].copy(), Status(code), record[-size:])
+        witnesses = x[h.n + h.m:].reshape(len(levels), h.n)
+        missing = np.isnan(witnesses[-1, -1])
+        found.memory, found.witnesses = (None, None) if missing else (record, witnesses)
+        return found
 
 
 def warm_record(memory: Array | None, size: int) -> Array:
