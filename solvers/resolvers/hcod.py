@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isnan
 from typing import ClassVar, final
 
 import numpy as np
@@ -105,16 +106,18 @@ class Hcod(Resolver):
         """
         if h.metric is not None:
             return super()._solve_giving(h, memory)
-        levels, give, size = h.giving, h.give, 3 * h.m + 3
-        assert give is not None
+        levels, n, m = h.giving, h.n, h.m
+        count, size = len(levels), 3 * m + 3
         part = 3 * int(h.offsets[levels[-1] + 1]) + 3
-        x = np.concatenate((h.start(), give, np.full(len(levels) * h.n, np.nan)))
-        record = warm_record(memory, len(levels) * part + size)
+        x = np.empty(n + m + count * n)
+        x[:n], x[n:n + m], x[-1] = h.reference, h.give, np.nan
+        record = warm_record(memory, count * part + size)
         code = run(entry(solve_giving), *h.rows, x, record, self._settings)
-        found: Resolution = ActiveSetResolution(x[:h.n].copy(), Status(code), record[-size:])
-        witnesses = x[h.n + h.m:].reshape(len(levels), h.n)
-        missing = np.isnan(witnesses[-1, -1])
-        found.memory, found.witnesses = (None, None) if missing else (record, witnesses)
+        status = _SOLVED if code == SOLVED else Status(code)
+        found: Resolution = ActiveSetResolution(x[:n].copy(), status, record[-size:])
+        found.memory = None
+        if not isnan(x.item(-1)):
+            found.memory, found.witnesses = record, x[n + m:].reshape(count, n)
         return found
 
 
