@@ -169,6 +169,10 @@ class Resolver(ABC):
         HierarchyError : the resolver cannot handle a row. A numerical outcome is a status.
         """
 
+    def _solve_giving(self, h: Hierarchy, memory: Array | None) -> Resolution:
+        """Resolve h, some levels of which give."""
+        return giving(self.solve, h, h.giving, memory)
+
     def _otherwise(self, h: Hierarchy, x: Array, code: int,
                    memory: Array | None = None) -> Resolution:
         """Handle a kernel's code other than SOLVED: a small work space, a bad row, a failure."""
@@ -214,9 +218,10 @@ def _with_checks(solve: Solve) -> Solve:
         try:
             if h.plain:
                 return solve(self, h, memory)
-            if levels := h.giving:
+            if h.giving:
                 refuse_give(self, h)
-                return giving(functools.partial(checked, self), h, levels, memory)
+                found: Resolution = self._solve_giving(h, memory)
+                return found
             if h.metric is not None:
                 return in_metric(functools.partial(solve, self), h, memory)
             return solve(self, h, memory)

@@ -38,6 +38,7 @@ def _arrays(_: Path) -> None:
         explain(h, result)
         certify(h, result.x)
         result.verified(h)
+        make("hcod").solve(h.changed(give=np.append(np.ones(h.m - 1), 0.0)))
 
 
 def _hierarchies() -> Iterator[tuple[Any, tuple[str, ...]]]:

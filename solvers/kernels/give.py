@@ -1,11 +1,19 @@
-"""Rows that give: their sides, moved by what an x misses and by what they give."""
+"""Rows that give: their sides, moved by what an x misses and by what they give; the exact solve.
+
+`solvers.give` has the method, for any resolver; `solve_giving` is the same around the exact kernel.
+"""
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
-from hierarchy.jit import compiled, inlined, inner_product
-from solvers.kernels.rows import length_of
+from typing import NamedTuple
+
+from hierarchy.jit import as_matrix, compiled, inlined, inner_product
+from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy, work_size
+from solvers.kernels.rows import ZERO, length_of
+from solvers.kernels.space import View, vector
+from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 _ROUNDING = 1e-10  # of a violation, relative to 1 + |a| |x|
 
@@ -34,3 +42,93 @@ def relax(A, lower, upper, give, x, first, last):
         room = _miss(A[i], lower[i], upper[i], x) + give[i]
         lower[i] -= room
         upper[i] += room
+
+
+class Giving(NamedTuple):
+    """A hierarchy, its sides (m,) a copy that moves; what rows give (m,); room for K witnesses."""
+
+    A: View
+    lower: View
+    upper: View
+    sizes: View
+    reference: View
+    give: View
+    witnesses: View
+
+
+@compiled
+def solve_giving(A, lower, upper, sizes, x, record, settings, work):
+    """Solve as `solvers.give` says, with the exact kernel.
+
+    x (n + m + K n,): the reference, what the rows give, in K levels, and anything; on return the
+    answer and, behind what rows give, the witnesses that were found. record: for each witness that
+    of the levels down to the last that gives, zeros where none had to be looked for; then that of
+    all levels. settings, work, and the codes: as of `solve_hierarchy`.
+    """
+    (m, n), levels, whole = A.shape, sizes.size, record.size - 3 * A.shape[0] - 3
+    if 2 * m + n + work_size(n, m, levels, settings[DAMPING] > 0.0) > work.size:
+        return ZERO + TOO_SMALL
+    low, at = vector(work, ZERO, m)
+    up, at = vector(work, at, m)
+    reference, at = vector(work, at, n)
+    for i in range(m):
+        low[i], up[i] = lower[i], upper[i]
+    for c in range(n):
+        reference[c] = x[c]
+    witnesses = as_matrix(x[n + m:], (x.size - n - m) // n, n)
+    g = Giving(A, low, up, sizes, reference, x[n:n + m], witnesses)
+    code, last = _find_witnesses(g, x[:n], record[:whole], settings, work[at:])
+    if code not in (SOLVED, INACCURATE):
+        for i in range(3):
+            record[record.size - 3 + i] = record[last + i]
+        return code
+    found = _solve(g, levels, x[:n], record[whole:], settings, work[at:])
+    return code if found == SOLVED else found
+
+
+@inlined
+def _find_witnesses(g, x, record, settings, work):
+    """Write the witnesses and move the sides; return a code, and where the last record ends."""
+    code, first, count, found, at = ZERO + SOLVED, ZERO, ZERO, ZERO, ZERO
+    for k in range(g.sizes.size):
+        first += g.sizes[k]
+        count = ZERO + k + 1 if _gives(g.give, first - g.sizes[k], first) else count
+    size, first, accurate = record.size // g.witnesses.shape[0], ZERO, True
+    for k in range(count):
+        last = first + g.sizes[k]
+        if code in (SOLVED, INACCURATE) and _gives(g.give, first, last):
+            if at == 0 or misses(g.A, g.lower, g.upper, x, first, last):
+                code = _solve(g, count, x, record[at:at + size], settings, work)
+                accurate, at = accurate and code == SOLVED, at + size
+            if code in (SOLVED, INACCURATE):
+                for c in range(x.size):
+                    g.witnesses[found, c] = x[c]
+                relax(g.A, g.lower, g.upper, g.give, x, first, last)
+                found += 1
+        first = last
+    for i in range(at, record.size):
+        record[i] = 0.0
+    return INACCURATE if code == SOLVED and not accurate else code, at - 3
+
+
+@inlined
+def _gives(give, first, last):
+    """Whether one of these rows gives."""
+    gives = False
+    for i in range(first, last):
+        gives |= give[i] > 0.0
+    return gives
+
+
+@inlined
+def _solve(g, count, x, record, settings, work):
+    """Solve the first levels, from the reference."""
+    rows = ZERO
+    for k in range(count):
+        rows += g.sizes[k]
+    for c in range(x.size):
+        x[c] = g.reference[c]
+    A, lower, upper, sizes = g.A[:rows], g.lower[:rows], g.upper[:rows], g.sizes[:count]
+    if settings[DAMPING] > 0.0:
+        return solve_damped(A, lower, upper, sizes, x, record, settings, work)
+    return solve_hierarchy(A, lower, upper, sizes, x, record, settings, work)

@@ -148,24 +148,53 @@ def _carve(work, m, n, levels):
 @compiled
 def _merge(s, A, lower, upper, sizes, strict, options, y):
     """Write the rows of all levels, those to merge times their weights and at moved sides."""
-    first = ZERO
+    first, hard = ZERO, ZERO
     for c in range(s.own.size):
         s.own[c] = 0.0
     for k in range(sizes.size):
-        weight = options.weights[k] if k >= strict else 1.0
+        hard = first if k == strict else hard
         for i in range(first, first + sizes[k]):
-            moved, last, entries = y[i] if k >= strict else 0.0, ZERO, ZERO
+            moved, weight = 0.0, 1.0
+            if k >= strict:
+                moved, weight, only = y[i], options.weights[k], _only_entry(A[i])
+                if only >= 0 and lower[i] == upper[i]:
+                    s.own[only] = 1.0
+                if only < 0 and _repeats(A, lower, upper, i, hard):
+                    weight = 0.0
             for c in range(A.shape[1]):
                 s.A[i, c] = weight * A[i, c]
-                if A[i, c] != 0.0:
-                    last, entries = ZERO + c, entries + 1
             s.lower[i], s.upper[i] = weight * (lower[i] + moved), weight * (upper[i] + moved)
-            if entries == 1 and k >= strict and lower[i] == upper[i]:
-                s.own[last] = 1.0
         s.sizes[k] = sizes[k]
         if k > strict:
             s.sizes[strict] += sizes[k]
         first += sizes[k]
+
+
+@inlined
+def _only_entry(a):
+    """Return the unknown that a row names alone, -1 if it has none or several."""
+    only = ZERO - 1
+    for c in range(a.size):
+        if a[c] != 0.0 and only >= 0:
+            return ZERO - 1
+        if a[c] != 0.0:
+            only = ZERO + c
+    return only
+
+
+@inlined
+def _repeats(A, lower, upper, i, hard):
+    """Whether equality i is one of the first `hard` rows too, which alone decide its value.
+
+    As of a foot that stands and is a task: weighed, its miss would drown the light rows.
+    """
+    for j in range(hard if lower[i] == upper[i] else 0):
+        c = 0
+        while lower[j] == upper[j] and c < A.shape[1] and A[i, c] == A[j, c]:
+            c += 1
+        if c == A.shape[1]:
+            return True
+    return False
 
 
 @compiled

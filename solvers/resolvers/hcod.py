@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isnan
 from typing import ClassVar, final
 
 import numpy as np
@@ -10,9 +11,10 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy
+from solvers.kernels.give import solve_giving
 from solvers.resolver import Handles, Resolution, Resolver, number, register, whole_number
 from solvers.status import SOLVED, TOO_SMALL, Status
-from solvers.workspace import WORKSPACE, entry
+from solvers.workspace import WORKSPACE, entry, run
 
 
 @final
@@ -96,6 +98,27 @@ class Hcod(Resolver):
         x, record = h.start(), warm_record(memory, 3 * h.m + 3)
         code = solve_exactly(h, x, record, self._settings)
         return ActiveSetResolution(x, _SOLVED if code == SOLVED else Status(code), record)
+
+    def _solve_giving(self, h: Hierarchy, memory: Array | None) -> Resolution:
+        """Resolve h, some levels of which give, in one call of a kernel.
+
+        The memory is that of all solves; there is none where one of the witnesses was not found.
+        """
+        if h.metric is not None:
+            return super()._solve_giving(h, memory)
+        levels, n, m = h.giving, h.n, h.m
+        count, size = len(levels), 3 * m + 3
+        part = 3 * int(h.offsets[levels[-1] + 1]) + 3
+        x = np.empty(n + m + count * n)
+        x[:n], x[n:n + m], x[-1] = h.reference, h.give, np.nan
+        record = warm_record(memory, count * part + size)
+        code = run(entry(solve_giving), *h.rows, x, record, self._settings)
+        status = _SOLVED if code == SOLVED else Status(code)
+        found: Resolution = ActiveSetResolution(x[:n].copy(), status, record[-size:])
+        found.memory = None
+        if not isnan(x.item(-1)):
+            found.memory, found.witnesses = record, x[n + m:].reshape(count, n)
+        return found
 
 
 def warm_record(memory: Array | None, size: int) -> Array:

@@ -112,7 +112,7 @@ def test_a_foot_that_lands_on_its_edge_does_not_make_torques_jump():
         "control.duration": 1.4}))
     assert run.fault is None
     assert not run.events                                             # no torque was cut off
-    assert np.abs(np.diff(run["command"], axis=0)).max() <= 4.0 + 1e-9
+    assert np.abs(np.diff(run["command"], axis=0)).max() <= 2.5 + 1e-9
     found = measure(run)
     assert found["miss_physics"].value < 1e-9
     assert found["miss_limits"].value < 1e-9

@@ -140,3 +140,19 @@ def test_weights_below_strict_levels_are_one_level_of_weighted_rows():
     found = solved(resolver, h)
     np.testing.assert_allclose(found.x, make("hcod").solve(by_hand).x, atol=1e-10)
     assert (found.carried == 0.0).all(), "weights have no memory"
+
+
+def test_a_task_whose_rows_are_strict_too_drowns_no_light_rows():
+    """Feet that stand and are tasks: their multipliers left rounding in what mu alone draws."""
+    random = np.random.default_rng(7)
+    feet = np.hstack([random.normal(size=(6, 9)), np.zeros((6, 6))])
+    motion, trunk = random.normal(size=(3, 15)), np.hstack([np.eye(3), np.zeros((3, 12))])
+    physics = (np.vstack([motion, feet]), np.zeros(9))
+    limits = (np.eye(15), np.full(15, -9.0), np.full(15, 9.0))
+    tasks = [(feet, np.full(6, 2.0))] * 6
+    resolver = make("merged", cap=0.0)
+    for seed in range(20):
+        rest = (trunk + 0.1, np.random.default_rng(seed).normal(size=3))
+        alone = solved(resolver, Hierarchy.from_levels([physics, limits, rest]))
+        both = solved(resolver, Hierarchy.from_levels([physics, limits, *tasks, rest]))
+        np.testing.assert_allclose(both.x, alone.x, atol=1e-9)
