@@ -27,6 +27,7 @@ def page(url: str) -> str:
     return LINK.sub(absolute, Path("README.md").read_text(encoding="utf-8"))
 
 
+os.umask(0o022)  # files of a wheel have the same modes, whoever builds it
 NAMES = find_namespace_packages(include=["task_hierarchy", *(f"{name}*" for name in PACKAGES)])
 INSIDE = {f"task_hierarchy.inside.{name}": name.replace(".", "/") for name in NAMES
           if name != "task_hierarchy"}

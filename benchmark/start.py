@@ -123,7 +123,7 @@ def run() -> Report:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         compiled, kernels = first_compilation(folder / "cache")
-        costs = [*beginnings(folder), *compiled, *memory(folder)]
+        costs = [*beginnings(folder), *compiled, library(folder), *memory(folder)]
     rows = [cost.row() for cost in costs]
     slowest = ", ".join(f"{name.removeprefix('solvers.kernels.')} {s:.1f}"
                         for name, s in list(kernels.items())[:_KERNELS])
@@ -156,8 +156,11 @@ def beginnings(folder: Path) -> Iterator[Cost]:
         yield _least(what, most, arguments)
     for wheel in sorted(_ROOT.glob("dist/*linux*.whl"))[-1:]:
         ZipFile(wheel).extractall(folder / "wheel")
-        yield _least("first answer of hcod, verified, from a wheel", 0.5,
-                     ["-P", "-c", _SOLVE, "hcod"], PYTHONPATH=str(folder / "wheel"))
+        for what, most, arguments in (
+                ("first answer of hcod, verified", 0.5, ["-c", _SOLVE, "hcod"]),
+                (f"hierarchy {' '.join(_SHORT)}", 1.5, ["-c", _COMMAND, *_SHORT])):
+            yield _least(f"{what}, from a wheel", most, ["-P", *arguments],
+                         PYTHONPATH=str(folder / "wheel"))
 
 
 def _least(what: str, most: float | None, arguments: list[str], **environment: str) -> Cost:
@@ -184,6 +187,14 @@ def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
     return [Cost("first answer of hcod, empty cache", first.seconds, "s", None, first.processor),
             Cost("ellipse, empty cache", done.seconds, "s", None, done.processor),
             Cost(f"compilation of {len(own)} kernels", sum(own.values()), "s")], own
+
+
+def library(folder: Path) -> Cost:
+    """Make the C library without cached kernels."""
+    _say("library, empty cache")
+    done = _run(["-m", "scenarios.cli.start", "library", "--out", str(folder / "library")],
+                NUMBA_CACHE_DIR=str(folder / "kernels"))
+    return Cost("hierarchy library, empty cache", done.seconds, "s", 10.0, done.processor)
 
 
 def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:

@@ -66,8 +66,10 @@ class Task(ABC):
     gain: float = 0.0
 
     def __init_subclass__(cls) -> None:
-        """Let the methods that take a state refuse anything else."""
+        """Let the methods that take a state refuse anything else, and `==` compare arrays."""
         super().__init_subclass__()
+        if "__eq__" not in vars(cls):  # a dataclass writes one that raises on arrays
+            cls.__eq__ = _equal  # type: ignore[method-assign]
         for name in _OF_STATE:
             if name in vars(cls):
                 setattr(cls, name, _of_state(vars(cls)[name]))
@@ -238,6 +240,16 @@ def _of_state(method: Callable[..., Any]) -> Callable[..., Any]:
         return method(self, state, *rest, **named)
 
     return checked
+
+
+def _equal(one: Any, other: Any) -> bool:
+    """Whether two values are the same; of a dataclass, its fields, and of an array, its numbers."""
+    if one is other or isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return one is other or np.array_equal(one, other)
+    if is_dataclass(one) and type(one) is type(other):
+        return all(_equal(getattr(one, field.name), getattr(other, field.name))
+                   for field in fields(one) if field.compare)
+    return not isinstance(one, Task) and bool(one == other)
 
 
 def seen_by(task: Task, state: State) -> Measurement:

@@ -191,10 +191,11 @@ def named(path: str | Path) -> Iterator[None]:
 
 
 def reason(error: OSError) -> str:
-    """Return why a file or folder cannot be written, naming a file where a folder should be."""
+    """Return why a file or folder cannot be written, naming what stands in its place."""
     if isinstance(error, FileExistsError | NotADirectoryError) and error.filename:
         asked = Path(error.filename)
-        return f"{next((one for one in (asked, *asked.parents) if one.is_file()), asked)} is a file"
+        there = next((one for one in (asked, *asked.parents) if one.is_file()), asked)
+        return f"{there} is no folder"
     return error.strerror or str(error)
 
 

@@ -89,7 +89,8 @@ class _Written:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is KeyboardInterrupt:
-            self.finish()
+            with suppress(PageError):  # matplotlib cannot be used if its import was interrupted
+                self.finish()
         if self._folder is not None:
             unlock(self._folder)
 

@@ -6,8 +6,10 @@ import json
 import numpy as np
 import pytest
 
+from benchmark import start
 from benchmark.solve import resolvers
 from benchmark.solve.entrants import NUMPY
+from benchmark.start import Cost, run
 from benchmark.tick import PlainTick
 from scenarios.cell.build import build
 from scenarios.config import load
@@ -63,3 +65,15 @@ def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
     for k in range(0, path.ticks, 100):
         found = plain.step(path["t"][k], path["q"][k], path["v"][k])
         np.testing.assert_allclose(found, path["a"][k], atol=1e-8)
+
+
+def test_everything_measured_is_told(monkeypatch):
+    monkeypatch.setattr(start, "beginnings", lambda folder: [Cost("help", 0.1, "s", 0.5, 0.09)])
+    monkeypatch.setattr(start, "first_compilation", lambda cache: (
+        [Cost("first", 20.0, "s", None, 19.0)], {"solvers.kernels.a.b": 2.0}))
+    monkeypatch.setattr(start, "library", lambda folder: Cost("library", 9.0, "s", 10.0, 8.0))
+    monkeypatch.setattr(start, "memory", lambda folder: [Cost("a run", 301.0, "MB", 300.0)])
+    found = run()
+    assert [row["verdict"] for row in found.rows["start"]] == ["met", "", "met", "not met"]
+    assert found.rows["compilation"] == [{"kernel": "solvers.kernels.a.b", "seconds": 2.0}]
+    assert "a.b 2.0" in found.sections[0].text

@@ -125,8 +125,11 @@ def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path)
 
 
 INTERRUPTED_AFTER_THE_FIRST_RUN = """
-import os, signal
+import os, signal, sys
 from scenarios.results import comparing
+
+if sys.argv.pop() == "broken":
+    comparing._Written._write = lambda *_: 1 / 0
 
 add = comparing._Written.add
 
@@ -140,15 +143,17 @@ main()
 """
 
 
-def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(tmp_path):
+@pytest.mark.parametrize("page", ["whole", "broken"])
+def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(page,
+                                                                                     tmp_path):
     command = [sys.executable, "-c", INTERRUPTED_AFTER_THE_FIRST_RUN, "compare", "ellipse",
-               "--resolvers", "tpm,hcod", "--workers", "2", *SHORT, "--out", "b"]
+               "--resolvers", "tpm,hcod", "--workers", "2", *SHORT, "--out", "b", page]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 130
     assert "the runs made so far are in b\n" in done.stderr
     assert list((tmp_path / "b").rglob("run.npz"))
-    assert {"results.csv", "index.html", "comparison.json"} <= {
-        path.name for path in (tmp_path / "b").iterdir()}
+    pages = {"index.html", "comparison.json"} if page == "whole" else set()
+    assert {"results.csv", *pages} <= {path.name for path in (tmp_path / "b").iterdir()}
 
 
 def test_runs_side_by_side_are_those_made_one_by_one_and_are_timed_alone(tmp_path, monkeypatch):
