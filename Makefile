@@ -18,15 +18,17 @@ BIN        := .venv/bin
 # Small matrices: threads of the linear algebra library only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
-# What kernels and demo need is installed first; then the rest, while kernels are compiled.
-MAKEFLAGS  += --jobs=2
+# What kernels need is installed first: those of the solvers, then of robots. The rest follows while
+# they are compiled.
+MAKEFLAGS  += --jobs=3
+ARRAYS     := .venv/arrays
 SMALL      := .venv/scenarios
 INSTALLED  := .venv/installed
 PIP        := $(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off \
-              --no-compile --constraint constraints.txt --editable
+              --no-compile --constraint constraints.txt
 
 .DELETE_ON_ERROR:
-.PHONY: demo test quick bench stress reproduce docs dist clean set-up kernels
+.PHONY: demo test quick bench stress reproduce docs dist clean set-up kernels solvers-o robots-o
 
 demo: kernels
 	@rm -rf runs/demo
@@ -80,16 +82,25 @@ set-up: kernels $(INSTALLED)
 
 # Kernels are compiled again when their sources have changed; without them each process compiles what
 # it calls, so that a failure stops nothing.
-kernels: $(SMALL)
-	-@$(BIN)/python -m scenarios.ahead
+kernels: solvers-o robots-o
+
+solvers-o: $(ARRAYS)
+	-@$(BIN)/python -m scenarios.ahead solvers
+
+robots-o: $(SMALL)
+	-@$(BIN)/python -m scenarios.ahead robots
 
 # One set-up for all targets, repeated only when what is to be installed has changed.
 $(INSTALLED): $(SMALL)
-	@$(PIP) '.[dev]'
+	@$(PIP) --editable '.[dev]'
 	@echo "Installed $$($(BIN)/python -m pip list --disable-pip-version-check --format freeze | wc -l) packages into .venv."
 	@touch $@
 
-$(SMALL): pyproject.toml constraints.txt
+$(SMALL): $(ARRAYS)
+	@$(PIP) --editable '.[scenarios,qp]'
+	@touch $@
+
+$(ARRAYS): pyproject.toml constraints.txt
 	@python=; \
 	for candidate in $(CANDIDATES); do \
 	  if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; \
@@ -108,5 +119,5 @@ $(SMALL): pyproject.toml constraints.txt
 	fi; \
 	echo "Setting up .venv with $$("$$python" --version) (once; downloads about 250 MB) ..."; \
 	"$$python" -m venv --clear .venv
-	@$(PIP) '.[scenarios,qp]'
+	@$(PIP) numba scipy
 	@touch $@

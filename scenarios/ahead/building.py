@@ -1,5 +1,7 @@
 """Compile kernels ahead: `python -m scenarios.ahead` writes the object files of the package.
 
+With the name of a part it writes that one; `solvers` needs nothing but numba and scipy.
+
 `calls.txt` says what Python calls. `python -m scenarios.ahead record` writes it anew, of what the
 jobs of `jobs.py` call.
 """
@@ -24,29 +26,30 @@ PARTS = {"solvers": ("solvers",), "robots": ("hierarchy", "scenarios")}
 
 
 def main() -> None:
-    """Write the object file of each part, unless both are as their sources are."""
+    """Write the object files of the parts that are named, or all, unless they are current."""
     from hierarchy.jit.ahead import FOLDER
     from hierarchy.jit.building import ENVIRONMENT
 
-    if sys.argv[1:] == ["record"]:
+    names = sys.argv[1:]
+    if names == ["record"]:
         CALLS.write_text("".join(f"{call}\n" for call in _recorded()))
-    if is_current():
-        return
+        names = []
     begun, calls = monotonic(), CALLS.read_text().splitlines()
-    _say(f"compiling {len(calls)} entries of kernels, once ...")
-    parts = [(FOLDER / f"{part}.o", [call for call in calls if call.startswith(packages)])
-             for part, packages in PARTS.items()]
+    parts = [(FOLDER / f"{part}.o", [call for call in calls if call.startswith(PARTS[part])])
+             for part in names or PARTS if not is_current(part)]
+    for file, entries in parts:
+        _say(f"{file.name}: compiling {len(entries)} entries of kernels, once ...")
     with _environment(**ENVIRONMENT):
         for (file, _), size in ended(compile_part, parts):
             _say(f"{file.name}: {size / 1e6:.2f} MB after {monotonic() - begun:.0f} s")
 
 
-def is_current() -> bool:
-    """Whether the object files were made of the calls and sources as they are."""
+def is_current(part: str) -> bool:
+    """Whether the object file of a part was made of the calls and sources as they are."""
     from hierarchy.jit import building
     from hierarchy.jit.ahead import FOLDER
 
-    return all(building.is_current(FOLDER / f"{part}.o", _listed()) for part in PARTS)
+    return building.is_current(FOLDER / f"{part}.o", _listed())
 
 
 def record(job: str) -> list[str]:

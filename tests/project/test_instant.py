@@ -11,7 +11,7 @@ import numba
 import pytest
 
 from hierarchy.jit.ahead import parts
-from scenarios.ahead.building import is_current
+from scenarios.ahead.building import PARTS, is_current
 
 ROOT = Path(__file__).parents[2]
 pytestmark = [pytest.mark.slow,
@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.slow,
 
 @pytest.fixture(scope="module", autouse=True)
 def _objects():
-    if not parts() or not is_current():
+    if not parts() or not all(map(is_current, PARTS)):
         pytest.skip("the object files are not there, or older than the kernels: make set-up")
 
 
