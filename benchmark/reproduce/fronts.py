@@ -76,7 +76,7 @@ class Point:
     units: list[str]
 
 
-_ROWS = 6  # of a method in a table
+_ROWS = 5  # of a method in a table
 FRONTS = {name: Front(**given) for name, given in GIVEN["front"].items()}
 
 
