@@ -76,7 +76,8 @@ class Point:
     units: list[str]
 
 
-_ROWS = 5  # of a method in a table
+_COLUMNS = 3  # of the figure
+_ROWS = 3  # of a method in a table
 FRONTS = {name: Front(**given) for name, given in GIVEN["front"].items()}
 
 
@@ -205,9 +206,14 @@ def _rows(tried: Sequence[Point], units: Sequence[str]) -> Iterator[list[str]]:
 def figure(points: Sequence[Point]) -> Figure:
     """Return the fronts as tested: second metric over first, the third as the mark's size."""
     names = list(dict.fromkeys(one.front for one in points))
-    fig = Figure(figsize=(4.0 * len(names), 3.4), layout="constrained")
+    columns = min(_COLUMNS, len(names))
+    rows = -(-len(names) // columns)
+    fig = Figure(figsize=(4.0 * columns, 3.4 * rows), layout="constrained")
+    axes = fig.subplots(rows, columns, squeeze=False).ravel()
     style = looks(dict.fromkeys(one.method for one in points))
-    for ax, name in zip(fig.subplots(1, len(names), squeeze=False)[0], names, strict=True):
+    for ax in axes[len(names):]:
+        ax.axis("off")
+    for ax, name in zip(axes, names, strict=False):
         for method in dict.fromkeys(one.method for one in points if one.front == name):
             own = [one.test for one in points if (one.front, one.method) == (name, method)
                    and None not in one.test]
