@@ -159,7 +159,7 @@ def beginnings(folder: Path) -> Iterator[Cost]:
         for what, most, arguments in (
                 ("first answer of hcod, verified", 0.5, ["-c", _SOLVE, "hcod"]),
                 (f"hierarchy {' '.join(_SHORT)}", 1.5, ["-c", _COMMAND, *_SHORT])):
-            yield _least(f"{what}, from a wheel", most, ["-P", *arguments],
+            yield _least(f"{what} from a wheel", most, ["-P", *arguments],
                          PYTHONPATH=str(folder / "wheel"))
 
 
