@@ -158,8 +158,8 @@ def beginnings(folder: Path) -> Iterator[Cost]:
         ZipFile(wheel).extractall(folder / "wheel")
         for what, most, arguments in (
                 ("first answer of hcod, verified", 0.5, ["-c", _SOLVE, "hcod"]),
-                (f"hierarchy {' '.join(_SHORT)}", 1.5, ["-c", _COMMAND, *_SHORT])):
-            yield _least(f"{what} from a wheel", most, ["-P", *arguments],
+                ("run of ellipse", 1.5, ["-c", _COMMAND, *_SHORT])):
+            yield _least(f"{what}, from a wheel", most, ["-P", *arguments],
                          PYTHONPATH=str(folder / "wheel"))
 
 
@@ -194,7 +194,7 @@ def library(folder: Path) -> Cost:
     _say("library, empty cache")
     done = _run(["-m", "scenarios.cli.start", "library", "--out", str(folder / "library")],
                 NUMBA_CACHE_DIR=str(folder / "kernels"))
-    return Cost("hierarchy library, empty cache", done.seconds, "s", 10.0, done.processor)
+    return Cost("the C library, empty cache", done.seconds, "s", 10.0, done.processor)
 
 
 def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
