@@ -36,7 +36,7 @@ class Box(NamedTuple):
 def solve_within_bounds(A, lower, upper, sizes, reference, x, record, settings, work):
     """Solve like `Tpm`: from a record at bounds exactly; else, or if none is active there, anew.
 
-    reference (n,), or (0,) for zero. x (n,): the answer, see `closed` for failures. record
+    reference (n,), or (0,) for zero. x (n,): the answer, zero on failure. record
     (n + L + 3 m + 3,): see `_is_at_bound`; that of an earlier solve or zeros on entry, and zeros
     on return where all rows are equalities. settings: those of `Hcod`. Returns a status, TOO_SMALL,
     or -(i + 1) if row i is an inequality but not a bound.

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hierarchy.jit import as_matrix, compiled, inlined, inner_product
-from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy, work_size
+from solvers.kernels.exact import DAMPING, solve, work_size
 from solvers.kernels.rows import ZERO, length_of
 from solvers.kernels.space import View, vector
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
@@ -128,7 +128,5 @@ def _solve(g, count, x, record, settings, work):
         rows += g.sizes[k]
     for c in range(x.size):
         x[c] = g.reference[c]
-    A, lower, upper, sizes = g.A[:rows], g.lower[:rows], g.upper[:rows], g.sizes[:count]
-    if settings[DAMPING] > 0.0:
-        return solve_damped(A, lower, upper, sizes, x, record, settings, work)
-    return solve_hierarchy(A, lower, upper, sizes, x, record, settings, work)
+    return solve(g.A[:rows], g.lower[:rows], g.upper[:rows], g.sizes[:count], x, record, settings,
+                 work)
