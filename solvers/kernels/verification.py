@@ -163,7 +163,7 @@ def _balances(s, p, reach, factored):
              and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     left = length_of(s.number[GRADIENT, :s.x.size])
     unsure = SIGN_MARGIN * (left + rounding + turned) / s.scalar[PIVOT]
-    holds = holds and _signs_hold(s, level, unsure, reach)
+    holds = holds and _signs_hold(s, level, unsure, reach, allowed)
     if holds:
         _decide(s, level, unsure, reach)
     return holds or met
@@ -216,16 +216,19 @@ def _beyond_rounding(s):
 
 
 @inlined
-def _signs_hold(s, level, unsure, reach):
+def _signs_hold(s, level, unsure, reach, allowed):
     """Whether no multiplier of level p points inward for a row that nothing has decided.
 
-    unsure: those below it decide weakly.
+    unsure: those below it decide weakly. allowed: what may remain of the gradient, also where an
+    inward violation counts as zero.
     """
     mu, holds = s.multiplier[level.p], True
     for i in range(level.end):
-        weak = abs(mu[i]) * s.number[NORM, i] <= unsure
-        if mu[i] * s.index[STATE, i] < 0.0 and not _is_rounding(s, level, i, reach):
-            holds = holds and s.index[CHANGE, i] != OPEN and (weak or s.index[CHANGE, i] == DECIDED)
+        pull = abs(mu[i]) * s.number[NORM, i]
+        if mu[i] * s.index[STATE, i] < 0.0 and not (
+                _is_rounding(s, level, i, reach) and pull <= allowed):
+            decided = s.index[CHANGE, i]
+            holds = holds and decided != OPEN and (pull <= unsure or decided == DECIDED)
     return holds
 
 
