@@ -26,7 +26,7 @@ FLOOR = 1e-3         # the same in the pass level by level
 # Verification: half of what `certify` accepts, because shifts and turns add up.
 BAND = 5e-9          # shift of a side, relative to 1 + |x|
 FREE_ROWS = 2.0      # share of the band of a row that acts over that of one that does not
-REMAINDER = 2.5e-9   # what may remain of a gradient, as a shift of the sides of its level
+REMAINDER = 2.5e-9   # what may remain of a gradient, as a turn [rad] of the rows of its level
 KNOWN_MULTIPLIER = 1e-4  # what may remain of it over its terms and the smallest pivot
 CUT_BALANCE = 2e-7   # what cut rows may add to a gradient, relative to its terms
 ROUNDING_BALANCE = 5e-9  # the same for rounding

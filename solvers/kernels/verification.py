@@ -150,7 +150,7 @@ def _balances(s, p, reach, factored):
         return True
     source, allowed = (reach if last else level.source), REMAINDER * reach
     if not last:
-        allowed = REMAINDER * level.least * level.least * max(level.missed, reach)
+        allowed = REMAINDER * level.least * level.least * level.missed
     outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
     if rounding > 0.0 or not last:  # rows with small pivots can make good what is left
         allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
