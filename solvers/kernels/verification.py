@@ -192,17 +192,20 @@ def _add_rows(s, level, reach):
     cuts of rows add to it.
     """
     mu, outside, rounding, turned = s.multiplier[level.p], False, SIGN_ROUNDING * reach, 0.0
-    signed = False
+    signed, k, cut, most = False, 0, 0.0, 0.0
     for c in range(s.x.size):
         s.number[GRADIENT, c] = s.x[c] - s.number[REFERENCE, c] if reach > 0.0 else 0.0
         s.number[NOISE, c] = CANCELLED * reach
     for i in range(level.end):
+        while i >= s.index[FIRST, k + 1]:
+            turned, k, cut, most = turned + 2.0 * cut * most, k + 1, 0.0, 0.0
+        cut, most = max(cut, s.number[CUT, i]), max(most, abs(mu[i]))
         if mu[i] != 0.0:
             state = s.index[STATE, i]
             outside, signed = outside or state == FREE, signed or state != EQUAL
             rounding += SIGN_ROUNDING * abs(mu[i]) * s.number[NORM, i]
-            turned += 2.0 * s.number[CUT, i] * abs(mu[i])
             _add_row(s, mu[i], i)
+    turned += 2.0 * cut * most
     return outside, rounding if signed else 0.0, turned
 
 
