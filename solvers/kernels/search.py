@@ -113,8 +113,9 @@ def _points_inward(s):
 def pivot_in_blocks(s, limit, keep):
     """Change all wrong rows at once while their number falls; return the code and the tries.
 
-    SOLVED is verified; INACCURATE: nothing is wrong, but that is not verified; UNPROVED: the number
-    does not fall. With `keep` the working set is then the one that it began with.
+    SOLVED and TURNED are verified; INACCURATE: nothing is wrong, but that is not verified;
+    UNPROVED: the number does not fall. With `keep` the working set is then the one that it began
+    with.
     """
     levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, PATIENCE, ZERO
     _copy_states(s, STATE, SEED)
@@ -122,8 +123,9 @@ def pivot_in_blocks(s, limit, keep):
         tries += 1
         meet(s, levels)
         write_multipliers(s, MET)
-        if not _points_inward(s) and verify(s, YES):
-            return ZERO + SOLVED, tries
+        code = verify(s, YES) if not _points_inward(s) else ZERO + UNPROVED
+        if code != UNPROVED:
+            return code, tries
         found = judge(s, levels, ZERO - 1)
         if found.wrong == 0:
             return ZERO + INACCURATE, tries

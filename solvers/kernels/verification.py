@@ -24,7 +24,7 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.multipliers import refine
-from solvers.kernels.rows import length_of
+from solvers.kernels.rows import ZERO, length_of
 from solvers.kernels.tolerances import (
     BAND,
     CANCELLED,
@@ -44,6 +44,7 @@ from solvers.kernels.tolerances import (
 from solvers.kernels.working_set import (
     CHANGE,
     CUT,
+    DIRTY,
     FIRST,
     GRADIENT,
     LOWER,
@@ -60,7 +61,7 @@ from solvers.kernels.working_set import (
     WHOLE,
     row_times_x,
 )
-from solvers.status import EQUAL, FREE
+from solvers.status import EQUAL, FREE, SOLVED, TURNED, UNPROVED
 
 # What is known of an inequality that acts: nothing, a weak multiplier decided, decided.
 OPEN, WEAKLY, DECIDED = range(3)
@@ -68,17 +69,27 @@ OPEN, WEAKLY, DECIDED = range(3)
 
 @compiled
 def verify(s, factored):
-    """Whether the claims of a working set prove its x.
+    """Return SOLVED if the claims of a working set prove its x, else UNPROVED.
 
+    TURNED if they do for the rows as cut, but what was cut may decide the sign of a multiplier: of
+    two problems within `rank_tolerance`, x is optimal for one, and no search decides for which.
     factored: whether `meet` has factored this set, so that its multipliers can be refined.
     """
-    levels, whole = s.multiplier.shape[0] - 1, s.count[WHOLE]
-    reach = 1.0 + length_of(s.x)
-    if not np.isfinite(reach) or not _rows_hold(s, reach):
-        return False
-    proved = True
+    reach, code = 1.0 + length_of(s.x), ZERO + UNPROVED
+    if np.isfinite(reach) and _rows_hold(s, reach):
+        if _all_balance(s, reach, factored, 1.0):
+            code = ZERO + SOLVED
+        elif s.count[DIRTY] == 1 and _rows_hold(s, reach) and _all_balance(s, reach, factored, 0.0):
+            code = ZERO + TURNED
+    return code
+
+
+@inlined
+def _all_balance(s, reach, factored, doubt):
+    """Whether (2) and (3) hold for all levels, down to one that sets all of x; see `_balances`."""
+    levels, whole, proved = s.multiplier.shape[0] - 1, s.count[WHOLE], True
     for p in range(levels + 1 if whole < 0 else whole + 1):
-        proved = proved and _balances(s, p, reach, factored)
+        proved = proved and _balances(s, p, reach, factored, doubt)
     return proved
 
 
@@ -141,8 +152,11 @@ class Level(NamedTuple):
 
 
 @inlined
-def _balances(s, p, reach, factored):
-    """Whether (2) and (3) hold for level p."""
+def _balances(s, p, reach, factored, doubt):
+    """Whether (2) and (3) hold for level p.
+
+    doubt: share of what was cut that may decide a sign.
+    """
     last = p == s.multiplier.shape[0] - 1
     level = _measured(s, p, last)
     met = not last and level.missed <= BAND * reach
@@ -155,14 +169,14 @@ def _balances(s, p, reach, factored):
     if rounding > 0.0 or not last:  # rows with small pivots can make good what is left
         allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
     rest = _beyond_rounding(s)
-    if factored and not rest <= allowed + turned:
+    if factored and not rest <= allowed:
         refine(s, p)
         outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
         rest = _beyond_rounding(s)
-    holds = (not outside and rest <= allowed + turned
+    holds = (not outside and rest <= allowed
              and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     left = length_of(s.number[GRADIENT, :s.x.size])
-    unsure = SIGN_MARGIN * (left + rounding + turned) / s.scalar[PIVOT]
+    unsure = SIGN_MARGIN * (left + rounding + doubt * turned) / s.scalar[PIVOT]
     holds = holds and _signs_hold(s, level, unsure, reach, allowed)
     if holds:
         _decide(s, level, unsure, reach)
@@ -254,8 +268,9 @@ def _is_rounding(s, level, i, reach):
 
 @inlined
 def _add_row(s, f, i):
-    """Add a multiple of row i of A to what is left, and its rounding to the noise."""
-    a, c, left, noise = s.A[i], s.index[UNIT, i], s.number[GRADIENT], s.number[NOISE]
+    """Add a multiple of row i, as cut, to what is left, and its rounding to the noise."""
+    a = s.C[i] if s.number[CUT, i] > 0.0 else s.A[i]
+    c, left, noise = s.index[UNIT, i], s.number[GRADIENT], s.number[NOISE]
     least = CANCELLED * abs(f) * s.number[NORM, i]
     if c >= 0:
         left[c] += f * a[c]
