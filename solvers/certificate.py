@@ -24,7 +24,8 @@ above and x - reference for t, decides whether x is the nearest; it needs no tur
 Double precision sets two limits. First, rows that agree up to an angle of `parallel` count as
 dependent: a direction that only their difference can see is free, and lower levels may use it.
 Their span is then known only up to that angle, so x may be right under either reading, with angles
-from a tenth of `parallel` to four times it. Second, a row smaller than 1e-13 of the largest row
+from a tenth of `parallel` to four times it, or for rows turned by no more than it that are exactly
+dependent. Second, a row smaller than 1e-13 of the largest row
 of its level is dust, which rounding in the large row could have produced: an x that meets it is
 accepted, and so is one that ignores it.
 
@@ -34,6 +35,7 @@ first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -51,6 +53,7 @@ to 1 + |x|."""
 PARALLEL = 1e-8
 """Angle [rad] up to which a row counts as dependent on others."""
 _EITHER = 0.25, 4.0, 0.1   # times `parallel`: up to these angles rows may count as dependent too
+_EXACTLY = 1e-4     # times `parallel`: the same for rows made exactly dependent
 _DUST = 1e-13       # norm of a row relative to the largest of its level: smaller ones are dust
 _SMALLEST = 1e-30   # norm of a row relative to the largest of its level: lower bound
 _CLEAR = 0.1        # relative pivot: smaller ones do not add to the uncertainty of parallel rows
@@ -173,10 +176,10 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
         if rows is None:
             unknown = np.full(len(pairs), np.inf)
             return Certificate(unknown, unknown.copy(), np.inf, tolerance, h.names)
-        levels = [rows.part(slice(i, j)) for i, j in pairs]
-        verdicts = (Certificate(violations, *_judged(levels, x - h.reference, rows.reach, tolerance,
-                                                     angle), tolerance, h.names)
-                    for angle in (parallel, *(factor * parallel for factor in _EITHER)))
+        verdicts = (Certificate(violations, *_judged([read.part(slice(*pair)) for pair in pairs],
+                                                     x - h.reference, rows.reach, tolerance, angle),
+                                tolerance, h.names)
+                    for read, angle in _readings(h, x, rows, pairs, tolerance, parallel))
         first = next(verdicts)
         return first if first.certified else next((v for v in verdicts if v.certified), first)
 
@@ -209,6 +212,39 @@ def _euclidean(h: Hierarchy, x: Array) -> tuple[Hierarchy, Array]:
     changed = h.changed(A=np.linalg.solve(L, h.A.T).T, lower=h.lower - at, upper=h.upper - at,
                         reference=None, metric=None)
     return changed, L.T @ (x - h.reference)
+
+
+def _readings(h: Hierarchy, x: Array, rows: _Rows, pairs: Sequence[tuple[int, int]],
+              tolerance: float, parallel: float) -> Iterator[tuple[_Rows, float]]:
+    """Yield the rows that x may be optimal for, each with the angle up to which they depend."""
+    for factor in (1.0, *_EITHER):
+        yield rows, factor * parallel
+    turned = _Rows.of(_made_dependent(h, rows, pairs, parallel), x, tolerance)
+    if turned is not None:
+        yield turned, _EXACTLY * parallel
+
+
+def _made_dependent(h: Hierarchy, rows: _Rows, pairs: Sequence[tuple[int, int]],
+                    parallel: float) -> Hierarchy:
+    """Return h with those rows on a side exactly dependent that are so up to an angle.
+
+    In each level the row with the largest remainder is independent, as long as there is one.
+    """
+    A, basis, on = h.A.copy(), np.empty((0, h.n)), rows.fixed | rows.upper | rows.lower
+    for first, last in pairs:
+        left = first + np.flatnonzero(on[first:last])
+        while len(left) and len(basis) < h.n:
+            rest = rows.unit[left]
+            for _ in range(2):  # once more: of a row nearly in the span, rounding remains
+                rest = rest - (rest @ basis.T) @ basis
+            size = norm(rest, axis=1)
+            chosen, near = int(np.argmax(size)), size <= parallel
+            A[left[near]] -= rest[near] * np.exp(rows.size[left[near]])[:, None]
+            if not near[chosen]:
+                basis = np.vstack([basis, rest[chosen] / size[chosen]])
+            near[chosen] = True
+            left = left[~near]
+    return h.changed(A=A)
 
 
 def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, parallel: float

@@ -11,7 +11,7 @@ from rank_cases import build, family, rng
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import certificate, certify, make
-from solvers.problems import Recipe, generate
+from solvers.problems import Recipe, generate, structured
 
 # Not DEGEN7: some of its rows are at an angle of 2e-9, whose answer is 1e8 away or not.
 FAMILIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10", "INEQ7", "HUM38")
@@ -132,7 +132,19 @@ def test_the_certificate_shares_no_code_with_any_solver():
                 if isinstance(node, ast.ImportFrom)}
     imported |= {alias.name.partition(".")[0] for node in ast.walk(tree)
                  if isinstance(node, ast.Import) for alias in node.names}
-    assert imported == {"__future__", "dataclasses", "typing", "numpy", "scipy", "hierarchy"}
+    assert imported == {"__future__", "collections", "dataclasses", "typing", "numpy", "scipy",
+                        "hierarchy"}
+
+
+def test_an_answer_for_rows_turned_until_they_depend_is_certified():
+    """Two rows depend up to 1.3e-9 where others are at a side; neither a shift nor a turn alone
+    explains x."""
+    h = structured(82019829, ("nearly_parallel",))
+    x = make("hcod").solve(h).x
+    assert certify(h, x).certified
+    assert not certify(h, x, parallel=1e-10).certified
+    for c in range(h.n):
+        assert not certify(h, x + 1e-5 * np.eye(h.n)[c]).certified
 
 
 @pytest.mark.parametrize(("angle", "counts"), [(1e-10, False), (1e-9, False), (1e-7, True),
