@@ -2,8 +2,7 @@
 
 Python, batches and the C library call this one kernel. The working set comes from the memory of an
 earlier solve, or from a pass level by level. It is factored anew and pivoted in blocks, then row by
-row, and then once more with small coefficients taken for zero. After each of these the claims are
-verified, and nothing is SOLVED otherwise.
+row. After each of these the claims are verified, and nothing is SOLVED otherwise.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -30,7 +29,6 @@ from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
 from solvers.kernels.tolerances import LARGER, MET, PASS_STEPS, SOLVE_STEPS
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
-    COARSE,
     FINISHED,
     FIRST,
     NEGLECTED,
@@ -193,9 +191,8 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     most, code, steps = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO
     limit = min(most, SOLVE_STEPS * (m + 1))
     warm, level, s.count[FINISHED] = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1, 0
-    begin = ZERO
     if warm:
-        level, begin = _resumed_at(record[3 * m + 2], sizes.size)
+        level = _resumed_at(record[3 * m + 2], sizes.size)
     if warm and level < 0:
         code, steps = pivot_in_blocks(s, limit, NO)
     blocks = steps
@@ -210,14 +207,11 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
         if code != SOLVED and steps < limit:
             code, tries = pivot_in_blocks(s, limit - steps, YES)
             steps, blocks = steps + tries, blocks + tries
-    for coarse in range(begin, 2):
-        if code in (UNPROVED, INACCURATE) and steps < limit:
-            s.count[COARSE] = coarse
-            restore(s)
-            code, tries, level = pivot_one_by_one(
-                s, current, saved, limit - steps, ZERO if coarse > begin else level)
-            steps += tries
-            code = _verified(s, code, YES)
+    if code in (UNPROVED, INACCURATE) and steps < limit:
+        restore(s)
+        code, tries, level = pivot_one_by_one(s, current, saved, limit - steps, level)
+        steps += tries
+        code = _verified(s, code, YES)
     if code == SOLVED and neglects(s):
         code, tries, more = _solve_with_light_rows(s, current, saved, limit - steps)
         steps, blocks = steps + tries + more, blocks + tries
@@ -273,12 +267,10 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
     for c in range(n):
         found[c] = x[n + c]
     s, code, _ = _open(A, lower, upper, sizes, found, record, settings, work[at:])
-    readings = 4 if s.count[NEGLECTED] > 0 else 2  # without rows to take up, two are all there are
-    for reading in range(readings if code == SOLVED else 0):
+    for reading in range(1 + (s.count[NEGLECTED] > 0) if code == SOLVED else 0):
         if not proved:
-            s.count[COARSE] = reading % 2
-            restore(s)
-            if reading == 2:
+            if reading == 1:
+                restore(s)
                 take_up(s)
             meet(s, sizes.size)
             write_multipliers(s, MET)
@@ -294,7 +286,7 @@ def _open(A, lower, upper, sizes, x, record, settings, work):
     m, n = A.shape
     multiplier, at = matrix(work, ZERO, sizes.size + 1, m)
     own, end = carve_working_set(A, sizes, x, multiplier, work, at)
-    s, own.scalar[SCALE], own.count[COARSE] = own, 1.0, 0
+    s, own.scalar[SCALE] = own, 1.0
     code = load(s, lower, upper, sizes, record, settings[RANK_TOLERANCE])
     if code == UNPROVED:
         scaled, end = _carve_scaled(work, end, m, n)
@@ -316,19 +308,18 @@ def _carve_scaled(work, at, m, n):
 
 @inlined
 def _resume(s, level):
-    """Return where a later solve resumes, see `_resumed_at`; rounded, the level."""
-    last, half = s.multiplier.shape[0] - 2, 0.5 * s.count[COARSE]
+    """Return where a later solve resumes, see `_resumed_at`."""
+    last = s.multiplier.shape[0] - 2
     if s.count[FINISHED] == 0:
-        return -2.0 - half - (level if level > 0 else 0)
-    return half + (s.count[FINISHED] if s.count[FINISHED] < last else last)
+        return -2.0 - (level if level > 0 else 0)
+    return 0.0 + (s.count[FINISHED] if s.count[FINISHED] < last else last)
 
 
 @inlined
 def _resumed_at(number, levels):
-    """Return the level at which an earlier search ended, -1 for none, and whether it was coarse."""
+    """Return the level at which an earlier search ended, -1 for none."""
     at = -2.0 - number if number <= -2.0 else number
-    level = np.int64(at) if 0.0 <= at < levels else ZERO - 1
-    return level, np.int64(level >= 0 and at > level)
+    return np.int64(at) if 0.0 <= at < levels else ZERO - 1
 
 
 @inlined

@@ -21,10 +21,9 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.least_squares import turn
 from solvers.kernels.rows import length_of, reflect
 from solvers.kernels.space import matrix
-from solvers.kernels.tolerances import CANCELLED, COARSE_SIGN, EPSILON, NEGLIGIBLE, SHADOW
+from solvers.kernels.tolerances import CANCELLED, EPSILON, NEGLIGIBLE, SHADOW
 from solvers.kernels.working_set import (
     BEGIN,
-    COARSE,
     DIAGONAL,
     FIRST,
     GOAL,
@@ -165,7 +164,7 @@ def _add_rows(s, k, least, reach, far):
 def _add(s, f, unsure, q, begin, end):
     """Add a multiple of the row at place q to the gradient in these columns."""
     w, gradient, noise = s.W[q], s.number[GRADIENT], s.number[NOISE]
-    unsure += (COARSE_SIGN if s.count[COARSE] == 1 else CANCELLED) * abs(f)
+    unsure += CANCELLED * abs(f)
     for t in range(begin, end):
         gradient[t] += f * w[t]
         noise[t] += abs(w[t]) * unsure

@@ -35,7 +35,6 @@ RANK_MARGIN = 1.1    # between a pivot or a cut and rank_tolerance, as a factor
 PIVOT_PRODUCT = 1e-15  # of the two smallest pivots: less, and the second is rounding of the first
 SIGN_MARGIN = 4.0    # multiplier over its error, that of the gradient over the smallest pivot
 SIGN_ROUNDING = 4e-16  # of a gradient over its terms
-COARSE_SIGN = 1e-10  # multiplier over its terms: the coarse search takes smaller ones for zero
 
 # Pivots
 CLEAR_SQUARE = 1e-2  # of a remainder over that of the row: smaller ones are summed, not updated

@@ -43,10 +43,10 @@ NUMBERS = 16  # one more than these: `levels.py` keeps its own behind REFERENCE
  RANK, SHORT) = range(14)
 INDICES = 14
 # In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
-# cut since the rows were those of A, whether small coefficients are cut along other rows too, the
-# number of rows that are negligible beside those of other levels alone, the number of levels that
-# the saved x meets, the number of levels in the search at its last checkpoint.
-PICKED, WHOLE, DIRTY, COARSE, NEGLECTED, FINISHED, SEEN_LAST = range(7)
+# cut since the rows were those of A, the number of rows that are negligible beside those of other
+# levels alone, the number of levels that the saved x meets, the number of levels in the search at
+# its last checkpoint.
+PICKED, WHOLE, DIRTY, NEGLECTED, FINISHED, SEEN_LAST = range(6)
 # In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm
 # and the next one, the factor by which the data are those of the caller.
 TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
@@ -86,7 +86,7 @@ class WorkingSet(NamedTuple):
 @inlined
 def working_set_size(n, m, levels):
     """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 12 + 3 * m * n + n * n
+    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 11 + 3 * m * n + n * n
 
 
 @inlined
@@ -96,7 +96,7 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
     w = max(m, n, sizes.size + 1)
     number, at = matrix(work, at, NUMBERS, w)
     numbers, at = integers(work, at, INDICES * w)
-    count, at = integers(work, at, 7)
+    count, at = integers(work, at, 6)
     scalar, at = vector(work, at, 5)
     W, at = matrix(work, at, m, n)
     basis, at = matrix(work, at, n, n)
@@ -295,7 +295,7 @@ def gives_all(s, k, goal, seen):
 def _is_short(s, begin, end, rank):
     """Whether a level has so few columns left that these cost less than its rows, as 0 or 1."""
     left = s.x.size - rank
-    few = s.count[COARSE] == 0 and rank > s.count[PICKED]
+    few = rank > s.count[PICKED]
     return ZERO + (few and 2 * left < s.x.size and left + SPARED < end - begin)
 
 
@@ -327,8 +327,8 @@ def _factor(s, begin, end, rank, short):
         least = CANCELLED * s.number[NORM, listed[q]]
         for t in range(rank):
             s.W[q, t] = s.W[q, t] if abs(s.W[q, t]) > least else 0.0
-    for q in range(begin + (0 if s.count[COARSE] == 1 else rank - above), end):
-        _cut(s, q, rank, q >= begin + rank - above)
+    for q in range(begin + rank - above, end):
+        _cut(s, q, rank)
     return rank
 
 
@@ -396,18 +396,13 @@ def _pick(s, begin, end, rank):
 
 
 @inlined
-def _cut(s, q, rank, dependent):
-    """Cut from the row at place q of the list what a dependent row has beyond the first columns.
-
-    If coarse, small coefficients in these as well.
-    """
+def _cut(s, q, rank):
+    """Cut from the dependent row at place q of the list what it has beyond the first columns."""
     i, n, most, part = s.index[LIST, q], s.x.size, 0.0, s.number[SCRATCH]
-    small = s.scalar[TOLERANCE] * s.number[NORM, i]
     for t in range(n):
-        gone = dependent if t >= rank else s.count[COARSE] == 1 and abs(s.W[q, t]) <= small
-        part[t] = s.W[q, t] if gone else 0.0
+        part[t] = s.W[q, t] if t >= rank else 0.0
         most = max(most, abs(part[t]))
-        s.W[q, t] = 0.0 if gone else s.W[q, t]
+        s.W[q, t] = s.W[q, t] if t < rank else 0.0
     if most <= NEGLIGIBLE * s.number[NORM, i]:
         return
     for k in range(rank - 1, s.count[PICKED] - 1, -1):
