@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.jit import compiled
-from hierarchy.kinematics import drift_of_point, place, write_point_jacobian
+from hierarchy.kinematics import place, write_point_jacobian
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Frame, Robot
@@ -193,22 +193,17 @@ class Contacts:
 
     def torques(self, state: State, x: ArrayLike) -> Array:
         """Torques M a + h - J_c^T f (n,) [N m or N] of the actuated joints that an x takes."""
-        torques = np.empty(self.robot.n - self.robot.actuated)
-        _write_torques(*state.dynamics, state.kinematics, self.points, self._checked(x), torques)
-        return torques
+        (M, h), first, x = state.dynamics, self.robot.actuated, self._checked(x)
+        rows = np.empty((self.robot.n - first, self.unknowns))
+        write_dynamics(M, state.kinematics, self.points, rows, first)
+        return rows @ x + h[first:]
 
     def jacobian(self, state: State) -> Array:
         """Jacobian J_c (3 p, n) of all contact points [m], world axes."""
         J = np.empty((3 * len(self.points.joints), state.n))
         for k, (joint, offset) in enumerate(zip(*self.points, strict=True)):
-            write_point_jacobian(state.J, state.placements, state.supports, joint, offset, J, 3 * k)
+            write_point_jacobian(state.kinematics, joint, offset, J[3 * k:])
         return J
-
-    def drift(self, state: State) -> Array:
-        """Accelerations dJ_c/dt v (3 p,) [m/s^2] of the contact points with a = 0."""
-        drift = np.empty(3 * len(self.points.joints))
-        _write_drift(state.kinematics, self.points, drift)
-        return drift
 
     def _checked(self, x: ArrayLike) -> Array:
         x = np.asarray(x, dtype=float)
@@ -256,52 +251,21 @@ def _axes(normal: Vector, what: str) -> Array:
 
 
 @compiled
-def write_dynamics(M, kinematics, points, A, row, first, count):
-    """Write the rows of the velocities `first`, ... of [M, -J_c^T] into A, from `row` on."""
+def write_dynamics(M, kinematics, points, A, first):
+    """Write the rows of the velocities `first`, ... of [M, -J_c^T] into A."""
     J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    n = M.shape[0]
+    n, count = M.shape[0], A.shape[0]
     for i in range(count):
         for c in range(n):
-            A[row + i, c] = M[first + i, c]
+            A[i, c] = M[first + i, c]
     for k in range(len(points.joints)):
-        joint, o, f = points.joints[k], points.offsets[k], n + 3 * k
-        x, y, z = place(placements[joint], o[0], o[1], o[2])
+        joint, f = points.joints[k], n + 3 * k
+        x, y, z = place(placements[joint], points.offsets[k])
         for i in range(count):
             c = first + i
             if supports[joint, c]:
-                A[row + i, f] = J[5, c] * y - J[4, c] * z - J[0, c]
-                A[row + i, f + 1] = J[3, c] * z - J[5, c] * x - J[1, c]
-                A[row + i, f + 2] = J[4, c] * x - J[3, c] * y - J[2, c]
+                A[i, f] = J[5, c] * y - J[4, c] * z - J[0, c]
+                A[i, f + 1] = J[3, c] * z - J[5, c] * x - J[1, c]
+                A[i, f + 2] = J[4, c] * x - J[3, c] * y - J[2, c]
             else:
-                A[row + i, f], A[row + i, f + 1], A[row + i, f + 2] = 0.0, 0.0, 0.0
-
-
-@compiled
-def _write_torques(M, h, kinematics, points, x, torques):
-    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    n = M.shape[0]
-    first = n - len(torques)
-    for i in range(len(torques)):
-        torque = h[first + i]
-        for c in range(n):
-            torque += M[first + i, c] * x[c]
-        torques[i] = torque
-    for k in range(len(points.joints)):
-        joint, o, f = points.joints[k], points.offsets[k], n + 3 * k
-        px, py, pz = place(placements[joint], o[0], o[1], o[2])
-        # The wrench of the force about the world's origin.
-        mx, my, mz = (py * x[f + 2] - pz * x[f + 1], pz * x[f] - px * x[f + 2],
-                      px * x[f + 1] - py * x[f])
-        for i in range(len(torques)):
-            c = first + i
-            if supports[joint, c]:
-                torques[i] -= (J[0, c] * x[f] + J[1, c] * x[f + 1] + J[2, c] * x[f + 2]
-                               + J[3, c] * mx + J[4, c] * my + J[5, c] * mz)
-
-
-@compiled
-def _write_drift(kinematics, points, drift):
-    for k in range(len(points.joints)):
-        o = points.offsets[k]
-        _, _, _, x, y, z, _, _, _ = drift_of_point(kinematics, points.joints[k], o[0], o[1], o[2])
-        drift[3 * k], drift[3 * k + 1], drift[3 * k + 2] = x, y, z
+                A[i, f], A[i, f + 1], A[i, f + 2] = 0.0, 0.0, 0.0

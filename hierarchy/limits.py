@@ -111,7 +111,7 @@ class Limits:
         Both are finite. The command is a velocity or an acceleration, depending on `level`.
         """
         lower, upper = np.empty(len(v)), np.empty(len(v))
-        write_box(q, v, self.packed, level == "acceleration", lower, upper, 0)
+        write_box(q, v, self.packed, level == "acceleration", lower, upper)
         return lower, upper
 
     def clamp(self, q: Array, v: Array, level: Level, x: ArrayLike) -> Array:
@@ -132,10 +132,10 @@ def _refuse(bad: NDArray[np.bool_], why: str, *values: Array) -> None:
 
 
 @compiled
-def write_box(q, v, limits, acceleration, lower, upper, row):
-    """Write the box of n joints into lower and upper from `row` on; limits as `Limits.packed`."""
+def write_box(q, v, limits, acceleration, lower, upper):
+    """Write the box of n joints into lower and upper; limits as `Limits.packed`."""
     for i in range(len(v)):
-        lower[row + i], upper[row + i] = box(q[i], v[i], limits, i, acceleration)
+        lower[i], upper[i] = box(q[i], v[i], limits, i, acceleration)
 
 
 @compiled

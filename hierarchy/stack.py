@@ -16,7 +16,7 @@ from hierarchy.gate import checked_give, checked_metric
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.state import State
-from hierarchy.task import Level, Task, writer_in_stack
+from hierarchy.task import Level, Rows, Task, writer_in_stack
 
 
 class _Prepared(NamedTuple):
@@ -165,13 +165,14 @@ class Stack:
         if self._metric is not None:  # M is symmetric, and its transpose is C-contiguous
             metric = state.dynamics.M.T if isinstance(self._metric, str) else self._metric
             h = h.changed(metric=metric)
-        writers = [writer_in_stack(self[name], state, self.level, h.A, h.lower, h.upper, int(row))
-                   for name, row in zip(order, h.offsets, strict=False)]
+        rows = Rows(h.A, h.lower, h.upper)
+        writers = [writer_in_stack(self[name], state, self.level, rows.some(first, count))
+                   for name, first, count in zip(order, h.offsets, h.sizes, strict=False)]
         if self.reference is not None:
             m = self.reference.dimension
             joints = h.reference[state.n - m:state.n]  # without those of a floating base
             writers.append(writer_in_stack(self.reference, state, self.level,
-                                           np.empty((m, state.n)), joints, joints, 0))
+                                           Rows(np.empty((m, state.n)), joints, joints)))
         writers.append(self._sides_checked(h, order))
         prepared = _Prepared(h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import Field, fields, is_dataclass
 from functools import wraps
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -36,6 +36,23 @@ _PARTS: dict[str, tuple[type, str]] = {
     "Path": (Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
     "Contacts": (Contacts, "Contacts(robot, ...) of hierarchy.contacts"),
     "Barrier": (Barrier, "Barrier(distance) of hierarchy.avoidance")}
+
+
+class Rows(NamedTuple):
+    """Where a task writes its rows: A (m, n), lower and upper (m,), in the arrays of a stack."""
+
+    A: Array
+    lower: Array
+    upper: Array
+
+    @classmethod
+    def empty(cls, m: int, n: int) -> Rows:
+        """Return rows of their own, of zeros."""
+        return cls(np.zeros((m, n)), np.zeros(m), np.zeros(m))
+
+    def some(self, first: int, count: int) -> Rows:
+        """Return `count` of the rows, as views."""
+        return Rows(*(part[first:first + count] for part in self))
 
 
 class Task(ABC):
@@ -133,24 +150,21 @@ class Task(ABC):
         return (self.desired_acceleration(state) + self.damping * rate
                 + self.stiffness * np.asarray(self.error(state)))
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
-        """Return a function that writes this task's rows into A (m_all, n), lower, upper (m_all,).
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
+        """Return a function that writes this task's rows for the present values of the state.
 
-        Each call writes the rows from `row` on for the present values of the state. A stack keeps
-        the writer as long as the state, and the measurement that it carries, are the same objects.
-        This general form calls the methods above; tasks override it with a kernel bound to its
-        arrays. A call raises HierarchyError, naming task and row, if a method returns the wrong
-        shape or NaN.
+        A stack keeps the writer as long as the state, and the measurement that it carries, are the
+        same objects. This general form calls the methods above; tasks override it with a kernel
+        bound to its arrays. A call raises HierarchyError, naming task and row, if a method returns
+        the wrong shape or NaN.
         """
-        rows = slice(row, row + self.dimension)
+        A, lower, upper = rows
 
         def write() -> None:
-            A[rows] = _shaped(self, "jacobian", self.jacobian(state),
-                              (self.dimension, A.shape[1]))
-            lower[rows] = _shaped(self, "reference", self._sides(state, level), (self.dimension,))
-            upper[rows] = lower[rows] if self.kind == "equality" else np.inf
-            check_rows(f"task {self.name!r}", A[rows], lower[rows], upper[rows])
+            A[:] = _shaped(self, "jacobian", self.jacobian(state), A.shape)
+            lower[:] = _shaped(self, "reference", self._sides(state, level), lower.shape)
+            upper[:] = lower if self.kind == "equality" else np.inf
+            check_rows(f"task {self.name!r}", *rows)
 
         return write
 
@@ -268,12 +282,11 @@ def in_turn(*functions: Writer) -> Writer:
     return call if len(functions) > 1 else functions[0]
 
 
-def writer_in_stack(task: Task, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                    row: int) -> Writer:
+def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Writer:
     """Return the writer of a task; at level "torque" one of the joints writes their columns."""
     if level == "torque" and not task.of_forces:
-        level, A = "acceleration", A[:, :state.n]
-    return task.writer(state, level, A, lower, upper, row)
+        level, rows = "acceleration", rows._replace(A=rows.A[:, :state.n])
+    return task.writer(state, level, rows)
 
 
 def _shaped(task: Task, what: str, value: Array, shape: tuple[int, ...]) -> Array:
@@ -288,6 +301,20 @@ def _shaped(task: Task, what: str, value: Array, shape: tuple[int, ...]) -> Arra
     return array
 
 
+class NamedRows(Task):
+    """A task with as many rows as names of them. Abstract: needs `row_names`."""
+
+    @property
+    def dimension(self) -> int:
+        """Number of rows m."""
+        return len(self.row_names)
+
+    @property
+    @abstractmethod
+    def row_names(self) -> tuple[str, ...]:
+        """What each row is about."""
+
+
 class Written(Task):
     """A task whose equations are in its writer alone; the plain methods read them there. Abstract.
 
@@ -295,24 +322,22 @@ class Written(Task):
     """
 
     @abstractmethod
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
 
-    def rows(self, state: State, level: Level = "velocity") -> tuple[Array, Array, Array]:
-        """The rows at a state: A (m, n), lower and upper (m,); of forces, see `ForceTask`."""
+    def rows(self, state: State, level: Level = "velocity") -> Rows:
+        """The rows at a state; of forces, see `ForceTask`."""
         columns = state.n
         if self.of_forces:
             level = "acceleration" if self.contacts is None else "torque"
             columns = columns if self.contacts is None else self.contacts.unknowns
-        A = np.zeros((self.dimension, columns))
-        lower, upper = np.zeros((2, self.dimension))
-        self.writer(state, level, A, lower, upper, 0)()
-        return A, lower, upper
+        rows = Rows.empty(self.dimension, columns)
+        self.writer(state, level, rows)()
+        return rows
 
     def jacobian(self, state: State) -> Array:
         """The rows over the unknowns (m, n)."""
-        return self.rows(state)[0]
+        return self.rows(state).A
 
     def jacobian_derivative(self, state: State) -> Array:
         """Their exact time derivative (m, n), by differences: to some 1e-9."""
@@ -320,11 +345,11 @@ class Written(Task):
 
     def reference_velocity(self, state: State) -> Array:
         """The least velocity of the task (m,)."""
-        return self.rows(state)[1]
+        return self.rows(state).lower
 
     def reference_acceleration(self, state: State) -> Array:
         """The least acceleration of the task (m,)."""
-        return self.rows(state, "acceleration")[1] + self.jacobian_derivative(state) @ state.v
+        return self.rows(state, "acceleration").lower + self.jacobian_derivative(state) @ state.v
 
 
 def derivative(task: Task, state: State) -> Array:

@@ -79,8 +79,8 @@ def least_acceleration(h, rate_of_h, bend, settings):
 
 
 @inlined
-def drop_rounding(A, row):
+def drop_rounding(row):
     """Set entries to zero that differ from it by rounding: joints that do not move along r."""
-    for c in range(A.shape[1]):
-        if abs(A[row, c]) < _ROUNDING:
-            A[row, c] = 0.0
+    for c in range(len(row)):
+        if abs(row[c]) < _ROUNDING:
+            row[c] = 0.0

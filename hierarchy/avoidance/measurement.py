@@ -13,7 +13,7 @@ from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turni
 from hierarchy.avoidance.repulsion import repulsion
 from hierarchy.errors import HierarchyError, number
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import Readings, point_at
+from hierarchy.kinematics import Readings, place
 from hierarchy.problem import Array
 
 
@@ -102,9 +102,8 @@ def _measure(placements, joints, offsets, obstacles, laws, mean_within, seen):
     count = len(joints)
     active, D_minimal = -1, np.inf
     for k in range(count):
-        joint = joints[k]
-        for i in range(3):
-            points[k, i] = point_at(placements, joint, offsets[k], i)
+        x, y, z = place(placements[joints[k]], offsets[k])
+        points[k, 0], points[k, 1], points[k, 2] = x, y, z
         D_min, at = np.inf, -1
         ax = ay = az = x = y = z = 0.0
         within = mean_within[1 if k == count - 1 else 0]

@@ -16,14 +16,12 @@ from hierarchy.kinematics import (
     dot,
     moving_point,
     place,
-    triple,
     write_identity,
     write_point_jacobian,
 )
 from hierarchy.measured import Measure, Measured, measured
-from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Task, Writer, in_turn, seen_by
+from hierarchy.task import Level, Rows, Task, Writer, in_turn, seen_by
 from hierarchy.tasks.posture import JointTask
 
 
@@ -32,16 +30,14 @@ def _avoidance(kinematics, reads, goal, J, motion):
     joints, offsets, seen = reads
     k = max(seen.active[0], 0)
     joint, offset, r, magnitude = joints[k], offsets[k], seen.direction[k], seen.magnitude[k]
-    columns, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     velocity, drift, _ = moving_point(kinematics, joint, offset)
     if len(motion.error) == 3:  # (28)
-        write_point_jacobian(columns, placements, supports, joint, offset, J, 0)
+        write_point_jacobian(kinematics, joint, offset, J)
         for i in range(3):
             motion.error[i] = magnitude * r[i]
             motion.rate[i], motion.drift[i] = velocity[i], drift[i]
         return
-    point = place(placements[joint], offset[0], offset[1], offset[2])
-    add_row(columns, supports, joint, point, triple(r, 0), J, 0)
+    add_row(kinematics, joint, place(kinematics.placements[joint], offset), r, J[0])
     motion.error[0], motion.rate[0] = magnitude, dot(r, velocity)
     motion.drift[0] = dot(r, drift)  # (29)
 
@@ -111,25 +107,23 @@ class CumulatedRepulsion(JointTask):
             raise HierarchyError(f"task {self.name!r}: {self.base.name!r} has "
                                  f"{self.base.dimension} rows, expected {self.joints}")
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         self.check_size(state)
-        below = bind(write_identity, A, row, self.joints) if self.base is None else (
-            self.base.writer(state, level, A, lower, upper, row))
-        sides = lower[row:row + self.joints]
+        below = bind(write_identity, rows.A) if self.base is None else (
+            self.base.writer(state, level, rows))
         parameters = (*pack_points(self.points), self.within, self.lever, level == "acceleration",
-                      np.empty((1, state.n)))
-        add = bind(_add, state.kinematics, parameters, seen_by(self, state).arrays, lower, upper,
-                   row)
-        return in_turn(lambda: sides.fill(0.0), below, add)
+                      np.empty(state.n))
+        add = bind(_add, state.kinematics, parameters, seen_by(self, state).arrays, rows.lower,
+                   rows.upper)
+        return in_turn(lambda: rows.lower.fill(0.0), below, add)
 
 
 @compiled
-def _add(kinematics, parameters, seen, lower, upper, row):
-    """Add each point's command to the n equalities from `row` on."""
-    bodies, offsets, within, lever, acceleration, scratch = parameters
-    n = scratch.shape[1]
+def _add(kinematics, parameters, seen, lower, upper):
+    """Add each point's command to the n equalities."""
+    bodies, offsets, within, lever, acceleration, row = parameters
+    n = len(row)
     for k in range(len(bodies)):
         if not seen.distance[k] <= within:
             continue
@@ -137,13 +131,12 @@ def _add(kinematics, parameters, seen, lower, upper, row):
         if acceleration:
             _, drift, _ = moving_point(kinematics, body, offset)
             asked -= dot(r, drift)
-        point = place(kinematics.placements[body], offset[0], offset[1], offset[2])
-        scratch[0, :] = 0.0
-        add_row(kinematics.J, kinematics.supports, body, point, triple(r, 0), scratch, 0)
+        row[:] = 0.0
+        add_row(kinematics, body, place(kinematics.placements[body], offset), r, row)
         square = 0.0
         for c in range(n):
-            square += scratch[0, c] * scratch[0, c]
+            square += row[c] * row[c]
         for c in range(n):
-            lower[row + c] += scratch[0, c] * asked / max(square, lever * lever)
+            lower[c] += row[c] * asked / max(square, lever * lever)
     for c in range(n):
-        upper[row + c] = lower[row + c]
+        upper[c] = lower[c]

@@ -17,6 +17,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
+from hierarchy.task import NamedRows
 
 
 @dataclass(frozen=True)
@@ -92,8 +93,7 @@ def _carried(placements, supports, shares, centres, c):
     s = mx = my = mz = 0.0
     for joint in range(1, len(shares)):
         if supports[joint, c] and shares[joint] > 0.0:
-            x, y, z = place(placements[joint], centres[joint, 0], centres[joint, 1],
-                            centres[joint, 2])
+            x, y, z = place(placements[joint], centres[joint])
             s += shares[joint]
             mx += shares[joint] * x
             my += shares[joint] * y
@@ -108,9 +108,8 @@ def _centre_of_mass(kinematics, reads, goal, J, motion):
     p, drift = np.zeros(3), np.zeros(3)
     for joint in range(1, len(shares)):
         if shares[joint] > 0.0:
-            o = centres[joint]
-            at = place(kinematics.placements[joint], o[0], o[1], o[2])
-            _, bend, _ = moving_point(kinematics, joint, o)
+            at = place(kinematics.placements[joint], centres[joint])
+            _, bend, _ = moving_point(kinematics, joint, centres[joint])
             for i in range(3):
                 p[i] += shares[joint] * at[i]
                 drift[i] += shares[joint] * bend[i]
@@ -124,7 +123,7 @@ _ROWS = {"both": (0, 6), "linear": (0, 3), "angular": (3, 6)}
 
 
 @dataclass(frozen=True)
-class Momentum(Measured):
+class Momentum(NamedRows, Measured):
     """Bring the momentum of the whole robot to `target`, about its centre of mass.
 
     `part` is "linear" (m = 3) [kg m/s], "angular" (m = 3) [kg m^2/s] or "both" (m = 6), linear
@@ -150,11 +149,6 @@ class Momentum(Measured):
                                         or not np.isfinite(self.target).all()):
             raise HierarchyError(f"task {self.name!r}: target {self.target!r} is not "
                                  f"{self.dimension} finite numbers")
-
-    @property
-    def dimension(self) -> int:
-        """Three rows, or six."""
-        return len(self.columns)
 
     @property
     def row_names(self) -> tuple[str, ...]:

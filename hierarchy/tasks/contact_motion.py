@@ -14,14 +14,14 @@ from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Task, Writer, Written
+from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written
 from hierarchy.tasks.pose import Pose
 from hierarchy.tasks.position import Along, Position
 from hierarchy.tasks.together import Together
 
 
 @dataclass(frozen=True)
-class ContactMotion(Written):
+class ContactMotion(NamedRows, Written):
     """Keep contacts at rest: J_c a + dJ_c/dt v = -damping v_c + stiffness e [m/s^2, rad/s^2].
 
     Three rows for a point, those of `Position`, one of them along the normal for a point that
@@ -69,11 +69,6 @@ class ContactMotion(Written):
         return cls(of, anchors, stiffness, damping, name=name)
 
     @property
-    def dimension(self) -> int:
-        """Three rows per point contact, one if it slides, six per surface."""
-        return sum(_rows(contact) for contact in self.of.contacts)
-
-    @property
     def row_names(self) -> tuple[str, ...]:
         """Contact, and axis of translation or turn, of each row."""
         axes = [f"{kind} {axis}" for kind in ("along", "about") for axis in "xyz"]
@@ -85,14 +80,11 @@ class ContactMotion(Written):
         """Distance of each contact from its anchor (m,) [m, rad]; zero without anchors."""
         return np.zeros(self.dimension) if self.anchors is None else self._tasks.error(state)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        write_rows, rows = self._tasks.writer(state, level, A, lower, upper, row), []
-        for contact in self.of.contacts:
-            of = slice(row, row := row + _rows(contact))
-            rows.append((A[of], lower[of], upper[of]))
-        return zero_while_open(write_rows, state, self.of, rows)
+        counts = [_rows(contact) for contact in self.of.contacts]
+        parts = [rows.some(sum(counts[:k]), count) for k, count in enumerate(counts)]
+        return zero_while_open(self._tasks.writer(state, level, rows), state, self.of, parts)
 
     @property
     def _tasks(self) -> Together:

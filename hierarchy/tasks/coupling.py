@@ -19,6 +19,7 @@ from hierarchy.robot import Robot
 from hierarchy.robots.found import Coupled
 from hierarchy.robots.joints import Part
 from hierarchy.state import State
+from hierarchy.task import NamedRows
 
 
 class Terms(NamedTuple):
@@ -37,16 +38,11 @@ class Terms(NamedTuple):
     turns: Array
 
 
-class _Coupling(Measured):
+class _Coupling(NamedRows, Measured):
     """Rows in which polynomials of joints add up to zero. Abstract: needs `terms`."""
 
     terms: Terms
     exact = True
-
-    @property
-    def dimension(self) -> int:
-        """One row per coupling."""
-        return len(self.terms.turns)
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`; the error is to the nearest full turn of a continuous joint."""

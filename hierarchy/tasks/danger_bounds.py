@@ -39,12 +39,12 @@ from hierarchy.kinematics import place
 from hierarchy.limits import clipped
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Writer, Written, in_turn, seen_by
+from hierarchy.task import Level, NamedRows, Rows, Writer, Written, in_turn, seen_by
 from hierarchy.tasks.joint_limits import JointLimits
 
 
 @dataclass(frozen=True)
-class DangerBounds(Written):
+class DangerBounds(NamedRows, Written):
     """Keep every joint within `limits` and slow those that move a control point to an obstacle.
 
     n rows, those of `limits`, with a box that is at most as large and never empty; see the module
@@ -86,11 +86,6 @@ class DangerBounds(Written):
             raise HierarchyError(f"task {self.name!r}: {error}") from error
 
     @property
-    def dimension(self) -> int:
-        """One row per joint."""
-        return self.limits.dimension
-
-    @property
     def row_names(self) -> tuple[str, ...]:
         """The joint of each row."""
         return self.limits.row_names
@@ -98,26 +93,23 @@ class DangerBounds(Written):
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
         lower, upper = self.limits.box(state, level)
-        self._tighten(state, level, lower, upper, 0)()
+        self._tighten(state, level, lower, upper)()
         return lower, upper
 
     def error(self, state: State) -> Array:
         """Distance of each joint from its range (n,) [rad or m], zero inside it."""
         return self.limits.error(state)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; the rows have two sides."""
-        return in_turn(self.limits.writer(state, level, A, lower, upper, row),
-                       self._tighten(state, level, lower, upper, row))
+        return in_turn(self.limits.writer(state, level, rows),
+                       self._tighten(state, level, rows.lower, rows.upper))
 
-    def _tighten(self, state: State, level: Level, lower: Array, upper: Array,
-                 row: int) -> Writer:
+    def _tighten(self, state: State, level: Level, lower: Array, upper: Array) -> Writer:
         parameters = (*pack_points(self.points), self.reach, self.shape, self.lever,
                       self.limits.limits.packed[2], max(self.limits.period, self.limits.horizon),
                       level == "acceleration")
-        return bind(_tighten, state.kinematics, parameters, self._seen(state).arrays, lower, upper,
-                    row)
+        return bind(_tighten, state.kinematics, parameters, self._seen(state).arrays, lower, upper)
 
     def _seen(self, state: State) -> Measurement:
         seen = seen_by(self, state)
@@ -128,8 +120,8 @@ class DangerBounds(Written):
 
 
 @compiled
-def _tighten(kinematics, parameters, seen, lower, upper, row):
-    """Tighten the bounds of a box of n joints that starts at `row`."""
+def _tighten(kinematics, parameters, seen, lower, upper):
+    """Tighten the bounds of a box of n joints."""
     v, J, _, placements, supports, _, _, _ = kinematics
     # V are the velocity limits, T the period, or the horizon.
     joints, offsets, reach, shape, lever, V, T, acceleration = parameters
@@ -139,7 +131,7 @@ def _tighten(kinematics, parameters, seen, lower, upper, row):
     for k in range(len(joints)):
         joint, r = joints[k], seen.direction[k]
         f = min(repulsion(max(seen.distance[k], 0.0), 1.0, reach, shape, 2.0) / contact, 1.0)
-        x, y, z = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        x, y, z = place(placements[joint], offsets[k])
         for c in range(n):
             if supports[joint, c]:
                 away = (r[0] * (J[0, c] + J[4, c] * z - J[5, c] * y)
@@ -153,5 +145,5 @@ def _tighten(kinematics, parameters, seen, lower, upper, row):
         low, up = -V[c] * (1.0 - danger[0, c]), V[c] * (1.0 - danger[1, c])
         if acceleration:
             low, up = (low - v[c]) / T, (up - v[c]) / T
-        least, most = lower[row + c], upper[row + c]
-        lower[row + c], upper[row + c] = clipped(low, least, most), clipped(up, least, most)
+        least, most = lower[c], upper[c]
+        lower[c], upper[c] = clipped(low, least, most), clipped(up, least, most)

@@ -14,7 +14,7 @@ from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Writer
+from hierarchy.task import Level, NamedRows, Rows, Writer
 from hierarchy.tasks.forces import WRENCH, ForceTask
 from hierarchy.tasks.joint_limits import JointRows
 
@@ -64,8 +64,7 @@ class TorqueLimits(JointRows):
         h = state.bias_effort()[self.robot.actuated:]
         return np.asarray(np.clip(h, -self.limit, self.limit) - h)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; HierarchyError at velocity level."""
         if level == "velocity":
             raise HierarchyError(f"task {self.name!r}: torque limits need the acceleration level, "
@@ -73,34 +72,32 @@ class TorqueLimits(JointRows):
         M, h = state.dynamics
         contacts = Contacts(self.robot) if self.contacts is None else self.contacts
         parameters = M, h, state.kinematics, contacts.points, self.robot.actuated
-        write_rows = bind(write_torques, parameters, self.limit, A, lower, upper, row)
+        write_rows = bind(write_torques, parameters, self.limit, *rows)
         if level != "torque" or self.step == inf:
             return write_rows
-        rows, efforts = slice(row, row + self.dimension), h[self.robot.actuated:]
-        low, up = lower[rows], upper[rows]
+        efforts = h[self.robot.actuated:]
 
         def write() -> None:
             write_rows()
             if state.commanded is not None:
                 here = state.commanded - efforts
-                np.clip(low, here - self.step, here + self.step, out=low)
-                np.clip(up, here - self.step, here + self.step, out=up)
+                for side in rows[1:]:
+                    np.clip(side, here - self.step, here + self.step, out=side)
 
         return write
 
 
 @compiled
-def write_torques(parameters, limit, A, lower, upper, row):
+def write_torques(parameters, limit, A, lower, upper):
     """Write rows of M a + h - J_c^T f from -limit to limit, of the velocities from `first` on."""
     M, h, kinematics, points, first = parameters
-    write_dynamics(M, kinematics, points, A, row, first, len(limit))
+    write_dynamics(M, kinematics, points, A, first)
     for i in range(len(limit)):
-        lower[row + i] = -limit[i] - h[first + i]
-        upper[row + i] = limit[i] - h[first + i]
+        lower[i], upper[i] = -limit[i] - h[first + i], limit[i] - h[first + i]
 
 
 @dataclass(frozen=True)
-class BaseDynamics(ForceTask):
+class BaseDynamics(NamedRows, ForceTask):
     """Let the contact forces move the base: M_b(q) a + h_b(q, v) = J_cb^T f [N, N m].
 
     Six rows, those of the floating base; none for a fixed one. It belongs at the top of a stack: an
@@ -115,21 +112,15 @@ class BaseDynamics(ForceTask):
     name: str = "base dynamics"
 
     @property
-    def dimension(self) -> int:
-        """Six rows, or none for a fixed base."""
-        return self.contacts.robot.actuated
-
-    @property
     def row_names(self) -> tuple[str, ...]:
-        """Force and moment along the axes of the base."""
-        return WRENCH[:self.dimension]
+        """Force and moment along the axes of the base, or none for a fixed one."""
+        return WRENCH[:self.contacts.robot.actuated]
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         M, h = state.dynamics
         parameters = M, h, state.kinematics, self.contacts.points, 0
-        write_rows = bind(write_torques, parameters, np.zeros(self.dimension), A, lower, upper, row)
-        forces = [(A[row:row + self.dimension, self.contacts.blocks[contact.name]],)
+        write_rows = bind(write_torques, parameters, np.zeros(self.dimension), *rows)
+        forces = [(rows.A[:, self.contacts.blocks[contact.name]],)
                   for contact in self.contacts.contacts]
         return zero_while_open(write_rows, state, self.contacts, forces)

@@ -12,10 +12,10 @@ import numpy as np
 from hierarchy.contacts import Contacts, Points
 from hierarchy.errors import HierarchyError, finite_numbers
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import place, write_equality
+from hierarchy.kinematics import less, place
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Writer, Written
+from hierarchy.task import Level, NamedRows, Rows, Writer, Written
 
 WRENCH = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
@@ -37,7 +37,7 @@ class ForceTask(Written):
         return np.asarray(np.clip(0.0, lower, upper))
 
 
-class FixedRows(ForceTask):
+class FixedRows(NamedRows, ForceTask):
     """Rows over forces that do not change with the state. Abstract: needs `fixed`."""
 
     @property
@@ -45,17 +45,11 @@ class FixedRows(ForceTask):
     def fixed(self) -> tuple[Array, Array, Array]:
         """The rows over the forces (m, 3 p), their lower and upper sides (m,)."""
 
-    @property
-    def dimension(self) -> int:
-        """One row for each of `fixed`."""
-        return len(self.fixed[0])
-
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         forces, *sides = self.fixed
-        rows = np.hstack([np.zeros((len(forces), state.n)), forces])
-        return bind(_copy, rows, *sides, A, lower, upper, row)
+        A = np.hstack([np.zeros((len(forces), state.n)), forces])
+        return bind(_copy, A, *sides, *rows)
 
 
 def required(contacts: Contacts, task: str) -> Contacts:
@@ -66,15 +60,15 @@ def required(contacts: Contacts, task: str) -> Contacts:
 
 
 @compiled
-def _copy(rows, low, up, A, lower, upper, row):
+def _copy(rows, low, up, A, lower, upper):
     for i in range(rows.shape[0]):
         for c in range(rows.shape[1]):
-            A[row + i, c] = rows[i, c]
-        lower[row + i], upper[row + i] = low[i], up[i]
+            A[i, c] = rows[i, c]
+        lower[i], upper[i] = low[i], up[i]
 
 
 @dataclass(frozen=True)
-class ContactForce(ForceTask):
+class ContactForce(NamedRows, ForceTask):
     """Let the surroundings push on one contact with `target`, the sum over its points.
 
     `target` has 1 number for the normal force [N], 3 for the force in world axes [N], or 6 for the
@@ -97,19 +91,11 @@ class ContactForce(ForceTask):
                                  "numbers")
 
     @property
-    def dimension(self) -> int:
-        """One row per number of the target."""
-        return len(self.target)
-
-    @property
     def row_names(self) -> tuple[str, ...]:
         """Force and moment along the axes, or the normal force."""
-        if self.dimension == 1:
-            return ("normal force",)
-        return WRENCH[:self.dimension]
+        return ("normal force",) if len(self.target) == 1 else WRENCH[:len(self.target)]
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         contact, block = self.contacts[self.contact], self.contacts.blocks[self.contact]
         first, joints, offsets = (block.start - state.n) // 3, *self.contacts.points
@@ -117,35 +103,29 @@ class ContactForce(ForceTask):
         directions = np.vstack([contact.axes[2:] if self.dimension == 1 else np.eye(3)])
         parameters = (Points(joints[of_contact], offsets[of_contact]), directions,
                       contact.frame.offset, np.array(self.target, dtype=float), block.start)
-        return bind(_write, state.placements, parameters, A, lower, upper, row)
+        return bind(_write, state.placements, parameters, *rows)
 
 
 @compiled
-def _write(placements, parameters, A, lower, upper, row):
+def _write(placements, parameters, A, lower, upper):
     # The directions (1 or 3, 3) are those of the rows of the force, the origin is of the moment.
     points, directions, origin, target, column = parameters
     T = placements[points.joints[0]]
-    ox, oy, oz = place(T, origin[0], origin[1], origin[2])
+    o = place(T, origin)
     for i in range(len(target)):
         for c in range(A.shape[1]):
-            A[row + i, c] = 0.0
-        write_equality(lower, upper, row + i, target[i])
+            A[i, c] = 0.0
+        lower[i] = upper[i] = target[i]
     for k in range(len(points.joints)):
-        f, o = column + 3 * k, points.offsets[k]
+        f = column + 3 * k
         for i in range(directions.shape[0]):
             for c in range(3):
-                A[row + i, f + c] = directions[i, c]
+                A[i, f + c] = directions[i, c]
         if len(target) == 6:
-            x, y, z = place(T, o[0], o[1], o[2])
-            _write_moment(x - ox, y - oy, z - oz, A, row + 3, f)
-
-
-@compiled
-def _write_moment(x, y, z, A, row, column):
-    """Write the moment r x f of a force at r = (x, y, z)."""
-    A[row, column + 1], A[row, column + 2] = -z, y
-    A[row + 1, column], A[row + 1, column + 2] = z, -x
-    A[row + 2, column], A[row + 2, column + 1] = -y, x
+            x, y, z = less(place(T, points.offsets[k]), o)
+            A[3, f + 1], A[3, f + 2] = -z, y  # the moment r x f
+            A[4, f], A[4, f + 2] = z, -x
+            A[5, f], A[5, f + 1] = -y, x
 
 
 @dataclass(frozen=True)

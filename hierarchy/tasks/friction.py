@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from math import cos, inf, isnan, nan, pi, sin
@@ -14,7 +14,7 @@ from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Writer, in_turn
+from hierarchy.task import Level, Rows, Writer, in_turn
 from hierarchy.tasks.forces import FixedRows, required
 
 _SLOW = 0.01      # [m/s] below which the friction of a sliding point falls to zero
@@ -83,22 +83,18 @@ class Friction(FixedRows):
             up += [*[inf] * self.faces, self.largest] * count + [inf] * summed
         return np.vstack(parts), np.array(low), np.array(up)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        write_rows, n = super().writer(state, level, A, lower, upper, row), state.n
-        changing: list[Callable[[], object]] = []
+        writers, first = [super().writer(state, level, rows)], 0
         for k, contact in enumerate(self.contacts.contacts):
-            rows = slice(row, row := row + len(self._of(contact)))
-            low, up = lower[rows], upper[rows]
+            own = rows.some(first, count := len(self._of(contact)))
+            first += count
             if contact.open:
-                changing.append(partial(self._ramp, k, state, low, up))
+                writers.append(partial(self._ramp, k, state, own.lower, own.upper))
             if contact.slides:
-                point = self.contacts.blocks[contact.name].start - n
-                changing.append(partial(self._slide, k, state, A[rows, n + point:n + point + 3],
-                                        (low, up)))
-
-        return in_turn(write_rows, *changing)
+                forces = own.A[:, self.contacts.blocks[contact.name]]
+                writers.append(partial(self._slide, k, state, own._replace(A=forces)))
+        return in_turn(*writers)
 
     def _ramp(self, number: int, state: State, low: Array, up: Array) -> None:
         """Write the sides (r,) of a contact that opens: its last row has all its normal force."""
@@ -115,9 +111,9 @@ class Friction(FixedRows):
         else:
             self._close(low[each].reshape(count, -1), up[each].reshape(count, -1))
 
-    def _slide(self, number: int, state: State, A: Array, sides: tuple[Array, Array]) -> None:
-        """Write the rows (faces + 1, 3) of one point that slides, and their sides."""
-        contact, (low, up) = self.contacts.contacts[number], sides
+    def _slide(self, number: int, state: State, rows: Rows) -> None:
+        """Write the rows (faces + 1, 3) of one point that slides, over its force."""
+        contact, (A, low, up) = self.contacts.contacts[number], rows
         along = contact.axes[:2] @ self._velocity(contact, state)
         drag = contact.friction * along / max(float(np.linalg.norm(along)), _SLOW)
         low[:-1], up[:-1], low[-1] = -inf, inf, max(low[-1], 0.0)

@@ -11,8 +11,7 @@ from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import (
     Kinematics,
     moving_point,
-    point_at,
-    velocity_of_point,
+    velocity_of_body,
     write_point_jacobian,
     write_rotation_jacobian,
 )
@@ -86,14 +85,6 @@ def turned_back(R, a):
             R[0, 2] * a[0] + R[1, 2] * a[1] + R[2, 2] * a[2])
 
 
-@inlined
-def position_of(placements, spot):
-    """World position of a spot, as a tuple."""
-    return (point_at(placements, spot.joint, spot.offset, 0),
-            point_at(placements, spot.joint, spot.offset, 1),
-            point_at(placements, spot.joint, spot.offset, 2))
-
-
 @compiled
 def rotation_of(placements, joint, rotation):
     """World rotation (3, 3) of a spot."""
@@ -109,15 +100,14 @@ def rotation_of(placements, joint, rotation):
 def motion_of(kinematics, spot):
     """Velocity, angular velocity, and their drifts dJ/dt v and dW/dt v, of a spot; exact ones."""
     v, a, w = moving_point(kinematics, spot.joint, spot.offset)
-    _, _, _, bx, by, bz = velocity_of_point(kinematics.dJ, kinematics.supports, spot.joint,
-                                            kinematics.v, 0.0, 0.0, 0.0)
-    return v, w, a, (bx, by, bz)
+    _, b = velocity_of_body(kinematics.dJ, kinematics.supports, spot.joint, kinematics.v)
+    return v, w, a, b
 
 
 @inlined
-def jacobians_of(J, placements, supports, spot):
+def jacobians_of(kinematics, spot):
     """Linear and angular Jacobian (3, n) of a spot."""
-    linear, angular = np.empty((3, J.shape[1])), np.empty((3, J.shape[1]))
-    write_point_jacobian(J, placements, supports, spot.joint, spot.offset, linear, 0)
-    write_rotation_jacobian(J, supports, spot.joint, angular, 0)
+    linear, angular = np.empty((3, len(kinematics.v))), np.empty((3, len(kinematics.v)))
+    write_point_jacobian(kinematics, spot.joint, spot.offset, linear)
+    write_rotation_jacobian(kinematics, spot.joint, angular)
     return linear, angular

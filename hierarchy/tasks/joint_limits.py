@@ -16,10 +16,10 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Writer, Written
+from hierarchy.task import Level, NamedRows, Rows, Writer, Written
 
 
-class JointRows(Written):
+class JointRows(NamedRows, Written):
     """A task with one row per actuated joint of `robot`, or per velocity from `first` on."""
 
     robot: Robot
@@ -29,11 +29,6 @@ class JointRows(Written):
     def first(self) -> int:
         """The velocity of the first row: the first that is actuated."""
         return self.robot.actuated
-
-    @property
-    def dimension(self) -> int:
-        """One row per velocity from `first` on."""
-        return self.robot.n - self.first
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -139,16 +134,14 @@ class JointLimits(JointRows):
         q = self._positions(state)
         return np.asarray(np.clip(q, *self.limits.packed[:2]) - q)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; the rows have two sides."""
-        write_rows, limits = bind(write_identity, A, row, self.dimension), self.limits.packed
-        acceleration = level == "acceleration"
+        write_rows, limits = bind(write_identity, rows.A), self.limits.packed
 
         def write() -> None:
             write_rows()
-            write_box(self._positions(state), self._rates(state, level), limits, acceleration,
-                      lower, upper, row)
+            write_box(self._positions(state), self._rates(state, level), limits,
+                      level == "acceleration", rows.lower, rows.upper)
 
         return write
 
@@ -207,15 +200,13 @@ class StepLimits(JointRows):
         """How far each velocity would have to be raised from zero (n,) [rad/s or m/s]."""
         return np.maximum(self.box(state)[0], 0.0)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; for velocity level."""
         if level != "velocity":
             raise HierarchyError(f"task {self.name!r}: for velocity level; see JointLimits")
-        rows = slice(row, row + self.dimension)
 
         def write() -> None:
-            A[rows] = np.eye(state.n)
-            lower[rows], upper[rows] = self.box(state)
+            rows.A[:] = np.eye(state.n)
+            rows.lower[:], rows.upper[:] = self.box(state)
 
         return write

@@ -11,14 +11,15 @@ import numpy as np
 from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
-    axis_at,
+    carried,
     crossed,
     dot,
     less,
+    place,
     row_times,
     times,
-    triple,
-    velocity_of_point,
+    turned,
+    velocity_of_body,
 )
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.paths.path import check_point
@@ -32,7 +33,6 @@ from hierarchy.tasks.geometric import (
     column,
     jacobians_of,
     motion_of,
-    position_of,
     rotation_of,
     turned_back,
 )
@@ -40,10 +40,7 @@ from hierarchy.tasks.geometric import (
 
 @compiled
 def _cone_error(placements, joint, z_e, z_d, cos_alpha_d):
-    cosine = 0.0
-    for i in range(3):
-        cosine += z_d[i] * axis_at(placements, joint, z_e, i)  # (16)
-    return cos_alpha_d - cosine
+    return cos_alpha_d - dot(z_d, turned(placements[joint], z_e))  # (16)
 
 
 @measured
@@ -51,19 +48,16 @@ def _pointing(kinematics, reads, goal, J, motion):
     joint, z_e, z_d, cos_alpha_d = reads
     v, columns, dJ, placements, supports, _, _, _ = kinematics
     motion.error[0] = _cone_error(placements, joint, z_e, z_d, cos_alpha_d)
-    x, y, z = (axis_at(placements, joint, z_e, 0), axis_at(placements, joint, z_e, 1),
-               axis_at(placements, joint, z_e, 2))
-    cx, cy, cz = y * z_d[2] - z * z_d[1], z * z_d[0] - x * z_d[2], x * z_d[1] - y * z_d[0]
+    z = turned(placements[joint], z_e)
+    axis = crossed(z, z_d)
     for c in range(J.shape[1]):  # z_d . (w x z_e) = w . (z_e x z_d): z_d^T S^T(z_e) J_O, (19)
         if supports[joint, c]:
-            J[0, c] = columns[3, c] * cx + columns[4, c] * cy + columns[5, c] * cz
-    _, _, _, wx, wy, wz = velocity_of_point(columns, supports, joint, v, 0.0, 0.0, 0.0)
-    dx, dy, dz = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x  # (18)
-    motion.rate[0] = z_d[0] * dx + z_d[1] * dy + z_d[2] * dz
-    _, _, _, ax, ay, az = velocity_of_point(dJ, supports, joint, v, 0.0, 0.0, 0.0)
-    motion.drift[0] = (z_d[0] * (ay * z - az * y + wy * dz - wz * dy)
-                       + z_d[1] * (az * x - ax * z + wz * dx - wx * dz)
-                       + z_d[2] * (ax * y - ay * x + wx * dy - wy * dx))
+            J[0, c] = columns[3, c] * axis[0] + columns[4, c] * axis[1] + columns[5, c] * axis[2]
+    _, w = velocity_of_body(columns, supports, joint, v)
+    _, a = velocity_of_body(dJ, supports, joint, v)
+    dz = crossed(w, z)  # (18)
+    motion.rate[0] = dot(z_d, dz)
+    motion.drift[0] = dot(z_d, carried(crossed(a, z), w, dz))
 
 
 @dataclass(frozen=True)
@@ -149,7 +143,7 @@ class LookAt(Measured):
 @compiled
 def _sight(placements, frame, point):
     """The target in the frame's axes y, its distance r, the vector d to it in world axes, and R."""
-    d = less(triple(point, 0), position_of(placements, frame))
+    d = less(point, place(placements[frame.joint], frame.offset))
     R = rotation_of(placements, frame.joint, frame.rotation)
     y = turned_back(R, d)
     r = max(np.sqrt(dot(y, y)), _NEAR)
@@ -164,7 +158,7 @@ def _look_at(kinematics, reads, goal, J, motion):
     frame, point = reads
     y, r, d, R = _sight(kinematics.placements, frame, point)
     D = r + y[2]
-    linear, angular = jacobians_of(kinematics.J, kinematics.placements, kinematics.supports, frame)
+    linear, angular = jacobians_of(kinematics, frame)
     for c in range(J.shape[1]):
         s = turned_back(R, less(crossed(d, column(angular, c)), column(linear, c)))
         dD = dot(y, s) / r + s[2]
@@ -179,5 +173,5 @@ def _look_at(kinematics, reads, goal, J, motion):
     for i in range(2):
         motion.error[i] = -2.0 * y[i] / D
         motion.rate[i] = row_times(J, i, kinematics.v)
-        turned = 2.0 * s[i] * dD + y[i] * (ddD - 2.0 * dD * dD / D)
-        motion.drift[i] = 2.0 * (ds[i] - turned / D) / D
+        bend = 2.0 * s[i] * dD + y[i] * (ddD - 2.0 * dD * dD / D)
+        motion.drift[i] = 2.0 * (ds[i] - bend / D) / D

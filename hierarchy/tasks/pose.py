@@ -13,9 +13,9 @@ from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
 from hierarchy.kinematics import (
     Kinematics,
-    drift_of_point,
-    point_at,
-    velocity_of_point,
+    moving_point,
+    place,
+    velocity_of_body,
     write_point_jacobian,
     write_rotation_jacobian,
 )
@@ -52,17 +52,17 @@ def rotation_vector(R):
 @measured
 def _pose(kinematics, reads, goal, J, motion):
     joint, offset, rotation, desired = reads
-    v, _, dJ, placements, supports, _, _, _ = kinematics
-    rate, drift = motion.rate, motion.drift
-    write_point_jacobian(kinematics.J, placements, supports, joint, offset, J, 0)
-    write_rotation_jacobian(kinematics.J, supports, joint, J, 3)
-    for i in range(3):
-        motion.error[i] = goal[0, i] - point_at(placements, joint, offset, i)
+    write_point_jacobian(kinematics, joint, offset, J)
+    write_rotation_jacobian(kinematics, joint, J[3:])
+    here = place(kinematics.placements[joint], offset)
+    v, a, w = moving_point(kinematics, joint, offset)
+    _, b = velocity_of_body(kinematics.dJ, kinematics.supports, joint, kinematics.v)
     motion.error[3:] = rotation_vector(times_transposed(
-        desired, rotation_of(placements, joint, rotation)))
-    rate[0], rate[1], rate[2], drift[0], drift[1], drift[2], rate[3], rate[4], rate[5] = (
-        drift_of_point(kinematics, joint, offset[0], offset[1], offset[2]))
-    _, _, _, drift[3], drift[4], drift[5] = velocity_of_point(dJ, supports, joint, v, 0.0, 0.0, 0.0)
+        desired, rotation_of(kinematics.placements, joint, rotation)))
+    for i in range(3):
+        motion.error[i] = goal[0, i] - here[i]
+        motion.rate[i], motion.rate[3 + i] = v[i], w[i]
+        motion.drift[i], motion.drift[3 + i] = a[i], b[i]
 
 
 @dataclass(frozen=True)

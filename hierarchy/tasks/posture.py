@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, expect, finite_numbers
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import write_equality, write_identity
+from hierarchy.kinematics import row_times, write_identity
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Writer, Written
+from hierarchy.task import Level, Rows, Writer, Written
 
 
 class JointTask(Written):
@@ -157,24 +157,17 @@ class JointDamping(JointTask):
                                  f"{self.weight!r}")
         expect(f"task {self.name!r}: joints", self.joints, int, "give robot.n")
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         self.check_size(state)
-        if self.weight == "identity" or level == "velocity":
-            damping = self.damping if level == "acceleration" else 0.0
-            return bind(_brake, state.v, damping, A, lower, upper, row)
-        write_rows, rows = bind(write_identity, A, row, self.joints), slice(row, row + self.joints)
-
-        def write() -> None:
-            write_rows()
-            lower[rows] = upper[rows] = -self.damping * (state.mass_matrix() @ state.v)
-
-        return write
+        damping = self.damping if level == "acceleration" else 0.0
+        by_mass = damping > 0.0 and self.weight == "mass"
+        weight = state.dynamics.M if by_mass else np.eye(state.n, order="F")
+        return bind(_brake, state.v, weight, damping, *rows)
 
 
 @compiled
-def _brake(v, damping, A, lower, upper, row):
-    write_identity(A, row, len(v))
+def _brake(v, weight, damping, A, lower, upper):
+    write_identity(A)
     for i in range(len(v)):
-        write_equality(lower, upper, row + i, -damping * v[i])  # (15)
+        lower[i] = upper[i] = -damping * row_times(weight, i, v)  # (15)

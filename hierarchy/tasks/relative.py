@@ -10,25 +10,25 @@ from numpy.typing import ArrayLike
 from hierarchy.errors import finite_numbers
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
-from hierarchy.kinematics import crossed, less, plus, row_times
+from hierarchy.kinematics import crossed, less, place, plus, row_times
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.robot import Frame
 from hierarchy.state import State
+from hierarchy.task import NamedRows
 from hierarchy.tasks.geometric import (
     Spot,
     column,
     jacobians_of,
     motion_of,
-    position_of,
     rotation_of,
     times_transposed,
     turned_back,
 )
-from hierarchy.tasks.pose import rotation_vector
+from hierarchy.tasks.pose import PoseTask, rotation_vector
 
 
 @dataclass(frozen=True)
-class RelativePose(Measured):
+class RelativePose(NamedRows, Measured):
     """Keep `frame` at `position` (3,) [m] and `rotation` (3, 3) in the axes of the frame `to`.
 
     m = 6, or 3 with `rotation` None: then only the position counts. The orientation error is the
@@ -51,14 +51,9 @@ class RelativePose(Measured):
             check_rotation(f"task {self.name!r}: rotation", self.rotation)
 
     @property
-    def dimension(self) -> int:
-        """Six rows, or three without orientation."""
-        return 3 if self.rotation is None else 6
-
-    @property
     def row_names(self) -> tuple[str, ...]:
-        """Axes of `to`."""
-        return ("x", "y", "z", "about x", "about y", "about z")[:self.dimension]
+        """Axes of `to`: six, or three without orientation."""
+        return PoseTask.row_names[:3 if self.rotation is None else 6]
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
@@ -70,9 +65,8 @@ class RelativePose(Measured):
 @compiled
 def _write_jacobian(kinematics, frame, to, R, d, J):
     """Write R^T (J_f - J_t + [d]x W_t) and R^T (W_f - W_t), with d = p_f - p_t."""
-    columns, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    linear, angular = jacobians_of(columns, placements, supports, frame)
-    linear_to, angular_to = jacobians_of(columns, placements, supports, to)
+    linear, angular = jacobians_of(kinematics, frame)
+    linear_to, angular_to = jacobians_of(kinematics, to)
     for c in range(J.shape[1]):
         w = column(angular_to, c)
         apart = less(column(linear, c), column(linear_to, c))
@@ -105,7 +99,7 @@ def _relative(kinematics, reads, goal, J, motion):
     frame, to, position, rotation = reads
     placements = kinematics.placements
     R = rotation_of(placements, to.joint, to.rotation)
-    d = less(position_of(placements, frame), position_of(placements, to))
+    d = less(place(placements[frame.joint], frame.offset), place(placements[to.joint], to.offset))
     _write_jacobian(kinematics, frame, to, R, d, J)
     _write_drift(kinematics, frame, to, R, d, motion.drift)
     here = turned_back(R, d)

@@ -36,19 +36,27 @@ from hierarchy.avoidance.self_collision import (
     on_axis,
     pack_capsules,
     pairs_of_chain,
-    turned,
 )
 from hierarchy.errors import HierarchyError, expect_each
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import add_row, crossed, dot, less, moving_point, place, times
+from hierarchy.kinematics import (
+    add_row,
+    crossed,
+    dot,
+    less,
+    moving_point,
+    place,
+    times,
+    turned,
+)
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Writer, Written
+from hierarchy.task import Kind, Level, NamedRows, Rows, Writer, Written
 
 
 @dataclass(frozen=True)
-class SelfSeparation(Written):
+class SelfSeparation(NamedRows, Written):
     """Keep pairs of capsules of the robot at `barrier.distance` or more (m = pairs).
 
     `pairs` are indices of `capsules`; None takes every pair of the chain except neighbours. No
@@ -97,30 +105,26 @@ class SelfSeparation(Written):
         """distance - d (m,) [m], positive where two capsules are too close."""
         return self.barrier.distance - self.distances(state)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         parameters = (*pack_capsules(self.capsules), self.indices, self.barrier.packed(),
                       level == "acceleration")
-        return bind(_write, state.kinematics, parameters, A, lower, upper, row)
+        return bind(_write, state.kinematics, parameters, *rows)
 
 
 @compiled
-def _write(kinematics, parameters, A, lower, upper, row):
+def _write(kinematics, parameters, A, lower, upper):
     joints, capsules, pairs, settings, acceleration = parameters
-    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    for m in range(pairs.shape[0]):
-        i, j = pairs[m, 0], pairs[m, 1]
+    for row in range(pairs.shape[0]):
+        i, j = pairs[row, 0], pairs[row, 1]
         a, b = capsules[i], capsules[j]
-        T_a, T_b = placements[joints[i]], placements[joints[j]]
+        T_a, T_b = kinematics.placements[joints[i]], kinematics.placements[joints[j]]
         seen = nearest_of_capsules(T_a, a, T_b, b)
         D, r, s, t = seen
         A[row, :] = 0.0
-        x, y, z = on_axis(a, s)
-        add_row(J, supports, joints[i], place(T_a, x, y, z), r, A, row)
-        x, y, z = on_axis(b, t)
-        add_row(J, supports, joints[j], place(T_b, x, y, z), times(-1.0, r), A, row)
-        drop_rounding(A, row)
+        add_row(kinematics, joints[i], place(T_a, on_axis(a, s)), r, A[row])
+        add_row(kinematics, joints[j], place(T_b, on_axis(b, t)), times(-1.0, r), A[row])
+        drop_rounding(A[row])
         lower[row], upper[row] = -np.inf, np.inf
         if D <= settings[2]:
             if acceleration:
@@ -128,7 +132,6 @@ def _write(kinematics, parameters, A, lower, upper, row):
                 lower[row] = least_acceleration(D - settings[0], rate, bend, settings) - drift
             else:
                 lower[row] = least_rate(D - settings[0], settings)
-        row += 1
 
 
 @compiled
@@ -142,6 +145,7 @@ def _motion(kinematics, joints, capsules, i, j, seen):
     rate, drift = dot(r, v), dot(r, less(drift_a, drift_b))
     if length < ON_AXIS:
         return rate, drift, 0.0
-    u, w = turned(kinematics.placements[joints[i]], a), turned(kinematics.placements[joints[j]], b)
+    u = turned(kinematics.placements[joints[i]], a[3:6])
+    w = turned(kinematics.placements[joints[j]], b[3:6])
     return rate, drift, bend_of_nearest(length, r, v, (u, crossed(w_a, u), s),
                                         (w, crossed(w_b, w), t))

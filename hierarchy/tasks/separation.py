@@ -31,16 +31,16 @@ from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.measurement import Pairs
 from hierarchy.errors import HierarchyError
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import add_row, dot, less, moving_point, place, triple
+from hierarchy.kinematics import add_row, dot, less, moving_point, place
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Writer, Written
+from hierarchy.task import Kind, Level, NamedRows, Rows, Writer, Written
 
 _SHARPEST = 1e-3  # [m] smallest radius of turning that is used
 
 
 @dataclass(frozen=True)
-class Separation(Written):
+class Separation(NamedRows, Written):
     """Keep every point at `barrier.distance` or more from every obstacle (m = points x obstacles).
 
     `points` are those of the sensor in its order, the end effector last; `obstacles` is how many
@@ -55,11 +55,6 @@ class Separation(Written):
     obstacles: int | None = None
     name: str = "separation"
     kind: Kind = "inequality"
-
-    @property
-    def dimension(self) -> int:
-        """One row per pair, or per point."""
-        return len(self.points) * (1 if self.obstacles is None else self.obstacles)
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -78,13 +73,11 @@ class Separation(Written):
         pairs = self._pairs(state)
         return np.asarray((pairs[:, 1:4] * pairs[:, 4:7]).sum(axis=1))
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         parameters = (*pack_points(self.points), self.barrier.packed(), self.obstacles is None,
                       level == "acceleration")
-        return bind(_write, state.kinematics, parameters, self._seen(state).table, A, lower, upper,
-                    row)
+        return bind(_write, state.kinematics, parameters, self._seen(state).table, *rows)
 
     def _pairs(self, state: State) -> Array:
         """The pair of each row (m, 14)."""
@@ -107,13 +100,12 @@ class Separation(Written):
 
 
 @compiled
-def _write(kinematics, parameters, pairs, A, lower, upper, row):
+def _write(kinematics, parameters, pairs, A, lower, upper):
     joints, offsets, settings, nearest, acceleration = parameters
-    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    distance, influence = settings[0], settings[2]
+    row, distance, influence = 0, settings[0], settings[2]
     for k in range(joints.size):
         joint = joints[k]
-        point = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        point = place(kinematics.placements[joint], offsets[k])
         velocity, drift, _ = moving_point(kinematics, joint, offsets[k])
         first, end = 0, pairs.shape[1]
         if nearest:
@@ -123,19 +115,19 @@ def _write(kinematics, parameters, pairs, A, lower, upper, row):
             end = first + 1
         for j in range(first, end):
             pair = pairs[k, j]
-            r = triple(pair, 1)
+            r = pair[1:4]
             A[row, :] = 0.0
-            add_row(J, supports, joint, point, r, A, row)
-            drop_rounding(A, row)
+            add_row(kinematics, joint, point, r, A[row])
+            drop_rounding(A[row])
             lower[row], upper[row] = -np.inf, np.inf
             h = pair[0] - distance
             if pair[0] <= influence and acceleration:
-                w = less(velocity, triple(pair, 4))
-                rate, straight = dot(r, w), dot(triple(pair, 10), w)
+                w = less(velocity, pair[4:7])
+                rate, straight = dot(r, w), dot(pair[10:13], w)
                 across = dot(w, w) - rate * rate - straight * straight
                 bend = max(across, 0.0) / max(pair[13], distance, _SHARPEST)
                 lower[row] = (least_acceleration(h, rate, bend, settings)
-                              + dot(r, less(triple(pair, 7), drift)))
+                              + dot(r, less(pair[7:10], drift)))
             elif pair[0] <= influence:
-                lower[row] = least_rate(h, settings) + dot(r, triple(pair, 4))
+                lower[row] = least_rate(h, settings) + dot(r, pair[4:7])
             row += 1
