@@ -9,8 +9,8 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy.avoidance.laws import repulsion
 from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turning_off_obstacle
-from hierarchy.avoidance.repulsion import repulsion
 from hierarchy.errors import HierarchyError, number
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import Readings, place

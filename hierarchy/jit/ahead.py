@@ -31,7 +31,7 @@ _FEATURES = ("avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movb
 
 @final
 @dataclass(frozen=True)
-class Entry:
+class Code:
     """Code for one list of types: names in the object file, and what its environment holds.
 
     digest : of the sources that the code was made of.
@@ -55,7 +55,7 @@ class Part:
 
     file: Path
     calls: str
-    entries: dict[str, Entry]
+    entries: dict[str, Code]
     externals: tuple[str, ...]
 
     @staticmethod
@@ -64,7 +64,7 @@ class Part:
         try:
             index = json.loads(file.with_suffix(".json").read_text())
             return Part(file, index["calls"],
-                        {call: Entry(**entry) for call, entry in index["entries"].items()},
+                        {call: Code(**entry) for call, entry in index["entries"].items()},
                         tuple(index["externals"]))
         except (OSError, ValueError, LookupError, TypeError, AttributeError):
             return None
@@ -90,7 +90,7 @@ class Part:
         engine.finalize_object()
         return engine
 
-    def function(self, entry: Entry, kernel: Any) -> Any:
+    def function(self, entry: Code, kernel: Any) -> Any:
         """Return what Python calls; None if the object file cannot be loaded."""
         if self.engine is None:
             return None

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import RobotError
-from hierarchy.robots import mjcf, urdf, urdf_remarks
+from hierarchy.robots import mjcf, urdf
 from hierarchy.robots.found import (
     Coupled,
     Found,
@@ -63,13 +63,13 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
     with _printed() as lines:
         try:
             model = model_of(root, base)
-            said = tuple(urdf_remarks.not_read(lines()))
+            said = tuple(urdf.not_read(lines()))
         except Exception as error:  # the parsers raise many types; all mean an invalid file
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
         model, coupled = without(model, urdf.coupled(root), locked, str(path))
         found = replace(_found(model, coupled),
-                        missing=(*said, *urdf_remarks.remarks(root), *remarks(model)))
+                        missing=(*said, *urdf.remarks(root), *remarks(model)))
         if not shapes:
             return found
         geometries, missing = _geometry(path, root, model)

@@ -9,13 +9,18 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from hierarchy.robots.found import Found, neutral_within_limits, proposed_end_effector
-from hierarchy.robots.mjcf.compare import compare
-from hierarchy.robots.mjcf.compiled import compiled
-from hierarchy.robots.mjcf.equalities import couplings, loops, pairs_apart
+from hierarchy.robots.mjcf.constraints import (
+    couplings,
+    effort_limits,
+    left_out,
+    loops,
+    pairs_apart,
+    refuse,
+    set_limits,
+)
 from hierarchy.robots.mjcf.geometry import shapes_of
-from hierarchy.robots.mjcf.limits import effort_limits, left_out, refuse, set_limits
-from hierarchy.robots.mjcf.model import build, configuration
-from hierarchy.robots.mjcf.part import part_of
+from hierarchy.robots.mjcf.model import build, compare, configuration
+from hierarchy.robots.mjcf.part import compiled, part_of
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.avoidance.repulsion import repulsion
+from hierarchy.avoidance.laws import repulsion
 from hierarchy.jit import compiled
 from hierarchy.kinematics import dot, place
 from hierarchy.problem import Array
