@@ -15,7 +15,7 @@ from hierarchy.avoidance.laws import Barrier
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, brief, expect
-from hierarchy.gate import check_rows
+from hierarchy.gate import check_rows, shaped
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
@@ -161,8 +161,9 @@ class Task(ABC):
         A, lower, upper = rows
 
         def write() -> None:
-            A[:] = _shaped(self, "jacobian", self.jacobian(state), A.shape)
-            lower[:] = _shaped(self, "reference", self._sides(state, level), lower.shape)
+            A[:] = shaped(f"task {self.name!r}: jacobian", self.jacobian(state), A.shape)
+            lower[:] = shaped(f"task {self.name!r}: reference", self._sides(state, level),
+                              lower.shape)
             upper[:] = lower if self.kind == "equality" else np.inf
             check_rows(f"task {self.name!r}", *rows)
 
@@ -172,8 +173,8 @@ class Task(ABC):
         """Required value of J x (m,), x being the velocity or the acceleration."""
         if level == "velocity":
             return self.reference_velocity(state)
-        drift = _shaped(self, "jacobian_derivative", self.jacobian_derivative(state),
-                        (self.dimension, state.n)) @ state.v
+        drift = shaped(f"task {self.name!r}: jacobian_derivative", self.jacobian_derivative(state),
+                       (self.dimension, state.n)) @ state.v
         return self.reference_acceleration(state) - drift
 
 
@@ -287,18 +288,6 @@ def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Write
     if level == "torque" and not task.of_forces:
         level, rows = "acceleration", rows._replace(A=rows.A[:, :state.n])
     return task.writer(state, level, rows)
-
-
-def _shaped(task: Task, what: str, value: Array, shape: tuple[int, ...]) -> Array:
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise HierarchyError(f"task {task.name!r}: {what} is no array of numbers: {brief(value)}"
-                             ) from None
-    if array.shape != shape:
-        raise HierarchyError(f"task {task.name!r}: {what} has shape {array.shape}, "
-                             f"expected {shape}")
-    return array
 
 
 class NamedRows(Task):

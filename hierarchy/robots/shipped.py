@@ -1,4 +1,4 @@
-"""The robots that are shipped, as tables: plausible round numbers, but for the geometry of the KUKA.
+"""The robots that are shipped, as tables: plausible round numbers but for the KUKA's geometry.
 
 - `KUKA_LWR`: KUKA LWR IV, base frame at the shoulder (0.3105 m above the foot of the real arm).
   Geometry and position limits: the arm's data sheet, as used in the letter. Velocity limits: the

@@ -33,7 +33,6 @@ import numpy as np
 
 from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.laws import Repulsion, repulsion
-from hierarchy.avoidance.measurement import Measurement
 from hierarchy.errors import HierarchyError, expect
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
@@ -233,17 +232,14 @@ class DangerBounds(NamedRows, Written):
                        self._tighten(state, level, rows.lower, rows.upper))
 
     def _tighten(self, state: State, level: Level, lower: Array, upper: Array) -> Writer:
-        parameters = (*pack_points(self.points), self.reach, self.shape, self.lever,
-                      self.limits.limits.packed[2], max(self.limits.period, self.limits.horizon),
-                      level == "acceleration")
-        return bind(_tighten, state.kinematics, parameters, self._seen(state).arrays, lower, upper)
-
-    def _seen(self, state: State) -> Measurement:
         seen = seen_by(self, state)
         if len(self.points) > len(seen.distance):
             raise HierarchyError(f"task {self.name!r}: {len(self.points)} control points, and "
                                  f"distances of {len(seen.distance)}")
-        return seen
+        parameters = (*pack_points(self.points), self.reach, self.shape, self.lever,
+                      self.limits.limits.packed[2], max(self.limits.period, self.limits.horizon),
+                      level == "acceleration")
+        return bind(_tighten, state.kinematics, parameters, seen.arrays, lower, upper)
 
 
 @compiled

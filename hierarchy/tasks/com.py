@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled, inlined
-from hierarchy.kinematics import moving_point, place, row_times
+from hierarchy.jit import compiled
+from hierarchy.kinematics import carried, moving_point, place, plus, row_times, times
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.paths import Path
 from hierarchy.problem import Array
@@ -78,41 +78,26 @@ def _write_jacobian(kinematics, shares, centres, axes, A):
     """Column c is s J_v + J_w x m, with s and m the mass and moment (as shares) that c moves."""
     J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     for c in range(A.shape[1]):
-        s, mx, my, mz = _carried(placements, supports, shares, centres, c)
+        s, m = 0.0, (0.0, 0.0, 0.0)
+        for joint in range(1, len(shares)):
+            if supports[joint, c] and shares[joint] > 0.0:
+                s += shares[joint]
+                m = plus(m, times(shares[joint], place(placements[joint], centres[joint])))
+        moved = carried(times(s, J[:3, c]), J[3:, c], m)
         for i in range(len(axes)):
-            if axes[i] == 0:
-                A[i, c] = s * J[0, c] + J[4, c] * mz - J[5, c] * my
-            elif axes[i] == 1:
-                A[i, c] = s * J[1, c] + J[5, c] * mx - J[3, c] * mz
-            else:
-                A[i, c] = s * J[2, c] + J[3, c] * my - J[4, c] * mx
-
-
-@inlined
-def _carried(placements, supports, shares, centres, c):
-    s = mx = my = mz = 0.0
-    for joint in range(1, len(shares)):
-        if supports[joint, c] and shares[joint] > 0.0:
-            x, y, z = place(placements[joint], centres[joint])
-            s += shares[joint]
-            mx += shares[joint] * x
-            my += shares[joint] * y
-            mz += shares[joint] * z
-    return s, mx, my, mz
+            A[i, c] = moved[axes[i]]
 
 
 @measured
 def _centre_of_mass(kinematics, reads, goal, J, motion):
     shares, centres, axes = reads
     _write_jacobian(kinematics, shares, centres, axes, J)
-    p, drift = np.zeros(3), np.zeros(3)
+    p, drift = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for joint in range(1, len(shares)):
         if shares[joint] > 0.0:
-            at = place(kinematics.placements[joint], centres[joint])
             _, bend, _ = moving_point(kinematics, joint, centres[joint])
-            for i in range(3):
-                p[i] += shares[joint] * at[i]
-                drift[i] += shares[joint] * bend[i]
+            p = plus(p, times(shares[joint], place(kinematics.placements[joint], centres[joint])))
+            drift = plus(drift, times(shares[joint], bend))
     for i in range(len(axes)):
         motion.error[i] = goal[0, axes[i]] - p[axes[i]]
         motion.rate[i] = row_times(J, i, kinematics.v)

@@ -151,12 +151,6 @@ def _part(robot: Robot, name: str) -> Part:
 
 
 @compiled
-def _position(q, at, continuous):
-    """Position or angle of a joint."""
-    return np.arctan2(q[at + 1], q[at]) if continuous else q[at]
-
-
-@compiled
 def _polynomial(c, x):
     """Value, derivative and second derivative of sum_i c_i x^i."""
     value, slope, bend = 0.0, 0.0, 0.0
@@ -173,7 +167,8 @@ def _coupling(kinematics, reads, goal, J, motion):
     v, error = kinematics.v, motion.error
     for t in range(len(terms.rows)):
         i, of = terms.rows[t], terms.velocities[t]
-        x = _position(q, terms.positions[t], terms.continuous[t])
+        at = terms.positions[t]
+        x = np.arctan2(q[at + 1], q[at]) if terms.continuous[t] else q[at]
         value, slope, bend = _polynomial(terms.coefficients[t], x)
         J[i, of] += slope
         error[i] -= value

@@ -102,45 +102,31 @@ class Friction(FixedRows):
         share, count = contact.load(state.t), len(contact.points)
         if share == 1.0:
             return
-        before = nan if state.carried is None else state.carried[number]
-        allowed = share * (self._weight if isnan(before) else before)
-        each = slice(0, count * (self.faces + 1))
+        robot, before = self.contacts.robot, nan if state.carried is None else state.carried[number]
+        weight = robot.masses.sum() * np.linalg.norm(robot.model.gravity.linear)
+        allowed = share * (weight if isnan(before) else before)
+        each_low, each_up = (side[:count * (self.faces + 1)].reshape(count, -1)
+                             for side in (low, up))
         if allowed > _NOTHING:
-            low[each][self.faces::self.faces + 1] = share * self.least or -inf
+            each_low[:, -1] = share * self.least or -inf
             up[-1] = min(up[-1], allowed)
-        else:
-            self._close(low[each].reshape(count, -1), up[each].reshape(count, -1))
+            return
+        # Two faces and the normal force are equalities and the other faces are free, because at
+        # the tip of the pyramid all faces would hold the force at once.
+        each_low[:, :-1] = -inf
+        for row in (0, self.faces // 4, -1):
+            each_low[:, row] = each_up[:, row] = 0.0
 
     def _slide(self, number: int, state: State, rows: Rows) -> None:
         """Write the rows (faces + 1, 3) of one point that slides, over its force."""
         contact, (A, low, up) = self.contacts.contacts[number], rows
-        along = contact.axes[:2] @ self._velocity(contact, state)
+        first = self.contacts.blocks[contact.name].start - state.n
+        along = contact.axes[:2] @ (self.contacts.jacobian(state)[first:first + 3] @ state.v)
         drag = contact.friction * along / max(float(np.linalg.norm(along)), _SLOW)
         low[:-1], up[:-1], low[-1] = -inf, inf, max(low[-1], 0.0)
         for row, tangent, share in zip((0, self.faces // 4), contact.axes[:2], drag, strict=True):
             A[row] = tangent + share * contact.axes[2]
             low[row] = up[row] = 0.0
-
-    def _velocity(self, contact: Contact, state: State) -> Array:
-        """Velocity (3,) [m/s] of the first point of a contact."""
-        first = self.contacts.blocks[contact.name].start - state.n
-        velocity: Array = self.contacts.jacobian(state)[first:first + 3] @ state.v
-        return velocity
-
-    @property
-    def _weight(self) -> float:
-        robot = self.contacts.robot
-        return float(robot.masses.sum() * np.linalg.norm(robot.model.gravity.linear))
-
-    def _close(self, low: Array, up: Array) -> None:
-        """Write sides (k, faces + 1) of k points whose forces are zero.
-
-        Two faces and the normal force are equalities and the other faces are free, because at the
-        tip of the pyramid all faces would hold the force at once.
-        """
-        low[:, :-1] = -inf
-        for row in (0, self.faces // 4, -1):
-            low[:, row] = up[:, row] = 0.0
 
     def _of(self, contact: Contact) -> Array:
         """Rows (r, 3 k) of one contact; the first two tangents are normal to faces."""

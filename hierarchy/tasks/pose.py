@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import atan2, sqrt
 from typing import Any
 
@@ -29,7 +29,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import NamedRows, Task
+from hierarchy.task import NamedRows
 from hierarchy.tasks.geometric import (
     Placed,
     Spot,
@@ -81,14 +81,15 @@ def _pose(kinematics, reads, goal, J, motion):
 
 
 @dataclass(frozen=True)
-class PoseTask(Task):
+class Pose(Measured):
     """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
 
-    Abstract: its subclasses differ in the error.
+    The orientation error is the rotation vector from the actual to the desired orientation, in
+    world axes; the last three rows are those of the angular velocity.
     """
 
     frame: Frame
-    path: Path
+    path: Path = field()  # required here
     rotation: ArrayLike
     stiffness: float = 40.0
     damping: float = 20.0
@@ -100,15 +101,6 @@ class PoseTask(Task):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_rotation(f"task {self.name!r}: rotation", self.rotation)
-
-
-@dataclass(frozen=True)
-class Pose(PoseTask, Measured):
-    """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
-
-    The orientation error is the rotation vector from the actual to the desired orientation, in
-    world axes; the last three rows are those of the angular velocity.
-    """
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
@@ -122,10 +114,10 @@ _STEP = 1e-30    # of a complex step: no difference is formed, so it may be this
 
 
 @dataclass(frozen=True)
-class FrameLog(PoseTask, Measured):
-    """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
+class FrameLog(Pose):
+    """The same pose with another error.
 
-    The error is e = log(T^-1 T_d), with the poses T of the frame and T_d of its target: the twist
+    It is e = log(T^-1 T_d), with the poses T of the frame and T_d of its target: the twist
     in the axes of the frame, linear part first, that takes it to the target in unit time. The frame
     moves on a screw, where with `Pose` its origin moves on a straight line. It is what `FrameTask`
     of pink and of placo are. Beyond half a turn the error jumps. The derivative is always exact.
@@ -231,7 +223,7 @@ class RelativePose(NamedRows, Measured):
     @property
     def row_names(self) -> tuple[str, ...]:
         """Axes of `to`: six, or three without orientation."""
-        return PoseTask.row_names[:3 if self.rotation is None else 6]
+        return Pose.row_names[:3 if self.rotation is None else 6]
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""

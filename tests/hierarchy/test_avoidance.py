@@ -21,8 +21,8 @@ SHAPES = {
 
 
 def distance(obstacle, point):
-    away = np.empty(3)
-    return distance_to_obstacle(obstacle.packed(), *point, away), away
+    D, away = distance_to_obstacle(obstacle.packed(), np.array(point))
+    return D, np.array(away)
 
 
 def surface_points(obstacle, count):

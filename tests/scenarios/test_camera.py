@@ -46,12 +46,12 @@ def depths(taken):
 
 def traced(obstacle, pinhole, u, v):
     """Depth by sphere tracing, from the distance function alone; 0 for a miss."""
-    away, row = np.zeros(3), obstacle.packed()
+    row = obstacle.packed()
     ray = deproject(pinhole, (u, v, 1.0)) - pinhole.position
     share = 0.0
     for _ in range(2000):
         point = pinhole.position + share * ray
-        distance = distance_to_obstacle(row, *point, away)
+        distance, _ = distance_to_obstacle(row, point)
         if distance < 1e-9:
             return share
         share += distance / np.linalg.norm(ray)
