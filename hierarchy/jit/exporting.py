@@ -20,15 +20,7 @@ from numba.np import arrayobj
 
 from hierarchy.jit.ahead import PROCESSOR, Code, Part
 from hierarchy.jit.compiling import Cached
-from hierarchy.jit.inside import (
-    cgutils,
-    compiler,
-    global_compiler_lock,
-    intrinsic,
-    llvm,
-    registry,
-    types,
-)
+from hierarchy.jit.inside import cgutils, compiler, global_compiler_lock, llvm, registry, types
 from hierarchy.jit.linking import Library, found, linked, naming
 from hierarchy.jit.sources import Kernel, kinds_in, source_digest
 
@@ -144,7 +136,7 @@ def _view(dtype: Any) -> Any:
 
         return kind(types.int64, types.int64), write
 
-    return intrinsic(view)
+    return numba.extending.intrinsic(view)
 
 
 numbers_at, integers_at = _view(types.float64), _view(types.int64)

@@ -19,15 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import RobotError
-from hierarchy.robots import mjcf, urdf
-from hierarchy.robots.found import (
-    Coupled,
-    Found,
-    is_floating,
-    neutral_within_limits,
-    proposed_end_effector,
-    remarks,
-)
+from hierarchy.robots import found, mjcf, urdf
+from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits
 from hierarchy.robots.from_table import ROOT
 from hierarchy.robots.joints import without
 from hierarchy.robots.library import pin
@@ -68,15 +61,15 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
         model, coupled = without(model, urdf.coupled(root), locked, str(path))
-        found = replace(_found(model, coupled),
-                        missing=(*said, *urdf.remarks(root), *remarks(model)))
+        robot = replace(_found(model, coupled),
+                        missing=(*said, *urdf.remarks(root), *found.remarks(model)))
         if not shapes:
-            return found
+            return robot
         geometries, missing = _geometry(path, root, model)
         capsules, left_out = capsules_of(geometries)
     kept, of_world = _held_by(model, capsules)
-    return replace(found, capsules=kept,
-                   missing=(*missing, *left_out, *of_world, *found.missing))
+    return replace(robot, capsules=kept,
+                   missing=(*missing, *left_out, *of_world, *robot.missing))
 
 
 def _found(model: Any, coupled: tuple[Coupled, ...]) -> Found:
@@ -85,7 +78,7 @@ def _found(model: Any, coupled: tuple[Coupled, ...]) -> Found:
         rest[:7] = pin.SE3ToXYZQUAT(model.jointPlacements[1])
         model.jointPlacements[1] = pin.SE3.Identity()
     names = set(model.names)
-    return Found(model, proposed_end_effector(model), rest=rest, coupled=tuple(
+    return Found(model, found.proposed_end_effector(model), rest=rest, coupled=tuple(
         one for one in coupled if {one.joint, one.other} <= {*names, ""}))
 
 
