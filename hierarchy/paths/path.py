@@ -45,7 +45,7 @@ class Still(Path):
     position: Vector
 
     def __post_init__(self) -> None:
-        check_point("position", self.position)
+        finite_numbers("position [m]", self.position, 3)
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -65,7 +65,7 @@ class Ellipse(Path):
 
     def __post_init__(self) -> None:
         for name in ("centre", "cosine", "sine"):
-            check_point(name, getattr(self, name))
+            finite_numbers(f"{name} [m]", getattr(self, name), 3)
         number("ellipse: rate", self.rate)
         set_frozen(self, _packed=np.array([self.centre, self.cosine, self.sine], dtype=float))
 
@@ -85,7 +85,7 @@ def circle(centre: Vector, radius: float, normal: Vector = (0.0, 0.0, 1.0), rate
     It starts, at phase zero, in the direction of the world's x axis as seen in its plane, or of y
     where the normal is along x. Raises HierarchyError for a radius < 0 or a normal of length zero.
     """
-    check_point("centre", centre)
+    finite_numbers("centre [m]", centre, 3)
     z = np.array(normal, dtype=float)
     length = float(np.linalg.norm(z))
     if z.shape != (3,) or not 1e-9 < length < inf or not 0.0 <= radius < inf:
@@ -108,7 +108,7 @@ class Shifted(Path):
     offset: Vector
 
     def __post_init__(self) -> None:
-        check_point("offset", self.offset)
+        finite_numbers("offset [m]", self.offset, 3)
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -161,15 +161,6 @@ class Jittered(Path):
         out[0] += size * np.sin(angles).sum(axis=1)
         out[1] += size * (speeds * np.cos(angles)).sum(axis=1)
         out[2] -= size * (speeds**2 * np.sin(angles)).sum(axis=1)
-
-
-def check_point(name: str, vector: Vector) -> None:
-    """Raise a HierarchyError unless a vector is three finite numbers, or return None."""
-    try:
-        finite_numbers(name, vector, 3)
-    except HierarchyError as error:
-        given = list(vector) if isinstance(vector, list | tuple | np.ndarray) else vector
-        raise HierarchyError(f"{name} must be three finite numbers [m], got {given!r}") from error
 
 
 @compiled
@@ -352,4 +343,4 @@ def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -
         if not a < b < inf:
             raise HierarchyError(f"{what}: times must increase, got {a} and then {b}")
     for i, point in enumerate(points):
-        check_point(f"points[{i}]", point)
+        finite_numbers(f"points[{i}] [m]", point, 3)

@@ -22,7 +22,6 @@ from hierarchy.kinematics import (
     velocity_of_body,
 )
 from hierarchy.measured import Measure, Measured, measured
-from hierarchy.paths.path import check_point
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Frame
@@ -133,7 +132,7 @@ class LookAt(Measured):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_point(f"task {self.name!r}: target", self.target)
+        finite_numbers(f"task {self.name!r}: target [m]", self.target, 3)
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`: the error is -2 (u_x, u_y) / (1 + u_z)."""
