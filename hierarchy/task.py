@@ -99,6 +99,11 @@ class Task(ABC):
         check_parts(self)
         check_gains(self)
 
+    def refuse(self, wrong: object, said: str) -> None:
+        """Raise a HierarchyError that names the task, and says what is wrong, if it is."""
+        if wrong:
+            raise HierarchyError(f"task {self.name!r}: {said}")
+
     @property
     @abstractmethod
     def dimension(self) -> int:

@@ -75,7 +75,7 @@ def bounding_capsule(points: Array) -> tuple[Array, Array, float]:
     best, least = principal[0], np.inf
     for axis in (*np.eye(3), *principal):
         start, end, radius = _around(few, axis)
-        volume = np.pi * radius**2 * (np.linalg.norm(end - start) + 4.0 / 3.0 * radius)
+        volume = np.pi * radius**2 * (float(np.linalg.norm(end - start)) + 4.0 / 3.0 * radius)
         if volume < least:
             best, least = axis, volume
     return _around(points, best)

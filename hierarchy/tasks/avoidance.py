@@ -90,8 +90,7 @@ class Avoidance(Measured):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.rows not in (1, 3):
-            raise HierarchyError(f"task {self.name!r}: rows must be 1 or 3, got {self.rows}")
+        self.refuse(self.rows not in (1, 3), f"rows must be 1 or 3, got {self.rows}")
 
     @property
     def dimension(self) -> int:
@@ -128,11 +127,10 @@ class CumulatedRepulsion(JointTask):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.lever > 0.0:
-            raise HierarchyError(f"task {self.name!r}: lever {self.lever} m must be positive")
-        if self.base is not None and self.base.dimension != self.joints:
-            raise HierarchyError(f"task {self.name!r}: {self.base.name!r} has "
-                                 f"{self.base.dimension} rows, expected {self.joints}")
+        self.refuse(not self.lever > 0.0, f"lever {self.lever} m must be positive")
+        if self.base is not None:
+            self.refuse(self.base.dimension != self.joints, f"{self.base.name!r} has "
+                        f"{self.base.dimension} rows, expected {self.joints}")
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
@@ -198,11 +196,9 @@ class DangerBounds(NamedRows, Written):
     def __post_init__(self) -> None:
         super().__post_init__()
         expect(f"task {self.name!r}: limits", self.limits, JointLimits, "give a JointLimits task")
-        if self.limits.robot.base == "floating":
-            raise HierarchyError(f"task {self.name!r}: robot {self.limits.robot.name!r} has a "
-                                 "floating base, whose speed no joint bounds")
-        if not 0.0 <= self.lever < np.inf:
-            raise HierarchyError(f"task {self.name!r}: lever {self.lever} m must not be negative")
+        self.refuse(self.limits.robot.base == "floating", f"robot {self.limits.robot.name!r} has "
+                    "a floating base, whose speed no joint bounds")
+        self.refuse(not 0.0 <= self.lever < np.inf, f"lever {self.lever} m must not be negative")
         for (i,) in np.argwhere(~np.isfinite(self.limits.robot.velocity_limit))[:1]:
             raise HierarchyError(f"task {self.name!r}: joint {self.limits.robot.velocity_names[i]} "
                                  "has no velocity limit to scale")
@@ -233,9 +229,8 @@ class DangerBounds(NamedRows, Written):
 
     def _tighten(self, state: State, level: Level, lower: Array, upper: Array) -> Writer:
         seen = seen_by(self, state)
-        if len(self.points) > len(seen.distance):
-            raise HierarchyError(f"task {self.name!r}: {len(self.points)} control points, and "
-                                 f"distances of {len(seen.distance)}")
+        self.refuse(len(self.points) > len(seen.distance), f"{len(self.points)} control points, "
+                    f"and distances of {len(seen.distance)}")
         parameters = (*pack_points(self.points), self.reach, self.shape, self.lever,
                       self.limits.limits.packed[2], max(self.limits.period, self.limits.horizon),
                       level == "acceleration")

@@ -44,8 +44,7 @@ class CentreOfMass(Measured):
                 set(axes)):
             raise HierarchyError(f"task {self.name!r}: axes {list(axes)} must be some of 0, 1, 2, "
                                  "in this order")
-        if not self.robot.masses.sum() > 0.0:
-            raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has no masses")
+        self.refuse(not self.robot.masses.sum() > 0.0, f"robot {self.robot.name!r} has no masses")
 
     @property
     def dimension(self) -> int:
@@ -127,9 +126,8 @@ class Momentum(NamedRows, Measured):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.part, str) or self.part not in _ROWS:
-            raise HierarchyError(f"task {self.name!r}: part {self.part!r} is not one of "
-                                 f"{', '.join(_ROWS)}")
+        self.refuse(not isinstance(self.part, str) or self.part not in _ROWS,
+                    f"part {self.part!r} is not one of {', '.join(_ROWS)}")
         if self.target is not None and (len(self.target) != self.dimension
                                         or not np.isfinite(self.target).all()):
             raise HierarchyError(f"task {self.name!r}: target {self.target!r} is not "

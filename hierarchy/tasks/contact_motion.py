@@ -47,14 +47,12 @@ class ContactMotion(NamedRows, Written):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.of.contacts:
-            raise HierarchyError(f"task {self.name!r}: there are no contacts")
-        if self.anchors is None and self.stiffness:
-            raise HierarchyError(f"task {self.name!r}: stiffness {self.stiffness} needs anchors")
+        self.refuse(not self.of.contacts, "there are no contacts")
+        self.refuse(self.anchors is None and self.stiffness, f"stiffness {self.stiffness} needs "
+                    "anchors")
         for contact in self.of.contacts:
-            if contact.open and self.stiffness:
-                raise HierarchyError(f"task {self.name!r}: contact {contact.name!r} opens, so its "
-                                     f"stiffness must be 0, not {self.stiffness}")
+            self.refuse(contact.open and self.stiffness, f"contact {contact.name!r} opens, so its "
+                        f"stiffness must be 0, not {self.stiffness}")
         if self.anchors is not None and [np.shape(one) for one in self.anchors] != [
                 (4, 3)] * len(self.of.contacts):
             raise HierarchyError(f"task {self.name!r}: anchors are not (4, 3) for each of "

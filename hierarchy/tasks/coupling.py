@@ -76,9 +76,8 @@ class JointCoupling(_Coupling):
         for name, factor in self.joints.items():
             number(f"task {self.name!r}: joints.{name}", factor)
         number(f"task {self.name!r}: value", self.value)
-        if not any(self.joints.values()):
-            raise HierarchyError(f"task {self.name!r}: joints {dict(self.joints)} have no factor "
-                                 "other than zero")
+        self.refuse(not any(self.joints.values()), f"joints {dict(self.joints)} have no factor "
+                    "other than zero")
         constants = [-self.value, *[0.0] * (len(self.joints) - 1)]
         terms = [(0, name, (constant, factor)) for constant, (name, factor)
                  in zip(constants, self.joints.items(), strict=True)]

@@ -180,14 +180,12 @@ class TorqueLimits(JointRows):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0.0 < self.fraction <= 1.0:
-            raise HierarchyError(f"task {self.name!r}: fraction {self.fraction} is not more than 0 "
-                                 "and at most 1")
-        if not self.step > 0.0:
-            raise HierarchyError(f"task {self.name!r}: step {self.step} must be positive")
-        if self.robot.base == "floating" and self.contacts is None:
-            raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has a floating "
-                                 "base; its torques depend on contact forces, so give the contacts")
+        self.refuse(not 0.0 < self.fraction <= 1.0, f"fraction {self.fraction} is not more than 0 "
+                    "and at most 1")
+        self.refuse(not self.step > 0.0, f"step {self.step} must be positive")
+        self.refuse(self.robot.base == "floating" and self.contacts is None,
+                    f"robot {self.robot.name!r} has a floating base; its torques depend on "
+                    "contact forces, so give the contacts")
 
     @property
     def limit(self) -> Array:
@@ -201,9 +199,8 @@ class TorqueLimits(JointRows):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; HierarchyError at velocity level."""
-        if level == "velocity":
-            raise HierarchyError(f"task {self.name!r}: torque limits need the acceleration level, "
-                                 f"not {level!r}")
+        self.refuse(level == "velocity", "torque limits need the acceleration level, not "
+                    f"{level!r}")
         M, h = state.dynamics
         contacts = Contacts(self.robot) if self.contacts is None else self.contacts
         parameters = M, h, state.kinematics, contacts.points, self.robot.actuated

@@ -50,11 +50,9 @@ class Friction(FixedRows):
     def __post_init__(self) -> None:
         super().__post_init__()
         required(self.contacts, self.name)
-        if self.faces not in (4, 8):
-            raise HierarchyError(f"task {self.name!r}: {self.faces!r} faces, expected 4 or 8")
-        if not 0.0 <= self.least < self.largest:
-            raise HierarchyError(f"task {self.name!r}: no normal force is pushing and lies between "
-                                 f"least {self.least} N and largest {self.largest} N")
+        self.refuse(self.faces not in (4, 8), f"{self.faces!r} faces, expected 4 or 8")
+        self.refuse(not 0.0 <= self.least < self.largest, "no normal force is pushing and lies "
+                    f"between least {self.least} N and largest {self.largest} N")
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -169,10 +167,9 @@ class CentreOfPressure(FixedRows):
             raise HierarchyError(f"task {self.name!r}: no contact is a surface")
         for contact in surfaces:
             widest = float(_distances(contact).mean(axis=1).min())
-            if not 0.0 <= self.margin < widest:
-                raise HierarchyError(f"task {self.name!r}: margin {self.margin} m of contact "
-                                     f"{contact.name!r} is not from 0 to less than {widest:.4g}, "
-                                     "the distance of its middle from an edge")
+            self.refuse(not 0.0 <= self.margin < widest, f"margin {self.margin} m of contact "
+                        f"{contact.name!r} is not from 0 to less than {widest:.4g}, the distance "
+                        "of its middle from an edge")
 
     @property
     def row_names(self) -> tuple[str, ...]:

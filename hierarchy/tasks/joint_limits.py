@@ -70,11 +70,10 @@ class JointLimits(JointRows):
         robot = self.robot
         acceleration = array_of(f"task {self.name!r}: acceleration", self.acceleration)
         n = robot.n - robot.actuated
-        if acceleration.shape not in ((), (n,)):
-            raise HierarchyError(f"task {self.name!r}: acceleration has shape "
-                                 f"{acceleration.shape}, expected a number or ({n},)")
-        if number(f"task {self.name!r}: margin", self.margin) < 0.0:
-            raise HierarchyError(f"task {self.name!r}: margin {self.margin} must not be negative")
+        self.refuse(acceleration.shape not in ((), (n,)), "acceleration has shape "
+                    f"{acceleration.shape}, expected a number or ({n},)")
+        self.refuse(number(f"task {self.name!r}: margin", self.margin) < 0.0,
+                    f"margin {self.margin} must not be negative")
         lower, upper = robot.position_limits()
         for i in np.flatnonzero(upper - lower < 2.0 * self.margin)[:1]:
             raise HierarchyError(f"task {self.name!r}: margin {self.margin:g} leaves "
@@ -82,9 +81,8 @@ class JointLimits(JointRows):
                                  f"{upper[i]:.4g}")
         speed = robot.velocity_limit.copy()
         rate = np.append(np.zeros(robot.actuated), np.broadcast_to(acceleration, n))
-        if self._limits_base and robot.base == "fixed":
-            raise HierarchyError(f"task {self.name!r}: robot {robot.name!r} has a fixed base, "
-                                 "which has no speed to limit")
+        self.refuse(self._limits_base and robot.base == "fixed", f"robot {robot.name!r} has a "
+                    "fixed base, which has no speed to limit")
         if self.first < robot.actuated:
             speed[:6] = self._of_base("base_speed", speed[:6])
             rate[:6] = self._of_base("base_acceleration", np.full(6, acceleration.max()))
@@ -182,8 +180,8 @@ class StepLimits(JointRows):
     first = 0
 
     def __post_init__(self) -> None:
-        if not number(f"task {self.name!r}: period [s]", self.period) > 0.0:
-            raise HierarchyError(f"task {self.name!r}: period {self.period} s must be positive")
+        self.refuse(not number(f"task {self.name!r}: period [s]", self.period) > 0.0,
+                    f"period {self.period} s must be positive")
         gain = APPROACH / self.period if self.gain is None else self.gain
         number(f"task {self.name!r}: gain [1/s]", gain, 0.0, 1.0 / self.period)
         set_frozen(self, gain=gain)
@@ -202,8 +200,7 @@ class StepLimits(JointRows):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; for velocity level."""
-        if level != "velocity":
-            raise HierarchyError(f"task {self.name!r}: for velocity level; see JointLimits")
+        self.refuse(level != "velocity", "for velocity level; see JointLimits")
 
         def write() -> None:
             rows.A[:] = np.eye(state.n)

@@ -8,7 +8,7 @@ from math import cos
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, finite_numbers, number
+from hierarchy.errors import finite_numbers, number
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     carried,
@@ -85,8 +85,8 @@ class Pointing(Measured):
         super().__post_init__()
         axis = finite_numbers(f"task {self.name!r}: axis", self.axis)
         length = float(np.linalg.norm(axis))
-        if axis.shape != (3,) or not 1e-9 < length < np.inf:
-            raise HierarchyError(f"task {self.name!r}: axis {list(self.axis)} has no direction")
+        self.refuse(axis.shape != (3,) or not 1e-9 < length < np.inf, f"axis {list(self.axis)} "
+                    "has no direction")
         number(f"task {self.name!r}: half_angle [rad]", self.half_angle, 0.0, np.pi)
         set_frozen(self, z_d=axis / length, cos_alpha_d=cos(self.half_angle),
                    z_e=np.ascontiguousarray(self.frame.rotation[:, 2]))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hierarchy.avoidance.measurement import Measurement
-from hierarchy.errors import HierarchyError, expect
+from hierarchy.errors import expect
 from hierarchy.kinematics import moving_point, place, write_point_jacobian
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.paths import Path
@@ -79,9 +79,8 @@ class Along(Written):
             D = np.array(self.directions, dtype=float)
         except (TypeError, ValueError):
             D = np.empty(0)
-        if D.ndim != 2 or D.shape[1:] != (3,) or not np.allclose(D @ D.T, np.eye(len(D))):
-            raise HierarchyError(f"task {self.name!r}: directions {self.directions!r} are not of "
-                                 "length one and orthogonal, (m, 3)")
+        self.refuse(D.ndim != 2 or D.shape[1:] != (3,) or not np.allclose(D @ D.T, np.eye(len(D))),
+                    f"directions {self.directions!r} are not of length one and orthogonal, (m, 3)")
 
     @property
     def dimension(self) -> int:

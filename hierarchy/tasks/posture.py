@@ -37,9 +37,8 @@ class JointTask(Written):
 
     def check_size(self, state: State) -> None:
         """Raise a HierarchyError unless a state has as many velocities as there are joints."""
-        if self.joints != state.n:
-            raise HierarchyError(f"task {self.name!r}: {self.joints} joints, the robot has "
-                                 f"{state.n} velocities")
+        self.refuse(self.joints != state.n, f"{self.joints} joints, the robot has {state.n} "
+                    "velocities")
 
 
 @dataclass(frozen=True)
@@ -88,9 +87,8 @@ class Posture(Measured):
         """One row for each velocity but those of a floating base."""
         if self.robot is not None:
             return self.robot.n - self.robot.actuated
-        if isinstance(self.target, Mapping):
-            raise HierarchyError(f"task {self.name!r}: a target by name has rows once the robot is "
-                                 "known; give Posture(..., robot=robot)")
+        self.refuse(isinstance(self.target, Mapping), "a target by name has rows once the robot "
+                    "is known; give Posture(..., robot=robot)")
         return len(np.asarray(self.target))
 
     @property
@@ -152,9 +150,8 @@ class JointDamping(JointTask):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.weight not in ("identity", "mass"):
-            raise HierarchyError(f"task {self.name!r}: weight must be 'identity' or 'mass', got "
-                                 f"{self.weight!r}")
+        self.refuse(self.weight not in ("identity", "mass"), "weight must be 'identity' or "
+                    f"'mass', got {self.weight!r}")
         expect(f"task {self.name!r}: joints", self.joints, int, "give robot.n")
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:

@@ -120,10 +120,9 @@ class Separation(NamedRows, Written):
             raise HierarchyError(f"task {self.name!r}: the state carries no measurement of pairs")
         points, obstacles, _ = seen.table.shape
         fits = obstacles > 0 if self.obstacles is None else obstacles == self.obstacles
-        if points != len(self.points) or not fits:
-            raise HierarchyError(
-                f"task {self.name!r}: {points} points are measured against {obstacles} obstacles, "
-                f"expected {len(self.points)} against {self.obstacles or 'one at least'}")
+        self.refuse(points != len(self.points) or not fits, f"{points} points are measured "
+                    f"against {obstacles} obstacles, expected {len(self.points)} against "
+                    f"{self.obstacles or 'one at least'}")
         return seen
 
 
@@ -184,12 +183,10 @@ class SelfSeparation(NamedRows, Written):
         expect_each("capsules", self.capsules, Capsule, "see robot.capsules")
         pairs = pairs_of_chain(self.capsules) if self.pairs is None else self.pairs
         count = len(self.capsules)
-        if not pairs:
-            raise HierarchyError(f"task {self.name!r}: no pair among {count} capsules")
+        self.refuse(not pairs, f"no pair among {count} capsules")
         for i, j in pairs:
-            if not (0 <= i < count and 0 <= j < count and i != j):
-                raise HierarchyError(f"task {self.name!r}: pair ({i}, {j}) is no pair among "
-                                     f"{count} capsules")
+            self.refuse(not (0 <= i < count and 0 <= j < count and i != j),
+                        f"pair ({i}, {j}) is no pair among {count} capsules")
         set_frozen(self, indices=np.array(pairs, dtype=np.int64))
 
     @property

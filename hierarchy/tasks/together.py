@@ -41,12 +41,10 @@ class Together(NamedRows, Written):
     def __post_init__(self) -> None:
         super().__post_init__()
         expect_each(f"task {self.name!r}: tasks", self.tasks, Task, "see hierarchy.tasks")
-        if not self.tasks:
-            raise HierarchyError(f"task {self.name!r}: there are no tasks in it")
+        self.refuse(not self.tasks, "there are no tasks in it")
         for task in self.tasks:
-            if task.of_forces and task.contacts is not self.contacts:
-                raise HierarchyError(f"task {self.name!r}: its tasks have different contacts; give "
-                                     "all of them the same object")
+            self.refuse(task.of_forces and task.contacts is not self.contacts,
+                        "its tasks have different contacts; give all of them the same object")
 
     def on(self, robot: Robot) -> Task:
         """Return the task with its tasks for a robot."""
@@ -131,9 +129,8 @@ class TangentCone(NamedRows, Written):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        if level != "velocity":
-            raise HierarchyError(f"task {self.name!r}: set-based tasks are defined at velocity "
-                                 f"level, got level = {level!r}")
+        self.refuse(level != "velocity", "set-based tasks are defined at velocity level, got "
+                    f"level = {level!r}")
         write_rows = self.task.writer(state, level, rows)
 
         def write() -> None:
