@@ -130,7 +130,7 @@ def couplings(part: Part) -> tuple[tuple[Coupled, ...], list[str]]:
     """
     file, found = part.compiled, []
     mj, said = file.model, []
-    for name, one, other, moved in (*_polynomials(mj), *_tendons(part)):
+    for name, one, other, moved in _followers(part):
         if one not in part.joints:
             if other in part.joints:
                 said.append(f"{name!r} is left out: joint {file.joints[one]!r} does not move")
@@ -151,15 +151,14 @@ def couplings(part: Part) -> tuple[tuple[Coupled, ...], list[str]]:
 _Follows = tuple[str, int, int, Polynomial]  # name, a joint, another or -1, and how one follows it
 
 
-def _polynomials(mj: Any) -> Iterator[_Follows]:
-    """Yield couplings of joints, as polynomials of differences from the reference."""
+def _followers(part: Part) -> Iterator[_Follows]:
+    """Yield couplings of joints, and fixed tendons of one or two that keep their length.
+
+    Their polynomials are of differences from the reference.
+    """
+    mj = part.compiled.model
     for name, i in _active(mj, _JOINT):
         yield name, int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i]), Polynomial(mj.eq_data[i, :5])
-
-
-def _tendons(part: Part) -> Iterator[_Follows]:
-    """Yield fixed tendons of one or two joints that keep their length, as lines of the same."""
-    mj = part.compiled.model
     for name, i in _active(mj, _TENDON):
         if weights := _fixed(mj, i):
             weights.sort(key=lambda weight: weight[0] not in part.joints)  # what moves follows
@@ -234,15 +233,11 @@ def _anchor(built: Built, i: int, end: int, name: str) -> str:
     if mj.eq_objtype[i] == _SITE:
         return built.sites[int((mj.eq_obj1id, mj.eq_obj2id)[end][i])]
     joint, place = built.placed[body]
-    return add_frame(built.model, f"{name} {end + 1}", joint, place * _place_of(
-        int(mj.eq_type[i]), mj.eq_data[i], end), "anchor")
-
-
-def _place_of(kind: int, data: Array, end: int) -> Any:
-    """Return where on its body an end is: MuJoCo stores the anchors of a weld in reverse."""
-    if kind == _CONNECT:
-        return pose(data[3 * end:3 * end + 3], _UPRIGHT)
-    return pose(data[3:6], data[6:10]) if end == 0 else pose(data[:3], _UPRIGHT)
+    data, welded = mj.eq_data[i], mj.eq_type[i] == _WELD
+    at = 3 * (1 - end if welded else end)  # MuJoCo stores the anchors of a weld in reverse
+    turn = data[6:10] if welded and end == 0 else _UPRIGHT
+    return add_frame(built.model, f"{name} {end + 1}", joint, place * pose(data[at:at + 3], turn),
+                     "anchor")
 
 
 _UPRIGHT: Array = np.array([1.0, 0.0, 0.0, 0.0])

@@ -54,8 +54,9 @@ def build(part: Part) -> Built:
         _place(built, body)
     for body in sorted(part.bodies):
         joint, place = built.placed[body]
-        inertia = pin.Inertia(mj.body_mass[body], mj.body_ipos[body], _turned(
-            mj.body_iquat[body], mj.body_inertia[body]))
+        R = pose(np.zeros(3), mj.body_iquat[body]).rotation
+        inertia = pin.Inertia(mj.body_mass[body], mj.body_ipos[body],
+                              R @ np.diag(mj.body_inertia[body]) @ R.T)
         built.model.appendBodyToJoint(joint, inertia, place)
         if body != WORLD:
             built.bodies[body] = add_frame(built.model, part.compiled.bodies[body], joint, place,
@@ -122,11 +123,6 @@ def pose(position: Array, quaternion: Array) -> Any:
     """Return a placement with a quaternion w, x, y, z of MuJoCo."""
     w, x, y, z = quaternion / np.linalg.norm(quaternion)
     return pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), np.array(position))
-
-
-def _turned(quaternion: Array, diagonal: Array) -> Array:
-    R = pose(np.zeros(3), quaternion).rotation
-    return np.asarray(R @ np.diag(diagonal) @ R.T)
 
 
 def _add(model: Any, parent: int, joint: Any, place: Any, name: str) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -165,25 +165,22 @@ def _from(file: Compiled, root: Sequence[str]) -> tuple[set[int], tuple[str, ...
     for body in range(1, file.model.nbody):  # parents come first
         if parents[body] in bodies:
             bodies.add(body)
-    others = [file.bodies[top] for top in _tops(file) if not bodies & set(_below(file, top))]
-    above = {body for body in _above(parents, bodies) if body not in bodies}
-    held = [name for j, name in enumerate(file.joints) if file.model.jnt_bodyid[j] in above]
+    others = [file.bodies[top] for top, below in _trees(file).items() if not bodies & below]
+    above = set[int]()
+    for body in bodies:
+        while (body := int(parents[body])) != WORLD:
+            above.add(body)
+    held = [name for j, name in enumerate(file.joints)
+            if file.model.jnt_bodyid[j] in above - bodies]
     return bodies, tuple(each(("left out, since it is not under root", others),
                               ("held at the reference, since it is above root", held)))
 
 
-def _above(parents: Array, bodies: Iterable[int]) -> Iterator[int]:
-    for body in bodies:
-        while body != WORLD:
-            body = int(parents[body])
-            yield body
-
-
 def _scene(file: Compiled) -> tuple[set[int], tuple[str, ...]]:
     """Return all bodies, without those that only float beside a robot, and those of a mocap."""
-    model = file.model
-    moves = {top: [file.kind(j) for j in range(model.njnt)
-                   if model.body_rootid[model.jnt_bodyid[j]] == top] for top in _tops(file)}
+    model, trees = file.model, _trees(file)
+    moves = {top: [file.kind(j) for j in range(model.njnt) if model.jnt_bodyid[j] in below]
+             for top, below in trees.items()}
     loose = [top for top, kinds in moves.items() if kinds == ["free"]]
     if len(loose) == sum(map(bool, moves.values())):
         loose = []
@@ -192,18 +189,15 @@ def _scene(file: Compiled) -> tuple[set[int], tuple[str, ...]]:
     told = (("bodies that only float are left out (root = \"NAME\" takes one as the robot)", loose),
             ("mocap bodies are left out", targets),
             ("mocap bodies stay where the file has them", sorted({*mocap} - {*targets})))
-    gone = {body for top in (*loose, *targets) for body in _below(file, top)}
-    return set(range(model.nbody)) - gone, tuple(
+    gone = [trees[top] for top in (*loose, *targets)]
+    return set(range(model.nbody)).difference(*gone), tuple(
         each(*((what, [file.bodies[top] for top in tops]) for what, tops in told)))
 
 
-def _tops(file: Compiled) -> Iterator[int]:
-    yield from (body for body in range(1, file.model.nbody)
-                if file.model.body_parentid[body] == WORLD)
-
-
-def _below(file: Compiled, top: int) -> list[int]:
-    return np.flatnonzero(file.model.body_rootid == top).tolist()
+def _trees(file: Compiled) -> dict[int, set[int]]:
+    """Return the bodies of each tree by the one of them that is on the world."""
+    tops = file.model.body_rootid
+    return {int(top): set(np.flatnonzero(tops == top).tolist()) for top in np.unique(tops[1:])}
 
 
 def _lock(file: Compiled, joints: Sequence[int], held: Array, name: str,
