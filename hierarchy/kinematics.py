@@ -1,4 +1,4 @@
-"""Compiled kinematics of points and axes fixed to a body, from the arrays of a State.
+"""Kinematics of points, axes and frames fixed to a body, compiled, from the arrays of a State.
 
 J is the world-frame spatial Jacobian of all joints (linear part at the world origin), so a point p
 on body j has the columns J_v + J_w x p of the joints that support j. Its time derivative is
@@ -7,7 +7,8 @@ dJ_v + dJ_w x p + J_w x dp/dt. `placements` rows are rotation (by columns) and t
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from math import atan2, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,3 +180,118 @@ def plus(a, b):
 def times(factor, a):
     """A multiple of a tuple."""
     return factor * a[0], factor * a[1], factor * a[2]
+
+
+@compiled
+def rotation_vector(R):
+    """Rotation vector (3,) [rad] of a rotation matrix (3, 3), angle in 0 .. pi."""
+    twist = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
+    sine = sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
+    cosine = (R[0, 0] + R[1, 1] + R[2, 2] - 1.0) / 2
+    angle = atan2(sine, cosine)
+    if sine > 1e-7:
+        return twist * (angle / sine)
+    if cosine > 0.0:
+        return twist
+    # Half a turn: the axis is the column of R + I with the largest diagonal entry.
+    i = 0
+    for k in range(1, 3):
+        if R[k, k] > R[i, i]:
+            i = k
+    axis = R[:, i].copy()
+    axis[i] += 1.0
+    return axis * (angle / sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2))
+
+
+class Placed(NamedTuple):
+    """A frame in world axes: position p (3,) [m], rotation R (3, 3), Jacobian and its derivative.
+
+    The Jacobian is (6, n), linear part first, and its derivative is exact.
+    """
+
+    p: Array
+    R: Array
+    J: Array
+    dJ: Array  # noqa: N815
+
+    @classmethod
+    def of(cls, kinematics: Kinematics, frame: Any) -> Placed:
+        """Return a frame as it is placed and moves."""
+        T, moves = kinematics.placements[frame.joint], kinematics.supports[frame.joint]
+        body = T[:9].reshape(3, 3).T
+        p = T[9:] + body @ frame.offset
+        J, dJ = kinematics.J * moves, kinematics.dJ * moves
+        J[:3] -= cross(p) @ J[3:]
+        dJ[:3] -= cross(p) @ dJ[3:] + cross(J[:3] @ kinematics.v) @ J[3:]
+        return cls(p, body @ frame.rotation, J, dJ)
+
+
+def cross(a: NDArray[Any]) -> NDArray[Any]:
+    """Return the matrix (3, 3) with which a x b is a product."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+class Spot(NamedTuple):
+    """A frame for kernels: its joint, offset (3,) and rotation (3, 3) in the joint's frame."""
+
+    joint: int
+    offset: Array
+    rotation: Array
+
+    @classmethod
+    def of(cls, frame: Any) -> Spot:
+        """Return the spot of a frame."""
+        return cls(frame.joint, frame.offset, np.ascontiguousarray(frame.rotation))
+
+
+@inlined
+def column(A, c):
+    """Column c of three rows, as a tuple."""
+    return A[0, c], A[1, c], A[2, c]
+
+
+@compiled
+def times_transposed(A, B):
+    """A B^T (3, 3) of two matrices (3, 3)."""
+    product = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                product[i, j] += A[i, k] * B[j, k]
+    return product
+
+
+@inlined
+def turned_back(R, a):
+    """R^T a of a rotation (3, 3) and a tuple."""
+    return (R[0, 0] * a[0] + R[1, 0] * a[1] + R[2, 0] * a[2],
+            R[0, 1] * a[0] + R[1, 1] * a[1] + R[2, 1] * a[2],
+            R[0, 2] * a[0] + R[1, 2] * a[1] + R[2, 2] * a[2])
+
+
+@compiled
+def rotation_of(placements, spot):
+    """World rotation (3, 3) of a spot."""
+    R, T, rotation = np.empty((3, 3)), placements[spot.joint], spot.rotation
+    for i in range(3):
+        for k in range(3):
+            R[i, k] = (T[i] * rotation[0, k] + T[3 + i] * rotation[1, k]
+                       + T[6 + i] * rotation[2, k])
+    return R
+
+
+@inlined
+def motion_of(kinematics, spot):
+    """Velocity, angular velocity, and their drifts dJ/dt v and dW/dt v, of a spot; exact ones."""
+    v, a, w = moving_point(kinematics, spot.joint, spot.offset)
+    _, b = velocity_of_body(kinematics.dJ, kinematics.supports, spot.joint, kinematics.v)
+    return v, w, a, b
+
+
+@inlined
+def jacobians_of(kinematics, spot):
+    """Linear and angular Jacobian (3, n) of a spot."""
+    linear, angular = np.empty((3, len(kinematics.v))), np.empty((3, len(kinematics.v)))
+    write_point_jacobian(kinematics, spot.joint, spot.offset, linear)
+    write_rotation_jacobian(kinematics, spot.joint, angular)
+    return linear, angular

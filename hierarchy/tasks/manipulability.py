@@ -13,13 +13,12 @@ from typing import Literal
 import numpy as np
 
 from hierarchy.errors import number
-from hierarchy.kinematics import Kinematics
+from hierarchy.kinematics import Kinematics, Placed, cross
 from hierarchy.measured import Measure, Measured, Motion, plain
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Kind
-from hierarchy.tasks.geometric import Placed, cross
 
 _SINGULAR = 1e-12  # w below which it has no gradient
 _CROSS: Array = np.array([cross(axis) for axis in np.eye(3)])

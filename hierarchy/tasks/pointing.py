@@ -11,14 +11,20 @@ import numpy as np
 from hierarchy.errors import finite_numbers, number
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
+    Spot,
     carried,
+    column,
     crossed,
     dot,
+    jacobians_of,
     less,
+    motion_of,
     place,
+    rotation_of,
     row_times,
     times,
     turned,
+    turned_back,
     velocity_of_body,
 )
 from hierarchy.measured import Measure, Measured, measured
@@ -27,14 +33,6 @@ from hierarchy.records import set_frozen
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Kind
-from hierarchy.tasks.geometric import (
-    Spot,
-    column,
-    jacobians_of,
-    motion_of,
-    rotation_of,
-    turned_back,
-)
 
 
 @compiled
@@ -143,7 +141,7 @@ class LookAt(Measured):
 def _sight(placements, frame, point):
     """The target in the frame's axes y, its distance r, the vector d to it in world axes, and R."""
     d = less(point, place(placements[frame.joint], frame.offset))
-    R = rotation_of(placements, frame.joint, frame.rotation)
+    R = rotation_of(placements, frame)
     y = turned_back(R, d)
     r = max(np.sqrt(dot(y, y)), _NEAR)
     if not y[2] > (_BEHIND - 1.0) * r:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import atan2, sqrt
 from typing import Any
 
 import numpy as np
@@ -14,13 +13,21 @@ from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
 from hierarchy.kinematics import (
     Kinematics,
+    Placed,
+    Spot,
+    column,
+    cross,
     crossed,
+    jacobians_of,
     less,
-    moving_point,
+    motion_of,
     place,
     plus,
+    rotation_of,
+    rotation_vector,
     row_times,
-    velocity_of_body,
+    times_transposed,
+    turned_back,
     write_point_jacobian,
     write_rotation_jacobian,
 )
@@ -30,50 +37,17 @@ from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import NamedRows
-from hierarchy.tasks.geometric import (
-    Placed,
-    Spot,
-    column,
-    cross,
-    jacobians_of,
-    motion_of,
-    rotation_of,
-    times_transposed,
-    turned_back,
-)
-
-
-@compiled
-def rotation_vector(R):
-    """Rotation vector (3,) [rad] of a rotation matrix (3, 3), angle in 0 .. pi."""
-    twist = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
-    sine = sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
-    cosine = (R[0, 0] + R[1, 1] + R[2, 2] - 1.0) / 2
-    angle = atan2(sine, cosine)
-    if sine > 1e-7:
-        return twist * (angle / sine)
-    if cosine > 0.0:
-        return twist
-    # Half a turn: the axis is the column of R + I with the largest diagonal entry.
-    i = 0
-    for k in range(1, 3):
-        if R[k, k] > R[i, i]:
-            i = k
-    axis = R[:, i].copy()
-    axis[i] += 1.0
-    return axis * (angle / sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2))
 
 
 @measured
 def _pose(kinematics, reads, goal, J, motion):
-    joint, offset, rotation, desired = reads
-    write_point_jacobian(kinematics, joint, offset, J)
-    write_rotation_jacobian(kinematics, joint, J[3:])
-    here = place(kinematics.placements[joint], offset)
-    v, a, w = moving_point(kinematics, joint, offset)
-    _, b = velocity_of_body(kinematics.dJ, kinematics.supports, joint, kinematics.v)
+    frame, desired = reads
+    write_point_jacobian(kinematics, frame.joint, frame.offset, J)
+    write_rotation_jacobian(kinematics, frame.joint, J[3:])
+    here = place(kinematics.placements[frame.joint], frame.offset)
+    v, w, a, b = motion_of(kinematics, frame)
     motion.error[3:] = rotation_vector(times_transposed(
-        desired, rotation_of(kinematics.placements, joint, rotation)))
+        desired, rotation_of(kinematics.placements, frame)))
     for i in range(3):
         motion.error[i] = goal[0, i] - here[i]
         motion.rate[i], motion.rate[3 + i] = v[i], w[i]
@@ -104,9 +78,7 @@ class Pose(Measured):
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
-        frame = self.frame
-        return _pose, (frame.joint, frame.offset, frame.rotation,
-                       np.array(self.rotation, dtype=float))
+        return _pose, (Spot.of(self.frame), np.array(self.rotation, dtype=float))
 
 
 _SERIES = 0.01   # [rad^2] squared angle below which coefficients are taken from their series
@@ -268,7 +240,7 @@ def _write_drift(kinematics, frame, to, R, d, drift):
 def _relative(kinematics, reads, goal, J, motion):
     frame, to, position, rotation = reads
     placements = kinematics.placements
-    R = rotation_of(placements, to.joint, to.rotation)
+    R = rotation_of(placements, to)
     d = less(place(placements[frame.joint], frame.offset), place(placements[to.joint], to.offset))
     _write_jacobian(kinematics, frame, to, R, d, J)
     _write_drift(kinematics, frame, to, R, d, motion.drift)
@@ -276,7 +248,7 @@ def _relative(kinematics, reads, goal, J, motion):
     for i in range(3):
         motion.error[i] = position[i] - here[i]
     if len(motion.error) == 6:
-        there = rotation_of(placements, frame.joint, frame.rotation)
+        there = rotation_of(placements, frame)
         motion.error[3:] = rotation_vector(times_transposed(
             times_transposed(rotation, there), R.T))  # R_d (R^T R_f)^T
     for i in range(len(motion.rate)):

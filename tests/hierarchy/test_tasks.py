@@ -19,6 +19,7 @@ from scipy.linalg import expm
 
 from hierarchy import HierarchyError, State
 from hierarchy.avoidance import Barrier
+from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
 from hierarchy.robots import TABLES as ROBOT_TABLES
 from hierarchy.robots import link_capsules
@@ -34,8 +35,6 @@ from hierarchy.tasks import (
     Separation,
     TorqueLimits,
 )
-from hierarchy.tasks.geometric import cross
-from hierarchy.tasks.pose import rotation_vector
 from scenarios.config.kinds.frames import ListedFrame, ListedPointing, ListedPose, ListedPosition
 from scenarios.config.kinds.whole import ListedCentreOfMass, ListedPosture
 
