@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy import plugins
-from hierarchy.avoidance.control_points import ControlPoint
+from hierarchy.avoidance.body import ControlPoint
 from hierarchy.errors import RobotError, UnknownNameError, expect, file_path, finite_numbers
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from hierarchy.avoidance.control_points import pack_points
+from hierarchy.avoidance.body import pack_points
 from hierarchy.avoidance.laws import Barrier
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts

@@ -11,8 +11,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from hierarchy.jit.ahead import find
-from hierarchy.jit.caching import KernelCache
+from hierarchy.jit.caching import KernelCache, find
 from hierarchy.jit.inside import CPUDispatcher, NumbaError, global_compiler_lock
 from hierarchy.jit.linking import name_of, naming
 from hierarchy.jit.sources import Kernel, described

@@ -18,7 +18,7 @@ import numpy as np
 from llvmlite import ir
 from numba.np import arrayobj
 
-from hierarchy.jit.ahead import PROCESSOR, Code, Part
+from hierarchy.jit.caching import PROCESSOR, Code, Part
 from hierarchy.jit.compiling import Cached
 from hierarchy.jit.inside import cgutils, compiler, global_compiler_lock, llvm, registry, types
 from hierarchy.jit.linking import Library, found, linked, naming

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy.avoidance.control_points import ControlPoint
-from hierarchy.avoidance.self_collision import Capsule
+from hierarchy.avoidance.body import Capsule, ControlPoint
 from hierarchy.problem import Array
 from hierarchy.robots.table import Table
 from hierarchy.words import listed, some

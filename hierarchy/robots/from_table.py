@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy.avoidance.control_points import ControlPoint
-from hierarchy.avoidance.self_collision import Vector
+from hierarchy.avoidance.body import ControlPoint, Vector
 from hierarchy.problem import Array
 from hierarchy.robots.found import Found
 from hierarchy.robots.library import pin

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy.avoidance.self_collision import Capsule, Vector
+from hierarchy.avoidance.body import Capsule, Vector
 from hierarchy.problem import Array
 from hierarchy.robots.table import Table, TreeTable
 

@@ -31,7 +31,7 @@ from typing import Literal
 
 import numpy as np
 
-from hierarchy.avoidance.control_points import ControlPoint, pack_points
+from hierarchy.avoidance.body import ControlPoint, pack_points
 from hierarchy.avoidance.laws import Repulsion, repulsion
 from hierarchy.errors import HierarchyError, expect
 from hierarchy.jit import bind, compiled

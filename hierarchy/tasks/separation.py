@@ -29,7 +29,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.avoidance.control_points import ControlPoint, pack_points
+from hierarchy.avoidance.body import (
+    ON_AXIS,
+    Capsule,
+    ControlPoint,
+    bend_of_nearest,
+    measure_capsules,
+    nearest_of_capsules,
+    on_axis,
+    pack_capsules,
+    pack_points,
+    pairs_of_chain,
+)
 from hierarchy.avoidance.laws import (
     Barrier,
     drop_rounding,
@@ -37,16 +48,6 @@ from hierarchy.avoidance.laws import (
     least_rate,
 )
 from hierarchy.avoidance.measurement import Pairs
-from hierarchy.avoidance.self_collision import (
-    ON_AXIS,
-    Capsule,
-    bend_of_nearest,
-    measure_capsules,
-    nearest_of_capsules,
-    on_axis,
-    pack_capsules,
-    pairs_of_chain,
-)
 from hierarchy.errors import HierarchyError, expect_each
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (

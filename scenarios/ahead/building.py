@@ -27,7 +27,7 @@ PARTS = {"solvers": ("solvers",), "robots": ("hierarchy", "scenarios")}
 
 def main() -> None:
     """Write the object files of the parts that are named, or all, unless they are current."""
-    from hierarchy.jit.ahead import FOLDER
+    from hierarchy.jit.caching import FOLDER
     from hierarchy.jit.exporting import ENVIRONMENT
 
     names = sys.argv[1:]
@@ -47,7 +47,7 @@ def main() -> None:
 def is_current(part: str) -> bool:
     """Whether the object file of a part was made of the calls and sources as they are."""
     from hierarchy.jit import exporting
-    from hierarchy.jit.ahead import FOLDER
+    from hierarchy.jit.caching import FOLDER
 
     return exporting.is_current(FOLDER / f"{part}.o", _listed())
 

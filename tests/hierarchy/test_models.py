@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hierarchy import Robot, State
-from hierarchy.avoidance.self_collision import pairs_of_tree
+from hierarchy.avoidance.body import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
 from scenarios.cell.robot import make_robot
 from scenarios.config.references import separable_pairs

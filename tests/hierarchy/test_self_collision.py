@@ -7,7 +7,7 @@ from scipy.optimize import lsq_linear
 
 from hierarchy import State
 from hierarchy.avoidance import Barrier, Capsule
-from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules
+from hierarchy.avoidance.body import measure_capsules, pack_capsules
 from hierarchy.robots import TABLES, link_capsules
 from hierarchy.tasks.separation import SelfSeparation
 

@@ -1,4 +1,4 @@
-"""Capsules fixed to the links of a robot, and the distances between them."""
+"""Points and capsules fixed to the links of a robot, and the distances between capsules."""
 
 from __future__ import annotations
 
@@ -14,6 +14,24 @@ from hierarchy.errors import expect_each, finite_numbers, number
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import dot, less, place, plus, times, turned
 from hierarchy.problem import Array
+
+
+@dataclass(frozen=True)
+class ControlPoint:
+    """A point fixed to the body that `joint` (an index) moves; offset (3,) [m] in its frame."""
+
+    name: str
+    joint: int
+    offset: Array
+
+
+def pack_points(points: Sequence[ControlPoint]) -> tuple[NDArray[np.int64], Array]:
+    """Joint indices (K,) and offsets (K, 3) [m] of control points, for the kernels."""
+    expect_each("control points", points, ControlPoint, "make one with robot.control_point(...)")
+    joints = np.array([point.joint for point in points], dtype=np.int64)
+    offsets = np.array([point.offset for point in points], dtype=float).reshape(-1, 3)
+    return joints, offsets
+
 
 Vector = tuple[float, float, float]
 _PARALLEL = 1e-12  # squared sine of the angle between two axes below which they count as parallel
