@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, refuse
 from hierarchy.jit import compiled
 from hierarchy.kinematics import place, write_point_jacobian
 from hierarchy.problem import Array
@@ -70,26 +70,22 @@ class Contact:
     def __post_init__(self) -> None:
         set_frozen(self, name=self.name or self.frame.name)
         points = np.array(self.points, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-            raise HierarchyError(f"contact {self.name!r}: points {self.points!r} are not (k, 3) "
-                                 "numbers")
-        if len(points) != 1 and np.linalg.matrix_rank(points - points.mean(0), tol=1e-6) < 2:
-            raise HierarchyError(f"contact {self.name!r}: {len(points)} points on one line; a "
-                                 "contact has one point, or at least three of a surface")
-        if not 0.0 < self.friction < np.inf:
-            raise HierarchyError(f"contact {self.name!r}: friction {self.friction} must be "
-                                 "positive and finite")
+        refuse(points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all(),
+               f"contact {self.name!r}: points {self.points!r} are not (k, 3) numbers")
+        refuse(len(points) != 1 and np.linalg.matrix_rank(points - points.mean(0), tol=1e-6) < 2,
+               f"contact {self.name!r}: {len(points)} points on one line; a contact has one "
+               "point, or at least three of a surface")
+        refuse(not 0.0 < self.friction < np.inf, f"contact {self.name!r}: friction "
+               f"{self.friction} must be positive and finite")
         axes, sole = (_axes(direction, f"contact {self.name!r}: {key}")
                       for key, direction in (("normal", self.normal), ("up", self.up)))
         for start, end in self.open:
-            if not start < end:
-                raise HierarchyError(f"contact {self.name!r}: it cannot be open from {start} s "
-                                     f"until {end} s")
-        if not 0.0 <= self.ramp < np.inf:
-            raise HierarchyError(f"contact {self.name!r}: ramp {self.ramp} s must not be negative")
-        if self.slides and len(points) > 1:
-            raise HierarchyError(f"contact {self.name!r}: {len(points)} points that slide; only a "
-                                 "contact of one point does")
+            refuse(not start < end, f"contact {self.name!r}: it cannot be open from {start} s "
+                   f"until {end} s")
+        refuse(not 0.0 <= self.ramp < np.inf, f"contact {self.name!r}: ramp {self.ramp} s must "
+               "not be negative")
+        refuse(self.slides and len(points) > 1, f"contact {self.name!r}: {len(points)} points "
+               "that slide; only a contact of one point does")
         set_frozen(self, axes=axes, sole=sole)
 
     @classmethod
@@ -128,15 +124,13 @@ class Contacts:
     def __post_init__(self) -> None:
         contacts = tuple(self.contacts)
         set_frozen(self, contacts=contacts)
-        if not self.robot.masses.sum() > 0.0:
-            raise HierarchyError(f"robot {self.robot.name!r} has no masses, so no torque or force "
-                                 "moves it")
+        refuse(not self.robot.masses.sum() > 0.0, f"robot {self.robot.name!r} has no masses, so "
+               "no torque or force moves it")
         for i, contact in enumerate(contacts):
-            if contact.name in self.names[:i]:
-                raise HierarchyError(f"contact {contact.name!r}: two contacts have this name")
-            if contact.frame.joint == 0:
-                raise HierarchyError(f"contact {contact.name!r}: no joint moves frame "
-                                     f"{contact.frame.name!r}")
+            refuse(contact.name in self.names[:i], f"contact {contact.name!r}: two contacts have "
+                   "this name")
+            refuse(contact.frame.joint == 0, f"contact {contact.name!r}: no joint moves frame "
+                   f"{contact.frame.name!r}")
         frames = [contact.frame for contact in contacts for _ in contact.points]
         offsets = [contact.frame.offset + contact.frame.rotation @ np.array(point, dtype=float)
                    for contact in contacts for point in contact.points]
@@ -241,8 +235,8 @@ def corners(x: tuple[float, float], y: tuple[float, float], up: Vector = (0.0, 0
 
 def _axes(normal: Vector, what: str) -> Array:
     """Return two tangents and the normal as rows (3, 3); x, y and z for normal z."""
-    if np.shape(normal) != (3,) or not 0.0 < np.linalg.norm(normal) < np.inf:
-        raise HierarchyError(f"{what} {normal!r} is no direction")
+    refuse(np.shape(normal) != (3,) or not 0.0 < np.linalg.norm(normal) < np.inf,
+           f"{what} {normal!r} is no direction")
     n = np.array(normal, dtype=float) / np.linalg.norm(normal)
     x = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]
     tangent = x - (x @ n) * n

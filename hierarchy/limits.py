@@ -51,7 +51,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, brief, number
+from hierarchy.errors import HierarchyError, brief, number, refuse
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -90,17 +90,16 @@ class Limits:
             raise HierarchyError("limits: lower, upper, velocity and acceleration must be numbers, "
                                  f"got {brief([self.lower, self.upper])} and "
                                  f"{brief([self.velocity, self.acceleration])}") from None
-        if len({len(row) for row in rows}) != 1:
-            raise HierarchyError("limits: lower, upper, velocity and acceleration have "
-                                 f"{', '.join(str(len(row)) for row in rows)} entries")
+        refuse(len({len(row) for row in rows}) != 1, "limits: lower, upper, velocity and "
+               f"acceleration have {', '.join(str(len(row)) for row in rows)} entries")
         lower, upper, velocity, acceleration = rows
         _refuse(~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)),
                 "no position lies between lower and upper", lower, upper)
         _refuse(~(velocity > 0.0), "velocity must be positive", velocity)
         _refuse(~((acceleration > 0.0) & (acceleration < np.inf)),
                 "acceleration must be positive and finite", acceleration)
-        if not 0.0 < number("limits: period [s]", self.period):
-            raise HierarchyError(f"limits: period {self.period} s must be positive and finite")
+        refuse(not 0.0 < number("limits: period [s]", self.period), "limits: period "
+               f"{self.period} s must be positive and finite")
         number("limits: horizon [s]", self.horizon, 0.0)
         times = [np.full(len(lower), time) for time in (self.period, self.horizon)]
         set_frozen(self, packed=np.array([*rows, *times]))

@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, ReadingError, UnknownNameError, brief, number
+from hierarchy.errors import ReadingError, UnknownNameError, brief, number, refuse
 from hierarchy.problem import Array
 
 
@@ -190,11 +190,11 @@ class Loop:
         for name, value in (("period", period), ("behind", behind), ("spin", spin),
                             ("watchdog", period if watchdog is None else watchdog)):
             number(f"loop: {name}", value)
-        _require(period > 0.0, f"period {period} s must be positive")
-        _require(behind >= 1, f"behind = {behind}, expected 1 or more ticks")
-        _require(spin >= 0.0, f"spin {spin} s must not be negative")
-        _require(watchdog is None or watchdog > period,
-                 f"watchdog {watchdog} s must be longer than the period {period} s")
+        refuse(not period > 0.0, f"loop: period {period} s must be positive")
+        refuse(not behind >= 1, f"loop: behind = {behind}, expected 1 or more ticks")
+        refuse(not spin >= 0.0, f"loop: spin {spin} s must not be negative")
+        refuse(not (watchdog is None or watchdog > period),
+               f"loop: watchdog {watchdog} s must be longer than the period {period} s")
         self.period, self.overrun, self.behind = period, overrun, behind
         self.watchdog, self.spin, self.priority, self.pause_gc = watchdog, spin, priority, pause_gc
         self.clock, self.sleep = clock, sleep
@@ -216,11 +216,11 @@ class Loop:
         it and a command may have been sent since. An exception in any of the functions, or Ctrl-C,
         then propagates to the caller.
         """
-        _require(number("loop: duration", duration) > 0.0,
-                 f"duration {duration} s must be positive")
+        refuse(not number("loop: duration", duration) > 0.0,
+               f"loop: duration {duration} s must be positive")
         for name, function in (("step", step), ("safe_stop", safe_stop), ("send", send)):
-            _require(callable(function) or (name == "send" and function is None),
-                     f"{name}: expected a function, got {brief(function)}")
+            refuse(not (callable(function) or (name == "send" and function is None)),
+                   f"loop: {name}: expected a function, got {brief(function)}")
         ticks = max(1, round(duration / self.period))
         self.log = log = Log(self.period, ticks, record)
         stop = Once(safe_stop)
@@ -340,8 +340,3 @@ def _raise_priority(priority: int | None, notes: list[str]) -> tuple[int, Any] |
         notes.append(f"SCHED_FIFO at priority {priority} was not given: {error}")
         return None
     return before
-
-
-def _require(condition: bool, text: str) -> None:
-    if not condition:
-        raise HierarchyError(f"loop: {text}")

@@ -14,7 +14,7 @@ from hierarchy.avoidance.body import pack_points
 from hierarchy.avoidance.laws import Barrier
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, brief, expect
+from hierarchy.errors import HierarchyError, brief, expect, refuse
 from hierarchy.gate import check_rows, shaped
 from hierarchy.paths import Path
 from hierarchy.problem import Array
@@ -101,8 +101,7 @@ class Task(ABC):
 
     def refuse(self, wrong: object, said: str) -> None:
         """Raise a HierarchyError that names the task, and says what is wrong, if it is."""
-        if wrong:
-            raise HierarchyError(f"task {self.name!r}: {said}")
+        refuse(wrong, f"task {self.name!r}: {said}")
 
     @property
     @abstractmethod
@@ -192,8 +191,7 @@ def check_gains(task: Task) -> None:
             sound = bool(sides.dtype.kind in "iuf" and ((sides >= 0.0) & (sides < np.inf)).all())
         except (TypeError, ValueError):
             sound = False
-        if not sound:
-            raise HierarchyError(f"task {task.name!r}: {gain} = {value!r}, expected a number >= 0")
+        refuse(not sound, f"task {task.name!r}: {gain} = {value!r}, expected a number >= 0")
 
 
 def check_period(task: Task, period: float) -> None:
@@ -204,14 +202,12 @@ def check_period(task: Task, period: float) -> None:
     """
     for part in (task, *parts(task)):
         own = getattr(part, "period", period)
-        if abs(own - period) > _ROUNDING * period:
-            raise HierarchyError(f"task {part.name!r}: its period is {own:g} s, that of the "
-                                 f"velocity {period:g} s; give both the same")
+        refuse(abs(own - period) > _ROUNDING * period, f"task {part.name!r}: its period is "
+               f"{own:g} s, that of the velocity {period:g} s; give both the same")
         gain = np.max(np.asarray(part.gain, dtype=float), initial=0.0)
-        if gain * period > 2.0 * (1.0 + _ROUNDING):
-            raise HierarchyError(f"task {part.name!r}: gain = {gain:g} 1/s times the period of "
-                                 f"{period:g} s is {gain * period:g}; above 2 its error grows from "
-                                 f"tick to tick, so give at most {2.0 / period:g} 1/s")
+        refuse(gain * period > 2.0 * (1.0 + _ROUNDING), f"task {part.name!r}: gain = {gain:g} 1/s "
+               f"times the period of {period:g} s is {gain * period:g}; above 2 its error grows "
+               f"from tick to tick, so give at most {2.0 / period:g} 1/s")
 
 
 def parts(task: Task) -> Iterator[Task]:
@@ -228,12 +224,10 @@ def check_parts(task: Task) -> None:
 
     A task has no robot at hand in which it could look up a frame.
     """
-    if not isinstance(task.name, str) or not task.name:
-        raise HierarchyError(f"{type(task).__name__}: name: expected a text, got "
-                             f"{brief(task.name)}")
-    if task.kind not in get_args(Kind):
-        raise HierarchyError(f"task {task.name!r}: kind must be 'equality' or 'inequality', got "
-                             f"{task.kind!r}")
+    refuse(not isinstance(task.name, str) or not task.name, f"{type(task).__name__}: name: "
+           f"expected a text, got {brief(task.name)}")
+    refuse(task.kind not in get_args(Kind), f"task {task.name!r}: kind must be 'equality' or "
+           f"'inequality', got {task.kind!r}")
     parts: tuple[Field[Any], ...] = fields(task) if is_dataclass(task) else ()
     for part in parts:
         named = part.type if isinstance(part.type, str) else part.type.__name__
@@ -244,8 +238,8 @@ def check_parts(task: Task) -> None:
                 raise HierarchyError(f"task {task.name!r}: {part.name} is the name {value!r}; "
                                      f"give {remedy.replace('NAME', repr(value))}")
             expect(f"task {task.name!r}: {part.name}", value, kind, f"give {remedy}")
-        if named == "Barrier" and task.kind != "inequality":
-            raise HierarchyError(f"task {task.name!r}: its rows are inequalities")
+        refuse(named == "Barrier" and task.kind != "inequality", f"task {task.name!r}: its rows "
+               "are inequalities")
     if any(part.type == "Sequence[ControlPoint]" for part in parts) and not len(
             pack_points(task.points)[0]):  # type: ignore[attr-defined]
         raise HierarchyError(f"task {task.name!r}: needs at least one control point")

@@ -23,7 +23,7 @@ from math import exp
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, number
+from hierarchy.errors import number, refuse
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 
@@ -52,11 +52,11 @@ class Barrier:
     def __post_init__(self) -> None:
         for name in ("distance", "rate", "recovery", "limit"):
             value = number(f"barrier: {name}", getattr(self, name), 0.0)
-            if name in ("rate", "limit") and value == 0.0:
-                raise HierarchyError(f"barrier: {name} = {value} is out of range")
-        if not self.distance < number("barrier: influence", self.influence):
-            raise HierarchyError(f"barrier: influence = {self.influence} m must be more than the "
-                                 f"distance to keep, {self.distance} m")
+            refuse(name in ("rate", "limit") and value == 0.0, f"barrier: {name} = {value} is out "
+                   "of range")
+        refuse(not self.distance < number("barrier: influence", self.influence),
+               f"barrier: influence = {self.influence} m must be more than the distance to keep, "
+               f"{self.distance} m")
 
     def packed(self) -> Array:
         """The settings as one array (5,) for the kernels."""
@@ -105,8 +105,7 @@ class Repulsion:
     def __post_init__(self) -> None:
         for name in ("maximum", "reach", "shape", "scale"):
             value = number(f"repulsion {name}", getattr(self, name))
-            if value <= 0.0:
-                raise HierarchyError(f"repulsion {name} must be positive, got {value}")
+            refuse(value <= 0.0, f"repulsion {name} must be positive, got {value}")
 
     def __call__(self, distance: float) -> float:
         """Magnitude at a distance [m]."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hierarchy.avoidance.laws import repulsion
 from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turning_off_obstacle
-from hierarchy.errors import HierarchyError, number
+from hierarchy.errors import number, refuse
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import Readings, dot, place, plus
 from hierarchy.problem import Array
@@ -28,12 +28,10 @@ class SurveillanceAreas:
     def __post_init__(self) -> None:
         for name in ("near", "far", "end_effector"):
             number(f"surveillance area {name}", getattr(self, name))
-        if not 0.0 <= self.near <= self.far:
-            raise HierarchyError(f"surveillance areas need 0 <= near <= far, got near = "
-                                 f"{self.near} m, far = {self.far} m")
-        if self.end_effector < 0.0:
-            raise HierarchyError(f"surveillance area end_effector = {self.end_effector} m must "
-                                 "not be negative")
+        refuse(not 0.0 <= self.near <= self.far, "surveillance areas need 0 <= near <= far, got "
+               f"near = {self.near} m, far = {self.far} m")
+        refuse(self.end_effector < 0.0, f"surveillance area end_effector = {self.end_effector} m "
+               "must not be negative")
 
 
 class Measurement:

@@ -9,7 +9,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, UnknownNameError, expect_each
+from hierarchy.errors import UnknownNameError, expect_each, refuse
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import dot, less
@@ -44,11 +44,11 @@ class Obstacle:
         if self.shape not in SHAPES:
             raise UnknownNameError("obstacle shape", self.shape, SHAPES)
         expected = SHAPES[self.shape]
-        if len(self.size) != expected or any(not 0.0 < s < inf for s in self.size):
-            raise HierarchyError(f"{self.name}: a {self.shape} takes {expected} positive "
-                                 f"size(s), got {list(self.size)}")
-        if not np.isfinite(np.asarray(self.centre, dtype=float)).all():
-            raise HierarchyError(f"{self.name}: centre {list(self.centre)} is not finite")
+        refuse(len(self.size) != expected or any(not 0.0 < s < inf for s in self.size),
+               f"{self.name}: a {self.shape} takes {expected} positive size(s), got "
+               f"{list(self.size)}")
+        refuse(not np.isfinite(np.asarray(self.centre, dtype=float)).all(),
+               f"{self.name}: centre {list(self.centre)} is not finite")
         check_rotation(f"{self.name}: rotation", self.rotation)
 
     def packed(self) -> Array:

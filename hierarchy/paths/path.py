@@ -12,7 +12,7 @@ from pathlib import Path as File
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, brief, expect, finite_numbers, number
+from hierarchy.errors import HierarchyError, brief, expect, finite_numbers, number, refuse
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -88,9 +88,9 @@ def circle(centre: Vector, radius: float, normal: Vector = (0.0, 0.0, 1.0), rate
     finite_numbers("centre [m]", centre, 3)
     z = np.array(normal, dtype=float)
     length = float(np.linalg.norm(z))
-    if z.shape != (3,) or not 1e-9 < length < inf or not 0.0 <= radius < inf:
-        raise HierarchyError(f"circle: radius {radius} and normal {list(normal)}, expected a "
-                             "number >= 0 and a direction")
+    refuse(z.shape != (3,) or not 1e-9 < length < inf or not 0.0 <= radius < inf,
+           f"circle: radius {radius} and normal {list(normal)}, expected a number >= 0 and a "
+           "direction")
     z = z / length
     toward = np.eye(3)[1 if abs(z[0]) > 0.9 else 0]
     x = toward - (toward @ z) * z
@@ -146,9 +146,9 @@ class Jittered(Path):
         for name in ("amplitude", "rate", "seed"):
             number(f"jitter: {name}", getattr(self, name))
         expect("jitter: path", self.path, Path, "see hierarchy.paths")
-        if not 0.0 <= self.amplitude or not 0.0 < self.rate or self.seed < 0:
-            raise HierarchyError(f"jitter: amplitude {self.amplitude}, rate {self.rate}, seed "
-                                 f"{self.seed}, expected numbers >= 0, > 0 and >= 0")
+        refuse(not 0.0 <= self.amplitude or not 0.0 < self.rate or self.seed < 0,
+               f"jitter: amplitude {self.amplitude}, rate {self.rate}, seed {self.seed}, expected "
+               "numbers >= 0, > 0 and >= 0")
         random = np.random.default_rng(self.seed)
         speeds = 2.0 * np.pi * self.rate * random.uniform(0.5, 1.0, (3, 5))  # rad/s
         set_frozen(self, _sines=np.stack([speeds, random.uniform(0.0, 2.0 * np.pi, (3, 5))]))
@@ -178,8 +178,8 @@ def line(start: Vector, end: Vector, duration: float, begin: float = 0.0) -> Way
 
     It is quintic in time and rests before and after.
     """
-    if number("line: duration [s]", duration) <= 0.0:
-        raise HierarchyError(f"line: duration {duration} s must be positive")
+    refuse(number("line: duration [s]", duration) <= 0.0, f"line: duration {duration} s must be "
+           "positive")
     number("line: begin [s]", begin)
     return Waypoints((begin, begin + duration), (start, end))
 
@@ -231,9 +231,8 @@ class Blended(Path):
     def __post_init__(self) -> None:
         _check_points("blended waypoints", self.times, self.points)
         shortest = min(np.diff(self.times), default=inf)
-        if not 0.0 < self.blend <= shortest:
-            raise HierarchyError(f"blended waypoints: blend {self.blend} s must be positive and at "
-                                 f"most {shortest:g} s, the shortest interval")
+        refuse(not 0.0 < self.blend <= shortest, f"blended waypoints: blend {self.blend} s must "
+               f"be positive and at most {shortest:g} s, the shortest interval")
         points = np.array(self.points, dtype=float)
         lines = np.diff(points, axis=0) / np.diff(self.times)[:, None]
         set_frozen(self, _velocities=np.vstack([np.zeros(3), lines, np.zeros(3)]))
@@ -270,8 +269,8 @@ class Recorded(Path):
 
     def __post_init__(self) -> None:
         _check_points("recorded path", self.times, self.points)
-        if len(self.times) < 2:
-            raise HierarchyError("recorded path: one point is no motion; use a path of kind still")
+        refuse(len(self.times) < 2, "recorded path: one point is no motion; use a path of kind "
+               "still")
         from scipy.interpolate import CubicSpline
 
         spline = CubicSpline(self.times, np.array(self.points, dtype=float), bc_type="clamped")
@@ -291,8 +290,7 @@ class Recorded(Path):
                 if count == 1:  # names of columns
                     continue
                 numbers = []
-            if len(numbers) != 4:
-                raise HierarchyError(f"{file}, line {count}: expected t, x, y, z, got {line_!r}")
+            refuse(len(numbers) != 4, f"{file}, line {count}: expected t, x, y, z, got {line_!r}")
             rows.append(numbers)
         try:
             return cls([row[0] for row in rows], [row[1:] for row in rows])
@@ -333,14 +331,13 @@ def _lines(file: str | File) -> list[str]:
 
 def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -> None:
     for name, given in (("times", times), ("points", points)):
-        if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
-            raise HierarchyError(f"{what}: {name}: expected a list, got {brief(given)}")
-    if len(times) != len(points) or not len(times):
-        raise HierarchyError(f"{what}: {len(times)} times for {len(points)} points")
+        refuse(isinstance(given, str) or not isinstance(given, Sequence | np.ndarray),
+               f"{what}: {name}: expected a list, got {brief(given)}")
+    refuse(len(times) != len(points) or not len(times), f"{what}: {len(times)} times for "
+           f"{len(points)} points")
     for i, time in enumerate(times):
         number(f"{what}: times[{i}]", time)
     for a, b in pairwise(times):
-        if not a < b < inf:
-            raise HierarchyError(f"{what}: times must increase, got {a} and then {b}")
+        refuse(not a < b < inf, f"{what}: times must increase, got {a} and then {b}")
     for i, point in enumerate(points):
         finite_numbers(f"points[{i}] [m]", point, 3)
