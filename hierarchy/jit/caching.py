@@ -112,18 +112,15 @@ def _read(file: Path) -> bytes | None:
     """Return the content of a file; None if it is missing, damaged or of another user."""
     try:
         with file.open("rb") as opened:
-            if not _is_trusted(os.fstat(opened.fileno())):
+            status = os.fstat(opened.fileno())
+            if sys.platform != "win32" and (status.st_uid not in (0, os.getuid())
+                                            or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)):
                 return None
             content = opened.read()
     except OSError:
         return None
     body = content[_CHECKSUM:]
     return body if content[:_CHECKSUM] == _checksum(file, body) else None
-
-
-def _is_trusted(status: os.stat_result) -> bool:
-    return sys.platform == "win32" or (status.st_uid in (0, os.getuid())
-                                       and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
 
 
 def _write(file: Path, body: bytes) -> None:
@@ -290,13 +287,9 @@ def find(kernel: Any, kinds: tuple[Any, ...]) -> Any:
 def parts() -> tuple[Part, ...]:
     """Return the object files that this processor can run."""
     files = sorted(FOLDER.glob("*.o"))
-    if not files or os.environ.get(NATIVE) or not _suits():
+    if not files or os.environ.get(NATIVE):
         return ()
-    return tuple(filter(None, map(Part.read, files)))
-
-
-def _suits() -> bool:
-    features = llvm.get_host_cpu_features()
-    triple = llvm.get_process_triple()
-    return (triple.startswith("x86_64") and "linux" in triple
-            and all(features.get(name) for name in _FEATURES))
+    features, triple = llvm.get_host_cpu_features(), llvm.get_process_triple()
+    suits = triple.startswith("x86_64") and "linux" in triple and all(
+        features.get(name) for name in _FEATURES)
+    return tuple(filter(None, map(Part.read, files))) if suits else ()

@@ -60,12 +60,9 @@ def _allocates(function: Kernel) -> bool:
     One that does not needs no reference counts; without them a call costs half (7 arrays: 0.15 us
     in place of 0.3), and a view of a row nothing.
     """
-    return (not _MAKERS.isdisjoint(function.__code__.co_names)
-            or any(getattr(kernel, "allocates", False) for kernel in _called(function)))
-
-
-def _called(function: Kernel) -> list[Any]:
-    return [function.__globals__.get(name) for name in function.__code__.co_names]
+    names = function.__code__.co_names
+    return not _MAKERS.isdisjoint(names) or any(
+        getattr(function.__globals__.get(name), "allocates", False) for name in names)
 
 
 if hasattr(os, "register_at_fork"):  # a child of a thread that waits would wait for ever

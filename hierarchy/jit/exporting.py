@@ -168,7 +168,9 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None])
                                for name in (entry.wrapper, entry.environment)})
     here = machine()
     code = object_code(whole, here.triple, here.processor, here.features)
-    Part(file, of, entries, _externals(whole)).write(code)
+    externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)
+                       if one.is_declaration and not one.name.startswith("llvm."))
+    Part(file, of, entries, tuple(externals)).write(code)
 
 
 def is_current(file: Path, of: str) -> bool:
@@ -186,8 +188,3 @@ def _entry(made: Any, digest: str) -> Code | None:
         return None
     return Code(digest, made.fndesc.llvm_cpython_wrapper_name, made.fndesc.env_name,
                 tuple(one.str for one in constants))
-
-
-def _externals(module: Any) -> tuple[str, ...]:
-    return tuple(sorted(one.name for one in (*module.functions, *module.global_variables)
-                        if one.is_declaration and not one.name.startswith("llvm.")))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
 from itertools import product
 from typing import Any
 
@@ -125,12 +125,10 @@ def _tree_capsules(table: TreeTable, base: int) -> tuple[Capsule, ...]:
     links = [(name, link) for name, link in
              (*((joint.name, joint.link) for joint in table.joints), *table.links)
              if link.radius > 0.0]
-    names = [name or "base" for name, _ in links]
-    return tuple(Capsule(_numbered(names, k), index[name], link.start, link.end, link.radius)
-                 for k, (name, link) in enumerate(links))
-
-
-def _numbered(names: Sequence[str], k: int) -> str:
-    """The k-th name, numbered from its second occurrence on."""
-    before = names[:k].count(names[k])
-    return f"{names[k]} {before + 1}" if before else names[k]
+    seen, capsules = Counter[str](), list[Capsule]()
+    for name, link in links:
+        seen[name] += 1
+        number = f" {seen[name]}" if seen[name] > 1 else ""
+        capsules.append(Capsule(f"{name or 'base'}{number}", index[name], link.start, link.end,
+                                link.radius))
+    return tuple(capsules)
