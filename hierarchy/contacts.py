@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import HierarchyError, UnknownNameError, refuse
 from hierarchy.jit import compiled
-from hierarchy.kinematics import place, write_point_jacobian
+from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Frame, Robot
@@ -187,16 +187,14 @@ class Contacts:
 
     def torques(self, state: State, x: ArrayLike) -> Array:
         """Torques M a + h - J_c^T f (n,) [N m or N] of the actuated joints that an x takes."""
-        (M, h), first, x = state.dynamics, self.robot.actuated, self._checked(x)
-        rows = np.empty((self.robot.n - first, self.unknowns))
-        write_dynamics(M, state.kinematics, self.points, rows, first)
-        return rows @ x + h[first:]
+        torques = np.empty(self.robot.n - self.robot.actuated)
+        _write_torques(*state.dynamics, state.kinematics, self.points, self._checked(x), torques)
+        return torques
 
     def jacobian(self, state: State) -> Array:
         """Jacobian J_c (3 p, n) of all contact points [m], world axes."""
         J = np.empty((3 * len(self.points.joints), state.n))
-        for k, (joint, offset) in enumerate(zip(*self.points, strict=True)):
-            write_point_jacobian(state.kinematics, joint, offset, J[3 * k:])
+        _write_jacobian(state.kinematics, self.points, J)
         return J
 
     def _checked(self, x: ArrayLike) -> Array:
@@ -263,3 +261,25 @@ def write_dynamics(M, kinematics, points, A, first):
                 A[i, f + 2] = J[4, c] * x - J[3, c] * y - J[2, c]
             else:
                 A[i, f], A[i, f + 1], A[i, f + 2] = 0.0, 0.0, 0.0
+
+
+@compiled
+def _write_torques(M, h, kinematics, points, x, torques):
+    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
+    n = M.shape[0]
+    first = n - len(torques)
+    for i in range(len(torques)):
+        torques[i] = h[first + i] + row_times(M, first + i, x)
+    for k in range(len(points.joints)):
+        joint, f = points.joints[k], x[n + 3 * k:n + 3 * k + 3]
+        m = crossed(place(placements[joint], points.offsets[k]), f)  # about the world's origin
+        for i in range(len(torques)):
+            c = first + i
+            if supports[joint, c]:
+                torques[i] -= dot(J[:3, c], f) + dot(J[3:, c], m)
+
+
+@compiled
+def _write_jacobian(kinematics, points, J):
+    for k in range(len(points.joints)):
+        write_point_jacobian(kinematics, points.joints[k], points.offsets[k], J[3 * k:])

@@ -60,7 +60,7 @@ def turned(T, a):
             T[2] * a[0] + T[5] * a[1] + T[8] * a[2])
 
 
-@compiled
+@inlined
 def write_point_jacobian(kinematics, joint, offset, A):
     """Write dp/dq of a point into the first three rows of A."""
     J, supports = kinematics.J, kinematics.supports
@@ -125,7 +125,7 @@ def add_row(kinematics, joint, point, r, row):
                        + J[3, c] * m[0] + J[4, c] * m[1] + J[5, c] * m[2])
 
 
-@compiled
+@inlined
 def write_rotation_jacobian(kinematics, joint, A):
     """Write the Jacobian of a body's angular velocity into the first three rows of A."""
     for i in range(3):

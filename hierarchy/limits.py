@@ -51,7 +51,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, brief, number, refuse
+from hierarchy.errors import HierarchyError, number, refuse
+from hierarchy.gate import array_of
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -83,13 +84,8 @@ class Limits:
     packed: Array = field(init=False, repr=False, compare=False)  # (6, n), for the kernels
 
     def __post_init__(self) -> None:
-        try:
-            rows = [np.asarray(side, dtype=float).ravel()
-                    for side in (self.lower, self.upper, self.velocity, self.acceleration)]
-        except (TypeError, ValueError):
-            raise HierarchyError("limits: lower, upper, velocity and acceleration must be numbers, "
-                                 f"got {brief([self.lower, self.upper])} and "
-                                 f"{brief([self.velocity, self.acceleration])}") from None
+        rows = [array_of(f"limits: {name}", getattr(self, name)).ravel()
+                for name in ("lower", "upper", "velocity", "acceleration")]
         refuse(len({len(row) for row in rows}) != 1, "limits: lower, upper, velocity and "
                f"acceleration have {', '.join(str(len(row)) for row in rows)} entries")
         lower, upper, velocity, acceleration = rows

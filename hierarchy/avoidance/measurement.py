@@ -100,11 +100,12 @@ def _measure(placements, joints, offsets, obstacles, laws, mean_within, seen):
     count = len(joints)
     active, D_minimal = -1, np.inf
     for k in range(count):
-        points[k, 0], points[k, 1], points[k, 2] = place(placements[joints[k]], offsets[k])
+        point = place(placements[joints[k]], offsets[k])
+        points[k, 0], points[k, 1], points[k, 2] = point
         of = 1 if k == count - 1 else 0
         D_min, at, away, total = np.inf, -1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for j in range(obstacles.shape[0]):
-            D, u = distance_to_obstacle(obstacles[j], points[k])
+            D, u = distance_to_obstacle(obstacles[j], point)
             if D < D_min:  # (22)
                 D_min, at, away = D, j, u
             if D < mean_within[of]:  # (25); the factor 1/h cancels in (26)

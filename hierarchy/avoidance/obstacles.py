@@ -107,7 +107,7 @@ def _in_axes(obstacle, p):
             obstacle[9] * o[0] + obstacle[12] * o[1] + obstacle[15] * o[2])
 
 
-@compiled
+@inlined
 def distance_to_obstacle(obstacle, p):
     """Signed distance of a point (3,) to one obstacle, and the unit vector away from it, a tuple.
 

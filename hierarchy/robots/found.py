@@ -49,13 +49,9 @@ class Loop:
 
 @dataclass(frozen=True)
 class Found:
-    """A pinocchio model, its shapes, and what is missing.
+    """A pinocchio model and the other parts of a `Robot`.
 
-    `end_effector` is a frame's name; `rest` (nq,) the default initial configuration, or None;
-    `missing` are sentences. `control_points` is None if they are to be proposed. `coupled` joints
-    follow others, `loops` are closed chains; `starts` are configurations (nq,) that the file names,
-    and `apart` pairs of bodies, by the joints that move them, whose distance it does not watch.
-    `table` is the table that the model was made from, or None.
+    `control_points` is None if they are to be proposed, `rest` for the neutral configuration.
     """
 
     model: Any

@@ -9,7 +9,7 @@ from math import cos
 import numpy as np
 
 from hierarchy.errors import finite_numbers, number
-from hierarchy.jit import bind, compiled
+from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import (
     Spot,
     carried,
@@ -137,7 +137,7 @@ class LookAt(Measured):
         return _look_at, (Spot.of(self.frame), np.array(self.target, dtype=float))
 
 
-@compiled
+@inlined
 def _sight(placements, frame, point):
     """The target in the frame's axes y, its distance r, the vector d to it in world axes, and R."""
     d = less(point, place(placements[frame.joint], frame.offset))

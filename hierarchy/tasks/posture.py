@@ -159,7 +159,7 @@ class JointDamping(JointTask):
         self.check_size(state)
         damping = self.damping if level == "acceleration" else 0.0
         by_mass = damping > 0.0 and self.weight == "mass"
-        weight = state.dynamics.M if by_mass else np.eye(state.n, order="F")
+        weight = state.dynamics.M if by_mass else np.empty((0, 0))
         return bind(_brake, state.v, weight, damping, *rows)
 
 
@@ -167,4 +167,4 @@ class JointDamping(JointTask):
 def _brake(v, weight, damping, A, lower, upper):
     write_identity(A)
     for i in range(len(v)):
-        lower[i] = upper[i] = -damping * row_times(weight, i, v)  # (15)
+        lower[i] = upper[i] = -damping * (row_times(weight, i, v) if len(weight) else v[i])  # (15)

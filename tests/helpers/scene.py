@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hierarchy import Robot, State, Task
-from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
+from hierarchy.avoidance import Obstacle, Obstacles, Pairs, Repulsion, measure_pairs
 from hierarchy.measured import Measured, measured
 from hierarchy.paths import Ellipse, Still
 from hierarchy.task import Rows
@@ -136,6 +136,13 @@ def driven(stack, ticks, period, start, resolver=None, differences=False, sensor
         yield state, h, res
         memory = res.memory
         plant.act(res.x)
+
+
+def distance(obstacle, point):
+    """Signed distance of a point to an obstacle, and the direction away from it (3,)."""
+    pairs = Pairs(1, 1)
+    measure_pairs(pairs, np.array([point]), Obstacles([obstacle]))
+    return pairs.distance[0, 0], pairs.direction[0, 0]
 
 
 def compiled_rows(task, state, level, rtol=1e-12):
