@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from hierarchy.errors import RobotError
 from hierarchy.robots import found, mjcf, urdf
-from hierarchy.robots.found import Coupled, Found, is_floating, neutral_within_limits
+from hierarchy.robots.found import Found, is_floating, neutral_within_limits
 from hierarchy.robots.from_table import ROOT
 from hierarchy.robots.joints import without
 from hierarchy.robots.library import pin
@@ -61,8 +61,14 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
         model, coupled = without(model, urdf.coupled(root), locked, str(path))
-        robot = replace(_found(model, coupled),
-                        missing=(*said, *urdf.remarks(root), *found.remarks(model)))
+        rest = neutral_within_limits(model, pin.neutral(model))
+        if is_floating(model):  # its position in q is that in the world
+            rest[:7] = pin.SE3ToXYZQUAT(model.jointPlacements[1])
+            model.jointPlacements[1] = pin.SE3.Identity()
+        names = {*model.names, ""}
+        robot = Found(model, found.proposed_end_effector(model), rest=rest,
+                      missing=(*said, *urdf.remarks(root), *found.remarks(model)),
+                      coupled=tuple(one for one in coupled if {one.joint, one.other} <= names))
         if not shapes:
             return robot
         geometries, missing = _geometry(path, root, model)
@@ -70,16 +76,6 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
     kept, of_world = _held_by(model, capsules)
     return replace(robot, capsules=kept,
                    missing=(*missing, *left_out, *of_world, *robot.missing))
-
-
-def _found(model: Any, coupled: tuple[Coupled, ...]) -> Found:
-    rest = neutral_within_limits(model, pin.neutral(model))
-    if is_floating(model):  # its position in q is that in the world
-        rest[:7] = pin.SE3ToXYZQUAT(model.jointPlacements[1])
-        model.jointPlacements[1] = pin.SE3.Identity()
-    names = set(model.names)
-    return Found(model, found.proposed_end_effector(model), rest=rest, coupled=tuple(
-        one for one in coupled if {one.joint, one.other} <= {*names, ""}))
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -25,12 +24,11 @@ class ContactMotion(NamedRows, Written):
     """Keep contacts at rest: J_c a + dJ_c/dt v = -damping v_c + stiffness e [m/s^2, rad/s^2].
 
     Three rows for a point, those of `Position`, one of them along the normal for a point that
-    slides; six for a surface, those of `Pose`. With e = 0 and
-    no damping the contact accelerates nowhere; damping [1/s] takes away what velocity it has, and
-    stiffness [1/s^2] brings it back to its anchor. `anchors` are (4, 3) for each contact: where its
-    point, or the frame of a surface, belongs [m], then the rotation of the frame;
-    `ContactMotion.at` takes them from a state. While a contact is open its rows ask for nothing: a
-    `Pose` or `Position` task swings the foot.
+    slides; six for a surface, those of `Pose`. With e = 0 and no damping the contact accelerates
+    nowhere; damping [1/s] takes away what velocity it has, and stiffness [1/s^2] brings it back to
+    its anchor. `anchors` are (4, 3) for each contact: where its point, or the frame of a surface,
+    belongs [m], then the rotation of the frame; `ContactMotion.at` takes them from a state. While a
+    contact is open its rows ask for nothing: a `Pose` or `Position` task swings the foot.
 
     Raises HierarchyError for no contacts, a stiffness without anchors, or a stiffness of a contact
     that opens, because it may come down elsewhere. Source: J. Baumgarte,
@@ -90,17 +88,12 @@ class ContactMotion(NamedRows, Written):
         return Together([self._task(*pair) for pair in zip(self.of.contacts, anchors, strict=True)])
 
     def _task(self, contact: Contact, anchor: Array) -> Task:
-        path, gain = Still(cast("list[float]", anchor[0].tolist())), self.gain
-        if self.anchors is None:
-            gain = 0.0
-        if contact.slides:
-            return Along(Position(_held(contact), path, self.stiffness, self.damping, gain),
-                         contact.axes[2:].tolist(), contact.name)
+        frame, path, name = _held(contact), Still(anchor[0].tolist()), contact.name
+        gains = self.stiffness, self.damping, 0.0 if self.anchors is None else self.gain
         if contact.is_surface:
-            return Pose(_held(contact), path, anchor[1:], self.stiffness, self.damping, gain,
-                        contact.name)
-        return Position(_held(contact), path, self.stiffness, self.damping, gain,
-                        name=contact.name)
+            return Pose(frame, path, anchor[1:], *gains, name)
+        point = Position(frame, path, *gains, name=name)
+        return Along(point, contact.axes[2:].tolist(), name) if contact.slides else point
 
 
 def _rows(contact: Contact) -> int:

@@ -20,18 +20,13 @@ _FREE: Array = np.array([-np.inf, np.inf])
 
 def set_limits(built: Built) -> Iterator[str]:
     """Set the ranges of hinges and slides; yield a sentence for each missing limit."""
-    file, model = built.part.compiled, built.model
-    mj, lower, upper = file.model, np.array(model.lowerPositionLimit), np.array(
-        model.upperPositionLimit)
-    balls = []
+    file, model, balls = built.part.compiled, built.model, []
+    lower, upper = np.full(model.nq, -np.inf), np.full(model.nq, np.inf)
     for j, joint in built.pairs():
-        limited = bool(mj.jnt_limited[j])
-        if joint.nq > 1:
-            lower[joint.idx_q:joint.idx_q + joint.nq] = -np.inf
-            upper[joint.idx_q:joint.idx_q + joint.nq] = np.inf
-            balls += [file.joints[j]] if limited else []
-            continue
-        lower[joint.idx_q], upper[joint.idx_q] = mj.jnt_range[j] if limited else _FREE
+        if file.model.jnt_limited[j] and joint.nq == 1:
+            lower[joint.idx_q], upper[joint.idx_q] = file.model.jnt_range[j]
+        elif file.model.jnt_limited[j]:
+            balls.append(file.joints[j])
     model.lowerPositionLimit, model.upperPositionLimit = lower, upper
     model.upperVelocityLimit = np.full(model.nv, np.inf)
     yield "velocity limits: an MJCF has none"
