@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, get_args
 
@@ -207,7 +208,7 @@ class Robot:
         names = dict.fromkeys(str(frame.name) for frame in self.model.frames)
         return [name for name in names if name not in unclear]
 
-    @property
+    @cached_property
     def velocity_names(self) -> list[str]:
         """The joint name of each velocity (n), numbered where a joint has several."""
         return self._numbered([joint.nv for joint in self.model.joints[1:]])
