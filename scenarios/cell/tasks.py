@@ -143,7 +143,7 @@ def _separation(section: SeparationSection, at: References, exact: bool) -> list
         tasks.append(Separation(sensed_points(at.robot), section.barrier(section.distance),
                                 len(section.obstacles) if exact else None))
     if (distance := section.self_collision) is not None:
-        with naming("avoidance.body"):
+        with naming("avoidance.self_collision"):
             tasks.append(SelfSeparation(at.robot.capsules, section.barrier(distance),
                                         at.pairs(distance)))
     return tasks

@@ -38,7 +38,7 @@ def test_the_order_is_fixed_and_limits_come_first():
     assert names_of() == ("joint limits", "separation", "position", "pointing")
     assert names_of("limits.torque=0.5") == ("joint limits", "torque limits", "separation",
                                              "position", "pointing")
-    assert names_of("avoidance.body=0.02")[1:3] == ("separation", "self-separation")
+    assert names_of("avoidance.self_collision=0.02")[1:3] == ("separation", "self-separation")
     assert names_of("posture={role='task', target=[0,0,0,0,0,0,0]}")[-1] == "posture"
 
 

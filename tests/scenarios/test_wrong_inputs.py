@@ -149,7 +149,7 @@ def test_check_warns_of_what_is_missed_or_doubtful(name, changes, said, capsys):
 @pytest.mark.parametrize(("line", "said"), [
     ("run ellipse --duration x", "'--duration'"),
     ("check ur5", "example_robot_data:ur5"),
-    ("check ellipse-hqp --set avoidance.body=5.0", "avoidance.body: barrier"),
+    ("check ellipse-hqp --set avoidance.self_collision=5.0", "avoidance.self_collision: barrier"),
     (f"check ellipse --set name={'n' * 101}", "at most 100 characters"),
     ("run ellipse --resolver recursiv", "did you mean 'recursive'"),
     ("sweep ellipse-starts --part 3", "expected I/N"), ("sweep ellipse", "is a scenario"),
