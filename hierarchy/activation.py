@@ -15,7 +15,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import refuse
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.state import State
 from hierarchy.task import Task
@@ -41,13 +41,16 @@ class Activation:
 
     def __init__(self, state: State, tasks: Sequence[Task], buffers: Mapping[str, float]) -> None:
         for name, width in buffers.items():
-            if not 0.0 < width < np.inf:
-                raise HierarchyError(f"task {name!r}: buffer {width} must be positive and finite")
-        self._state, self._tasks, self._buffers = state, tuple(tasks), dict(buffers)
+            refuse(not 0.0 < width < np.inf, f"task {name!r}: buffer {width} must be positive and "
+                   "finite")
+        self._state, self._buffers = state, dict(buffers)
+        self._tasks = [(task, np.ones(task.dimension)) for task in tasks]
 
     def __call__(self) -> Array:
         """Return the activations (m,)."""
-        return np.concatenate([np.empty(0), *map(self._of_task, self._tasks)])
+        return np.concatenate([np.empty(0), *(
+            activation(task.error(self._state), self._buffers[task.name])
+            if task.name in self._buffers else rows for task, rows in self._tasks)])
 
     def demanded(self, h: Hierarchy) -> Array:
         """Return the lower sides (m,) of h, without those of rows that do not act fully.
@@ -55,9 +58,3 @@ class Activation:
         Such a row is followed in part by design, so it cannot be missed. h has the rows of `tasks`.
         """
         return np.where(self() < 1.0, -np.inf, h.lower)
-
-    def _of_task(self, task: Task) -> Array:
-        width = self._buffers.get(task.name)
-        if width is None:
-            return np.ones(task.dimension)
-        return activation(task.error(self._state), width)

@@ -20,9 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, refuse
 from hierarchy.jit import compiled
-from hierarchy.kinematics import drift_of_point, place, write_point_jacobian
+from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Frame, Robot
@@ -70,26 +70,22 @@ class Contact:
     def __post_init__(self) -> None:
         set_frozen(self, name=self.name or self.frame.name)
         points = np.array(self.points, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-            raise HierarchyError(f"contact {self.name!r}: points {self.points!r} are not (k, 3) "
-                                 "numbers")
-        if len(points) != 1 and np.linalg.matrix_rank(points - points.mean(0), tol=1e-6) < 2:
-            raise HierarchyError(f"contact {self.name!r}: {len(points)} points on one line; a "
-                                 "contact has one point, or at least three of a surface")
-        if not 0.0 < self.friction < np.inf:
-            raise HierarchyError(f"contact {self.name!r}: friction {self.friction} must be "
-                                 "positive and finite")
+        refuse(points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all(),
+               f"contact {self.name!r}: points {self.points!r} are not (k, 3) numbers")
+        refuse(len(points) != 1 and np.linalg.matrix_rank(points - points.mean(0), tol=1e-6) < 2,
+               f"contact {self.name!r}: {len(points)} points on one line; a contact has one "
+               "point, or at least three of a surface")
+        refuse(not 0.0 < self.friction < np.inf, f"contact {self.name!r}: friction "
+               f"{self.friction} must be positive and finite")
         axes, sole = (_axes(direction, f"contact {self.name!r}: {key}")
                       for key, direction in (("normal", self.normal), ("up", self.up)))
         for start, end in self.open:
-            if not start < end:
-                raise HierarchyError(f"contact {self.name!r}: it cannot be open from {start} s "
-                                     f"until {end} s")
-        if not 0.0 <= self.ramp < np.inf:
-            raise HierarchyError(f"contact {self.name!r}: ramp {self.ramp} s must not be negative")
-        if self.slides and len(points) > 1:
-            raise HierarchyError(f"contact {self.name!r}: {len(points)} points that slide; only a "
-                                 "contact of one point does")
+            refuse(not start < end, f"contact {self.name!r}: it cannot be open from {start} s "
+                   f"until {end} s")
+        refuse(not 0.0 <= self.ramp < np.inf, f"contact {self.name!r}: ramp {self.ramp} s must "
+               "not be negative")
+        refuse(self.slides and len(points) > 1, f"contact {self.name!r}: {len(points)} points "
+               "that slide; only a contact of one point does")
         set_frozen(self, axes=axes, sole=sole)
 
     @classmethod
@@ -128,15 +124,13 @@ class Contacts:
     def __post_init__(self) -> None:
         contacts = tuple(self.contacts)
         set_frozen(self, contacts=contacts)
-        if not self.robot.masses.sum() > 0.0:
-            raise HierarchyError(f"robot {self.robot.name!r} has no masses, so no torque or force "
-                                 "moves it")
+        refuse(not self.robot.masses.sum() > 0.0, f"robot {self.robot.name!r} has no masses, so "
+               "no torque or force moves it")
         for i, contact in enumerate(contacts):
-            if contact.name in self.names[:i]:
-                raise HierarchyError(f"contact {contact.name!r}: two contacts have this name")
-            if contact.frame.joint == 0:
-                raise HierarchyError(f"contact {contact.name!r}: no joint moves frame "
-                                     f"{contact.frame.name!r}")
+            refuse(contact.name in self.names[:i], f"contact {contact.name!r}: two contacts have "
+                   "this name")
+            refuse(contact.frame.joint == 0, f"contact {contact.name!r}: no joint moves frame "
+                   f"{contact.frame.name!r}")
         frames = [contact.frame for contact in contacts for _ in contact.points]
         offsets = [contact.frame.offset + contact.frame.rotation @ np.array(point, dtype=float)
                    for contact in contacts for point in contact.points]
@@ -200,15 +194,8 @@ class Contacts:
     def jacobian(self, state: State) -> Array:
         """Jacobian J_c (3 p, n) of all contact points [m], world axes."""
         J = np.empty((3 * len(self.points.joints), state.n))
-        for k, (joint, offset) in enumerate(zip(*self.points, strict=True)):
-            write_point_jacobian(state.J, state.placements, state.supports, joint, offset, J, 3 * k)
+        _write_jacobian(state.kinematics, self.points, J)
         return J
-
-    def drift(self, state: State) -> Array:
-        """Accelerations dJ_c/dt v (3 p,) [m/s^2] of the contact points with a = 0."""
-        drift = np.empty(3 * len(self.points.joints))
-        _write_drift(state.kinematics, self.points, drift)
-        return drift
 
     def _checked(self, x: ArrayLike) -> Array:
         x = np.asarray(x, dtype=float)
@@ -246,8 +233,8 @@ def corners(x: tuple[float, float], y: tuple[float, float], up: Vector = (0.0, 0
 
 def _axes(normal: Vector, what: str) -> Array:
     """Return two tangents and the normal as rows (3, 3); x, y and z for normal z."""
-    if np.shape(normal) != (3,) or not 0.0 < np.linalg.norm(normal) < np.inf:
-        raise HierarchyError(f"{what} {normal!r} is no direction")
+    refuse(np.shape(normal) != (3,) or not 0.0 < np.linalg.norm(normal) < np.inf,
+           f"{what} {normal!r} is no direction")
     n = np.array(normal, dtype=float) / np.linalg.norm(normal)
     x = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]
     tangent = x - (x @ n) * n
@@ -256,24 +243,24 @@ def _axes(normal: Vector, what: str) -> Array:
 
 
 @compiled
-def write_dynamics(M, kinematics, points, A, row, first, count):
-    """Write the rows of the velocities `first`, ... of [M, -J_c^T] into A, from `row` on."""
+def write_dynamics(M, kinematics, points, A, first):
+    """Write the rows of the velocities `first`, ... of [M, -J_c^T] into A."""
     J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    n = M.shape[0]
+    n, count = M.shape[0], A.shape[0]
     for i in range(count):
         for c in range(n):
-            A[row + i, c] = M[first + i, c]
+            A[i, c] = M[first + i, c]
     for k in range(len(points.joints)):
-        joint, o, f = points.joints[k], points.offsets[k], n + 3 * k
-        x, y, z = place(placements[joint], o[0], o[1], o[2])
+        joint, f = points.joints[k], n + 3 * k
+        x, y, z = place(placements[joint], points.offsets[k])
         for i in range(count):
             c = first + i
             if supports[joint, c]:
-                A[row + i, f] = J[5, c] * y - J[4, c] * z - J[0, c]
-                A[row + i, f + 1] = J[3, c] * z - J[5, c] * x - J[1, c]
-                A[row + i, f + 2] = J[4, c] * x - J[3, c] * y - J[2, c]
+                A[i, f] = J[5, c] * y - J[4, c] * z - J[0, c]
+                A[i, f + 1] = J[3, c] * z - J[5, c] * x - J[1, c]
+                A[i, f + 2] = J[4, c] * x - J[3, c] * y - J[2, c]
             else:
-                A[row + i, f], A[row + i, f + 1], A[row + i, f + 2] = 0.0, 0.0, 0.0
+                A[i, f], A[i, f + 1], A[i, f + 2] = 0.0, 0.0, 0.0
 
 
 @compiled
@@ -282,26 +269,17 @@ def _write_torques(M, h, kinematics, points, x, torques):
     n = M.shape[0]
     first = n - len(torques)
     for i in range(len(torques)):
-        torque = h[first + i]
-        for c in range(n):
-            torque += M[first + i, c] * x[c]
-        torques[i] = torque
+        torques[i] = h[first + i] + row_times(M, first + i, x)
     for k in range(len(points.joints)):
-        joint, o, f = points.joints[k], points.offsets[k], n + 3 * k
-        px, py, pz = place(placements[joint], o[0], o[1], o[2])
-        # The wrench of the force about the world's origin.
-        mx, my, mz = (py * x[f + 2] - pz * x[f + 1], pz * x[f] - px * x[f + 2],
-                      px * x[f + 1] - py * x[f])
+        joint, f = points.joints[k], x[n + 3 * k:n + 3 * k + 3]
+        m = crossed(place(placements[joint], points.offsets[k]), f)  # about the world's origin
         for i in range(len(torques)):
             c = first + i
             if supports[joint, c]:
-                torques[i] -= (J[0, c] * x[f] + J[1, c] * x[f + 1] + J[2, c] * x[f + 2]
-                               + J[3, c] * mx + J[4, c] * my + J[5, c] * mz)
+                torques[i] -= dot(J[:3, c], f) + dot(J[3:, c], m)
 
 
 @compiled
-def _write_drift(kinematics, points, drift):
+def _write_jacobian(kinematics, points, J):
     for k in range(len(points.joints)):
-        o = points.offsets[k]
-        _, _, _, x, y, z, _, _, _ = drift_of_point(kinematics, points.joints[k], o[0], o[1], o[2])
-        drift[3 * k], drift[3 * k + 1], drift[3 * k + 2] = x, y, z
+        write_point_jacobian(kinematics, points.joints[k], points.offsets[k], J[3 * k:])

@@ -49,6 +49,12 @@ def nearest(name: object, known: Iterable[str], most: int = 5, similarity: float
     return [by_key[one] for one in dict.fromkeys([*containing, *similar])][:most]
 
 
+def refuse(wrong: object, said: str) -> None:
+    """Raise a HierarchyError with what is said if something is wrong, or return None."""
+    if wrong:
+        raise HierarchyError(said)
+
+
 def expect(what: str, value: object, kind: type, remedy: str) -> None:
     """Raise a HierarchyError that says what was given and what is expected, or return None."""
     if not isinstance(value, kind):

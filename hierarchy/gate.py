@@ -53,7 +53,7 @@ def readable(what: str, value: Any) -> Array:
     """Return numbers as kernels read them: float64, C-contiguous, aligned and writeable.
 
     The same memory if it is like that, through a view of its own: a caller who then gives his array
-    another shape or type does not change this one. Raises a HierarchyError as `array_of`.
+    another shape or type does not change this one.
     """
     if type(value) is np.ndarray and value.dtype == np.float64 and value.flags.carray:
         return value.view()

@@ -1,4 +1,4 @@
-"""Compiled kinematics of points and axes fixed to a body, from the arrays of a State.
+"""Kinematics of points, axes and frames fixed to a body, compiled, from the arrays of a State.
 
 J is the world-frame spatial Jacobian of all joints (linear part at the world origin), so a point p
 on body j has the columns J_v + J_w x p of the joints that support j. Its time derivative is
@@ -7,7 +7,8 @@ dJ_v + dJ_w x p + J_w x dp/dt. `placements` rows are rotation (by columns) and t
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from math import atan2, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,46 +46,44 @@ class Readings(NamedTuple):
 
 
 @inlined
-def place(T, ox, oy, oz):
-    """World position of an offset on the body whose placement is T (12,)."""
-    return (T[9] + T[0] * ox + T[3] * oy + T[6] * oz, T[10] + T[1] * ox + T[4] * oy + T[7] * oz,
-            T[11] + T[2] * ox + T[5] * oy + T[8] * oz)
+def place(T, o):
+    """World position of the offset o on the body whose placement is T (12,), as a tuple."""
+    return (T[9] + T[0] * o[0] + T[3] * o[1] + T[6] * o[2],
+            T[10] + T[1] * o[0] + T[4] * o[1] + T[7] * o[2],
+            T[11] + T[2] * o[0] + T[5] * o[1] + T[8] * o[2])
 
 
 @inlined
-def point_at(placements, joint, offset, i):
-    """Coordinate i of the world position of `offset` on body `joint`."""
-    T = placements[joint]
-    return T[9 + i] + T[i] * offset[0] + T[3 + i] * offset[1] + T[6 + i] * offset[2]
+def turned(T, a):
+    """World direction of a, which the body whose placement is T (12,) carries, as a tuple."""
+    return (T[0] * a[0] + T[3] * a[1] + T[6] * a[2], T[1] * a[0] + T[4] * a[1] + T[7] * a[2],
+            T[2] * a[0] + T[5] * a[1] + T[8] * a[2])
 
 
 @inlined
-def axis_at(placements, joint, axis, i):
-    """Coordinate i of the world direction of `axis` on body `joint`."""
-    T = placements[joint]
-    return T[i] * axis[0] + T[3 + i] * axis[1] + T[6 + i] * axis[2]
-
-
-@compiled
-def write_point_jacobian(J, placements, supports, joint, offset, A, row):
-    """Write dp/dq (3, n) of a point into A[row : row + 3]."""
-    x = point_at(placements, joint, offset, 0)
-    y = point_at(placements, joint, offset, 1)
-    z = point_at(placements, joint, offset, 2)
+def write_point_jacobian(kinematics, joint, offset, A):
+    """Write dp/dq of a point into the first three rows of A."""
+    J, supports = kinematics.J, kinematics.supports
+    x, y, z = place(kinematics.placements[joint], offset)
     for c in range(A.shape[1]):
         if supports[joint, c]:
-            A[row, c] = J[0, c] + J[4, c] * z - J[5, c] * y
-            A[row + 1, c] = J[1, c] + J[5, c] * x - J[3, c] * z
-            A[row + 2, c] = J[2, c] + J[3, c] * y - J[4, c] * x
+            A[0, c] = J[0, c] + J[4, c] * z - J[5, c] * y
+            A[1, c] = J[1, c] + J[5, c] * x - J[3, c] * z
+            A[2, c] = J[2, c] + J[3, c] * y - J[4, c] * x
         else:
-            A[row, c] = 0.0
-            A[row + 1, c] = 0.0
-            A[row + 2, c] = 0.0
+            A[0, c], A[1, c], A[2, c] = 0.0, 0.0, 0.0
 
 
 @inlined
-def velocity_of_point(J, supports, joint, v, x, y, z):
-    """Velocity of the material point at x, y, z, and the angular velocity of its body."""
+def carried(v, w, p):
+    """v + w x p of tuples: the velocity of p on a body."""
+    return (v[0] + w[1] * p[2] - w[2] * p[1], v[1] + w[2] * p[0] - w[0] * p[2],
+            v[2] + w[0] * p[1] - w[1] * p[0])
+
+
+@inlined
+def velocity_of_body(J, supports, joint, v):
+    """Velocity of a body at the world's origin, and its angular velocity, as tuples."""
     px = py = pz = wx = wy = wz = 0.0
     for c in range(v.size):
         if supports[joint, c]:
@@ -94,63 +93,54 @@ def velocity_of_point(J, supports, joint, v, x, y, z):
             wx += J[3, c] * v[c]
             wy += J[4, c] * v[c]
             wz += J[5, c] * v[c]
-    return px + wy * z - wz * y, py + wz * x - wx * z, pz + wx * y - wy * x, wx, wy, wz
+    return (px, py, pz), (wx, wy, wz)
 
 
 @inlined
-def drift_of_point(kinematics, joint, ox, oy, oz):
-    """Velocity J_c v and drift dJ_c/dt v of the point at offset ox, oy, oz on a body.
+def moving_point(kinematics, joint, offset):
+    """Velocity J_c v and drift dJ_c/dt v of a point of a body, and the body's angular velocity.
 
-    The drift is exact, or with a period > 0 uses the backward difference of J_c. The angular
-    velocity of the body comes last.
+    The drift is exact, or with a period > 0 uses the backward difference of J_c.
     """
     v, J, dJ, placements, supports, previous_J, previous_placements, period = kinematics
-    x, y, z = place(placements[joint], ox, oy, oz)
-    px, py, pz, wx, wy, wz = velocity_of_point(J, supports, joint, v, x, y, z)
+    point = place(placements[joint], offset)
+    origin, w = velocity_of_body(J, supports, joint, v)
+    velocity = carried(origin, w, point)
     if period > 0.0:
-        x, y, z = place(previous_placements[joint], ox, oy, oz)
-        bx, by, bz, _, _, _ = velocity_of_point(previous_J, supports, joint, v, x, y, z)
-        ax, ay, az = (px - bx) / period, (py - by) / period, (pz - bz) / period
-    else:  # dJ_v v + dJ_w v x p + w x dp/dt
-        ax, ay, az, _, _, _ = velocity_of_point(dJ, supports, joint, v, x, y, z)
-        ax, ay, az = ax + wy * pz - wz * py, ay + wz * px - wx * pz, az + wx * py - wy * px
-    return px, py, pz, ax, ay, az, wx, wy, wz
+        origin, turn = velocity_of_body(previous_J, supports, joint, v)
+        before = carried(origin, turn, place(previous_placements[joint], offset))
+        apart = less(velocity, before)
+        return velocity, (apart[0] / period, apart[1] / period, apart[2] / period), w
+    origin, turn = velocity_of_body(dJ, supports, joint, v)  # dJ_v v + dJ_w v x p + w x dp/dt
+    return velocity, carried(carried(origin, turn, point), w, velocity), w
 
 
 @inlined
-def moving_point(kinematics, joint, o):
-    """Velocity and drift of the point at offset o, and the angular velocity of its body."""
-    vx, vy, vz, ax, ay, az, wx, wy, wz = drift_of_point(kinematics, joint, o[0], o[1], o[2])
-    return (vx, vy, vz), (ax, ay, az), (wx, wy, wz)
+def add_row(kinematics, joint, point, r, row):
+    """Add r^T J_c of the material point at `point` of a body to a row (n,)."""
+    J, m = kinematics.J, crossed(point, r)  # r . (w x p) = w . (p x r)
+    for c in range(len(row)):
+        if kinematics.supports[joint, c]:
+            row[c] += (J[0, c] * r[0] + J[1, c] * r[1] + J[2, c] * r[2]
+                       + J[3, c] * m[0] + J[4, c] * m[1] + J[5, c] * m[2])
 
 
 @inlined
-def add_row(J, supports, joint, point, r, A, row):
-    """Add r^T J_c (n,) of the material point at `point` of a body to A[row]."""
-    (x, y, z), (rx, ry, rz) = point, r
-    mx, my, mz = y * rz - z * ry, z * rx - x * rz, x * ry - y * rx  # r . (w x p) = w . (p x r)
-    for c in range(A.shape[1]):
-        if supports[joint, c]:
-            A[row, c] += (J[0, c] * rx + J[1, c] * ry + J[2, c] * rz
-                          + J[3, c] * mx + J[4, c] * my + J[5, c] * mz)
-
-
-@compiled
-def write_rotation_jacobian(J, supports, joint, A, row):
-    """Write the Jacobian (3, n) of a body's angular velocity into A[row : row + 3]."""
+def write_rotation_jacobian(kinematics, joint, A):
+    """Write the Jacobian of a body's angular velocity into the first three rows of A."""
     for i in range(3):
         for c in range(A.shape[1]):
-            A[row + i, c] = J[3 + i, c] if supports[joint, c] else 0.0
+            A[i, c] = kinematics.J[3 + i, c] if kinematics.supports[joint, c] else 0.0
 
 
 @compiled
-def write_identity(A, row, count):
-    """Write zeros and, right of them, the identity (count, count) into A[row : row + count]."""
-    base = A.shape[1] - count
-    for i in range(count):
-        for j in range(A.shape[1]):
-            A[row + i, j] = 0.0
-        A[row + i, base + i] = 1.0
+def write_identity(A):
+    """Write zeros and, right of them, the identity (m, m) into A (m, n)."""
+    m, n = A.shape
+    for i in range(m):
+        for j in range(n):
+            A[i, j] = 0.0
+        A[i, n - m + i] = 1.0
 
 
 @inlined
@@ -160,19 +150,6 @@ def row_times(A, row, v):
     for c in range(A.shape[1]):
         total += A[row, c] * v[c]
     return total
-
-
-@inlined
-def write_equality(lower, upper, row, value):
-    """Make a row an equality."""
-    lower[row] = value
-    upper[row] = value
-
-
-@inlined
-def triple(a, i):
-    """Three entries of an array, from i on, as a tuple."""
-    return a[i], a[i + 1], a[i + 2]
 
 
 @inlined
@@ -203,3 +180,118 @@ def plus(a, b):
 def times(factor, a):
     """A multiple of a tuple."""
     return factor * a[0], factor * a[1], factor * a[2]
+
+
+@compiled
+def rotation_vector(R):
+    """Rotation vector (3,) [rad] of a rotation matrix (3, 3), angle in 0 .. pi."""
+    twist = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
+    sine = sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
+    cosine = (R[0, 0] + R[1, 1] + R[2, 2] - 1.0) / 2
+    angle = atan2(sine, cosine)
+    if sine > 1e-7:
+        return twist * (angle / sine)
+    if cosine > 0.0:
+        return twist
+    # Half a turn: the axis is the column of R + I with the largest diagonal entry.
+    i = 0
+    for k in range(1, 3):
+        if R[k, k] > R[i, i]:
+            i = k
+    axis = R[:, i].copy()
+    axis[i] += 1.0
+    return axis * (angle / sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2))
+
+
+class Placed(NamedTuple):
+    """A frame in world axes: position p (3,) [m], rotation R (3, 3), Jacobian and its derivative.
+
+    The Jacobian is (6, n), linear part first, and its derivative is exact.
+    """
+
+    p: Array
+    R: Array
+    J: Array
+    dJ: Array  # noqa: N815
+
+    @classmethod
+    def of(cls, kinematics: Kinematics, frame: Any) -> Placed:
+        """Return a frame as it is placed and moves."""
+        T, moves = kinematics.placements[frame.joint], kinematics.supports[frame.joint]
+        body = T[:9].reshape(3, 3).T
+        p = T[9:] + body @ frame.offset
+        J, dJ = kinematics.J * moves, kinematics.dJ * moves
+        J[:3] -= cross(p) @ J[3:]
+        dJ[:3] -= cross(p) @ dJ[3:] + cross(J[:3] @ kinematics.v) @ J[3:]
+        return cls(p, body @ frame.rotation, J, dJ)
+
+
+def cross(a: NDArray[Any]) -> NDArray[Any]:
+    """Return the matrix (3, 3) with which a x b is a product."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+class Spot(NamedTuple):
+    """A frame for kernels: its joint, offset (3,) and rotation (3, 3) in the joint's frame."""
+
+    joint: int
+    offset: Array
+    rotation: Array
+
+    @classmethod
+    def of(cls, frame: Any) -> Spot:
+        """Return the spot of a frame."""
+        return cls(frame.joint, frame.offset, np.ascontiguousarray(frame.rotation))
+
+
+@inlined
+def column(A, c):
+    """Column c of three rows, as a tuple."""
+    return A[0, c], A[1, c], A[2, c]
+
+
+@compiled
+def times_transposed(A, B):
+    """A B^T (3, 3) of two matrices (3, 3)."""
+    product = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                product[i, j] += A[i, k] * B[j, k]
+    return product
+
+
+@inlined
+def turned_back(R, a):
+    """R^T a of a rotation (3, 3) and a tuple."""
+    return (R[0, 0] * a[0] + R[1, 0] * a[1] + R[2, 0] * a[2],
+            R[0, 1] * a[0] + R[1, 1] * a[1] + R[2, 1] * a[2],
+            R[0, 2] * a[0] + R[1, 2] * a[1] + R[2, 2] * a[2])
+
+
+@compiled
+def rotation_of(placements, spot):
+    """World rotation (3, 3) of a spot."""
+    R, T, rotation = np.empty((3, 3)), placements[spot.joint], spot.rotation
+    for i in range(3):
+        for k in range(3):
+            R[i, k] = (T[i] * rotation[0, k] + T[3 + i] * rotation[1, k]
+                       + T[6 + i] * rotation[2, k])
+    return R
+
+
+@inlined
+def motion_of(kinematics, spot):
+    """Velocity, angular velocity, and their drifts dJ/dt v and dW/dt v, of a spot; exact ones."""
+    v, a, w = moving_point(kinematics, spot.joint, spot.offset)
+    _, b = velocity_of_body(kinematics.dJ, kinematics.supports, spot.joint, kinematics.v)
+    return v, w, a, b
+
+
+@inlined
+def jacobians_of(kinematics, spot):
+    """Linear and angular Jacobian (3, n) of a spot."""
+    linear, angular = np.empty((3, len(kinematics.v))), np.empty((3, len(kinematics.v)))
+    write_point_jacobian(kinematics, spot.joint, spot.offset, linear)
+    write_rotation_jacobian(kinematics, spot.joint, angular)
+    return linear, angular

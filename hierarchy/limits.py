@@ -51,7 +51,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, brief, number
+from hierarchy.errors import HierarchyError, number, refuse
+from hierarchy.gate import array_of
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -83,24 +84,18 @@ class Limits:
     packed: Array = field(init=False, repr=False, compare=False)  # (6, n), for the kernels
 
     def __post_init__(self) -> None:
-        try:
-            rows = [np.asarray(side, dtype=float).ravel()
-                    for side in (self.lower, self.upper, self.velocity, self.acceleration)]
-        except (TypeError, ValueError):
-            raise HierarchyError("limits: lower, upper, velocity and acceleration must be numbers, "
-                                 f"got {brief([self.lower, self.upper])} and "
-                                 f"{brief([self.velocity, self.acceleration])}") from None
-        if len({len(row) for row in rows}) != 1:
-            raise HierarchyError("limits: lower, upper, velocity and acceleration have "
-                                 f"{', '.join(str(len(row)) for row in rows)} entries")
+        rows = [array_of(f"limits: {name}", getattr(self, name)).ravel()
+                for name in ("lower", "upper", "velocity", "acceleration")]
+        refuse(len({len(row) for row in rows}) != 1, "limits: lower, upper, velocity and "
+               f"acceleration have {', '.join(str(len(row)) for row in rows)} entries")
         lower, upper, velocity, acceleration = rows
         _refuse(~((lower <= upper) & (lower < np.inf) & (upper > -np.inf)),
                 "no position lies between lower and upper", lower, upper)
         _refuse(~(velocity > 0.0), "velocity must be positive", velocity)
         _refuse(~((acceleration > 0.0) & (acceleration < np.inf)),
                 "acceleration must be positive and finite", acceleration)
-        if not 0.0 < number("limits: period [s]", self.period):
-            raise HierarchyError(f"limits: period {self.period} s must be positive and finite")
+        refuse(not 0.0 < number("limits: period [s]", self.period), "limits: period "
+               f"{self.period} s must be positive and finite")
         number("limits: horizon [s]", self.horizon, 0.0)
         times = [np.full(len(lower), time) for time in (self.period, self.horizon)]
         set_frozen(self, packed=np.array([*rows, *times]))
@@ -111,7 +106,7 @@ class Limits:
         Both are finite. The command is a velocity or an acceleration, depending on `level`.
         """
         lower, upper = np.empty(len(v)), np.empty(len(v))
-        write_box(q, v, self.packed, level == "acceleration", lower, upper, 0)
+        write_box(q, v, self.packed, level == "acceleration", lower, upper)
         return lower, upper
 
     def clamp(self, q: Array, v: Array, level: Level, x: ArrayLike) -> Array:
@@ -132,10 +127,10 @@ def _refuse(bad: NDArray[np.bool_], why: str, *values: Array) -> None:
 
 
 @compiled
-def write_box(q, v, limits, acceleration, lower, upper, row):
-    """Write the box of n joints into lower and upper from `row` on; limits as `Limits.packed`."""
+def write_box(q, v, limits, acceleration, lower, upper):
+    """Write the box of n joints into lower and upper; limits as `Limits.packed`."""
     for i in range(len(v)):
-        lower[row + i], upper[row + i] = box(q[i], v[i], limits, i, acceleration)
+        lower[i], upper[i] = box(q[i], v[i], limits, i, acceleration)
 
 
 @compiled

@@ -20,7 +20,7 @@ from hierarchy.kinematics import Kinematics
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Task, derivative
+from hierarchy.task import Level, Rows, Task, Writer, derivative
 
 Measure = tuple[Kernel, Any]  # the function, and what it reads; see `Measured.measure`
 _NONE, _EXACT, _DIFFERENCE = 0, 1, 2  # the derivative of the Jacobian
@@ -128,13 +128,12 @@ class Measured(Task):
         """Closed loop and push (m,)."""
         return super().reference_acceleration(state) + self._measured(state)[1].push
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         task = cast("Measured", self.on(state.robot))
         function, reads = task.measure(state)
         asked = task._asked(state, level, np.zeros((8, task.dimension)))
-        write_rows = bind(function, state.kinematics, reads, asked, A, lower, upper, row)
+        write_rows = bind(function, state.kinematics, reads, asked, *rows)
         move_goal = task.follow(state, asked.goal)
         if move_goal is None:
             return write_rows
@@ -172,7 +171,7 @@ class Measured(Task):
             if move_goal is not None:
                 move_goal(state.t)
             # Called, not bound: to bind takes 0.5 ms.
-            function(kinematics, reads, asked, J, *sides, 0)
+            function(kinematics, reads, asked, J, *sides)
             return J, Motion(*motion[:4]), np.hstack([asked.goal, np.zeros((3, 1))])[
                 :, task.columns]
 
@@ -209,11 +208,10 @@ def _copy_of_rows(function: Kernel, **known: Any) -> Kernel:
 _measure: Any = None  # what a copy of `_rows` calls
 
 
-def _rows(kinematics, reads, asked, A, lower, upper, row):
+def _rows(kinematics, reads, asked, J, lower, upper):
     """Write the rows that a measure makes with what is asked."""
     goal, settings, derivative, room, J_before = asked
-    m = settings.shape[1]
-    J, motion = A[row:row + m], Motion(room[0], room[1], room[2], room[3])
+    motion = Motion(room[0], room[1], room[2], room[3])
     clear(J, motion)
     _measure(kinematics, reads, goal, J, motion)
     if derivative == _DIFFERENCE:
@@ -223,10 +221,10 @@ def _rows(kinematics, reads, asked, A, lower, upper, row):
         # Made here: what a function without reference counts returns, its caller would release.
         _measure(Kinematics(v, previous, dJ, placements, supports, previous, placements, period),
                  reads, goal, J_before, before)
-        for i in range(m):
+        for i in range(len(lower)):
             motion.drift[i] = (motion.rate[i] - before.rate[i]) / period
-    for i in range(m):
-        close(motion, goal, settings, derivative, lower, upper, row + i, i)
+    for i in range(len(lower)):
+        close(motion, goal, settings, derivative, lower, upper, i)
 
 
 @inlined
@@ -240,7 +238,7 @@ def clear(J, motion):
 
 
 @inlined
-def close(motion, goal, settings, derivative, lower, upper, row, i):
+def close(motion, goal, settings, derivative, lower, upper, i):
     """Write the sides of row i: equations (7) and (12), and (21) for one side."""
     speed, acceleration, k = 0.0, 0.0, int(settings[4, i])
     if k >= 0:
@@ -250,5 +248,5 @@ def close(motion, goal, settings, derivative, lower, upper, row, i):
     else:
         b = (acceleration + settings[1, i] * (speed - motion.rate[i])
              + settings[0, i] * motion.error[i] - motion.drift[i])
-    lower[row] = b + motion.push[i]
-    upper[row] = lower[row] + settings[3, i]
+    lower[i] = b + motion.push[i]
+    upper[i] = lower[i] + settings[3, i]

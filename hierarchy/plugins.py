@@ -136,14 +136,12 @@ def fingerprint() -> str:
         return ""
     found = hashlib.sha256()
     for module in sorted(_loaded):
-        file = getattr(sys.modules[module], "__file__", None)
-        for path in _sources(Path(file)) if file else ():
-            found.update(path.name.encode() + path.read_bytes())
+        if file := getattr(sys.modules[module], "__file__", None):
+            path = Path(file)
+            package = path.name == "__init__.py"
+            for source in sorted(path.parent.rglob("*.py")) if package else [path]:
+                found.update(source.name.encode() + source.read_bytes())
     return found.hexdigest()[:16]
-
-
-def _sources(file: Path) -> list[Path]:
-    return sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]
 
 
 def _load(point: EntryPoint, group: Group) -> None:

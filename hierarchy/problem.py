@@ -11,22 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hierarchy import gate
 from hierarchy.errors import HierarchyError, brief
 from hierarchy.gate import Array as Array
-from hierarchy.gate import (
-    Sizes,
-    array_of,
-    check_finite,
-    check_rows,
-    checked_give,
-    checked_level,
-    checked_metric,
-    checked_sizes,
-    level_names,
-    readable,
-    shaped,
-    sound_rows,
-)
+from hierarchy.gate import Sizes
 from hierarchy.notebook import html_table
 from hierarchy.records import set_frozen
 
@@ -104,7 +92,7 @@ class Hierarchy:
                  metric: ArrayLike | None = None, give: ArrayLike | None = None) -> None:
         """Keep packed arrays, in the same memory if kernels can read it; else copies."""
         self._keep(A, lower, upper, sizes, reference, names, metric, give)
-        set_frozen(self, names=level_names(names, len(self.names)))
+        set_frozen(self, names=gate.level_names(names, len(self.names)))
         self._check_values()
 
     @classmethod
@@ -148,14 +136,14 @@ class Hierarchy:
         if not isinstance(levels, Sequence) or isinstance(levels, str):
             raise HierarchyError("levels: expected a list of (A, b) or (A, lower, upper), got "
                                  f"{brief(levels)}")
-        names = level_names(names, len(levels))
-        packed = [checked_level(name, level) for name, level in zip(names, levels, strict=True)]
+        names = gate.level_names(names, len(levels))
+        packed = list(map(gate.checked_level, names, levels))
         n, sizes = _columns(packed, names, reference), [len(lower) for _, lower, _ in packed]
         return cls(np.vstack([np.empty((0, n)), *(A for A, _, _ in packed)]),
                    np.concatenate([np.empty(0), *(low for _, low, _ in packed)]),
                    np.concatenate([np.empty(0), *(up for _, _, up in packed)]), sizes,
-                   None if reference is None else array_of("reference", reference), names,
-                   None if metric is None else array_of("metric", metric),
+                   None if reference is None else gate.array_of("reference", reference), names,
+                   None if metric is None else gate.array_of("metric", metric),
                    None if give is None else _checked_give(give, names, sizes))
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -189,34 +177,34 @@ class Hierarchy:
     def _keep(self, A: Any, lower: Any, upper: Any, sizes: Any, reference: Any = None,
               names: Sequence[str] | None = None, metric: Any = None, give: Any = None) -> None:
         """Accept arrays of matching shapes, or raise a HierarchyError."""
-        A = readable("A", A)
+        A = gate.readable("A", A)
         if A.ndim != 2 or not A.shape[1]:
             raise HierarchyError(f"A has shape {A.shape}, expected (rows, n) with n >= 1")
         m, n = A.shape
-        lower, upper = shaped("lower", lower, (m,)), shaped("upper", upper, (m,))
+        lower, upper = gate.shaped("lower", lower, (m,)), gate.shaped("upper", upper, (m,))
         reference = (np.zeros(n).view() if reference is None
-                     else shaped("reference", reference, (n,)))
-        sizes = checked_sizes(sizes, m)
-        names = level_names(None, len(sizes)) if names is None else tuple(names)
+                     else gate.shaped("reference", reference, (n,)))
+        sizes = gate.checked_sizes(sizes, m)
+        names = gate.level_names(None, len(sizes)) if names is None else tuple(names)
         if len(names) != len(sizes):
             raise HierarchyError(f"{len(names)} names for {len(sizes)} levels")
         set_frozen(
             self, rows=(A, lower, upper, sizes), start=reference.copy, m=m, n=n, names=names,
             named=None, plain=metric is None and give is None, _reference=reference,
-            _metric=None if metric is None else shaped("metric", metric, (n, n)),
-            _give=None if give is None else shaped("give", give, (m,)))
+            _metric=None if metric is None else gate.shaped("metric", metric, (n, n)),
+            _give=None if give is None else gate.shaped("give", give, (m,)))
 
     def _check_values(self) -> None:
         """Raise a HierarchyError that names the first bad value, or return None."""
-        if not sound_rows(*self.rows[:3]):
+        if not gate.sound_rows(*self.rows[:3]):
             for name, level in zip(self.names, self.levels(), strict=True):
-                check_rows(name, *level)
-        check_finite("reference", self._reference)
+                gate.check_rows(name, *level)
+        gate.check_finite("reference", self._reference)
         if self._metric is not None:
-            checked_metric(self._metric, self.n)
+            gate.checked_metric(self._metric, self.n)
         for name, (first, last) in zip(self.names, self._bounds(), strict=True):
             if self._give is not None:
-                checked_give(name, self._give[first:last], last - first)
+                gate.checked_give(name, self._give[first:last], last - first)
 
     @property
     def is_equality(self) -> bool:
@@ -279,7 +267,7 @@ class Hierarchy:
         Raises HierarchyError for another shape.
         """
         A, lower, upper, _ = self.rows
-        value = A @ shaped("x", x, (self.n,))
+        value = A @ gate.shaped("x", x, (self.n,))
         return np.maximum(value - upper, 0.0) - np.maximum(lower - value, 0.0)
 
     def violations(self, x: ArrayLike) -> Array:
@@ -287,8 +275,8 @@ class Hierarchy:
 
         Raises HierarchyError for another shape or an entry that is not finite.
         """
-        x = shaped("x", x, (self.n,))
-        check_finite("x", x)
+        x = gate.shaped("x", x, (self.n,))
+        gate.check_finite("x", x)
         slack = self.slacks(x)
         return np.array([np.linalg.norm(slack[i:j]) for i, j in self._bounds()])
 
@@ -305,15 +293,14 @@ class Hierarchy:
 def _checked_give(give: Sequence[ArrayLike], names: Sequence[str], sizes: list[int]) -> Array:
     if len(give) != len(names):
         raise HierarchyError(f"give has {len(give)} entries for {len(names)} levels")
-    return np.concatenate([np.empty(0), *(checked_give(name, one, size) for name, one, size in zip(
-        names, give, sizes, strict=True))])
+    return np.concatenate([np.empty(0), *map(gate.checked_give, names, give, sizes)])
 
 
 def _columns(packed: list[tuple[Array, Array, Array]], names: tuple[str, ...],
              reference: ArrayLike | None) -> int:
     if not packed and reference is None:
         raise HierarchyError("no levels and no reference: the number of unknowns is not known")
-    n = packed[0][0].shape[1] if packed else array_of("reference", reference).size
+    n = packed[0][0].shape[1] if packed else gate.array_of("reference", reference).size
     for name, (A, _, _) in zip(names, packed, strict=True):
         if A.shape[1] != n:
             raise HierarchyError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, get_args
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy import plugins
-from hierarchy.avoidance.control_points import ControlPoint
+from hierarchy.avoidance.body import ControlPoint
 from hierarchy.errors import RobotError, UnknownNameError, expect, file_path, finite_numbers
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
@@ -93,10 +94,12 @@ class Robot:
         self.actuated = 6 if self.base == "floating" else 0
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
         self.parents: tuple[int, ...] = tuple(int(i) for i in model.parents)
-        self.lower, self.upper = _finite_or_inf(model.lowerPositionLimit,
-                                                model.upperPositionLimit)
-        self.velocity_limit = _positive_or_inf(model.upperVelocityLimit)
-        self.effort_limit = _positive_or_inf(model.effortLimit)
+        # pinocchio has huge numbers for "none".
+        self.lower, self.upper = (np.where(np.abs(limit) > 1e300, none, limit) for limit, none in (
+            (model.lowerPositionLimit, -np.inf), (model.upperPositionLimit, np.inf)))
+        self.velocity_limit, self.effort_limit = (
+            np.where((limit <= 0.0) | (limit > 1e300), np.inf, limit)
+            for limit in (model.upperVelocityLimit, model.effortLimit))
         if self.base == "floating":
             self.lower[:7], self.upper[:7] = -np.inf, np.inf
             self.effort_limit[:6] = np.inf
@@ -119,23 +122,13 @@ class Robot:
 
     @classmethod
     def named(cls, name: str, base: Base | None = None) -> Robot:
-        """Build a robot of `hierarchy.robot.ROBOTS`; an unknown name raises UnknownNameError.
+        """Build a robot of `hierarchy.robot.ROBOTS` or of a plugin; UnknownNameError for another.
 
+        A plugin registers a table, a file, or a function that returns one of these or a Robot.
         `base` "fixed" or "floating" overrides that of its table.
         """
         expect("Robot.named: name", name, str, "give a name of ROBOTS")
-        if name not in TABLES:
-            return cls._of_plugin(name, base)
-        found = from_table(TABLES[name], base)
-        return cls(found.model, name, found=found)
-
-    @classmethod
-    def _of_plugin(cls, name: str, base: Base | None) -> Robot:
-        """Make a robot that a plugin registered: a table, a file, or a function that returns one.
-
-        A function may return a Robot too.
-        """
-        found = plugins.find("robots", name)
+        found = TABLES.get(name) or plugins.find("robots", name)
         if found is None:
             known = {*TABLES, *plugins.own("robots")}
             raise UnknownNameError("robot", name, known, elsewhere(name))
@@ -215,7 +208,7 @@ class Robot:
         names = dict.fromkeys(str(frame.name) for frame in self.model.frames)
         return [name for name in names if name not in unclear]
 
-    @property
+    @cached_property
     def velocity_names(self) -> list[str]:
         """The joint name of each velocity (n), numbered where a joint has several."""
         return self._numbered([joint.nv for joint in self.model.joints[1:]])
@@ -415,13 +408,3 @@ def _units(joint: Any) -> tuple[str, ...]:
         return tuple(unit for inner in joint.extract().joints for unit in _units(inner))
     slides = kind.startswith(("FreeFlyer", "Translation", "P"))
     return tuple("m" if slides and i < 3 else "rad" for i in range(joint.nv))
-
-
-def _finite_or_inf(lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Limits as given, with pinocchio's huge numbers for "none" replaced by infinity."""
-    return (np.where(np.abs(lower) > 1e300, -np.inf, lower),
-            np.where(np.abs(upper) > 1e300, np.inf, upper))
-
-
-def _positive_or_inf(limit: Array) -> Array:
-    return np.where((limit <= 0.0) | (limit > 1e300), np.inf, limit)

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, ReadingError, UnknownNameError, expect
+from hierarchy.errors import HierarchyError, ReadingError, UnknownNameError, expect, refuse
 from hierarchy.gate import checked_give, checked_metric
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.state import State
-from hierarchy.task import Level, Task, writer_in_stack
+from hierarchy.task import Level, Rows, Task, writer_in_stack
 
 
 class _Prepared(NamedTuple):
@@ -52,9 +52,8 @@ class Stack:
                  reference: Task | None = None, contacts: Contacts | None = None,
                  metric: ArrayLike | Literal["mass"] | None = None,
                  give: Mapping[str, ArrayLike] | None = None) -> None:
-        if level not in get_args(Level):
-            raise HierarchyError("level must be 'velocity', 'acceleration' or 'torque', got "
-                                 f"{level!r}")
+        refuse(level not in get_args(Level), "level must be 'velocity', 'acceleration' or "
+               f"'torque', got {level!r}")
         if (level == "torque") != (contacts is not None):
             raise HierarchyError(
                 "level 'torque' needs contacts, Contacts(robot) for none" if contacts is None else
@@ -92,14 +91,12 @@ class Stack:
     def insert(self, task: Task, index: int | None = None) -> None:
         """Insert a task at `index` of the order, 0 being the most important; None for the end."""
         expect("a stack", task, Task, "a task says itself what it moves; see hierarchy.tasks")
-        if task.name in self._tasks:
-            raise HierarchyError(f"the stack already has a task {task.name!r}")
+        refuse(task.name in self._tasks, f"the stack already has a task {task.name!r}")
         _check_forces(task, self.level, self.contacts)
         position = len(self._order) if index is None else index
         expect(f"task {task.name!r}: index", position, int, "0 is the most important")
-        if not 0 <= position <= len(self._order):
-            raise HierarchyError(f"task {task.name!r}: index {index} is outside "
-                                 f"0 .. {len(self._order)}")
+        refuse(not 0 <= position <= len(self._order), f"task {task.name!r}: index {index} is "
+               f"outside 0 .. {len(self._order)}")
         self._tasks[task.name] = task
         self._order = (*self._order[:position], task.name, *self._order[position:])
 
@@ -121,9 +118,8 @@ class Stack:
         expect("order of a stack", order, Sequence, "give a list of names of tasks")
         for name in order:
             self[name]
-        if sorted(order) != sorted(self._order):
-            raise HierarchyError(f"reorder needs each of {list(self._order)} once, got "
-                                 f"{list(order)}")
+        refuse(sorted(order) != sorted(self._order), f"reorder needs each of {list(self._order)} "
+               f"once, got {list(order)}")
         self._order = tuple(order)
 
     def row_names(self, order: Sequence[str] | None = None) -> tuple[str, ...]:
@@ -155,8 +151,7 @@ class Stack:
     def prepare(self, state: State, order: tuple[str, ...]) -> _Prepared:
         """Bind the tasks of an order to a state now rather than in the first tick that uses it."""
         expect("Stack.hierarchy: state", state, State, "make one with State.at(robot, q)")
-        if not self._tasks:
-            raise HierarchyError("the stack is empty: there are no tasks")
+        refuse(not self._tasks, "the stack is empty: there are no tasks")
         self._tasks = {name: task.on(state.robot) for name, task in self._tasks.items()}
         if self.reference is not None:
             self.reference = self.reference.on(state.robot)
@@ -165,13 +160,14 @@ class Stack:
         if self._metric is not None:  # M is symmetric, and its transpose is C-contiguous
             metric = state.dynamics.M.T if isinstance(self._metric, str) else self._metric
             h = h.changed(metric=metric)
-        writers = [writer_in_stack(self[name], state, self.level, h.A, h.lower, h.upper, int(row))
-                   for name, row in zip(order, h.offsets, strict=False)]
+        rows = Rows(h.A, h.lower, h.upper)
+        writers = [writer_in_stack(self[name], state, self.level, rows.some(first, count))
+                   for name, first, count in zip(order, h.offsets, h.sizes, strict=False)]
         if self.reference is not None:
             m = self.reference.dimension
             joints = h.reference[state.n - m:state.n]  # without those of a floating base
             writers.append(writer_in_stack(self.reference, state, self.level,
-                                           np.empty((m, state.n)), joints, joints, 0))
+                                           Rows(np.empty((m, state.n)), joints, joints)))
         writers.append(self._sides_checked(h, order))
         prepared = _Prepared(h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared
@@ -214,12 +210,10 @@ def _check_forces(task: Task, level: Level, contacts: Contacts | None) -> None:
     """Raise HierarchyError if a task's contact forces are not those of the stack."""
     if not task.of_forces or (level != "torque" and task.contacts is None):
         return
-    if level != "torque":
-        raise HierarchyError(f"task {task.name!r}: contact forces need the level 'torque', "
-                             f"not {level!r}")
-    if task.contacts is not contacts:
-        raise HierarchyError(f"task {task.name!r}: its contacts are not those of the stack; give "
-                             "both the same object")
+    refuse(level != "torque", f"task {task.name!r}: contact forces need the level 'torque', not "
+           f"{level!r}")
+    refuse(task.contacts is not contacts, f"task {task.name!r}: its contacts are not those of the "
+           "stack; give both the same object")
 
 
 def _metric(metric: ArrayLike | Literal["mass"] | None,
@@ -228,9 +222,7 @@ def _metric(metric: ArrayLike | Literal["mass"] | None,
         return None
     if not isinstance(metric, str):
         return checked_metric(metric)
-    if metric != "mass":
-        raise HierarchyError(f"metric must be (n, n), 'mass' or None, got {metric!r}")
-    if contacts is not None and contacts.contacts:
-        raise HierarchyError("metric 'mass' is over accelerations alone, and contact forces have "
-                             "no mass; give a metric over both")
+    refuse(metric != "mass", f"metric must be (n, n), 'mass' or None, got {metric!r}")
+    refuse(contacts is not None and contacts.contacts, "metric 'mass' is over accelerations "
+           "alone, and contact forces have no mass; give a metric over both")
     return "mass"

@@ -6,16 +6,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import Field, fields, is_dataclass
 from functools import wraps
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from hierarchy.avoidance.barrier import Barrier
-from hierarchy.avoidance.control_points import pack_points
+from hierarchy.avoidance.body import pack_points
+from hierarchy.avoidance.laws import Barrier
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, brief, expect
-from hierarchy.gate import check_rows
+from hierarchy.errors import HierarchyError, brief, expect, refuse
+from hierarchy.gate import check_rows, shaped
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
@@ -36,6 +36,23 @@ _PARTS: dict[str, tuple[type, str]] = {
     "Path": (Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
     "Contacts": (Contacts, "Contacts(robot, ...) of hierarchy.contacts"),
     "Barrier": (Barrier, "Barrier(distance) of hierarchy.avoidance")}
+
+
+class Rows(NamedTuple):
+    """Where a task writes its rows: A (m, n), lower and upper (m,), in the arrays of a stack."""
+
+    A: Array
+    lower: Array
+    upper: Array
+
+    @classmethod
+    def empty(cls, m: int, n: int) -> Rows:
+        """Return rows of their own, of zeros."""
+        return cls(np.zeros((m, n)), np.zeros(m), np.zeros(m))
+
+    def some(self, first: int, count: int) -> Rows:
+        """Return `count` of the rows, as views."""
+        return Rows(*(part[first:first + count] for part in self))
 
 
 class Task(ABC):
@@ -81,6 +98,10 @@ class Task(ABC):
         """
         check_parts(self)
         check_gains(self)
+
+    def refuse(self, wrong: object, said: str) -> None:
+        """Raise a HierarchyError that names the task, and says what is wrong, if it is."""
+        refuse(wrong, f"task {self.name!r}: {said}")
 
     @property
     @abstractmethod
@@ -133,24 +154,22 @@ class Task(ABC):
         return (self.desired_acceleration(state) + self.damping * rate
                 + self.stiffness * np.asarray(self.error(state)))
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
-        """Return a function that writes this task's rows into A (m_all, n), lower, upper (m_all,).
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
+        """Return a function that writes this task's rows for the present values of the state.
 
-        Each call writes the rows from `row` on for the present values of the state. A stack keeps
-        the writer as long as the state, and the measurement that it carries, are the same objects.
-        This general form calls the methods above; tasks override it with a kernel bound to its
-        arrays. A call raises HierarchyError, naming task and row, if a method returns the wrong
-        shape or NaN.
+        A stack keeps the writer as long as the state, and the measurement that it carries, are the
+        same objects. This general form calls the methods above; tasks override it with a kernel
+        bound to its arrays. A call raises HierarchyError, naming task and row, if a method returns
+        the wrong shape or NaN.
         """
-        rows = slice(row, row + self.dimension)
+        A, lower, upper = rows
 
         def write() -> None:
-            A[rows] = _shaped(self, "jacobian", self.jacobian(state),
-                              (self.dimension, A.shape[1]))
-            lower[rows] = _shaped(self, "reference", self._sides(state, level), (self.dimension,))
-            upper[rows] = lower[rows] if self.kind == "equality" else np.inf
-            check_rows(f"task {self.name!r}", A[rows], lower[rows], upper[rows])
+            A[:] = shaped(f"task {self.name!r}: jacobian", self.jacobian(state), A.shape)
+            lower[:] = shaped(f"task {self.name!r}: reference", self._sides(state, level),
+                              lower.shape)
+            upper[:] = lower if self.kind == "equality" else np.inf
+            check_rows(f"task {self.name!r}", *rows)
 
         return write
 
@@ -158,8 +177,8 @@ class Task(ABC):
         """Required value of J x (m,), x being the velocity or the acceleration."""
         if level == "velocity":
             return self.reference_velocity(state)
-        drift = _shaped(self, "jacobian_derivative", self.jacobian_derivative(state),
-                        (self.dimension, state.n)) @ state.v
+        drift = shaped(f"task {self.name!r}: jacobian_derivative", self.jacobian_derivative(state),
+                       (self.dimension, state.n)) @ state.v
         return self.reference_acceleration(state) - drift
 
 
@@ -172,8 +191,7 @@ def check_gains(task: Task) -> None:
             sound = bool(sides.dtype.kind in "iuf" and ((sides >= 0.0) & (sides < np.inf)).all())
         except (TypeError, ValueError):
             sound = False
-        if not sound:
-            raise HierarchyError(f"task {task.name!r}: {gain} = {value!r}, expected a number >= 0")
+        refuse(not sound, f"task {task.name!r}: {gain} = {value!r}, expected a number >= 0")
 
 
 def check_period(task: Task, period: float) -> None:
@@ -184,14 +202,12 @@ def check_period(task: Task, period: float) -> None:
     """
     for part in (task, *parts(task)):
         own = getattr(part, "period", period)
-        if abs(own - period) > _ROUNDING * period:
-            raise HierarchyError(f"task {part.name!r}: its period is {own:g} s, that of the "
-                                 f"velocity {period:g} s; give both the same")
+        refuse(abs(own - period) > _ROUNDING * period, f"task {part.name!r}: its period is "
+               f"{own:g} s, that of the velocity {period:g} s; give both the same")
         gain = np.max(np.asarray(part.gain, dtype=float), initial=0.0)
-        if gain * period > 2.0 * (1.0 + _ROUNDING):
-            raise HierarchyError(f"task {part.name!r}: gain = {gain:g} 1/s times the period of "
-                                 f"{period:g} s is {gain * period:g}; above 2 its error grows from "
-                                 f"tick to tick, so give at most {2.0 / period:g} 1/s")
+        refuse(gain * period > 2.0 * (1.0 + _ROUNDING), f"task {part.name!r}: gain = {gain:g} 1/s "
+               f"times the period of {period:g} s is {gain * period:g}; above 2 its error grows "
+               f"from tick to tick, so give at most {2.0 / period:g} 1/s")
 
 
 def parts(task: Task) -> Iterator[Task]:
@@ -208,12 +224,10 @@ def check_parts(task: Task) -> None:
 
     A task has no robot at hand in which it could look up a frame.
     """
-    if not isinstance(task.name, str) or not task.name:
-        raise HierarchyError(f"{type(task).__name__}: name: expected a text, got "
-                             f"{brief(task.name)}")
-    if task.kind not in get_args(Kind):
-        raise HierarchyError(f"task {task.name!r}: kind must be 'equality' or 'inequality', got "
-                             f"{task.kind!r}")
+    refuse(not isinstance(task.name, str) or not task.name, f"{type(task).__name__}: name: "
+           f"expected a text, got {brief(task.name)}")
+    refuse(task.kind not in get_args(Kind), f"task {task.name!r}: kind must be 'equality' or "
+           f"'inequality', got {task.kind!r}")
     parts: tuple[Field[Any], ...] = fields(task) if is_dataclass(task) else ()
     for part in parts:
         named = part.type if isinstance(part.type, str) else part.type.__name__
@@ -224,8 +238,8 @@ def check_parts(task: Task) -> None:
                 raise HierarchyError(f"task {task.name!r}: {part.name} is the name {value!r}; "
                                      f"give {remedy.replace('NAME', repr(value))}")
             expect(f"task {task.name!r}: {part.name}", value, kind, f"give {remedy}")
-        if named == "Barrier" and task.kind != "inequality":
-            raise HierarchyError(f"task {task.name!r}: its rows are inequalities")
+        refuse(named == "Barrier" and task.kind != "inequality", f"task {task.name!r}: its rows "
+               "are inequalities")
     if any(part.type == "Sequence[ControlPoint]" for part in parts) and not len(
             pack_points(task.points)[0]):  # type: ignore[attr-defined]
         raise HierarchyError(f"task {task.name!r}: needs at least one control point")
@@ -268,24 +282,25 @@ def in_turn(*functions: Writer) -> Writer:
     return call if len(functions) > 1 else functions[0]
 
 
-def writer_in_stack(task: Task, state: State, level: Level, A: Array, lower: Array, upper: Array,
-                    row: int) -> Writer:
+def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Writer:
     """Return the writer of a task; at level "torque" one of the joints writes their columns."""
     if level == "torque" and not task.of_forces:
-        level, A = "acceleration", A[:, :state.n]
-    return task.writer(state, level, A, lower, upper, row)
+        level, rows = "acceleration", rows._replace(A=rows.A[:, :state.n])
+    return task.writer(state, level, rows)
 
 
-def _shaped(task: Task, what: str, value: Array, shape: tuple[int, ...]) -> Array:
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise HierarchyError(f"task {task.name!r}: {what} is no array of numbers: {brief(value)}"
-                             ) from None
-    if array.shape != shape:
-        raise HierarchyError(f"task {task.name!r}: {what} has shape {array.shape}, "
-                             f"expected {shape}")
-    return array
+class NamedRows(Task):
+    """A task with as many rows as names of them. Abstract: needs `row_names`."""
+
+    @property
+    def dimension(self) -> int:
+        """Number of rows m."""
+        return len(self.row_names)
+
+    @property
+    @abstractmethod
+    def row_names(self) -> tuple[str, ...]:
+        """What each row is about."""
 
 
 class Written(Task):
@@ -295,24 +310,22 @@ class Written(Task):
     """
 
     @abstractmethod
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
 
-    def rows(self, state: State, level: Level = "velocity") -> tuple[Array, Array, Array]:
-        """The rows at a state: A (m, n), lower and upper (m,); of forces, see `ForceTask`."""
+    def rows(self, state: State, level: Level = "velocity") -> Rows:
+        """The rows at a state; of forces, see `ForceTask`."""
         columns = state.n
         if self.of_forces:
             level = "acceleration" if self.contacts is None else "torque"
             columns = columns if self.contacts is None else self.contacts.unknowns
-        A = np.zeros((self.dimension, columns))
-        lower, upper = np.zeros((2, self.dimension))
-        self.writer(state, level, A, lower, upper, 0)()
-        return A, lower, upper
+        rows = Rows.empty(self.dimension, columns)
+        self.writer(state, level, rows)()
+        return rows
 
     def jacobian(self, state: State) -> Array:
         """The rows over the unknowns (m, n)."""
-        return self.rows(state)[0]
+        return self.rows(state).A
 
     def jacobian_derivative(self, state: State) -> Array:
         """Their exact time derivative (m, n), by differences: to some 1e-9."""
@@ -320,11 +333,11 @@ class Written(Task):
 
     def reference_velocity(self, state: State) -> Array:
         """The least velocity of the task (m,)."""
-        return self.rows(state)[1]
+        return self.rows(state).lower
 
     def reference_acceleration(self, state: State) -> Array:
         """The least acceleration of the task (m,)."""
-        return self.rows(state, "acceleration")[1] + self.jacobian_derivative(state) @ state.v
+        return self.rows(state, "acceleration").lower + self.jacobian_derivative(state) @ state.v
 
 
 def derivative(task: Task, state: State) -> Array:

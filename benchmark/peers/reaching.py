@@ -18,9 +18,9 @@ from benchmark.tables import Column, Table, power
 from benchmark.timing import times_of
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
+from hierarchy.kinematics import rotation_vector
 from hierarchy.problem import Array
 from hierarchy.robots.names import file_of
-from hierarchy.tasks.pose import rotation_vector
 
 QUESTIONS = "benchmark.peers.questions:Reaching"
 TOLERANCE = 1e-6     # of the errors [m and rad] together

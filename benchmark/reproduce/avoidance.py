@@ -7,9 +7,9 @@ from typing import Any, final
 
 import numpy as np
 
+from hierarchy.kinematics import cross
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.tasks.geometric import cross
 from scenarios.config import Scenario
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate

@@ -9,11 +9,11 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy.avoidance.laws import repulsion
 from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turning_off_obstacle
-from hierarchy.avoidance.repulsion import repulsion
-from hierarchy.errors import HierarchyError, number
+from hierarchy.errors import number, refuse
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import Readings, point_at
+from hierarchy.kinematics import Readings, dot, place, plus
 from hierarchy.problem import Array
 
 
@@ -28,12 +28,10 @@ class SurveillanceAreas:
     def __post_init__(self) -> None:
         for name in ("near", "far", "end_effector"):
             number(f"surveillance area {name}", getattr(self, name))
-        if not 0.0 <= self.near <= self.far:
-            raise HierarchyError(f"surveillance areas need 0 <= near <= far, got near = "
-                                 f"{self.near} m, far = {self.far} m")
-        if self.end_effector < 0.0:
-            raise HierarchyError(f"surveillance area end_effector = {self.end_effector} m must "
-                                 "not be negative")
+        refuse(not 0.0 <= self.near <= self.far, "surveillance areas need 0 <= near <= far, got "
+               f"near = {self.near} m, far = {self.far} m")
+        refuse(self.end_effector < 0.0, f"surveillance area end_effector = {self.end_effector} m "
+               "must not be negative")
 
 
 class Measurement:
@@ -102,33 +100,24 @@ def _measure(placements, joints, offsets, obstacles, laws, mean_within, seen):
     count = len(joints)
     active, D_minimal = -1, np.inf
     for k in range(count):
-        joint = joints[k]
-        for i in range(3):
-            points[k, i] = point_at(placements, joint, offsets[k], i)
-        D_min, at = np.inf, -1
-        ax = ay = az = x = y = z = 0.0
-        within = mean_within[1 if k == count - 1 else 0]
-        away = direction[k]  # overwritten for each obstacle
+        point = place(placements[joints[k]], offsets[k])
+        points[k, 0], points[k, 1], points[k, 2] = point
+        of = 1 if k == count - 1 else 0
+        D_min, at, away, total = np.inf, -1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for j in range(obstacles.shape[0]):
-            D = distance_to_obstacle(obstacles[j], points[k, 0], points[k, 1], points[k, 2], away)
+            D, u = distance_to_obstacle(obstacles[j], point)
             if D < D_min:  # (22)
-                D_min, at = D, j
-                ax, ay, az = away[0], away[1], away[2]
-            if D < within:  # (25); the factor 1/h cancels in (26)
-                x += away[0]
-                y += away[1]
-                z += away[2]
-        direction[k, 0], direction[k, 1], direction[k, 2] = ax, ay, az
-        distance[k], nearest[k] = D_min, at
-        if at < 0:
-            magnitude[k] = 0.0
-            continue
-        norm = sqrt(x * x + y * y + z * z)
+                D_min, at, away = D, j, u
+            if D < mean_within[of]:  # (25); the factor 1/h cancels in (26)
+                total = plus(total, u)
+        distance[k], nearest[k], magnitude[k] = D_min, at, 0.0
+        if at >= 0:
+            magnitude[k] = repulsion(max(D_min, 0.0), laws[of, 0], laws[of, 1], laws[of, 2],
+                                     laws[of, 3])  # (23)
+        norm = sqrt(dot(total, total))
         if norm > 1e-6:  # else the unit vectors cancel, or none is within
-            direction[k, 0], direction[k, 1], direction[k, 2] = x / norm, y / norm, z / norm  # (26)
-        law = 1 if k == count - 1 else 0
-        magnitude[k] = repulsion(max(D_min, 0.0), laws[law, 0], laws[law, 1], laws[law, 2],
-                                 laws[law, 3])  # (23)
+            away = (total[0] / norm, total[1] / norm, total[2] / norm)  # (26)
+        direction[k, 0], direction[k, 1], direction[k, 2] = away
         if k < count - 1 and D_min < D_minimal:  # (31)
             D_minimal, active = D_min, k
     chosen[0] = active
@@ -171,10 +160,11 @@ def measure_pairs(pairs: Pairs, points: Array, obstacles: Obstacles) -> None:
 @compiled
 def _measure_pairs(points, obstacles, motion, table):
     for k in range(table.shape[0]):
-        x, y, z = points[k, 0], points[k, 1], points[k, 2]
         for j in range(table.shape[1]):
             pair = table[k, j]
-            pair[0] = distance_to_obstacle(obstacles[j], x, y, z, pair[1:4])
+            pair[0], r = distance_to_obstacle(obstacles[j], points[k])
+            pair[1], pair[2], pair[3] = r
             for i in range(6):
                 pair[4 + i] = motion[j, i]
-            pair[13] = turning_off_obstacle(obstacles[j], x, y, z, pair[0], pair[10:13])
+            pair[13], straight = turning_off_obstacle(obstacles[j], points[k], pair[0])
+            pair[10], pair[11], pair[12] = straight

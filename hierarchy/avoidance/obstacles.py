@@ -9,9 +9,10 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, UnknownNameError, expect_each
+from hierarchy.errors import UnknownNameError, expect_each, refuse
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled, inlined
+from hierarchy.kinematics import dot, less
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 
@@ -43,11 +44,11 @@ class Obstacle:
         if self.shape not in SHAPES:
             raise UnknownNameError("obstacle shape", self.shape, SHAPES)
         expected = SHAPES[self.shape]
-        if len(self.size) != expected or any(not 0.0 < s < inf for s in self.size):
-            raise HierarchyError(f"{self.name}: a {self.shape} takes {expected} positive "
-                                 f"size(s), got {list(self.size)}")
-        if not np.isfinite(np.asarray(self.centre, dtype=float)).all():
-            raise HierarchyError(f"{self.name}: centre {list(self.centre)} is not finite")
+        refuse(len(self.size) != expected or any(not 0.0 < s < inf for s in self.size),
+               f"{self.name}: a {self.shape} takes {expected} positive size(s), got "
+               f"{list(self.size)}")
+        refuse(not np.isfinite(np.asarray(self.centre, dtype=float)).all(),
+               f"{self.name}: centre {list(self.centre)} is not finite")
         check_rotation(f"{self.name}: rotation", self.rotation)
 
     def packed(self) -> Array:
@@ -98,84 +99,74 @@ class Obstacles:
 
 
 @inlined
-def _in_axes(obstacle, x, y, z):
+def _in_axes(obstacle, p):
     """A point in the axes of an obstacle, as a tuple."""
-    ox, oy, oz = x - obstacle[4], y - obstacle[5], z - obstacle[6]
-    return (obstacle[7] * ox + obstacle[10] * oy + obstacle[13] * oz,
-            obstacle[8] * ox + obstacle[11] * oy + obstacle[14] * oz,
-            obstacle[9] * ox + obstacle[12] * oy + obstacle[15] * oz)
+    o = less(p, obstacle[4:7])
+    return (obstacle[7] * o[0] + obstacle[10] * o[1] + obstacle[13] * o[2],
+            obstacle[8] * o[0] + obstacle[11] * o[1] + obstacle[14] * o[2],
+            obstacle[9] * o[0] + obstacle[12] * o[1] + obstacle[15] * o[2])
 
 
-@compiled
-def distance_to_obstacle(obstacle, x, y, z, away):
-    """Signed distance of a point to one obstacle; writes the unit vector away from it to `away`.
+@inlined
+def distance_to_obstacle(obstacle, p):
+    """Signed distance of a point (3,) to one obstacle, and the unit vector away from it, a tuple.
 
     The distance is negative inside. Where the direction is undefined (on a point, at a centre or
-    on an axis), `away` (3,) is the obstacle's z axis.
+    on an axis) it is the obstacle's z axis.
     """
-    px, py, pz = _in_axes(obstacle, x, y, z)
-    shape = int(obstacle[0])
+    x, y, z = _in_axes(obstacle, p)
+    shape, u = int(obstacle[0]), (0.0, 0.0, 1.0)
     if shape == 3:
-        D, ux, uy, uz = _off_box(obstacle[1], obstacle[2], obstacle[3], px, py, pz)
+        D, u = _off_box(obstacle[1:4], x, y, z)
     else:
         if shape == 2:  # nearest point of the capsule's segment
-            pz -= min(max(pz, -obstacle[2]), obstacle[2])
-        length = sqrt(px * px + py * py + pz * pz)
+            z -= min(max(z, -obstacle[2]), obstacle[2])
+        length = sqrt(x * x + y * y + z * z)
         D = length - obstacle[1]
         if length > 1e-12:
-            ux, uy, uz = px / length, py / length, pz / length
-        else:
-            ux, uy, uz = 0.0, 0.0, 1.0
-    for i in range(3):
-        away[i] = obstacle[7 + 3 * i] * ux + obstacle[8 + 3 * i] * uy + obstacle[9 + 3 * i] * uz
-    return D
+            u = (x / length, y / length, z / length)
+    return D, (dot(obstacle[7:10], u), dot(obstacle[10:13], u), dot(obstacle[13:16], u))
 
 
 @compiled
-def turning_off_obstacle(obstacle, x, y, z, D, straight):
-    """Radius [m] about which the direction away from an obstacle turns; infinite at a flat face.
+def turning_off_obstacle(obstacle, p, D):
+    """Radius [m] about which the direction away from an obstacle turns, and a vector e, a tuple.
 
     The second derivative of the distance D with respect to the point is
-    (I - r r^T - e e^T) / radius; e is `straight` (3,): the axis of a capsule beside its cylinder,
-    the direction of an edge of a box beside that edge, and zero elsewhere.
+    (I - r r^T - e e^T) / radius; e is the axis of a capsule beside its cylinder, the direction of
+    an edge of a box beside that edge, and zero elsewhere. At a flat face the radius is infinite.
     """
-    straight[0] = straight[1] = straight[2] = 0.0
-    shape = int(obstacle[0])
+    shape, beyond, axis = int(obstacle[0]), 0, -1
     if shape < 2:
-        return D + obstacle[1]
-    p = _in_axes(obstacle, x, y, z)
+        return D + obstacle[1], (0.0, 0.0, 0.0)
+    q = _in_axes(obstacle, p)
     if shape == 2:
-        _copy_axis(obstacle, 2 if abs(p[2]) < obstacle[2] else -1, straight)
-        return D + obstacle[1]
-    beyond, axis = 0, -1
+        return D + obstacle[1], _axis(obstacle, 2 if abs(q[2]) < obstacle[2] else -1)
     for i in range(3):  # outside one pair of faces: flat; two: an edge; three: a corner
-        if abs(p[i]) > obstacle[1 + i]:
+        if abs(q[i]) > obstacle[1 + i]:
             beyond += 1
         else:
             axis = i
-    if beyond < 2:
-        return np.inf
-    _copy_axis(obstacle, axis, straight)
-    return D
+    return (np.inf, (0.0, 0.0, 0.0)) if beyond < 2 else (D, _axis(obstacle, axis))
 
 
-@compiled
-def _copy_axis(obstacle, axis, out):
-    if axis >= 0:
-        for i in range(3):
-            out[i] = obstacle[7 + 3 * i + axis]
+@inlined
+def _axis(obstacle, axis):
+    """An axis of an obstacle in the world, or zero for -1."""
+    if axis < 0:
+        return 0.0, 0.0, 0.0
+    return obstacle[7 + axis], obstacle[10 + axis], obstacle[13 + axis]
 
 
-@compiled
-def _off_box(hx, hy, hz, px, py, pz):
-    dx, dy, dz = abs(px) - hx, abs(py) - hy, abs(pz) - hz
+@inlined
+def _off_box(h, px, py, pz):
+    """The same of a box of half lengths h at the origin."""
+    dx, dy, dz = abs(px) - h[0], abs(py) - h[1], abs(pz) - h[2]
     sx, sy, sz = (1.0 if px >= 0 else -1.0), (1.0 if py >= 0 else -1.0), (1.0 if pz >= 0 else -1.0)
     if dx <= 0.0 and dy <= 0.0 and dz <= 0.0:  # inside: leave through the nearest face
         if dx >= dy and dx >= dz:
-            return dx, sx, 0.0, 0.0
-        if dy >= dz:
-            return dy, 0.0, sy, 0.0
-        return dz, 0.0, 0.0, sz
+            return dx, (sx, 0.0, 0.0)
+        return (dy, (0.0, sy, 0.0)) if dy >= dz else (dz, (0.0, 0.0, sz))
     ex, ey, ez = max(dx, 0.0), max(dy, 0.0), max(dz, 0.0)
     D = sqrt(ex * ex + ey * ey + ez * ez)
-    return D, sx * ex / D, sy * ey / D, sz * ez / D
+    return D, (sx * ex / D, sy * ey / D, sz * ez / D)

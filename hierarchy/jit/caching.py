@@ -1,30 +1,48 @@
-"""Compiled kernels on disk: one file for a kernel, the types of its arguments, and a machine.
+"""Compiled kernels on disk: made when the package was built, or here when they were first needed.
 
-numba's own cache does not notice when a helper in another file has changed. Here the name of a file
-carries a digest of everything that the code depends on, so no stale one is found. The cache is a
-convenience: what cannot be read is compiled, and what cannot be written is lost with the process.
-Files hold pickles, so only those are read that this user or root has written and nobody else can.
+Ahead: object files, each with an index that has, for each kernel, the digest of the sources that it
+was made of and the types of arguments that there is code for. Any other call, and a kernel whose
+sources have changed since, is compiled when it is needed.
+
+Then: one file for a kernel, the types of its arguments, and a machine. numba's own cache does not
+notice when a helper in another file has changed. Here the name of a file carries a digest of
+everything that the code depends on, so no stale one is found. The cache is a convenience: what
+cannot be read is compiled, and what cannot be written is lost with the process. Files hold pickles,
+so only those are read that this user or root has written and nobody else can.
 """
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
+import json
 import os
 import pickle
 import stat
 import sys
 import tempfile
 from contextlib import suppress
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, final
 
 import llvmlite
 import numba
+import numpy as np
 
-from hierarchy.jit.inside import CompileResult, NullCache, dumps, llvm, nrt_helpers
+from hierarchy.jit.inside import (
+    CompileResult,
+    Environment,
+    NullCache,
+    dumps,
+    llvm,
+    load_helpers,
+    make_function,
+    nrt_helpers,
+)
 from hierarchy.jit.linking import found
 from hierarchy.jit.saying import say
 from hierarchy.jit.sources import described, source_digest
@@ -94,18 +112,15 @@ def _read(file: Path) -> bytes | None:
     """Return the content of a file; None if it is missing, damaged or of another user."""
     try:
         with file.open("rb") as opened:
-            if not _is_trusted(os.fstat(opened.fileno())):
+            status = os.fstat(opened.fileno())
+            if sys.platform != "win32" and (status.st_uid not in (0, os.getuid())
+                                            or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)):
                 return None
             content = opened.read()
     except OSError:
         return None
     body = content[_CHECKSUM:]
     return body if content[:_CHECKSUM] == _checksum(file, body) else None
-
-
-def _is_trusted(status: os.stat_result) -> bool:
-    return sys.platform == "win32" or (status.st_uid in (0, os.getuid())
-                                       and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
 
 
 def _write(file: Path, body: bytes) -> None:
@@ -174,3 +189,107 @@ def _prepare_compilation() -> None:
 def _expect_blas() -> None:
     if find_spec("scipy") is None:
         raise ImportError("scipy is not installed")
+
+
+FOLDER = Path(__file__).with_name("objects")
+NATIVE = "TASK_HIERARCHY_NATIVE"  # set: every kernel is compiled for this very processor
+PROCESSOR = "x86-64-v3"
+_FEATURES = ("avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt",
+             "sahf", "sse3", "sse4.1", "sse4.2", "ssse3", "xsave")  # of x86-64-v3
+
+
+@final
+@dataclass(frozen=True)
+class Code:
+    """Code for one list of types: names in the object file, and what its environment holds.
+
+    digest : of the sources that the code was made of.
+    """
+
+    digest: str
+    wrapper: str
+    environment: str
+    constants: tuple[str, ...]
+
+
+@final
+@dataclass(frozen=True)
+class Part:
+    """An object file and its index.
+
+    calls : digest of the list of calls that it was made for.
+    entries : by name of the kernel and types of arguments, as `name(types)`.
+    externals : the names that the object file expects to find.
+    """
+
+    file: Path
+    calls: str
+    entries: dict[str, Code]
+    externals: tuple[str, ...]
+
+    @staticmethod
+    def read(file: Path) -> Part | None:
+        """Read the index beside an object file; None if it is missing or damaged."""
+        try:
+            index = json.loads(file.with_suffix(".json").read_text())
+            return Part(file, index["calls"],
+                        {call: Code(**entry) for call, entry in index["entries"].items()},
+                        tuple(index["externals"]))
+        except (OSError, ValueError, LookupError, TypeError, AttributeError):
+            return None
+
+    def write(self, code: bytes) -> None:
+        """Write both files, the object first."""
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        self.file.write_bytes(code)
+        index = {"calls": self.calls, "externals": self.externals,
+                 "entries": {call: vars(entry) for call, entry in self.entries.items()}}
+        self.file.with_suffix(".json").write_text(json.dumps(index, indent=1))
+
+    @cached_property
+    def engine(self) -> Any:
+        """The loaded object file; None if this numba or this Python lacks what it expects."""
+        load_helpers()
+        register_symbols()
+        if any(llvm.address_of_symbol(name) is None for name in self.externals):
+            return None
+        target = llvm.Target.from_triple(llvm.get_process_triple())
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.create_target_machine())
+        engine.add_object_file(llvm.ObjectFileRef.from_path(str(self.file)))
+        engine.finalize_object()
+        return engine
+
+    def function(self, entry: Code, kernel: Any) -> Any:
+        """Return what Python calls; None if the object file cannot be loaded."""
+        if self.engine is None:
+            return None
+        module, address = import_module(kernel.__module__), self.engine.get_function_address
+        environment = Environment(vars(module))
+        environment.env_name = entry.environment
+        environment.consts.extend(map(np.dtype, entry.constants))
+        place = self.engine.get_global_value_address(entry.environment)
+        ctypes.c_void_p.from_address(place).value = id(environment)
+        return make_function(module, kernel.__name__, kernel.__doc__ or "",
+                                      address(entry.wrapper), environment, (self.engine,))
+
+
+def find(kernel: Any, kinds: tuple[Any, ...]) -> Any:
+    """Return what Python calls for a kernel and the types of arguments; None if there is none."""
+    call = f"{kernel.__module__}.{kernel.__qualname__}({described(kinds)})"
+    for part in parts():
+        entry = part.entries.get(call)
+        if entry is not None and entry.digest == source_digest(kernel):
+            return part.function(entry, kernel)
+    return None
+
+
+@cache
+def parts() -> tuple[Part, ...]:
+    """Return the object files that this processor can run."""
+    files = sorted(FOLDER.glob("*.o"))
+    if not files or os.environ.get(NATIVE):
+        return ()
+    features, triple = llvm.get_host_cpu_features(), llvm.get_process_triple()
+    suits = triple.startswith("x86_64") and "linux" in triple and all(
+        features.get(name) for name in _FEATURES)
+    return tuple(filter(None, map(Part.read, files))) if suits else ()

@@ -1,13 +1,20 @@
-"""The one decorator that makes a kernel of a function."""
+"""The one decorator that makes a kernel, and kernels as Python calls them: bound to arrays."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import numba
+import numpy as np
 
-from hierarchy.jit.dispatching import Cached, OnlyInlined
-from hierarchy.jit.sources import Kernel
+from hierarchy.jit.caching import KernelCache, find
+from hierarchy.jit.inside import CPUDispatcher, NumbaError, global_compiler_lock
+from hierarchy.jit.linking import name_of, naming
+from hierarchy.jit.sources import Kernel, described
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
 _MAKERS = {"empty", "empty_like", "zeros", "zeros_like", "ones", "full", "eye", "copy", "array"}
@@ -53,9 +60,101 @@ def _allocates(function: Kernel) -> bool:
     One that does not needs no reference counts; without them a call costs half (7 arrays: 0.15 us
     in place of 0.3), and a view of a row nothing.
     """
-    return (not _MAKERS.isdisjoint(function.__code__.co_names)
-            or any(getattr(kernel, "allocates", False) for kernel in _called(function)))
+    names = function.__code__.co_names
+    return not _MAKERS.isdisjoint(names) or any(
+        getattr(function.__globals__.get(name), "allocates", False) for name in names)
 
 
-def _called(function: Kernel) -> list[Any]:
-    return [function.__globals__.get(name) for name in function.__code__.co_names]
+if hasattr(os, "register_at_fork"):  # a child of a thread that waits would wait for ever
+    os.register_at_fork(before=global_compiler_lock.acquire,
+                        after_in_parent=global_compiler_lock.release,
+                        after_in_child=global_compiler_lock.release)
+
+asked: set[str] = set()  # what Python has called, or bound, in this process: `name(types)`
+
+
+class Cached(CPUDispatcher):  # type: ignore[misc]
+    """A kernel that looks for its files when it is first needed; most are only compiled in."""
+
+    kept = True  # on disk
+    is_named = True  # in code that calls it, not linked into it
+    ready: dict[Any, Any]  # entries for Python by types of arguments, compiled ahead
+    _cache: Any
+
+    def entry(self, kinds: tuple[Any, ...]) -> Any:
+        """Return what Python calls with arguments of these types, compiled ahead or now."""
+        with global_compiler_lock:
+            return self._ready(kinds) or self.compile(kinds)
+
+    def _ready(self, kinds: tuple[Any, ...]) -> Any:
+        if name := name_of(self):
+            asked.add(f"{name}({described(kinds)})")
+        if kinds not in self.ready and kinds not in self.overloads:
+            found = find(self, kinds)
+            if found is not None:
+                self.ready[kinds] = found
+                self._insert([kind._code for kind in kinds], found, False)
+        return self.ready.get(kinds)
+
+    def _compile_for_args(self, *arguments: Any, **named: Any) -> Any:
+        with global_compiler_lock, suppress(ValueError, NumbaError):
+            found = self._ready(tuple(map(numba.typeof, arguments)))
+            if found is not None:
+                return found
+        return super()._compile_for_args(*arguments, **named)
+
+    def add_overload(self, made: Any) -> None:
+        """Take code in; where there is an entry compiled ahead, only for kernels that call this."""
+        if self.is_named and (name := name_of(self)):
+            made.library.kernel = name, made.signature.args
+        if made.signature.args in self.ready:
+            self.overloads[made.signature.args] = made
+        else:
+            super().add_overload(made)
+
+    def compile(self, signature: Any) -> Any:
+        """Return the function that Python calls, compiled now or loaded from the cache."""
+        with global_compiler_lock:
+            if self.kept and not isinstance(self._cache, KernelCache):
+                self._cache = KernelCache(self.py_func)
+            with naming(None if self.is_named else self.py_func):
+                return super().compile(signature)
+
+
+class OnlyInlined(Cached):
+    """A kernel without an entry for Python, where a call would end the process."""
+
+    is_named = kept = False
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Raise a TypeError."""
+        raise TypeError(f"{self.py_func.__name__} is compiled into other kernels; "
+                        "Python calls what is `compiled`")
+
+
+def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callable[..., Any]:
+    """Return `kernel` bound to its first arguments; a call gives the rest: numbers, tuples of them.
+
+    A call of a kernel looks at the type of every argument, each time (20 arrays: 0.4 us). Here that
+    is done once, and a call costs a third. `then` has an example of each argument of a call; where
+    it has a number, a call may give any that Python can convert.
+    """
+    dispatcher: Any = kernel
+    if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT
+        return partial(kernel, *arguments)
+    types = tuple(_type_of(value) for value in (*arguments, *then))
+    entry = dispatcher.entry(types)
+    return partial(entry, *arguments) if arguments else entry
+
+
+_TYPES: dict[tuple[Any, ...], Any] = {}
+
+
+def _type_of(value: Any) -> Any:
+    """Return numba's type of a value; types of arrays are cached, since finding one takes 4 us."""
+    if not isinstance(value, np.ndarray):
+        return numba.typeof(value)
+    kind = value.dtype, value.ndim, value.flags.num
+    if kind not in _TYPES:
+        _TYPES[kind] = numba.typeof(value)
+    return _TYPES[kind]

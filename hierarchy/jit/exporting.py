@@ -1,30 +1,28 @@
-"""Compiled functions for programs without Python: a C signature, and LLVM code to make objects of.
+"""Object files: of functions for programs without Python, and of kernels for `ahead` to load.
 
 numba's own `cfunc` reports errors through the interpreter and so refers to it. Here a function gets
-a plain C entry that returns its error code instead, and nothing refers to Python.
+a plain C entry that returns its error code instead, and nothing refers to Python. A kernel is
+compiled as it would be when called, for a processor that numba is told by its environment when this
+process starts; only the machine code is made once, of all of them together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, final
 
 import numba
+import numpy as np
 from llvmlite import ir
 from numba.np import arrayobj
 
-from hierarchy.jit.inside import (
-    cgutils,
-    compiler,
-    global_compiler_lock,
-    intrinsic,
-    llvm,
-    registry,
-    types,
-)
-from hierarchy.jit.linking import linked, naming
-from hierarchy.jit.sources import Kernel
+from hierarchy.jit.caching import PROCESSOR, Code, Part
+from hierarchy.jit.compiling import Cached
+from hierarchy.jit.inside import cgutils, compiler, global_compiler_lock, llvm, registry, types
+from hierarchy.jit.linking import Library, found, linked, naming
+from hierarchy.jit.sources import Kernel, kinds_in, source_digest
 
 INTEGER, STATUS = types.int64, types.int32  # of arguments and results; a pointer is an INTEGER too
 
@@ -138,7 +136,55 @@ def _view(dtype: Any) -> Any:
 
         return kind(types.int64, types.int64), write
 
-    return intrinsic(view)
+    return numba.extending.intrinsic(view)
 
 
 numbers_at, integers_at = _view(types.float64), _view(types.int64)
+
+
+ENVIRONMENT = {"NUMBA_CPU_NAME": PROCESSOR, "NUMBA_CPU_FEATURES": "",
+               "NUMBA_DISABLE_INTEL_SVML": "1"}  # of a process that builds
+
+
+@global_compiler_lock  # type: ignore[untyped-decorator]
+def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None]) -> None:
+    """Write an object file with these calls, whose list has the digest `of`.
+
+    calls : each `name(types)`, as `described` writes types. say : takes the number compiled.
+    """
+    Library.running = Cached.kept = False
+    libraries: list[Any] = []
+    entries: dict[str, Code] = {}
+    for count, call in enumerate(calls):
+        say(count)
+        name, _, text = call.removesuffix(")").partition("(")
+        kernel, kinds = found(name), kinds_in(text)
+        kernel.compile(kinds)
+        made = kernel.overloads[kinds]
+        if (entry := _entry(made, source_digest(kernel))) is not None:
+            libraries.append(made.library)
+            entries[call] = entry
+    whole = linked(libraries, {name for entry in entries.values()
+                               for name in (entry.wrapper, entry.environment)})
+    here = machine()
+    code = object_code(whole, here.triple, here.processor, here.features)
+    externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)
+                       if one.is_declaration and not one.name.startswith("llvm."))
+    Part(file, of, entries, tuple(externals)).write(code)
+
+
+def is_current(file: Path, of: str) -> bool:
+    """Whether an object file was made of this list of calls from the sources as they are."""
+    part = Part.read(file)
+    return part is not None and part.calls == of and all(
+        entry.digest == source_digest(found(call.partition("(")[0]))
+        for call, entry in part.entries.items())
+
+
+def _entry(made: Any, digest: str) -> Code | None:
+    """Return how to find a compiled call; None if its environment holds other than number types."""
+    constants = made.environment.consts
+    if not all(isinstance(one, np.dtype) and one.fields is None for one in constants):
+        return None
+    return Code(digest, made.fndesc.llvm_cpython_wrapper_name, made.fndesc.env_name,
+                tuple(one.str for one in constants))

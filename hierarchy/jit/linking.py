@@ -117,19 +117,16 @@ def linked(libraries: Iterable[Any], visible: set[str]) -> Any:
     for is_optimised in (False, True):
         for library in behind:
             if (library._finalized and getattr(library, "runs", True)) is is_optimised:
-                _link(whole, library._get_module_for_linking().clone())
+                module = library._get_module_for_linking().clone()
+                for one in (*module.functions, *module.global_variables):
+                    if not one.is_declaration and one.linkage in _SHARED:
+                        one.linkage = "weak_odr"  # or what nothing refers to yet is dropped
+                whole.link_in(module)
         hide(whole, visible)
         if not is_optimised:
             manager, builder = _passes()
             manager.run(whole, builder)
     return whole
-
-
-def _link(whole: Any, module: Any) -> None:
-    for one in (*module.functions, *module.global_variables):
-        if not one.is_declaration and one.linkage in _SHARED:
-            one.linkage = "weak_odr"  # or the linker drops what nothing refers to yet
-    whole.link_in(module)
 
 
 def hide(module: Any, visible: set[str]) -> None:

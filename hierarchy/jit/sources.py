@@ -19,7 +19,7 @@ from hierarchy.jit.linking import found
 
 Kernel = Callable[..., Any]  # without annotations: its types are those of the first call
 _OWN = tuple(str(Path(__file__).with_name(f"{name}.py")) for name in (
-    "compiling", "lanes", "views"))  # these write code of their own
+    "compiling", "intrinsics"))  # these write code of their own
 _KIND = re.compile(r"(readonly )?array\((\w+), (\d)d, (\w)\)|([\w.]+)(\()?|\)")
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, refuse
 from hierarchy.problem import Array
 
 _CHANNELS = tuple(axis + kind for kind in ("position", "rotation") for axis in "xyz")
@@ -46,9 +46,9 @@ def read_bvh(file: str | File) -> Motion:
         values = np.array(words[at + 6:], dtype=float).reshape(frames, count)
     except (ValueError, IndexError, StopIteration) as error:
         raise HierarchyError(f"{file} is no BVH file: {error or 'it ends early'}") from error
-    if not (frames > 0 and period > 0.0 and isfinite(period) and np.isfinite(values).all()):
-        raise HierarchyError(f"{file}: expected frames of finite numbers and a positive time of a "
-                             f"frame, got {frames} frames of {period} s")
+    refuse(not (frames > 0 and period > 0.0 and isfinite(period) and np.isfinite(values).all()),
+           f"{file}: expected frames of finite numbers and a positive time of a frame, got "
+           f"{frames} frames of {period} s")
     return Motion(np.arange(frames, dtype=np.float64) * period, _positions(joints, values))
 
 

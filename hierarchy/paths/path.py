@@ -1,15 +1,18 @@
-"""Paths in space as functions of time: position, velocity and acceleration."""
+"""Paths in space as functions of time: ellipses, lines, blends and recorded motions."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import cos, inf, sin
+from pathlib import Path as File
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, expect, finite_numbers, number
+from hierarchy.errors import HierarchyError, brief, expect, finite_numbers, number, refuse
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -42,7 +45,7 @@ class Still(Path):
     position: Vector
 
     def __post_init__(self) -> None:
-        check_point("position", self.position)
+        finite_numbers("position [m]", self.position, 3)
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -62,7 +65,7 @@ class Ellipse(Path):
 
     def __post_init__(self) -> None:
         for name in ("centre", "cosine", "sine"):
-            check_point(name, getattr(self, name))
+            finite_numbers(f"{name} [m]", getattr(self, name), 3)
         number("ellipse: rate", self.rate)
         set_frozen(self, _packed=np.array([self.centre, self.cosine, self.sine], dtype=float))
 
@@ -82,12 +85,12 @@ def circle(centre: Vector, radius: float, normal: Vector = (0.0, 0.0, 1.0), rate
     It starts, at phase zero, in the direction of the world's x axis as seen in its plane, or of y
     where the normal is along x. Raises HierarchyError for a radius < 0 or a normal of length zero.
     """
-    check_point("centre", centre)
+    finite_numbers("centre [m]", centre, 3)
     z = np.array(normal, dtype=float)
     length = float(np.linalg.norm(z))
-    if z.shape != (3,) or not 1e-9 < length < inf or not 0.0 <= radius < inf:
-        raise HierarchyError(f"circle: radius {radius} and normal {list(normal)}, expected a "
-                             "number >= 0 and a direction")
+    refuse(z.shape != (3,) or not 1e-9 < length < inf or not 0.0 <= radius < inf,
+           f"circle: radius {radius} and normal {list(normal)}, expected a number >= 0 and a "
+           "direction")
     z = z / length
     toward = np.eye(3)[1 if abs(z[0]) > 0.9 else 0]
     x = toward - (toward @ z) * z
@@ -105,7 +108,7 @@ class Shifted(Path):
     offset: Vector
 
     def __post_init__(self) -> None:
-        check_point("offset", self.offset)
+        finite_numbers("offset [m]", self.offset, 3)
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -143,9 +146,9 @@ class Jittered(Path):
         for name in ("amplitude", "rate", "seed"):
             number(f"jitter: {name}", getattr(self, name))
         expect("jitter: path", self.path, Path, "see hierarchy.paths")
-        if not 0.0 <= self.amplitude or not 0.0 < self.rate or self.seed < 0:
-            raise HierarchyError(f"jitter: amplitude {self.amplitude}, rate {self.rate}, seed "
-                                 f"{self.seed}, expected numbers >= 0, > 0 and >= 0")
+        refuse(not 0.0 <= self.amplitude or not 0.0 < self.rate or self.seed < 0,
+               f"jitter: amplitude {self.amplitude}, rate {self.rate}, seed {self.seed}, expected "
+               "numbers >= 0, > 0 and >= 0")
         random = np.random.default_rng(self.seed)
         speeds = 2.0 * np.pi * self.rate * random.uniform(0.5, 1.0, (3, 5))  # rad/s
         set_frozen(self, _sines=np.stack([speeds, random.uniform(0.0, 2.0 * np.pi, (3, 5))]))
@@ -160,15 +163,6 @@ class Jittered(Path):
         out[2] -= size * (speeds**2 * np.sin(angles)).sum(axis=1)
 
 
-def check_point(name: str, vector: Vector) -> None:
-    """Raise a HierarchyError unless a vector is three finite numbers, or return None."""
-    try:
-        finite_numbers(name, vector, 3)
-    except HierarchyError as error:
-        given = list(vector) if isinstance(vector, list | tuple | np.ndarray) else vector
-        raise HierarchyError(f"{name} must be three finite numbers [m], got {given!r}") from error
-
-
 @compiled
 def _write_ellipse(packed, rate, out, t):
     c, s = cos(rate * t), sin(rate * t)
@@ -177,3 +171,173 @@ def _write_ellipse(packed, rate, out, t):
         out[0, i] = packed[0, i] + along
         out[1, i] = rate * (packed[2, i] * c - packed[1, i] * s)
         out[2, i] = -rate * rate * along
+
+
+def line(start: Vector, end: Vector, duration: float, begin: float = 0.0) -> Waypoints:
+    """Return the straight line from `start` to `end` [m] within `duration` [s], from `begin` [s].
+
+    It is quintic in time and rests before and after.
+    """
+    refuse(number("line: duration [s]", duration) <= 0.0, f"line: duration {duration} s must be "
+           "positive")
+    number("line: begin [s]", begin)
+    return Waypoints((begin, begin + duration), (start, end))
+
+
+@dataclass(frozen=True)
+class Waypoints(Path):
+    """Straight lines between points, quintic in time, at rest at every point.
+
+    `times` (N,) [s] increasing, `points` (N, 3) [m]; before the first and after the last it rests.
+    """
+
+    times: Sequence[float]
+    points: Sequence[Vector]
+
+    def __post_init__(self) -> None:
+        _check_points("waypoints", self.times, self.points)
+
+    def write(self, t: float, out: Array) -> None:
+        """See `Path.write`."""
+        i = _interval(self.times, self.points, t, out)
+        if i is None:
+            return
+        span = self.times[i] - self.times[i - 1]
+        s = (t - self.times[i - 1]) / span
+        start = np.asarray(self.points[i - 1], dtype=float)
+        step = np.asarray(self.points[i], dtype=float) - start
+        out[0] = start + step * (s**3 * (10 - 15 * s + 6 * s * s))
+        out[1] = step * (30 * s * s * (1 - s) ** 2 / span)
+        out[2] = step * (60 * s * (1 - s) * (1 - 2 * s) / span**2)
+
+
+@dataclass(frozen=True)
+class Blended(Path):
+    """Straight lines at constant speed between points, blended at each: it does not stop there.
+
+    `times` (N,) [s] increasing, `points` (N, 3) [m]. Within `blend` [s] the velocity of one line
+    becomes that of the next, quintic in time, so that the acceleration is continuous. It rests
+    until the first time, is nearest to point i at times[i] + blend / 2, and rests from
+    times[N - 1] + blend on. A corner is missed by 5/64 blend times the change of velocity.
+
+    Raises HierarchyError for points and times that do not fit, or a blend longer than an interval.
+    """
+
+    times: Sequence[float]
+    points: Sequence[Vector]
+    blend: float
+    _velocities: Array = field(init=False, repr=False, compare=False)  # (N + 1, 3), of the lines
+
+    def __post_init__(self) -> None:
+        _check_points("blended waypoints", self.times, self.points)
+        shortest = min(np.diff(self.times), default=inf)
+        refuse(not 0.0 < self.blend <= shortest, f"blended waypoints: blend {self.blend} s must "
+               f"be positive and at most {shortest:g} s, the shortest interval")
+        points = np.array(self.points, dtype=float)
+        lines = np.diff(points, axis=0) / np.diff(self.times)[:, None]
+        set_frozen(self, _velocities=np.vstack([np.zeros(3), lines, np.zeros(3)]))
+
+    def write(self, t: float, out: Array) -> None:
+        """See `Path.write`."""
+        i = int(np.searchsorted(self.times, t, side="right"))  # blends that have begun
+        out[1:] = 0.0
+        if i == 0:
+            out[0] = self.points[0]
+            return
+        before, after = self._velocities[i - 1], self._velocities[i]
+        T, since = self.blend, t - self.times[i - 1]
+        s = min(since / T, 1.0)
+        change, past = after - before, max(since - T, 0.0)
+        # On the old line up to the middle of the blend, on the new one from there.
+        out[0] = (np.asarray(self.points[i - 1]) - before * T / 2 + before * min(since, T)
+                  + change * T * (2.5 * s**4 - 3 * s**5 + s**6) + after * past)
+        out[1] = before + change * (10 * s**3 - 15 * s**4 + 6 * s**5)
+        out[2] = change * (30 * s * s * (1 - s) ** 2 / T)
+
+
+@dataclass(frozen=True)
+class Recorded(Path):
+    """A recorded motion: the cubic spline through points, at rest at both ends.
+
+    `times` (N,) [s] increasing, N >= 2, `points` (N, 3) [m]; before the first and after the last it
+    rests. Position and velocity are continuous, the acceleration too but at the ends.
+    """
+
+    times: Sequence[float]
+    points: Sequence[Vector]
+    _slopes: Array = field(init=False, repr=False, compare=False)  # (N, 3) [m/s]
+
+    def __post_init__(self) -> None:
+        _check_points("recorded path", self.times, self.points)
+        refuse(len(self.times) < 2, "recorded path: one point is no motion; use a path of kind "
+               "still")
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(self.times, np.array(self.points, dtype=float), bc_type="clamped")
+        set_frozen(self, _slopes=spline(self.times, 1))
+
+    @classmethod
+    def from_csv(cls, file: str | File) -> Recorded:
+        """Read a file with the columns t [s], x, y, z [m], with or without a line of names.
+
+        Raises HierarchyError, naming the file and the line, if it is not that.
+        """
+        rows: list[list[float]] = []
+        for count, line_ in enumerate(_lines(file), 1):
+            try:
+                numbers = [float(part) for part in line_.split(",")]
+            except ValueError:
+                if count == 1:  # names of columns
+                    continue
+                numbers = []
+            refuse(len(numbers) != 4, f"{file}, line {count}: expected t, x, y, z, got {line_!r}")
+            rows.append(numbers)
+        try:
+            return cls([row[0] for row in rows], [row[1:] for row in rows])
+        except HierarchyError as error:
+            raise HierarchyError(f"{file}: {error}") from error
+
+    def write(self, t: float, out: Array) -> None:
+        """See `Path.write`."""
+        i = _interval(self.times, self.points, t, out)
+        if i is None:
+            return
+        h = self.times[i] - self.times[i - 1]
+        s = (t - self.times[i - 1]) / h
+        p0, p1 = np.asarray(self.points[i - 1]), np.asarray(self.points[i])
+        m0, m1 = h * self._slopes[i - 1], h * self._slopes[i]
+        c2, c3 = 3 * (p1 - p0) - 2 * m0 - m1, 2 * (p0 - p1) + m0 + m1
+        out[0] = p0 + s * (m0 + s * (c2 + s * c3))
+        out[1] = (m0 + s * (2 * c2 + s * 3 * c3)) / h
+        out[2] = (2 * c2 + s * 6 * c3) / h**2
+
+
+def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: Array
+              ) -> int | None:
+    """Return the point at which the interval around t ends; outside, write the rest and None."""
+    i = bisect_right(times, t)
+    if 0 < i < len(times):
+        return i
+    out[0], out[1:] = points[min(i, len(times) - 1)], 0.0
+    return None
+
+
+def _lines(file: str | File) -> list[str]:
+    try:
+        return [line_ for line_ in File(file).read_text(encoding="utf-8").splitlines() if line_]
+    except (OSError, UnicodeDecodeError) as error:
+        raise HierarchyError(f"{file} cannot be read: {error}") from error
+
+
+def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -> None:
+    for name, given in (("times", times), ("points", points)):
+        refuse(isinstance(given, str) or not isinstance(given, Sequence | np.ndarray),
+               f"{what}: {name}: expected a list, got {brief(given)}")
+    refuse(len(times) != len(points) or not len(times), f"{what}: {len(times)} times for "
+           f"{len(points)} points")
+    for i, time in enumerate(times):
+        number(f"{what}: times[{i}]", time)
+    for a, b in pairwise(times):
+        refuse(not a < b < inf, f"{what}: times must increase, got {a} and then {b}")
+    for i, point in enumerate(points):
+        finite_numbers(f"points[{i}] [m]", point, 3)

@@ -4,11 +4,8 @@ Besides `hierarchy.robot` and `hierarchy.state` only the readers here call pinoc
 `Found`.
 """
 
-from hierarchy.robots.dual_arm import DUAL_ARM
-from hierarchy.robots.humanoid import HUMANOID
-from hierarchy.robots.kuka_lwr import KUKA_LWR
-from hierarchy.robots.quadruped import QUADRUPED
 from hierarchy.robots.shapes import link_capsules
+from hierarchy.robots.shipped import DUAL_ARM, HUMANOID, KUKA_LWR, QUADRUPED
 from hierarchy.robots.table import DHTable, Link, Table, TreeFrame, TreeJoint, TreeTable
 
 TABLES: dict[str, Table] = {table.name: table

@@ -19,15 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import RobotError
-from hierarchy.robots import mjcf, urdf, urdf_remarks
-from hierarchy.robots.found import (
-    Coupled,
-    Found,
-    is_floating,
-    neutral_within_limits,
-    proposed_end_effector,
-    remarks,
-)
+from hierarchy.robots import found, mjcf, urdf
+from hierarchy.robots.found import Found, is_floating, neutral_within_limits
 from hierarchy.robots.from_table import ROOT
 from hierarchy.robots.joints import without
 from hierarchy.robots.library import pin
@@ -63,30 +56,26 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
     with _printed() as lines:
         try:
             model = model_of(root, base)
-            said = tuple(urdf_remarks.not_read(lines()))
+            said = tuple(urdf.not_read(lines()))
         except Exception as error:  # the parsers raise many types; all mean an invalid file
             raise RobotError(f"robot file {str(path)!r} cannot be read: "
                              f"{'; '.join([*lines(), _in_one_line(error)])}") from error
         model, coupled = without(model, urdf.coupled(root), locked, str(path))
-        found = replace(_found(model, coupled),
-                        missing=(*said, *urdf_remarks.remarks(root), *remarks(model)))
+        rest = neutral_within_limits(model, pin.neutral(model))
+        if is_floating(model):  # its position in q is that in the world
+            rest[:7] = pin.SE3ToXYZQUAT(model.jointPlacements[1])
+            model.jointPlacements[1] = pin.SE3.Identity()
+        names = {*model.names, ""}
+        robot = Found(model, found.proposed_end_effector(model), rest=rest,
+                      missing=(*said, *urdf.remarks(root), *found.remarks(model)),
+                      coupled=tuple(one for one in coupled if {one.joint, one.other} <= names))
         if not shapes:
-            return found
+            return robot
         geometries, missing = _geometry(path, root, model)
         capsules, left_out = capsules_of(geometries)
     kept, of_world = _held_by(model, capsules)
-    return replace(found, capsules=kept,
-                   missing=(*missing, *left_out, *of_world, *found.missing))
-
-
-def _found(model: Any, coupled: tuple[Coupled, ...]) -> Found:
-    rest = neutral_within_limits(model, pin.neutral(model))
-    if is_floating(model):  # its position in q is that in the world
-        rest[:7] = pin.SE3ToXYZQUAT(model.jointPlacements[1])
-        model.jointPlacements[1] = pin.SE3.Identity()
-    names = set(model.names)
-    return Found(model, proposed_end_effector(model), rest=rest, coupled=tuple(
-        one for one in coupled if {one.joint, one.other} <= {*names, ""}))
+    return replace(robot, capsules=kept,
+                   missing=(*missing, *left_out, *of_world, *robot.missing))
 
 
 @contextmanager

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy.avoidance.control_points import ControlPoint
-from hierarchy.avoidance.self_collision import Capsule
+from hierarchy.avoidance.body import Capsule, ControlPoint
 from hierarchy.problem import Array
 from hierarchy.robots.table import Table
 from hierarchy.words import listed, some
@@ -50,13 +49,9 @@ class Loop:
 
 @dataclass(frozen=True)
 class Found:
-    """A pinocchio model, its shapes, and what is missing.
+    """A pinocchio model and the other parts of a `Robot`.
 
-    `end_effector` is a frame's name; `rest` (nq,) the default initial configuration, or None;
-    `missing` are sentences. `control_points` is None if they are to be proposed. `coupled` joints
-    follow others, `loops` are closed chains; `starts` are configurations (nq,) that the file names,
-    and `apart` pairs of bodies, by the joints that move them, whose distance it does not watch.
-    `table` is the table that the model was made from, or None.
+    `control_points` is None if they are to be proposed, `rest` for the neutral configuration.
     """
 
     model: Any
@@ -134,8 +129,8 @@ def in_words(model: Any, frames: list[Any]) -> str:
                       if frame.parentJoint > 0 else "fixed to the world") for frame in frames])
 
 
-COUNT = 8            # number of proposed control points
-FIRST_MOVED_BY = 3   # they start at the origin of this joint of the chain, counted from 1
+_COUNT = 8  # number of proposed control points
+_FIRST = 3  # they start at the origin of this joint of the chain, counted from 1
 _NAMED_SO = re.compile(r"(^|[_\W])(tcp|tool\d*|eef?|end_?effector|gripper|flange)($|[_\W])",
                        re.IGNORECASE)
 
@@ -158,18 +153,17 @@ def proposed_end_effector(model: Any) -> str:
     return str((links or named or farthest)[-1])
 
 
-def points_along_chain(model: Any, end_effector: str, count: int = COUNT,
-                       first: int = FIRST_MOVED_BY) -> tuple[ControlPoint, ...]:
-    """Return points spread evenly over the chain that carries the end effector.
+def points_along_chain(model: Any, end_effector: str) -> tuple[ControlPoint, ...]:
+    """Return eight points spread evenly over the chain that carries the end effector.
 
-    The chain is the line through the origins of its joints, from joint number `first` of those that
-    carry it (a floating base does not count) to the end effector, which is omitted because sensors
-    measure it anyway. A point between two origins is fixed to the joint before it.
+    The chain is the line through the origins of its joints, from the third of those that carry it
+    (a floating base does not count) to the end effector, which is omitted because sensors measure
+    it anyway. A point between two origins is fixed to the joint before it.
     """
     frame = next(one for one in model.frames if one.name == end_effector)
     chain = [joint for joint in model.supports[frame.parentJoint].tolist()
              if joint > 0 and model.joints[joint].nv == 1]
-    chain = chain[min(first, len(chain)) - 1:]
+    chain = chain[min(_FIRST, len(chain)) - 1:]
     ends = [np.array(_between(model, a, b)) for a, b in pairwise(chain)]
     ends.append(np.array(frame.placement.translation))
     lengths = np.array([np.linalg.norm(end) for end in ends])
@@ -177,8 +171,8 @@ def points_along_chain(model: Any, end_effector: str, count: int = COUNT,
     if not chain or starts[-1] < 1e-3:
         return ()
     points = []
-    for k in range(1, count + 1):
-        at = k * starts[-1] / (count + 1)
+    for k in range(1, _COUNT + 1):
+        at = k * starts[-1] / (_COUNT + 1)
         i = min(int(np.searchsorted(starts, at, side="right")) - 1, len(chain) - 1)
         offset = ends[i] * ((at - starts[i]) / lengths[i])
         points.append(ControlPoint(f"{model.names[chain[i]]} {np.round(offset, 3).tolist()}",

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy.avoidance.control_points import ControlPoint
-from hierarchy.avoidance.self_collision import Vector
+from hierarchy.avoidance.body import ControlPoint, Vector
 from hierarchy.problem import Array
 from hierarchy.robots.found import Found
 from hierarchy.robots.library import pin
@@ -34,7 +33,10 @@ def _from_chain(table: DHTable, base: Base) -> Found:
         joint = model.addJoint(joint, pin.JointModelRZ(), placement, f"joint_{i + 1}",
                                np.array([table.effort[i]]), np.array([table.velocity[i]]),
                                -limit, limit)
-        placement = pin.SE3(_rotation_about_x(table.alpha[i]), np.array([table.a[i], 0.0, d]))
+        alpha = np.deg2rad(table.alpha[i])
+        c, s = np.round([np.cos(alpha), np.sin(alpha)], 15)  # exact for multiples of 90 degrees
+        placement = pin.SE3(np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]),
+                            np.array([table.a[i], 0.0, d]))
         model.appendBodyToJoint(joint, _rod(table, i), pin.SE3.Identity())
         model.addJointFrame(joint, -1)
     model.addFrame(pin.Frame(END_EFFECTOR, joint, placement, pin.FrameType.OP_FRAME))
@@ -60,8 +62,12 @@ def _from_tree(table: TreeTable, base: Base) -> Found:
         placement = pin.SE3(_axes_with_z(frame.z_axis), np.array(frame.offset))
         model.addFrame(pin.Frame(frame.name, _index(model, frame.joint, root), placement,
                                  pin.FrameType.OP_FRAME))
+    q = np.array(pin.neutral(model))
+    if base == "floating":
+        q[2] = table.base_height
+    q[model.nq - len(table.joints):] = np.deg2rad([joint.rest for joint in table.joints])
     return Found(model, table.end_effector, link_capsules(table, base=root),
-                 _points(model, table.control_points), _rest(model, table, base), table=table)
+                 _points(model, table.control_points), q, table=table)
 
 
 def _empty(name: str, base: Base) -> Any:
@@ -71,14 +77,6 @@ def _empty(name: str, base: Base) -> Any:
         joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT)
         model.addJointFrame(joint, -1)
     return model
-
-
-def _rest(model: Any, table: TreeTable, base: Base) -> Array:
-    q = np.array(pin.neutral(model))
-    if base == "floating":
-        q[2] = table.base_height
-    q[model.nq - len(table.joints):] = np.deg2rad([joint.rest for joint in table.joints])
-    return q
 
 
 def _points(model: Any, points: tuple[tuple[str, Vector], ...]) -> tuple[ControlPoint, ...]:
@@ -125,9 +123,3 @@ def _rod(table: DHTable, i: int) -> Any:
     along = table.mass[i] * table.radius**2 / 2
     centre = np.array([table.a[i], 0.0, table.d[i]]) / 2
     return pin.Inertia(table.mass[i], centre, np.diag([across, across, along]))
-
-
-def _rotation_about_x(degrees: float) -> Array:
-    """Exact for multiples of 90 degrees."""
-    c, s = np.round([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))], 15)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])

@@ -19,7 +19,7 @@ from hierarchy.problem import Array
 from hierarchy.robots.found import Coupled
 from hierarchy.robots.library import pin
 
-UNIT = 1e-6     # off one to which the length of a quaternion or (cos, sin) may be given
+_UNIT = 1e-6    # off one to which the length of a quaternion or (cos, sin) may be given
 _EXACT = 1e-14  # off one by rounding, which is left
 
 
@@ -115,17 +115,17 @@ def set_joint(parts: Sequence[Part], q: Array, joint: int, name: str, value: Arr
     normalise(own, q, {joint: name})
 
 
-def normalise(parts: Iterable[Part], q: Array, names: Any, tolerance: float = UNIT) -> None:
+def normalise(parts: Iterable[Part], q: Array, names: Any) -> None:
     """Give each quaternion and (cos, sin) in q (nq,) the length one, in place.
 
-    RobotError, naming the joint by `names`, if a length differs from one by more than `tolerance`.
+    RobotError, naming the joint by `names`, if a length differs from one by more than 1e-6.
     """
     for part in parts:
         if part.size == 1:
             continue
         own = q[part.q:part.q + part.size]
         length = float(np.linalg.norm(own))
-        if not abs(length - 1.0) <= tolerance:
+        if not abs(length - 1.0) <= _UNIT:
             what = "(cos, sin)" if part.size == 2 else "quaternion (x, y, z, w)"
             raise RobotError(f"joint {names[part.joint]!r}: its {what} {own.tolist()} has length "
                              f"{length:.9g}, not 1")

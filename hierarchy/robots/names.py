@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, PackagePath, distribution
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +34,10 @@ def is_file_name(model: str) -> bool:
 
 def elsewhere(name: str) -> str:
     """Return where a robot that the package does not ship may be found, as a sentence."""
-    found = [f"{package}:{known}" for package, names in _installed().items()
-             for known in nearest(name, names, 3, _NEAR)]
+    found = list[str]()
+    for package, names in _NAMES.items():
+        with suppress(PackageNotFoundError, ImportError):
+            found += [f"{package}:{known}" for known in nearest(name, names(), 3, _NEAR)]
     if found:
         return f"The installed packages have {', '.join(sorted(found, key=len)[:3])}."
     return ("Others: a URDF or MJCF file, or with the extra `descriptions` "
@@ -42,17 +45,7 @@ def elsewhere(name: str) -> str:
             "example_robot_data:ur5_robot.")
 
 
-def _installed() -> dict[str, list[str]]:
-    """Return the names of the robots in each package of robots that is installed."""
-    found: dict[str, list[str]] = {}
-    for package, names in (("example_robot_data", _example_files), ("robot_descriptions",
-                                                                    _descriptions)):
-        with suppress(PackageNotFoundError, ImportError):
-            found[package] = list(names())
-    return found
-
-
-def _example_files() -> dict[str, PackagePath]:
+def _example_files() -> dict[str, Any]:
     """Return the URDF files of example_robot_data by name; raises PackageNotFoundError."""
     files = distribution("example-robot-data").files or []
     return {file.name.removesuffix(".urdf"): file for file in sorted(files, reverse=True)
@@ -63,6 +56,10 @@ def _descriptions() -> dict[str, Any]:
     """Return the modules of robot_descriptions by name; raises ImportError."""
     known: dict[str, Any] = import_module("robot_descriptions._descriptions").DESCRIPTIONS
     return known
+
+
+_NAMES: dict[str, Callable[[], dict[str, Any]]] = dict(
+    zip(PACKAGES, (_example_files, _descriptions), strict=True))
 
 
 def file_of(model: str) -> Path:
@@ -77,7 +74,7 @@ def file_of(model: str) -> Path:
         raise UnknownNameError("package of robots", package, PACKAGES)
     of_files = package == "example_robot_data"
     try:
-        known = _example_files() if of_files else _descriptions()
+        known = _NAMES[package]()
     except (PackageNotFoundError, ImportError) as error:
         raise RobotError(f"robot {model!r} needs the package {package.replace('_', '-')}: "
                          f"{_REMEDY}") from error

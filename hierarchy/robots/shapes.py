@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from hierarchy.avoidance.self_collision import Capsule, Vector
+from hierarchy.avoidance.body import Capsule, Vector
 from hierarchy.problem import Array
 from hierarchy.robots.table import Table, TreeTable
 
@@ -39,9 +39,7 @@ def _capsule_of(shape: Any, kind: str) -> tuple[Array, Array, float] | None:
     z = np.array([0.0, 0.0, 1.0])
     if kind == "Sphere":
         return 0.0 * z, 0.0 * z, shape.radius
-    if kind == "Capsule":
-        return -shape.halfLength * z, shape.halfLength * z, shape.radius
-    if kind == "Cylinder":
+    if kind in ("Capsule", "Cylinder"):
         return -shape.halfLength * z, shape.halfLength * z, shape.radius
     points = _points_of(shape, kind)
     return None if points is None or len(points) == 0 else bounding_capsule(points)
@@ -74,14 +72,20 @@ def bounding_capsule(points: Array) -> tuple[Array, Array, float]:
     few = points[::max(1, len(points) // _MOST)]
     centred = few - few.mean(axis=0)
     principal = np.linalg.svd(centred, full_matrices=False)[2]
-    axes = [*np.eye(3), *principal]
-    best = min(axes, key=lambda axis: _volume(_around(few, axis)))
+    best, least = principal[0], np.inf
+    for axis in (*np.eye(3), *principal):
+        start, end, radius = _around(few, axis)
+        volume = np.pi * radius**2 * (float(np.linalg.norm(end - start)) + 4.0 / 3.0 * radius)
+        if volume < least:
+            best, least = axis, volume
     return _around(points, best)
 
 
 def _around(points: Array, axis: Array) -> tuple[Array, Array, float]:
     """Return the capsule along `axis` that contains the points."""
-    across = _across(axis)
+    first = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    first /= np.linalg.norm(first)
+    across = np.array([first, np.cross(axis, first)])
     flat = points @ across.T
     middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
     off_axis = np.linalg.norm(flat - middle, axis=1)
@@ -93,19 +97,6 @@ def _around(points: Array, axis: Array) -> tuple[Array, Array, float]:
         low = high = (low + high) / 2
     origin = middle @ across
     return origin + low * axis, origin + high * axis, radius
-
-
-def _across(axis: Array) -> Array:
-    """Two unit vectors (2, 3) perpendicular to an axis and to each other."""
-    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    first = np.cross(axis, other)
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(axis, first)])
-
-
-def _volume(capsule: tuple[Array, Array, float]) -> float:
-    start, end, radius = capsule
-    return float(np.pi * radius**2 * (np.linalg.norm(end - start) + 4.0 / 3.0 * radius))
 
 
 def _vector(point: Array) -> Vector:
@@ -134,12 +125,10 @@ def _tree_capsules(table: TreeTable, base: int) -> tuple[Capsule, ...]:
     links = [(name, link) for name, link in
              (*((joint.name, joint.link) for joint in table.joints), *table.links)
              if link.radius > 0.0]
-    names = [name or "base" for name, _ in links]
-    return tuple(Capsule(_numbered(names, k), index[name], link.start, link.end, link.radius)
-                 for k, (name, link) in enumerate(links))
-
-
-def _numbered(names: Sequence[str], k: int) -> str:
-    """The k-th name, numbered from its second occurrence on."""
-    before = names[:k].count(names[k])
-    return f"{names[k]} {before + 1}" if before else names[k]
+    seen, capsules = Counter[str](), list[Capsule]()
+    for name, link in links:
+        seen[name] += 1
+        number = f" {seen[name]}" if seen[name] > 1 else ""
+        capsules.append(Capsule(f"{name or 'base'}{number}", index[name], link.start, link.end,
+                                link.radius))
+    return tuple(capsules)

@@ -1,18 +1,21 @@
-"""Checks of a URDF before pinocchio, whose errors name no joint or end the process."""
+"""Checks of a URDF before pinocchio, which names no joint; what a robot made of it lacks."""
 
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
 
+import numpy as np
+
 from hierarchy.errors import RobotError
 from hierarchy.robots.found import Coupled
+from hierarchy.words import some
 
 Element = ElementTree.Element
 
@@ -141,24 +144,20 @@ def _of_joint(joint: Element, links: list[str], joints: list[str]) -> Iterator[s
         link = attribute_of(joint, end, "link")
         if link not in links:
             yield f"its {end} link {link!r} does not exist"
-    axis = joint.find("axis")
-    if axis is not None and kind in _WITH_AXIS:
-        numbers = numbers_in(axis.get("xyz", ""), 3)
-        if numbers is None:
-            yield f"its axis {axis.get('xyz')!r} is not three finite numbers"
-        elif not any(numbers):
-            yield f"its axis is zero: {axis.get('xyz')!r}"
-    yield from _of_origin(joint)
+    if kind in _WITH_AXIS:
+        yield from _unread(joint, "axis", 3, xyz="")
+        axis = attribute_of(joint, "axis", "xyz")
+        if axis is not None and not any(numbers_in(axis, 3) or (1.0,)):
+            yield f"its axis is zero: {axis!r}"
+    yield from _unread(joint, "origin", 3, xyz="0 0 0", rpy="0 0 0")
+    yield from _unread(joint, "limit", 1, lower="0", upper="0", velocity="0", effort="0")
     yield from _of_limit(joint, kind)
+    yield from _unread(joint, "mimic", 1, multiplier="0", offset="0")
     mimic = joint.find("mimic")
-    if mimic is not None:
-        if mimic.get("joint") == name_of(joint):
-            yield "it is to follow itself"
-        if mimic.get("joint") not in joints:
-            yield f"it is to follow joint {mimic.get('joint')!r}, which does not exist"
-        for key in ("multiplier", "offset"):
-            if numbers_in(mimic.get(key, "0"), 1) is None:
-                yield f"its mimic {key} {mimic.get(key)!r} is not a finite number"
+    if mimic is not None and mimic.get("joint") == name_of(joint):
+        yield "it is to follow itself"
+    if mimic is not None and mimic.get("joint") not in joints:
+        yield f"it is to follow joint {mimic.get('joint')!r}, which does not exist"
 
 
 def _of_limit(joint: Element, kind: str | None) -> Iterator[str]:
@@ -167,17 +166,21 @@ def _of_limit(joint: Element, kind: str | None) -> Iterator[str]:
         if kind in _WITH_LIMIT:
             yield f"it is {kind} and has no <limit>; without limits it is of type continuous"
         return
-    found = {}
-    for key in ("lower", "upper", "velocity", "effort"):
-        numbers = numbers_in(limit.get(key, "0"), 1)
-        if numbers is None:
-            yield f"its limit {key} = {limit.get(key)!r} is not a finite number"
-        else:
-            found[key] = numbers[0]
-    if kind in _WITH_LIMIT and found.get("lower", 0.0) > found.get("upper", 0.0):
-        yield f"its lower limit {found['lower']:g} is above its upper limit {found['upper']:g}"
-    yield from (f"its limit {key} = {found[key]:g} is negative" for key in ("velocity", "effort")
-                if found.get(key, 0.0) < 0.0)
+    lower, upper, velocity, effort = ((numbers_in(limit.get(key, "0"), 1) or (0.0,))[0]
+                                      for key in ("lower", "upper", "velocity", "effort"))
+    if kind in _WITH_LIMIT and lower > upper:
+        yield f"its lower limit {lower:g} is above its upper limit {upper:g}"
+    yield from (f"its limit {key} = {value:g} is negative"
+                for key, value in (("velocity", velocity), ("effort", effort)) if value < 0.0)
+
+
+def _unread(parent: Element, tag: str, count: int, **defaults: str) -> Iterator[str]:
+    """Yield the attributes of a part that are not `count` finite numbers."""
+    part, numbers = parent.find(tag), "a finite number" if count == 1 else "three finite numbers"
+    if part is not None:
+        yield from (f"its {tag} {key} = {part.get(key)!r} is not {numbers}"
+                    for key, default in defaults.items()
+                    if numbers_in(part.get(key, default), count) is None)
 
 
 def _of_link(link: Element) -> Iterator[str]:
@@ -186,18 +189,11 @@ def _of_link(link: Element) -> Iterator[str]:
     if mass is not None and (number is None or number[0] < 0.0):
         yield f"its mass {mass!r} is not a number from 0 on"
     for collision in link.findall("collision"):
-        yield from _of_origin(collision)
+        yield from _unread(collision, "origin", 3, xyz="0 0 0", rpy="0 0 0")
         for shape in collision.findall("geometry/*"):
             yield from (f"its {shape.tag} has {key} = {shape.get(key)!r}"
                         for key in ("radius", "length") if shape.get(key) is not None
                         and not (numbers_in(str(shape.get(key)), 1) or (-1.0,))[0] >= 0.0)
-
-
-def _of_origin(element: Element) -> Iterator[str]:
-    origin = element.find("origin")
-    for key in ("xyz", "rpy") if origin is not None else ():
-        if origin is not None and numbers_in(origin.get(key, "0 0 0"), 3) is None:
-            yield f"its origin {key} = {origin.get(key)!r} is not three finite numbers"
 
 
 def _of_tree(root: Element, links: list[str]) -> Iterator[str]:
@@ -240,3 +236,60 @@ def attribute_of(element: Element, path: str, key: str) -> str | None:
 def name_of(element: Element) -> str:
     """Return the name of a link or joint, "" if it has none."""
     return element.get("name", "")
+
+
+_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_MACROS = 5        # that are named
+_ROUNDING = 1e-12  # of a principal moment relative to the largest
+_NOT_READ = re.compile(r"Could not parse (\w+) element for Link \[(.*)\]")
+
+
+def not_read(lines: Iterable[str]) -> Iterator[str]:
+    """Yield what the parser printed, one sentence for all links with the same fault."""
+    links: dict[tuple[str, str], list[str]] = defaultdict(list)
+    why: list[str] = []
+    for line in lines:
+        if (found := _NOT_READ.match(line)) is None:
+            why.append(line)
+            continue
+        links[found[1], "; ".join(why)].append(found[2])
+        why = []
+    for (part, reason), names in links.items():
+        told = f": {reason}" if reason else ""
+        yield f"{part} of {some(list(dict.fromkeys(names)))} cannot be read{told}"
+    yield from dict.fromkeys(why)
+
+
+def remarks(root: Element) -> Iterator[str]:
+    """Yield a sentence for each thing that a URDF has and the robot made from it lacks."""
+    if macros := left_over(root):
+        yield (f"what the macros {some(macros, _MACROS)} stand for is not in the robot; {EXPAND}")
+    ignored = [name_of(joint) for joint in root.findall("joint") if joint.find("limit") is not None
+               and joint.get("type") in ("floating", "planar")]
+    if ignored:
+        yield f"limits of {some(ignored)}: a floating or planar joint has none"
+    plain = [name_of(joint) for joint in root.findall("joint")
+             if joint.get("type") == "planar" and joint.find("axis") is None]
+    if plain:
+        yield f"axes of the planar joints {some(plain)}: their planes are normal to x by default"
+    moments = {name_of(link): _least_moment(link) for link in root.findall("link")}
+    for sign, what in ((-1.0, "negative, which no body has"),
+                       (0.0, "zero, though the link has a mass")):
+        if names := [name for name, found in moments.items() if found == sign]:
+            yield f"inertias of {some(names)}: a principal moment is {what}"
+
+
+def _least_moment(link: Element) -> float:
+    """Return the sign of the least principal moment of a link; 1 without an inertia or a mass."""
+    inertia = link.find("inertial/inertia")
+    numbers = None if inertia is None else numbers_in(
+        " ".join(inertia.get(key, "") for key in _INERTIA), len(_INERTIA))
+    if numbers is None:
+        return 1.0  # the parser says so
+    xx, xy, xz, yy, yz, zz = numbers
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    mass = numbers_in(attribute_of(link, "inertial/mass", "value") or "", 1) or [0.0]
+    rounding = _ROUNDING * float(np.abs(moments).max())
+    if abs(moments[0]) <= rounding:
+        return 0.0 if mass[0] > 0.0 else 1.0
+    return float(np.sign(moments[0]))

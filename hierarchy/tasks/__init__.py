@@ -1,24 +1,20 @@
 """The tasks that are shipped; `TASKS` lists them by name."""
 
 from hierarchy.task import Task
-from hierarchy.tasks.avoidance import Avoidance, CumulatedRepulsion
+from hierarchy.tasks.avoidance import Avoidance, CumulatedRepulsion, DangerBounds
 from hierarchy.tasks.com import CentreOfMass, Momentum
 from hierarchy.tasks.contact_motion import ContactMotion
 from hierarchy.tasks.coupling import JointCoupling
-from hierarchy.tasks.danger_bounds import DangerBounds
-from hierarchy.tasks.dynamics import BaseDynamics, TorqueLimits
-from hierarchy.tasks.forces import ContactForce, LeastForce
+from hierarchy.tasks.forces import BaseDynamics, ContactForce, LeastForce, TorqueLimits
 from hierarchy.tasks.friction import CentreOfPressure, Friction
 from hierarchy.tasks.joint_limits import JointLimits
 from hierarchy.tasks.manipulability import Manipulability
 from hierarchy.tasks.mechanism import Mechanism, model_rows
 from hierarchy.tasks.pointing import LookAt, Pointing
-from hierarchy.tasks.pose import FrameLog, Pose
+from hierarchy.tasks.pose import FrameLog, Pose, RelativePose
 from hierarchy.tasks.position import Along, Position
 from hierarchy.tasks.posture import JointDamping, Posture
-from hierarchy.tasks.relative import RelativePose
-from hierarchy.tasks.self_separation import SelfSeparation
-from hierarchy.tasks.separation import Separation
+from hierarchy.tasks.separation import SelfSeparation, Separation
 from hierarchy.tasks.together import Together
 
 TASKS: dict[str, type[Task]] = {

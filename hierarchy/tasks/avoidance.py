@@ -1,4 +1,27 @@
-"""Obstacle avoidance: of the nearest control point, 3-D (28) or one row (29), or of all at once."""
+"""Obstacle avoidance: of the nearest control point (28), (29), of all of them, by joint bounds.
+
+`DangerBounds` slows joints that move toward an obstacle. A control point at distance D [m] from its
+nearest obstacle, r being the direction away from it, has the danger
+
+    f(D) = g(D) / g(0),  g(D) = 1 / (1 + exp((2 D / reach - 1) shape))
+
+which is 1 at contact and near 0 from `reach` on. For each joint with velocity limit V that supports
+the point, one bound is tightened: the next velocity w satisfies w <= V (1 - f) where the joint's
+column of r^T J_c is negative and w >= -V (1 - f) where it is positive; a column of at most `lever`
+[m] tightens neither. The greatest danger of all points counts. At acceleration level w = v + a T,
+with the horizon of the limits in place of T if it is longer; a joint beyond such a bound brakes as
+hard as its limits allow, or gradually within the horizon. Braking is never forbidden.
+
+Once the joints are within these bounds, a point approaches an obstacle at rest at most at (1 - f)
+times the sum of V |r^T J_c| over the joints, which is zero at contact. The task does not push away
+and does not retreat from an approaching obstacle. At acceleration level `reach` must leave room to
+brake. A bound jumps where a column changes sign, and f considers only the nearest obstacle of each
+point.
+
+Source: Flacco, Kroeger, De Luca, Khatib, "A depth space approach to human-robot collision
+avoidance", ICRA 2012, reference [10] of the letter; there f is g, which leaves exp(-shape) of the
+velocity at contact.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +31,24 @@ from typing import Literal
 
 import numpy as np
 
-from hierarchy.avoidance.control_points import ControlPoint, pack_points
-from hierarchy.errors import HierarchyError
+from hierarchy.avoidance.body import ControlPoint, pack_points
+from hierarchy.avoidance.laws import Repulsion, repulsion
+from hierarchy.errors import HierarchyError, expect
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
     dot,
     moving_point,
     place,
-    triple,
     write_identity,
     write_point_jacobian,
 )
+from hierarchy.limits import clipped
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Task, Writer, in_turn, seen_by
+from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written, in_turn, seen_by
+from hierarchy.tasks.joint_limits import JointLimits
 from hierarchy.tasks.posture import JointTask
 
 
@@ -32,16 +57,14 @@ def _avoidance(kinematics, reads, goal, J, motion):
     joints, offsets, seen = reads
     k = max(seen.active[0], 0)
     joint, offset, r, magnitude = joints[k], offsets[k], seen.direction[k], seen.magnitude[k]
-    columns, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     velocity, drift, _ = moving_point(kinematics, joint, offset)
     if len(motion.error) == 3:  # (28)
-        write_point_jacobian(columns, placements, supports, joint, offset, J, 0)
+        write_point_jacobian(kinematics, joint, offset, J)
         for i in range(3):
             motion.error[i] = magnitude * r[i]
             motion.rate[i], motion.drift[i] = velocity[i], drift[i]
         return
-    point = place(placements[joint], offset[0], offset[1], offset[2])
-    add_row(columns, supports, joint, point, triple(r, 0), J, 0)
+    add_row(kinematics, joint, place(kinematics.placements[joint], offset), r, J[0])
     motion.error[0], motion.rate[0] = magnitude, dot(r, velocity)
     motion.drift[0] = dot(r, drift)  # (29)
 
@@ -67,8 +90,7 @@ class Avoidance(Measured):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.rows not in (1, 3):
-            raise HierarchyError(f"task {self.name!r}: rows must be 1 or 3, got {self.rows}")
+        self.refuse(self.rows not in (1, 3), f"rows must be 1 or 3, got {self.rows}")
 
     @property
     def dimension(self) -> int:
@@ -105,31 +127,28 @@ class CumulatedRepulsion(JointTask):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.lever > 0.0:
-            raise HierarchyError(f"task {self.name!r}: lever {self.lever} m must be positive")
-        if self.base is not None and self.base.dimension != self.joints:
-            raise HierarchyError(f"task {self.name!r}: {self.base.name!r} has "
-                                 f"{self.base.dimension} rows, expected {self.joints}")
+        self.refuse(not self.lever > 0.0, f"lever {self.lever} m must be positive")
+        if self.base is not None:
+            self.refuse(self.base.dimension != self.joints, f"{self.base.name!r} has "
+                        f"{self.base.dimension} rows, expected {self.joints}")
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         self.check_size(state)
-        below = bind(write_identity, A, row, self.joints) if self.base is None else (
-            self.base.writer(state, level, A, lower, upper, row))
-        sides = lower[row:row + self.joints]
+        below = bind(write_identity, rows.A) if self.base is None else (
+            self.base.writer(state, level, rows))
         parameters = (*pack_points(self.points), self.within, self.lever, level == "acceleration",
-                      np.empty((1, state.n)))
-        add = bind(_add, state.kinematics, parameters, seen_by(self, state).arrays, lower, upper,
-                   row)
-        return in_turn(lambda: sides.fill(0.0), below, add)
+                      np.empty(state.n))
+        add = bind(_add, state.kinematics, parameters, seen_by(self, state).arrays, rows.lower,
+                   rows.upper)
+        return in_turn(lambda: rows.lower.fill(0.0), below, add)
 
 
 @compiled
-def _add(kinematics, parameters, seen, lower, upper, row):
-    """Add each point's command to the n equalities from `row` on."""
-    bodies, offsets, within, lever, acceleration, scratch = parameters
-    n = scratch.shape[1]
+def _add(kinematics, parameters, seen, lower, upper):
+    """Add each point's command to the n equalities."""
+    bodies, offsets, within, lever, acceleration, row = parameters
+    n = len(row)
     for k in range(len(bodies)):
         if not seen.distance[k] <= within:
             continue
@@ -137,13 +156,112 @@ def _add(kinematics, parameters, seen, lower, upper, row):
         if acceleration:
             _, drift, _ = moving_point(kinematics, body, offset)
             asked -= dot(r, drift)
-        point = place(kinematics.placements[body], offset[0], offset[1], offset[2])
-        scratch[0, :] = 0.0
-        add_row(kinematics.J, kinematics.supports, body, point, triple(r, 0), scratch, 0)
+        row[:] = 0.0
+        add_row(kinematics, body, place(kinematics.placements[body], offset), r, row)
         square = 0.0
         for c in range(n):
-            square += scratch[0, c] * scratch[0, c]
+            square += row[c] * row[c]
         for c in range(n):
-            lower[row + c] += scratch[0, c] * asked / max(square, lever * lever)
+            lower[c] += row[c] * asked / max(square, lever * lever)
     for c in range(n):
-        upper[row + c] = lower[row + c]
+        upper[c] = lower[c]
+
+
+@dataclass(frozen=True)
+class DangerBounds(NamedRows, Written):
+    """Keep every joint within `limits` and slow those that move a control point to an obstacle.
+
+    n rows, those of `limits`, with a box that is at most as large and never empty; see the module
+    for how danger tightens it.
+
+    limits : the box without obstacles; every joint must have a velocity limit.
+    points : the control points in the order of the measurement; with those of the sensor, the end
+        effector is the last of them.
+    reach : distance [m] from which on the danger is near 0.
+    shape : steepness of the danger.
+    lever : column of r^T J_c [m] below which a joint is not slowed.
+
+    Raises HierarchyError if a joint has no velocity limit, there is no point, or a number is out
+    of range.
+    """
+
+    limits: JointLimits
+    points: Sequence[ControlPoint]
+    reach: float = 0.4
+    shape: float = 6.0
+    lever: float = 1e-9
+    name: str = "danger bounds"
+    kind = "inequality"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        expect(f"task {self.name!r}: limits", self.limits, JointLimits, "give a JointLimits task")
+        self.refuse(self.limits.robot.base == "floating", f"robot {self.limits.robot.name!r} has "
+                    "a floating base, whose speed no joint bounds")
+        self.refuse(not 0.0 <= self.lever < np.inf, f"lever {self.lever} m must not be negative")
+        for (i,) in np.argwhere(~np.isfinite(self.limits.robot.velocity_limit))[:1]:
+            raise HierarchyError(f"task {self.name!r}: joint {self.limits.robot.velocity_names[i]} "
+                                 "has no velocity limit to scale")
+        try:
+            Repulsion(1.0, self.reach, self.shape)
+        except HierarchyError as error:
+            raise HierarchyError(f"task {self.name!r}: {error}") from error
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The joint of each row."""
+        return self.limits.row_names
+
+    def box(self, state: State, level: Level) -> tuple[Array, Array]:
+        """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
+        lower, upper = self.limits.box(state, level)
+        self._tighten(state, level, lower, upper)()
+        return lower, upper
+
+    def error(self, state: State) -> Array:
+        """Distance of each joint from its range (n,) [rad or m], zero inside it."""
+        return self.limits.error(state)
+
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
+        """See `Task.writer`; the rows have two sides."""
+        return in_turn(self.limits.writer(state, level, rows),
+                       self._tighten(state, level, rows.lower, rows.upper))
+
+    def _tighten(self, state: State, level: Level, lower: Array, upper: Array) -> Writer:
+        seen = seen_by(self, state)
+        self.refuse(len(self.points) > len(seen.distance), f"{len(self.points)} control points, "
+                    f"and distances of {len(seen.distance)}")
+        parameters = (*pack_points(self.points), self.reach, self.shape, self.lever,
+                      self.limits.limits.packed[2], max(self.limits.period, self.limits.horizon),
+                      level == "acceleration")
+        return bind(_tighten, state.kinematics, parameters, seen.arrays, lower, upper)
+
+
+@compiled
+def _tighten(kinematics, parameters, seen, lower, upper):
+    """Tighten the bounds of a box of n joints."""
+    v, J, _, placements, supports, _, _, _ = kinematics
+    # V are the velocity limits, T the period, or the horizon.
+    joints, offsets, reach, shape, lever, V, T, acceleration = parameters
+    n = len(v)
+    danger = np.zeros((2, n))  # of moving backward, and forward
+    contact = repulsion(0.0, 1.0, reach, shape, 2.0)
+    for k in range(len(joints)):
+        joint, r = joints[k], seen.direction[k]
+        f = min(repulsion(max(seen.distance[k], 0.0), 1.0, reach, shape, 2.0) / contact, 1.0)
+        x, y, z = place(placements[joint], offsets[k])
+        for c in range(n):
+            if supports[joint, c]:
+                away = (r[0] * (J[0, c] + J[4, c] * z - J[5, c] * y)
+                        + r[1] * (J[1, c] + J[5, c] * x - J[3, c] * z)
+                        + r[2] * (J[2, c] + J[3, c] * y - J[4, c] * x))  # column c of r^T J_c
+                if away > lever:
+                    danger[0, c] = max(danger[0, c], f)
+                elif away < -lever:
+                    danger[1, c] = max(danger[1, c], f)
+    for c in range(n):
+        low, up = -V[c] * (1.0 - danger[0, c]), V[c] * (1.0 - danger[1, c])
+        if acceleration:
+            low, up = (low - v[c]) / T, (up - v[c]) / T
+        least, most = lower[c], upper[c]
+        lower[c], upper[c] = clipped(low, least, most), clipped(up, least, most)

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled, inlined
-from hierarchy.kinematics import moving_point, place, row_times
+from hierarchy.jit import compiled
+from hierarchy.kinematics import carried, moving_point, place, plus, row_times, times
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
+from hierarchy.task import NamedRows
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,7 @@ class CentreOfMass(Measured):
                 set(axes)):
             raise HierarchyError(f"task {self.name!r}: axes {list(axes)} must be some of 0, 1, 2, "
                                  "in this order")
-        if not self.robot.masses.sum() > 0.0:
-            raise HierarchyError(f"task {self.name!r}: robot {self.robot.name!r} has no masses")
+        self.refuse(not self.robot.masses.sum() > 0.0, f"robot {self.robot.name!r} has no masses")
 
     @property
     def dimension(self) -> int:
@@ -77,43 +77,26 @@ def _write_jacobian(kinematics, shares, centres, axes, A):
     """Column c is s J_v + J_w x m, with s and m the mass and moment (as shares) that c moves."""
     J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     for c in range(A.shape[1]):
-        s, mx, my, mz = _carried(placements, supports, shares, centres, c)
+        s, m = 0.0, (0.0, 0.0, 0.0)
+        for joint in range(1, len(shares)):
+            if supports[joint, c] and shares[joint] > 0.0:
+                s += shares[joint]
+                m = plus(m, times(shares[joint], place(placements[joint], centres[joint])))
+        moved = carried(times(s, J[:3, c]), J[3:, c], m)
         for i in range(len(axes)):
-            if axes[i] == 0:
-                A[i, c] = s * J[0, c] + J[4, c] * mz - J[5, c] * my
-            elif axes[i] == 1:
-                A[i, c] = s * J[1, c] + J[5, c] * mx - J[3, c] * mz
-            else:
-                A[i, c] = s * J[2, c] + J[3, c] * my - J[4, c] * mx
-
-
-@inlined
-def _carried(placements, supports, shares, centres, c):
-    s = mx = my = mz = 0.0
-    for joint in range(1, len(shares)):
-        if supports[joint, c] and shares[joint] > 0.0:
-            x, y, z = place(placements[joint], centres[joint, 0], centres[joint, 1],
-                            centres[joint, 2])
-            s += shares[joint]
-            mx += shares[joint] * x
-            my += shares[joint] * y
-            mz += shares[joint] * z
-    return s, mx, my, mz
+            A[i, c] = moved[axes[i]]
 
 
 @measured
 def _centre_of_mass(kinematics, reads, goal, J, motion):
     shares, centres, axes = reads
     _write_jacobian(kinematics, shares, centres, axes, J)
-    p, drift = np.zeros(3), np.zeros(3)
+    p, drift = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for joint in range(1, len(shares)):
         if shares[joint] > 0.0:
-            o = centres[joint]
-            at = place(kinematics.placements[joint], o[0], o[1], o[2])
-            _, bend, _ = moving_point(kinematics, joint, o)
-            for i in range(3):
-                p[i] += shares[joint] * at[i]
-                drift[i] += shares[joint] * bend[i]
+            _, bend, _ = moving_point(kinematics, joint, centres[joint])
+            p = plus(p, times(shares[joint], place(kinematics.placements[joint], centres[joint])))
+            drift = plus(drift, times(shares[joint], bend))
     for i in range(len(axes)):
         motion.error[i] = goal[0, axes[i]] - p[axes[i]]
         motion.rate[i] = row_times(J, i, kinematics.v)
@@ -124,7 +107,7 @@ _ROWS = {"both": (0, 6), "linear": (0, 3), "angular": (3, 6)}
 
 
 @dataclass(frozen=True)
-class Momentum(Measured):
+class Momentum(NamedRows, Measured):
     """Bring the momentum of the whole robot to `target`, about its centre of mass.
 
     `part` is "linear" (m = 3) [kg m/s], "angular" (m = 3) [kg m^2/s] or "both" (m = 6), linear
@@ -143,18 +126,12 @@ class Momentum(Measured):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.part, str) or self.part not in _ROWS:
-            raise HierarchyError(f"task {self.name!r}: part {self.part!r} is not one of "
-                                 f"{', '.join(_ROWS)}")
+        self.refuse(not isinstance(self.part, str) or self.part not in _ROWS,
+                    f"part {self.part!r} is not one of {', '.join(_ROWS)}")
         if self.target is not None and (len(self.target) != self.dimension
                                         or not np.isfinite(self.target).all()):
             raise HierarchyError(f"task {self.name!r}: target {self.target!r} is not "
                                  f"{self.dimension} finite numbers")
-
-    @property
-    def dimension(self) -> int:
-        """Three rows, or six."""
-        return len(self.columns)
 
     @property
     def row_names(self) -> tuple[str, ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -14,23 +13,22 @@ from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Task, Writer, Written
+from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written
 from hierarchy.tasks.pose import Pose
 from hierarchy.tasks.position import Along, Position
 from hierarchy.tasks.together import Together
 
 
 @dataclass(frozen=True)
-class ContactMotion(Written):
+class ContactMotion(NamedRows, Written):
     """Keep contacts at rest: J_c a + dJ_c/dt v = -damping v_c + stiffness e [m/s^2, rad/s^2].
 
     Three rows for a point, those of `Position`, one of them along the normal for a point that
-    slides; six for a surface, those of `Pose`. With e = 0 and
-    no damping the contact accelerates nowhere; damping [1/s] takes away what velocity it has, and
-    stiffness [1/s^2] brings it back to its anchor. `anchors` are (4, 3) for each contact: where its
-    point, or the frame of a surface, belongs [m], then the rotation of the frame;
-    `ContactMotion.at` takes them from a state. While a contact is open its rows ask for nothing: a
-    `Pose` or `Position` task swings the foot.
+    slides; six for a surface, those of `Pose`. With e = 0 and no damping the contact accelerates
+    nowhere; damping [1/s] takes away what velocity it has, and stiffness [1/s^2] brings it back to
+    its anchor. `anchors` are (4, 3) for each contact: where its point, or the frame of a surface,
+    belongs [m], then the rotation of the frame; `ContactMotion.at` takes them from a state. While a
+    contact is open its rows ask for nothing: a `Pose` or `Position` task swings the foot.
 
     Raises HierarchyError for no contacts, a stiffness without anchors, or a stiffness of a contact
     that opens, because it may come down elsewhere. Source: J. Baumgarte,
@@ -47,14 +45,12 @@ class ContactMotion(Written):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.of.contacts:
-            raise HierarchyError(f"task {self.name!r}: there are no contacts")
-        if self.anchors is None and self.stiffness:
-            raise HierarchyError(f"task {self.name!r}: stiffness {self.stiffness} needs anchors")
+        self.refuse(not self.of.contacts, "there are no contacts")
+        self.refuse(self.anchors is None and self.stiffness, f"stiffness {self.stiffness} needs "
+                    "anchors")
         for contact in self.of.contacts:
-            if contact.open and self.stiffness:
-                raise HierarchyError(f"task {self.name!r}: contact {contact.name!r} opens, so its "
-                                     f"stiffness must be 0, not {self.stiffness}")
+            self.refuse(contact.open and self.stiffness, f"contact {contact.name!r} opens, so its "
+                        f"stiffness must be 0, not {self.stiffness}")
         if self.anchors is not None and [np.shape(one) for one in self.anchors] != [
                 (4, 3)] * len(self.of.contacts):
             raise HierarchyError(f"task {self.name!r}: anchors are not (4, 3) for each of "
@@ -69,11 +65,6 @@ class ContactMotion(Written):
         return cls(of, anchors, stiffness, damping, name=name)
 
     @property
-    def dimension(self) -> int:
-        """Three rows per point contact, one if it slides, six per surface."""
-        return sum(_rows(contact) for contact in self.of.contacts)
-
-    @property
     def row_names(self) -> tuple[str, ...]:
         """Contact, and axis of translation or turn, of each row."""
         axes = [f"{kind} {axis}" for kind in ("along", "about") for axis in "xyz"]
@@ -85,14 +76,11 @@ class ContactMotion(Written):
         """Distance of each contact from its anchor (m,) [m, rad]; zero without anchors."""
         return np.zeros(self.dimension) if self.anchors is None else self._tasks.error(state)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        write_rows, rows = self._tasks.writer(state, level, A, lower, upper, row), []
-        for contact in self.of.contacts:
-            of = slice(row, row := row + _rows(contact))
-            rows.append((A[of], lower[of], upper[of]))
-        return zero_while_open(write_rows, state, self.of, rows)
+        counts = [_rows(contact) for contact in self.of.contacts]
+        parts = [rows.some(sum(counts[:k]), count) for k, count in enumerate(counts)]
+        return zero_while_open(self._tasks.writer(state, level, rows), state, self.of, parts)
 
     @property
     def _tasks(self) -> Together:
@@ -100,17 +88,12 @@ class ContactMotion(Written):
         return Together([self._task(*pair) for pair in zip(self.of.contacts, anchors, strict=True)])
 
     def _task(self, contact: Contact, anchor: Array) -> Task:
-        path, gain = Still(cast("list[float]", anchor[0].tolist())), self.gain
-        if self.anchors is None:
-            gain = 0.0
-        if contact.slides:
-            return Along(Position(_held(contact), path, self.stiffness, self.damping, gain),
-                         contact.axes[2:].tolist(), contact.name)
+        frame, path, name = _held(contact), Still(anchor[0].tolist()), contact.name
+        gains = self.stiffness, self.damping, 0.0 if self.anchors is None else self.gain
         if contact.is_surface:
-            return Pose(_held(contact), path, anchor[1:], self.stiffness, self.damping, gain,
-                        contact.name)
-        return Position(_held(contact), path, self.stiffness, self.damping, gain,
-                        name=contact.name)
+            return Pose(frame, path, anchor[1:], *gains, name)
+        point = Position(frame, path, *gains, name=name)
+        return Along(point, contact.axes[2:].tolist(), name) if contact.slides else point
 
 
 def _rows(contact: Contact) -> int:

@@ -19,6 +19,7 @@ from hierarchy.robot import Robot
 from hierarchy.robots.found import Coupled
 from hierarchy.robots.joints import Part
 from hierarchy.state import State
+from hierarchy.task import NamedRows
 
 
 class Terms(NamedTuple):
@@ -37,16 +38,11 @@ class Terms(NamedTuple):
     turns: Array
 
 
-class _Coupling(Measured):
+class _Coupling(NamedRows, Measured):
     """Rows in which polynomials of joints add up to zero. Abstract: needs `terms`."""
 
     terms: Terms
     exact = True
-
-    @property
-    def dimension(self) -> int:
-        """One row per coupling."""
-        return len(self.terms.turns)
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`; the error is to the nearest full turn of a continuous joint."""
@@ -80,9 +76,8 @@ class JointCoupling(_Coupling):
         for name, factor in self.joints.items():
             number(f"task {self.name!r}: joints.{name}", factor)
         number(f"task {self.name!r}: value", self.value)
-        if not any(self.joints.values()):
-            raise HierarchyError(f"task {self.name!r}: joints {dict(self.joints)} have no factor "
-                                 "other than zero")
+        self.refuse(not any(self.joints.values()), f"joints {dict(self.joints)} have no factor "
+                    "other than zero")
         constants = [-self.value, *[0.0] * (len(self.joints) - 1)]
         terms = [(0, name, (constant, factor)) for constant, (name, factor)
                  in zip(constants, self.joints.items(), strict=True)]
@@ -155,12 +150,6 @@ def _part(robot: Robot, name: str) -> Part:
 
 
 @compiled
-def _position(q, at, continuous):
-    """Position or angle of a joint."""
-    return np.arctan2(q[at + 1], q[at]) if continuous else q[at]
-
-
-@compiled
 def _polynomial(c, x):
     """Value, derivative and second derivative of sum_i c_i x^i."""
     value, slope, bend = 0.0, 0.0, 0.0
@@ -177,7 +166,8 @@ def _coupling(kinematics, reads, goal, J, motion):
     v, error = kinematics.v, motion.error
     for t in range(len(terms.rows)):
         i, of = terms.rows[t], terms.velocities[t]
-        x = _position(q, terms.positions[t], terms.continuous[t])
+        at = terms.positions[t]
+        x = np.arctan2(q[at + 1], q[at]) if terms.continuous[t] else q[at]
         value, slope, bend = _polynomial(terms.coefficients[t], x)
         J[i, of] += slope
         error[i] -= value

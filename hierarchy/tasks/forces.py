@@ -1,21 +1,24 @@
-"""Rows over contact forces: what they have in common, a force that is given, the least ones."""
+"""Rows over contact forces and of the equations of motion: forces, floating base, torque limits."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import ClassVar
 
 import numpy as np
 
-from hierarchy.contacts import Contacts, Points
+from hierarchy.contacts import Contacts, Points, write_dynamics, zero_while_open
 from hierarchy.errors import HierarchyError, finite_numbers
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import place, write_equality
+from hierarchy.kinematics import less, place
 from hierarchy.problem import Array
+from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Writer, Written
+from hierarchy.task import Level, NamedRows, Rows, Writer, Written
+from hierarchy.tasks.joint_limits import JointRows
 
 WRENCH = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
@@ -37,7 +40,7 @@ class ForceTask(Written):
         return np.asarray(np.clip(0.0, lower, upper))
 
 
-class FixedRows(ForceTask):
+class FixedRows(NamedRows, ForceTask):
     """Rows over forces that do not change with the state. Abstract: needs `fixed`."""
 
     @property
@@ -45,17 +48,11 @@ class FixedRows(ForceTask):
     def fixed(self) -> tuple[Array, Array, Array]:
         """The rows over the forces (m, 3 p), their lower and upper sides (m,)."""
 
-    @property
-    def dimension(self) -> int:
-        """One row for each of `fixed`."""
-        return len(self.fixed[0])
-
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         forces, *sides = self.fixed
-        rows = np.hstack([np.zeros((len(forces), state.n)), forces])
-        return bind(_copy, rows, *sides, A, lower, upper, row)
+        A = np.hstack([np.zeros((len(forces), state.n)), forces])
+        return bind(_copy, A, *sides, *rows)
 
 
 def required(contacts: Contacts, task: str) -> Contacts:
@@ -66,15 +63,15 @@ def required(contacts: Contacts, task: str) -> Contacts:
 
 
 @compiled
-def _copy(rows, low, up, A, lower, upper, row):
+def _copy(rows, low, up, A, lower, upper):
     for i in range(rows.shape[0]):
         for c in range(rows.shape[1]):
-            A[row + i, c] = rows[i, c]
-        lower[row + i], upper[row + i] = low[i], up[i]
+            A[i, c] = rows[i, c]
+        lower[i], upper[i] = low[i], up[i]
 
 
 @dataclass(frozen=True)
-class ContactForce(ForceTask):
+class ContactForce(NamedRows, ForceTask):
     """Let the surroundings push on one contact with `target`, the sum over its points.
 
     `target` has 1 number for the normal force [N], 3 for the force in world axes [N], or 6 for the
@@ -97,19 +94,11 @@ class ContactForce(ForceTask):
                                  "numbers")
 
     @property
-    def dimension(self) -> int:
-        """One row per number of the target."""
-        return len(self.target)
-
-    @property
     def row_names(self) -> tuple[str, ...]:
         """Force and moment along the axes, or the normal force."""
-        if self.dimension == 1:
-            return ("normal force",)
-        return WRENCH[:self.dimension]
+        return ("normal force",) if len(self.target) == 1 else WRENCH[:len(self.target)]
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         contact, block = self.contacts[self.contact], self.contacts.blocks[self.contact]
         first, joints, offsets = (block.start - state.n) // 3, *self.contacts.points
@@ -117,35 +106,29 @@ class ContactForce(ForceTask):
         directions = np.vstack([contact.axes[2:] if self.dimension == 1 else np.eye(3)])
         parameters = (Points(joints[of_contact], offsets[of_contact]), directions,
                       contact.frame.offset, np.array(self.target, dtype=float), block.start)
-        return bind(_write, state.placements, parameters, A, lower, upper, row)
+        return bind(_write, state.placements, parameters, *rows)
 
 
 @compiled
-def _write(placements, parameters, A, lower, upper, row):
+def _write(placements, parameters, A, lower, upper):
     # The directions (1 or 3, 3) are those of the rows of the force, the origin is of the moment.
     points, directions, origin, target, column = parameters
     T = placements[points.joints[0]]
-    ox, oy, oz = place(T, origin[0], origin[1], origin[2])
+    o = place(T, origin)
     for i in range(len(target)):
         for c in range(A.shape[1]):
-            A[row + i, c] = 0.0
-        write_equality(lower, upper, row + i, target[i])
+            A[i, c] = 0.0
+        lower[i] = upper[i] = target[i]
     for k in range(len(points.joints)):
-        f, o = column + 3 * k, points.offsets[k]
+        f = column + 3 * k
         for i in range(directions.shape[0]):
             for c in range(3):
-                A[row + i, f + c] = directions[i, c]
+                A[i, f + c] = directions[i, c]
         if len(target) == 6:
-            x, y, z = place(T, o[0], o[1], o[2])
-            _write_moment(x - ox, y - oy, z - oz, A, row + 3, f)
-
-
-@compiled
-def _write_moment(x, y, z, A, row, column):
-    """Write the moment r x f of a force at r = (x, y, z)."""
-    A[row, column + 1], A[row, column + 2] = -z, y
-    A[row + 1, column], A[row + 1, column + 2] = z, -x
-    A[row + 2, column], A[row + 2, column + 1] = -y, x
+            x, y, z = less(place(T, points.offsets[k]), o)
+            A[3, f + 1], A[3, f + 2] = -z, y  # the moment r x f
+            A[4, f], A[4, f + 2] = z, -x
+            A[5, f], A[5, f + 1] = -y, x
 
 
 @dataclass(frozen=True)
@@ -169,3 +152,107 @@ class LeastForce(FixedRows):
         """The identity (3 p, 3 p), and zeros (3 p,), twice."""
         count = 3 * len(self.contacts.points.joints)
         return np.eye(count), np.zeros(count), np.zeros(count)
+
+
+@dataclass(frozen=True)
+class TorqueLimits(JointRows):
+    """Keep every joint torque within its limits: -limit <= M(q) a + h(q, v) - J_c^T f <= limit.
+
+    One row per actuated joint, n in number below, at acceleration level without contacts and at
+    level "torque" with those of the stack. The limit is `fraction`, more than 0 and at most 1, of
+    the robot's `effort_limit` [N m or N]; rows of joints without one have infinite bounds. At level
+    "torque" no torque differs by more than `step` [N m or N] from that in `State.commanded`; one
+    beyond its limit comes back by `step`. The torques are those of the robot's model: rigid bodies,
+    no friction, no payload.
+
+    Raises HierarchyError for another fraction, a step that is not positive, or a floating base
+    without contacts.
+    """
+
+    robot: Robot
+    fraction: float = 1.0
+    name: str = "torque limits"
+    contacts: Contacts | None = None
+    step: float = inf
+    kind = "inequality"
+    of_forces: ClassVar[bool] = True
+    straight = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.refuse(not 0.0 < self.fraction <= 1.0, f"fraction {self.fraction} is not more than 0 "
+                    "and at most 1")
+        self.refuse(not self.step > 0.0, f"step {self.step} must be positive")
+        self.refuse(self.robot.base == "floating" and self.contacts is None,
+                    f"robot {self.robot.name!r} has a floating base; its torques depend on "
+                    "contact forces, so give the contacts")
+
+    @property
+    def limit(self) -> Array:
+        """The largest torque of each row (n,) [N m or N]."""
+        return self.fraction * self.robot.effort_limit[self.robot.actuated:]
+
+    def error(self, state: State) -> Array:
+        """Distance of the torque with x = 0 from the limits (n,) [N m or N]."""
+        h = state.bias_effort()[self.robot.actuated:]
+        return np.asarray(np.clip(h, -self.limit, self.limit) - h)
+
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
+        """See `Task.writer`; HierarchyError at velocity level."""
+        self.refuse(level == "velocity", "torque limits need the acceleration level, not "
+                    f"{level!r}")
+        M, h = state.dynamics
+        contacts = Contacts(self.robot) if self.contacts is None else self.contacts
+        parameters = M, h, state.kinematics, contacts.points, self.robot.actuated
+        write_rows = bind(write_torques, parameters, self.limit, *rows)
+        if level != "torque" or self.step == inf:
+            return write_rows
+        efforts = h[self.robot.actuated:]
+
+        def write() -> None:
+            write_rows()
+            if state.commanded is not None:
+                here = state.commanded - efforts
+                for side in rows[1:]:
+                    np.clip(side, here - self.step, here + self.step, out=side)
+
+        return write
+
+
+@compiled
+def write_torques(parameters, limit, A, lower, upper):
+    """Write rows of M a + h - J_c^T f from -limit to limit, of the velocities from `first` on."""
+    M, h, kinematics, points, first = parameters
+    write_dynamics(M, kinematics, points, A, first)
+    for i in range(len(limit)):
+        lower[i], upper[i] = -limit[i] - h[first + i], limit[i] - h[first + i]
+
+
+@dataclass(frozen=True)
+class BaseDynamics(NamedRows, ForceTask):
+    """Let the contact forces move the base: M_b(q) a + h_b(q, v) = J_cb^T f [N, N m].
+
+    Six rows, those of the floating base; none for a fixed one. It belongs at the top of a stack: an
+    x that violates it cannot happen. A contact without load moves nothing; without contacts the
+    rows say that the robot falls.
+
+    Source: A. Herzog et al., "Momentum control with hierarchical inverse dynamics on a
+    torque-controlled humanoid", Autonomous Robots (2016), eq. (7).
+    """
+
+    contacts: Contacts
+    name: str = "base dynamics"
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Force and moment along the axes of the base, or none for a fixed one."""
+        return WRENCH[:self.contacts.robot.actuated]
+
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
+        """See `Task.writer`."""
+        M, h = state.dynamics
+        parameters = M, h, state.kinematics, self.contacts.points, 0
+        write_rows = bind(write_torques, parameters, np.zeros(self.dimension), *rows)
+        forces = [(rows.A[:, self.contacts.blocks[contact.name]],)
+                  for contact in self.contacts.contacts]
+        return zero_while_open(write_rows, state, self.contacts, forces)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from math import cos, inf, isnan, nan, pi, sin
@@ -14,7 +14,7 @@ from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Writer, in_turn
+from hierarchy.task import Level, Rows, Writer, in_turn
 from hierarchy.tasks.forces import FixedRows, required
 
 _SLOW = 0.01      # [m/s] below which the friction of a sliding point falls to zero
@@ -50,11 +50,9 @@ class Friction(FixedRows):
     def __post_init__(self) -> None:
         super().__post_init__()
         required(self.contacts, self.name)
-        if self.faces not in (4, 8):
-            raise HierarchyError(f"task {self.name!r}: {self.faces!r} faces, expected 4 or 8")
-        if not 0.0 <= self.least < self.largest:
-            raise HierarchyError(f"task {self.name!r}: no normal force is pushing and lies between "
-                                 f"least {self.least} N and largest {self.largest} N")
+        self.refuse(self.faces not in (4, 8), f"{self.faces!r} faces, expected 4 or 8")
+        self.refuse(not 0.0 <= self.least < self.largest, "no normal force is pushing and lies "
+                    f"between least {self.least} N and largest {self.largest} N")
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -83,22 +81,18 @@ class Friction(FixedRows):
             up += [*[inf] * self.faces, self.largest] * count + [inf] * summed
         return np.vstack(parts), np.array(low), np.array(up)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        write_rows, n = super().writer(state, level, A, lower, upper, row), state.n
-        changing: list[Callable[[], object]] = []
+        writers, first = [super().writer(state, level, rows)], 0
         for k, contact in enumerate(self.contacts.contacts):
-            rows = slice(row, row := row + len(self._of(contact)))
-            low, up = lower[rows], upper[rows]
+            own = rows.some(first, count := len(self._of(contact)))
+            first += count
             if contact.open:
-                changing.append(partial(self._ramp, k, state, low, up))
+                writers.append(partial(self._ramp, k, state, own.lower, own.upper))
             if contact.slides:
-                point = self.contacts.blocks[contact.name].start - n
-                changing.append(partial(self._slide, k, state, A[rows, n + point:n + point + 3],
-                                        (low, up)))
-
-        return in_turn(write_rows, *changing)
+                forces = own.A[:, self.contacts.blocks[contact.name]]
+                writers.append(partial(self._slide, k, state, own._replace(A=forces)))
+        return in_turn(*writers)
 
     def _ramp(self, number: int, state: State, low: Array, up: Array) -> None:
         """Write the sides (r,) of a contact that opens: its last row has all its normal force."""
@@ -106,45 +100,31 @@ class Friction(FixedRows):
         share, count = contact.load(state.t), len(contact.points)
         if share == 1.0:
             return
-        before = nan if state.carried is None else state.carried[number]
-        allowed = share * (self._weight if isnan(before) else before)
-        each = slice(0, count * (self.faces + 1))
+        robot, before = self.contacts.robot, nan if state.carried is None else state.carried[number]
+        weight = robot.masses.sum() * np.linalg.norm(robot.model.gravity.linear)
+        allowed = share * (weight if isnan(before) else before)
+        each_low, each_up = (side[:count * (self.faces + 1)].reshape(count, -1)
+                             for side in (low, up))
         if allowed > _NOTHING:
-            low[each][self.faces::self.faces + 1] = share * self.least or -inf
+            each_low[:, -1] = share * self.least or -inf
             up[-1] = min(up[-1], allowed)
-        else:
-            self._close(low[each].reshape(count, -1), up[each].reshape(count, -1))
+            return
+        # Two faces and the normal force are equalities and the other faces are free, because at
+        # the tip of the pyramid all faces would hold the force at once.
+        each_low[:, :-1] = -inf
+        for row in (0, self.faces // 4, -1):
+            each_low[:, row] = each_up[:, row] = 0.0
 
-    def _slide(self, number: int, state: State, A: Array, sides: tuple[Array, Array]) -> None:
-        """Write the rows (faces + 1, 3) of one point that slides, and their sides."""
-        contact, (low, up) = self.contacts.contacts[number], sides
-        along = contact.axes[:2] @ self._velocity(contact, state)
+    def _slide(self, number: int, state: State, rows: Rows) -> None:
+        """Write the rows (faces + 1, 3) of one point that slides, over its force."""
+        contact, (A, low, up) = self.contacts.contacts[number], rows
+        first = self.contacts.blocks[contact.name].start - state.n
+        along = contact.axes[:2] @ (self.contacts.jacobian(state)[first:first + 3] @ state.v)
         drag = contact.friction * along / max(float(np.linalg.norm(along)), _SLOW)
         low[:-1], up[:-1], low[-1] = -inf, inf, max(low[-1], 0.0)
         for row, tangent, share in zip((0, self.faces // 4), contact.axes[:2], drag, strict=True):
             A[row] = tangent + share * contact.axes[2]
             low[row] = up[row] = 0.0
-
-    def _velocity(self, contact: Contact, state: State) -> Array:
-        """Velocity (3,) [m/s] of the first point of a contact."""
-        first = self.contacts.blocks[contact.name].start - state.n
-        velocity: Array = self.contacts.jacobian(state)[first:first + 3] @ state.v
-        return velocity
-
-    @property
-    def _weight(self) -> float:
-        robot = self.contacts.robot
-        return float(robot.masses.sum() * np.linalg.norm(robot.model.gravity.linear))
-
-    def _close(self, low: Array, up: Array) -> None:
-        """Write sides (k, faces + 1) of k points whose forces are zero.
-
-        Two faces and the normal force are equalities and the other faces are free, because at the
-        tip of the pyramid all faces would hold the force at once.
-        """
-        low[:, :-1] = -inf
-        for row in (0, self.faces // 4, -1):
-            low[:, row] = up[:, row] = 0.0
 
     def _of(self, contact: Contact) -> Array:
         """Rows (r, 3 k) of one contact; the first two tangents are normal to faces."""
@@ -187,10 +167,9 @@ class CentreOfPressure(FixedRows):
             raise HierarchyError(f"task {self.name!r}: no contact is a surface")
         for contact in surfaces:
             widest = float(_distances(contact).mean(axis=1).min())
-            if not 0.0 <= self.margin < widest:
-                raise HierarchyError(f"task {self.name!r}: margin {self.margin} m of contact "
-                                     f"{contact.name!r} is not from 0 to less than {widest:.4g}, "
-                                     "the distance of its middle from an edge")
+            self.refuse(not 0.0 <= self.margin < widest, f"margin {self.margin} m of contact "
+                        f"{contact.name!r} is not from 0 to less than {widest:.4g}, the distance "
+                        "of its middle from an edge")
 
     @property
     def row_names(self) -> tuple[str, ...]:

@@ -16,10 +16,10 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Writer, Written
+from hierarchy.task import Level, NamedRows, Rows, Writer, Written
 
 
-class JointRows(Written):
+class JointRows(NamedRows, Written):
     """A task with one row per actuated joint of `robot`, or per velocity from `first` on."""
 
     robot: Robot
@@ -29,11 +29,6 @@ class JointRows(Written):
     def first(self) -> int:
         """The velocity of the first row: the first that is actuated."""
         return self.robot.actuated
-
-    @property
-    def dimension(self) -> int:
-        """One row per velocity from `first` on."""
-        return self.robot.n - self.first
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -75,11 +70,10 @@ class JointLimits(JointRows):
         robot = self.robot
         acceleration = array_of(f"task {self.name!r}: acceleration", self.acceleration)
         n = robot.n - robot.actuated
-        if acceleration.shape not in ((), (n,)):
-            raise HierarchyError(f"task {self.name!r}: acceleration has shape "
-                                 f"{acceleration.shape}, expected a number or ({n},)")
-        if number(f"task {self.name!r}: margin", self.margin) < 0.0:
-            raise HierarchyError(f"task {self.name!r}: margin {self.margin} must not be negative")
+        self.refuse(acceleration.shape not in ((), (n,)), "acceleration has shape "
+                    f"{acceleration.shape}, expected a number or ({n},)")
+        self.refuse(number(f"task {self.name!r}: margin", self.margin) < 0.0,
+                    f"margin {self.margin} must not be negative")
         lower, upper = robot.position_limits()
         for i in np.flatnonzero(upper - lower < 2.0 * self.margin)[:1]:
             raise HierarchyError(f"task {self.name!r}: margin {self.margin:g} leaves "
@@ -87,9 +81,8 @@ class JointLimits(JointRows):
                                  f"{upper[i]:.4g}")
         speed = robot.velocity_limit.copy()
         rate = np.append(np.zeros(robot.actuated), np.broadcast_to(acceleration, n))
-        if self._limits_base and robot.base == "fixed":
-            raise HierarchyError(f"task {self.name!r}: robot {robot.name!r} has a fixed base, "
-                                 "which has no speed to limit")
+        self.refuse(self._limits_base and robot.base == "fixed", f"robot {robot.name!r} has a "
+                    "fixed base, which has no speed to limit")
         if self.first < robot.actuated:
             speed[:6] = self._of_base("base_speed", speed[:6])
             rate[:6] = self._of_base("base_acceleration", np.full(6, acceleration.max()))
@@ -139,16 +132,14 @@ class JointLimits(JointRows):
         q = self._positions(state)
         return np.asarray(np.clip(q, *self.limits.packed[:2]) - q)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; the rows have two sides."""
-        write_rows, limits = bind(write_identity, A, row, self.dimension), self.limits.packed
-        acceleration = level == "acceleration"
+        write_rows, limits = bind(write_identity, rows.A), self.limits.packed
 
         def write() -> None:
             write_rows()
-            write_box(self._positions(state), self._rates(state, level), limits, acceleration,
-                      lower, upper, row)
+            write_box(self._positions(state), self._rates(state, level), limits,
+                      level == "acceleration", rows.lower, rows.upper)
 
         return write
 
@@ -189,8 +180,8 @@ class StepLimits(JointRows):
     first = 0
 
     def __post_init__(self) -> None:
-        if not number(f"task {self.name!r}: period [s]", self.period) > 0.0:
-            raise HierarchyError(f"task {self.name!r}: period {self.period} s must be positive")
+        self.refuse(not number(f"task {self.name!r}: period [s]", self.period) > 0.0,
+                    f"period {self.period} s must be positive")
         gain = APPROACH / self.period if self.gain is None else self.gain
         number(f"task {self.name!r}: gain [1/s]", gain, 0.0, 1.0 / self.period)
         set_frozen(self, gain=gain)
@@ -207,15 +198,12 @@ class StepLimits(JointRows):
         """How far each velocity would have to be raised from zero (n,) [rad/s or m/s]."""
         return np.maximum(self.box(state)[0], 0.0)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; for velocity level."""
-        if level != "velocity":
-            raise HierarchyError(f"task {self.name!r}: for velocity level; see JointLimits")
-        rows = slice(row, row + self.dimension)
+        self.refuse(level != "velocity", "for velocity level; see JointLimits")
 
         def write() -> None:
-            A[rows] = np.eye(state.n)
-            lower[rows], upper[rows] = self.box(state)
+            rows.A[:] = np.eye(state.n)
+            rows.lower[:], rows.upper[:] = self.box(state)
 
         return write

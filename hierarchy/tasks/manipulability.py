@@ -12,14 +12,13 @@ from typing import Literal
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, number
-from hierarchy.kinematics import Kinematics
+from hierarchy.errors import number
+from hierarchy.kinematics import Kinematics, Placed, cross
 from hierarchy.measured import Measure, Measured, Motion, plain
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Kind
-from hierarchy.tasks.geometric import Placed, cross
 
 _SINGULAR = 1e-12  # w below which it has no gradient
 _CROSS: Array = np.array([cross(axis) for axis in np.eye(3)])
@@ -48,9 +47,8 @@ class Manipulability(Measured):
     def __post_init__(self) -> None:
         super().__post_init__()
         number(f"task {self.name!r}: least", self.least, 0.0)
-        if self.part not in ("position", "pose"):
-            raise HierarchyError(f"task {self.name!r}: part must be 'position' or 'pose', got "
-                                 f"{self.part!r}")
+        self.refuse(self.part not in ("position", "pose"), "part must be 'position' or 'pose', "
+                    f"got {self.part!r}")
 
     @property
     def rows(self) -> int:
@@ -63,9 +61,8 @@ class Manipulability(Measured):
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`; HierarchyError for a joint with several velocities."""
-        if len(state.supports) != state.n + 1:
-            raise HierarchyError(f"task {self.name!r}: a joint of the robot has several "
-                                 "velocities, or the base floats")
+        self.refuse(len(state.supports) != state.n + 1, "a joint of the robot has several "
+                    "velocities, or the base floats")
         return _manipulability, self
 
 

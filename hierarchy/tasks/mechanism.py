@@ -6,7 +6,7 @@ these rows stand at the top of a stack.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, final
@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Task, Writer, Written
+from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written
 from hierarchy.tasks.coupling import FollowedJoints
-from hierarchy.tasks.relative import RelativePose
+from hierarchy.tasks.pose import RelativePose
 from hierarchy.tasks.together import Together
 
 MECHANISM = "mechanism"  # the name of the rows in a stack
@@ -77,7 +77,7 @@ class _Parts(NamedTuple):
 
 @final
 @dataclass(frozen=True)
-class ClosedChains(Written):
+class ClosedChains(NamedRows, Written):
     """The rows of `whole` that are independent of each other.
 
     A chain in a plane closes out of it by itself, but for the rounding of its file. So of all rows,
@@ -89,14 +89,9 @@ class ClosedChains(Written):
     name: str = MECHANISM
 
     @property
-    def dimension(self) -> int:
-        """As many as `whole` has."""
-        return self.whole.dimension
-
-    @property
     def row_names(self) -> tuple[str, ...]:
         """Numbers: a row is a mixture of those of `whole`."""
-        return tuple(f"constraint {i + 1}" for i in range(self.dimension))
+        return tuple(f"constraint {i + 1}" for i in range(self.whole.dimension))
 
     def error(self, state: State) -> Array:
         """How far the mechanism is from closed (m,) [m or rad]."""
@@ -106,19 +101,17 @@ class ClosedChains(Written):
         """The derivatives of what is to be closed (m, n)."""
         return self.whole.jacobian(state)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        m = self.dimension
-        J, side, rows = np.zeros((m, state.n)), np.zeros(m), slice(row, row + m)
-        write_whole = self.whole.writer(state, level, J, side, side.copy(), 0)
+        whole = Rows.empty(self.dimension, state.n)
+        write_whole = self.whole.writer(state, level, whole)
 
         def write() -> None:
             write_whole()
-            V, sizes, c = self.parts(J, side)
-            A[rows], lower[rows] = 0.0, 0.0
-            A[row:row + len(V)], lower[row:row + len(V)] = V, c / sizes
-            upper[rows] = lower[rows]
+            V, sizes, c = self.parts(whole.A, whole.lower)
+            rows.A[:], rows.lower[:] = 0.0, 0.0
+            rows.A[:len(V)], rows.lower[:len(V)] = V, c / sizes
+            rows.upper[:] = rows.lower
 
         return write
 
@@ -214,21 +207,20 @@ class Mechanism:
 
     def _rows(self, q: Array) -> tuple[Array, Array]:
         """Jacobian (m, n) and error (m,) at q."""
-        write, J, side, gain = self._written
+        write, rows = self._written
         self._state.move(0.0, q, self._state.v)
         write()
-        return J.copy(), side / gain
+        return rows.A.copy(), rows.lower / self._tasks[0].whole.tasks[0].gain
 
     @cached_property
-    def _written(self) -> tuple[Callable[[], object], Array, Array, float]:
-        """What writes the rows at velocity level, and their Jacobian, sides and gain.
+    def _written(self) -> tuple[Writer, Rows]:
+        """What writes the rows at velocity level, and the rows.
 
         To bind it takes 1 ms, and to write them 1 us: closing a mechanism asks ten times.
         """
         whole = self._tasks[0].whole
-        J, side = np.zeros((whole.dimension, self._robot.n)), np.zeros(whole.dimension)
-        return (whole.writer(self._state, "velocity", J, side, side.copy(), 0), J, side,
-                whole.tasks[0].gain)
+        rows = Rows.empty(whole.dimension, self._robot.n)
+        return whole.writer(self._state, "velocity", rows), rows
 
     def _solved(self, J: Array, side: Array, damping: float) -> Array:
         """Return the x (n,) that makes |J x - side|^2 + damping |x|^2 least, at the scales of J."""

@@ -8,42 +8,36 @@ from math import cos
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, finite_numbers, number
-from hierarchy.jit import bind, compiled
+from hierarchy.errors import finite_numbers, number
+from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import (
-    axis_at,
+    Spot,
+    carried,
+    column,
     crossed,
     dot,
+    jacobians_of,
     less,
+    motion_of,
+    place,
+    rotation_of,
     row_times,
     times,
-    triple,
-    velocity_of_point,
+    turned,
+    turned_back,
+    velocity_of_body,
 )
 from hierarchy.measured import Measure, Measured, measured
-from hierarchy.paths.path import check_point
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Kind
-from hierarchy.tasks.geometric import (
-    Spot,
-    column,
-    jacobians_of,
-    motion_of,
-    position_of,
-    rotation_of,
-    turned_back,
-)
 
 
 @compiled
 def _cone_error(placements, joint, z_e, z_d, cos_alpha_d):
-    cosine = 0.0
-    for i in range(3):
-        cosine += z_d[i] * axis_at(placements, joint, z_e, i)  # (16)
-    return cos_alpha_d - cosine
+    return cos_alpha_d - dot(z_d, turned(placements[joint], z_e))  # (16)
 
 
 @measured
@@ -51,19 +45,16 @@ def _pointing(kinematics, reads, goal, J, motion):
     joint, z_e, z_d, cos_alpha_d = reads
     v, columns, dJ, placements, supports, _, _, _ = kinematics
     motion.error[0] = _cone_error(placements, joint, z_e, z_d, cos_alpha_d)
-    x, y, z = (axis_at(placements, joint, z_e, 0), axis_at(placements, joint, z_e, 1),
-               axis_at(placements, joint, z_e, 2))
-    cx, cy, cz = y * z_d[2] - z * z_d[1], z * z_d[0] - x * z_d[2], x * z_d[1] - y * z_d[0]
+    z = turned(placements[joint], z_e)
+    axis = crossed(z, z_d)
     for c in range(J.shape[1]):  # z_d . (w x z_e) = w . (z_e x z_d): z_d^T S^T(z_e) J_O, (19)
         if supports[joint, c]:
-            J[0, c] = columns[3, c] * cx + columns[4, c] * cy + columns[5, c] * cz
-    _, _, _, wx, wy, wz = velocity_of_point(columns, supports, joint, v, 0.0, 0.0, 0.0)
-    dx, dy, dz = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x  # (18)
-    motion.rate[0] = z_d[0] * dx + z_d[1] * dy + z_d[2] * dz
-    _, _, _, ax, ay, az = velocity_of_point(dJ, supports, joint, v, 0.0, 0.0, 0.0)
-    motion.drift[0] = (z_d[0] * (ay * z - az * y + wy * dz - wz * dy)
-                       + z_d[1] * (az * x - ax * z + wz * dx - wx * dz)
-                       + z_d[2] * (ax * y - ay * x + wx * dy - wy * dx))
+            J[0, c] = columns[3, c] * axis[0] + columns[4, c] * axis[1] + columns[5, c] * axis[2]
+    _, w = velocity_of_body(columns, supports, joint, v)
+    _, a = velocity_of_body(dJ, supports, joint, v)
+    dz = crossed(w, z)  # (18)
+    motion.rate[0] = dot(z_d, dz)
+    motion.drift[0] = dot(z_d, carried(crossed(a, z), w, dz))
 
 
 @dataclass(frozen=True)
@@ -92,8 +83,8 @@ class Pointing(Measured):
         super().__post_init__()
         axis = finite_numbers(f"task {self.name!r}: axis", self.axis)
         length = float(np.linalg.norm(axis))
-        if axis.shape != (3,) or not 1e-9 < length < np.inf:
-            raise HierarchyError(f"task {self.name!r}: axis {list(self.axis)} has no direction")
+        self.refuse(axis.shape != (3,) or not 1e-9 < length < np.inf, f"axis {list(self.axis)} "
+                    "has no direction")
         number(f"task {self.name!r}: half_angle [rad]", self.half_angle, 0.0, np.pi)
         set_frozen(self, z_d=axis / length, cos_alpha_d=cos(self.half_angle),
                    z_e=np.ascontiguousarray(self.frame.rotation[:, 2]))
@@ -139,18 +130,18 @@ class LookAt(Measured):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_point(f"task {self.name!r}: target", self.target)
+        finite_numbers(f"task {self.name!r}: target [m]", self.target, 3)
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`: the error is -2 (u_x, u_y) / (1 + u_z)."""
         return _look_at, (Spot.of(self.frame), np.array(self.target, dtype=float))
 
 
-@compiled
+@inlined
 def _sight(placements, frame, point):
     """The target in the frame's axes y, its distance r, the vector d to it in world axes, and R."""
-    d = less(triple(point, 0), position_of(placements, frame))
-    R = rotation_of(placements, frame.joint, frame.rotation)
+    d = less(point, place(placements[frame.joint], frame.offset))
+    R = rotation_of(placements, frame)
     y = turned_back(R, d)
     r = max(np.sqrt(dot(y, y)), _NEAR)
     if not y[2] > (_BEHIND - 1.0) * r:
@@ -164,7 +155,7 @@ def _look_at(kinematics, reads, goal, J, motion):
     frame, point = reads
     y, r, d, R = _sight(kinematics.placements, frame, point)
     D = r + y[2]
-    linear, angular = jacobians_of(kinematics.J, kinematics.placements, kinematics.supports, frame)
+    linear, angular = jacobians_of(kinematics, frame)
     for c in range(J.shape[1]):
         s = turned_back(R, less(crossed(d, column(angular, c)), column(linear, c)))
         dD = dot(y, s) / r + s[2]
@@ -179,5 +170,5 @@ def _look_at(kinematics, reads, goal, J, motion):
     for i in range(2):
         motion.error[i] = -2.0 * y[i] / D
         motion.rate[i] = row_times(J, i, kinematics.v)
-        turned = 2.0 * s[i] * dD + y[i] * (ddD - 2.0 * dD * dD / D)
-        motion.drift[i] = 2.0 * (ds[i] - turned / D) / D
+        bend = 2.0 * s[i] * dD + y[i] * (ddD - 2.0 * dD * dD / D)
+        motion.drift[i] = 2.0 * (ds[i] - bend / D) / D

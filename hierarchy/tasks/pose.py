@@ -1,21 +1,33 @@
-"""Pose of a frame (m = 6): by a rotation vector and a line, or by the logarithm of SE(3)."""
+"""Pose of a frame: by a rotation vector and a line, by the logarithm of SE(3), in another frame."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import atan2, sqrt
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hierarchy.errors import finite_numbers
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
 from hierarchy.kinematics import (
     Kinematics,
-    drift_of_point,
-    point_at,
-    velocity_of_point,
+    Placed,
+    Spot,
+    column,
+    cross,
+    crossed,
+    jacobians_of,
+    less,
+    motion_of,
+    place,
+    plus,
+    rotation_of,
+    rotation_vector,
+    row_times,
+    times_transposed,
+    turned_back,
     write_point_jacobian,
     write_rotation_jacobian,
 )
@@ -24,56 +36,34 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Task
-from hierarchy.tasks.geometric import Placed, cross, rotation_of, times_transposed
-
-
-@compiled
-def rotation_vector(R):
-    """Rotation vector (3,) [rad] of a rotation matrix (3, 3), angle in 0 .. pi."""
-    twist = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
-    sine = sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
-    cosine = (R[0, 0] + R[1, 1] + R[2, 2] - 1.0) / 2
-    angle = atan2(sine, cosine)
-    if sine > 1e-7:
-        return twist * (angle / sine)
-    if cosine > 0.0:
-        return twist
-    # Half a turn: the axis is the column of R + I with the largest diagonal entry.
-    i = 0
-    for k in range(1, 3):
-        if R[k, k] > R[i, i]:
-            i = k
-    axis = R[:, i].copy()
-    axis[i] += 1.0
-    return axis * (angle / sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2))
+from hierarchy.task import NamedRows
 
 
 @measured
 def _pose(kinematics, reads, goal, J, motion):
-    joint, offset, rotation, desired = reads
-    v, _, dJ, placements, supports, _, _, _ = kinematics
-    rate, drift = motion.rate, motion.drift
-    write_point_jacobian(kinematics.J, placements, supports, joint, offset, J, 0)
-    write_rotation_jacobian(kinematics.J, supports, joint, J, 3)
-    for i in range(3):
-        motion.error[i] = goal[0, i] - point_at(placements, joint, offset, i)
+    frame, desired = reads
+    write_point_jacobian(kinematics, frame.joint, frame.offset, J)
+    write_rotation_jacobian(kinematics, frame.joint, J[3:])
+    here = place(kinematics.placements[frame.joint], frame.offset)
+    v, w, a, b = motion_of(kinematics, frame)
     motion.error[3:] = rotation_vector(times_transposed(
-        desired, rotation_of(placements, joint, rotation)))
-    rate[0], rate[1], rate[2], drift[0], drift[1], drift[2], rate[3], rate[4], rate[5] = (
-        drift_of_point(kinematics, joint, offset[0], offset[1], offset[2]))
-    _, _, _, drift[3], drift[4], drift[5] = velocity_of_point(dJ, supports, joint, v, 0.0, 0.0, 0.0)
+        desired, rotation_of(kinematics.placements, frame)))
+    for i in range(3):
+        motion.error[i] = goal[0, i] - here[i]
+        motion.rate[i], motion.rate[3 + i] = v[i], w[i]
+        motion.drift[i], motion.drift[3 + i] = a[i], b[i]
 
 
 @dataclass(frozen=True)
-class PoseTask(Task):
+class Pose(Measured):
     """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
 
-    Abstract: its subclasses differ in the error.
+    The orientation error is the rotation vector from the actual to the desired orientation, in
+    world axes; the last three rows are those of the angular velocity.
     """
 
     frame: Frame
-    path: Path
+    path: Path = field()  # required here
     rotation: ArrayLike
     stiffness: float = 40.0
     damping: float = 20.0
@@ -86,20 +76,9 @@ class PoseTask(Task):
         super().__post_init__()
         check_rotation(f"task {self.name!r}: rotation", self.rotation)
 
-
-@dataclass(frozen=True)
-class Pose(PoseTask, Measured):
-    """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
-
-    The orientation error is the rotation vector from the actual to the desired orientation, in
-    world axes; the last three rows are those of the angular velocity.
-    """
-
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
-        frame = self.frame
-        return _pose, (frame.joint, frame.offset, frame.rotation,
-                       np.array(self.rotation, dtype=float))
+        return _pose, (Spot.of(self.frame), np.array(self.rotation, dtype=float))
 
 
 _SERIES = 0.01   # [rad^2] squared angle below which coefficients are taken from their series
@@ -107,10 +86,10 @@ _STEP = 1e-30    # of a complex step: no difference is formed, so it may be this
 
 
 @dataclass(frozen=True)
-class FrameLog(PoseTask, Measured):
-    """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
+class FrameLog(Pose):
+    """The same pose with another error.
 
-    The error is e = log(T^-1 T_d), with the poses T of the frame and T_d of its target: the twist
+    It is e = log(T^-1 T_d), with the poses T of the frame and T_d of its target: the twist
     in the axes of the frame, linear part first, that takes it to the target in unit time. The frame
     moves on a screw, where with `Pose` its origin moves on a straight line. It is what `FrameTask`
     of pink and of placo are. Beyond half a turn the error jumps. The derivative is always exact.
@@ -188,3 +167,89 @@ def _of_angle(square: Any) -> tuple[Any, Any, Any]:
 def _along(e: Array, rate: Array) -> Array:
     """The derivative of D at e along `rate`, by a complex step: exact to rounding."""
     return np.asarray(_left(e + 1j * _STEP * rate).imag / _STEP)
+
+
+@dataclass(frozen=True)
+class RelativePose(NamedRows, Measured):
+    """Keep `frame` at `position` (3,) [m] and `rotation` (3, 3) in the axes of the frame `to`.
+
+    m = 6, or 3 with `rotation` None: then only the position counts. The orientation error is the
+    rotation vector from the actual to the desired orientation, in the axes of `to`.
+    """
+
+    frame: Frame
+    to: Frame
+    position: ArrayLike
+    rotation: ArrayLike | None = None
+    stiffness: float = 40.0
+    damping: float = 20.0
+    gain: float = 10.0
+    name: str = "relative"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        finite_numbers(f"task {self.name!r}: position", self.position, 3)
+        if self.rotation is not None:
+            check_rotation(f"task {self.name!r}: rotation", self.rotation)
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Axes of `to`: six, or three without orientation."""
+        return Pose.row_names[:3 if self.rotation is None else 6]
+
+    def measure(self, state: State) -> Measure:
+        """See `Measured.measure`."""
+        rotation = np.eye(3) if self.rotation is None else self.rotation
+        return _relative, (Spot.of(self.frame), Spot.of(self.to),
+                           np.array(self.position, dtype=float), np.array(rotation, dtype=float))
+
+
+@compiled
+def _write_jacobian(kinematics, frame, to, R, d, J):
+    """Write R^T (J_f - J_t + [d]x W_t) and R^T (W_f - W_t), with d = p_f - p_t."""
+    linear, angular = jacobians_of(kinematics, frame)
+    linear_to, angular_to = jacobians_of(kinematics, to)
+    for c in range(J.shape[1]):
+        w = column(angular_to, c)
+        apart = less(column(linear, c), column(linear_to, c))
+        moved = turned_back(R, plus(apart, crossed(d, w)))
+        turned = turned_back(R, less(column(angular, c), w))
+        for i in range(3):
+            J[i, c] = moved[i]
+            if J.shape[0] == 6:
+                J[3 + i, c] = turned[i]
+
+
+@compiled
+def _write_drift(kinematics, frame, to, R, d, drift):
+    """Write the exact dJ/dt v (3 or 6,), with dR/dt = [w]x R."""
+    v, w, a, b = motion_of(kinematics, frame)
+    v_to, w_to, a_to, b_to = motion_of(kinematics, to)
+    apart = less(v, v_to)
+    linear = plus(plus(less(a, a_to), crossed(apart, w_to)), crossed(d, b_to))
+    linear = less(linear, crossed(w_to, plus(apart, crossed(d, w_to))))
+    moved = turned_back(R, linear)
+    turned = turned_back(R, less(less(b, b_to), crossed(w_to, less(w, w_to))))
+    for i in range(3):
+        drift[i] = moved[i]
+        if len(drift) == 6:
+            drift[3 + i] = turned[i]
+
+
+@measured
+def _relative(kinematics, reads, goal, J, motion):
+    frame, to, position, rotation = reads
+    placements = kinematics.placements
+    R = rotation_of(placements, to)
+    d = less(place(placements[frame.joint], frame.offset), place(placements[to.joint], to.offset))
+    _write_jacobian(kinematics, frame, to, R, d, J)
+    _write_drift(kinematics, frame, to, R, d, motion.drift)
+    here = turned_back(R, d)
+    for i in range(3):
+        motion.error[i] = position[i] - here[i]
+    if len(motion.error) == 6:
+        there = rotation_of(placements, frame)
+        motion.error[3:] = rotation_vector(times_transposed(
+            times_transposed(rotation, there), R.T))  # R_d (R^T R_f)^T
+    for i in range(len(motion.rate)):
+        motion.rate[i] = row_times(J, i, kinematics.v)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from hierarchy.avoidance.measurement import Measurement
-from hierarchy.errors import HierarchyError, expect
-from hierarchy.kinematics import moving_point, point_at, write_point_jacobian
+from hierarchy.errors import expect
+from hierarchy.kinematics import moving_point, place, write_point_jacobian
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Writer, Written
+from hierarchy.task import Level, Rows, Writer, Written
 
 _NOTHING_SEEN = Measurement(0).arrays
 
@@ -23,13 +23,13 @@ _NOTHING_SEEN = Measurement(0).arrays
 @measured
 def _position(kinematics, reads, goal, J, motion):
     joint, offset, seen, repulsion_within = reads
-    placements = kinematics.placements
-    write_point_jacobian(kinematics.J, placements, kinematics.supports, joint, offset, J, 0)
+    write_point_jacobian(kinematics, joint, offset, J)
+    here = place(kinematics.placements[joint], offset)
     velocity, drift, _ = moving_point(kinematics, joint, offset)
     last = len(seen.distance) - 1
     for i in range(3):
         motion.rate[i], motion.drift[i] = velocity[i], drift[i]
-        motion.error[i] = goal[0, i] - point_at(placements, joint, offset, i)
+        motion.error[i] = goal[0, i] - here[i]
         if seen.distance[last] <= repulsion_within:
             motion.push[i] = seen.magnitude[last] * seen.direction[last, i]  # (30)
 
@@ -79,9 +79,8 @@ class Along(Written):
             D = np.array(self.directions, dtype=float)
         except (TypeError, ValueError):
             D = np.empty(0)
-        if D.ndim != 2 or D.shape[1:] != (3,) or not np.allclose(D @ D.T, np.eye(len(D))):
-            raise HierarchyError(f"task {self.name!r}: directions {self.directions!r} are not of "
-                                 "length one and orthogonal, (m, 3)")
+        self.refuse(D.ndim != 2 or D.shape[1:] != (3,) or not np.allclose(D @ D.T, np.eye(len(D))),
+                    f"directions {self.directions!r} are not of length one and orthogonal, (m, 3)")
 
     @property
     def dimension(self) -> int:
@@ -92,16 +91,14 @@ class Along(Written):
         """Distance to the path along the directions (m,) [m]."""
         return np.asarray(self.directions) @ self.task.error(state)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        rows, b, above = np.zeros((3, A.shape[1])), np.zeros(3), np.zeros(3)
-        write_rows = self.task.writer(state, level, rows, b, above, 0)
-        own, D = slice(row, row + self.dimension), np.array(self.directions, dtype=float)
+        three, D = Rows.empty(3, rows.A.shape[1]), np.array(self.directions, dtype=float)
+        write_three = self.task.writer(state, level, three)
 
         def write() -> None:
-            write_rows()
-            A[own] = D @ rows
-            lower[own] = upper[own] = D @ b
+            write_three()
+            rows.A[:] = D @ three.A
+            rows.lower[:] = rows.upper[:] = D @ three.lower
 
         return write

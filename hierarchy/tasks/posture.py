@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, expect, finite_numbers
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import write_equality, write_identity
+from hierarchy.kinematics import row_times, write_identity
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Writer, Written
+from hierarchy.task import Level, Rows, Writer, Written
 
 
 class JointTask(Written):
@@ -37,9 +37,8 @@ class JointTask(Written):
 
     def check_size(self, state: State) -> None:
         """Raise a HierarchyError unless a state has as many velocities as there are joints."""
-        if self.joints != state.n:
-            raise HierarchyError(f"task {self.name!r}: {self.joints} joints, the robot has "
-                                 f"{state.n} velocities")
+        self.refuse(self.joints != state.n, f"{self.joints} joints, the robot has {state.n} "
+                    "velocities")
 
 
 @dataclass(frozen=True)
@@ -88,9 +87,8 @@ class Posture(Measured):
         """One row for each velocity but those of a floating base."""
         if self.robot is not None:
             return self.robot.n - self.robot.actuated
-        if isinstance(self.target, Mapping):
-            raise HierarchyError(f"task {self.name!r}: a target by name has rows once the robot is "
-                                 "known; give Posture(..., robot=robot)")
+        self.refuse(isinstance(self.target, Mapping), "a target by name has rows once the robot "
+                    "is known; give Posture(..., robot=robot)")
         return len(np.asarray(self.target))
 
     @property
@@ -152,29 +150,21 @@ class JointDamping(JointTask):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.weight not in ("identity", "mass"):
-            raise HierarchyError(f"task {self.name!r}: weight must be 'identity' or 'mass', got "
-                                 f"{self.weight!r}")
+        self.refuse(self.weight not in ("identity", "mass"), "weight must be 'identity' or "
+                    f"'mass', got {self.weight!r}")
         expect(f"task {self.name!r}: joints", self.joints, int, "give robot.n")
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         self.check_size(state)
-        if self.weight == "identity" or level == "velocity":
-            damping = self.damping if level == "acceleration" else 0.0
-            return bind(_brake, state.v, damping, A, lower, upper, row)
-        write_rows, rows = bind(write_identity, A, row, self.joints), slice(row, row + self.joints)
-
-        def write() -> None:
-            write_rows()
-            lower[rows] = upper[rows] = -self.damping * (state.mass_matrix() @ state.v)
-
-        return write
+        damping = self.damping if level == "acceleration" else 0.0
+        by_mass = damping > 0.0 and self.weight == "mass"
+        weight = state.dynamics.M if by_mass else np.empty((0, 0))
+        return bind(_brake, state.v, weight, damping, *rows)
 
 
 @compiled
-def _brake(v, damping, A, lower, upper, row):
-    write_identity(A, row, len(v))
+def _brake(v, weight, damping, A, lower, upper):
+    write_identity(A)
     for i in range(len(v)):
-        write_equality(lower, upper, row + i, -damping * v[i])  # (15)
+        lower[i] = upper[i] = -damping * (row_times(weight, i, v) if len(weight) else v[i])  # (15)

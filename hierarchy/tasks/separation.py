@@ -1,7 +1,7 @@
-"""Separation: one-sided rows that keep all points away from all obstacles.
+"""Separation: one-sided rows that keep points from obstacles, and links of the robot apart.
 
-With d the distance of a pair, r the direction and o the obstacle, a row is (see `Barrier` for the
-required dh/dt and d2h/dt2)
+With d the distance of a pair and r its direction, a row is (see `Barrier` for the required dh/dt
+and d2h/dt2), of a point and an obstacle o
 
     velocity level       r^T J_c v >= required dh/dt + r . v_o
     acceleration level   r^T J_c a >= required d2h/dt2 + r . a_o - r^T dJ_c/dt v - bend
@@ -12,35 +12,64 @@ convex obstacle that does not rotate, so a sensor that does not know the radius 
 then a point that swings around an obstacle at a constant distance has a row that no acceleration
 can satisfy. The radius is taken as at least d_min. The derivative of J_c is exact or a backward
 difference, as in the state.
+
+Of two links with the nearest points a and b, taken as fixed to their bodies, J_a - J_b is in place
+of J_c, and nothing moves by itself. Then r turns and the nearest points slide along the axes, so
+that bend may be negative. Where two axes become parallel the nearest points jump, d has a kink, and
+bend falls without bound; `barrier.limit` then limits the row, and d may fall below
+`barrier.distance` by the motion of one period at velocity level, and by the braking distance with
+`limit` at acceleration level.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hierarchy.avoidance.barrier import (
+from hierarchy.avoidance.body import (
+    ON_AXIS,
+    Capsule,
+    ControlPoint,
+    bend_of_nearest,
+    measure_capsules,
+    nearest_of_capsules,
+    on_axis,
+    pack_capsules,
+    pack_points,
+    pairs_of_chain,
+)
+from hierarchy.avoidance.laws import (
     Barrier,
     drop_rounding,
     least_acceleration,
     least_rate,
 )
-from hierarchy.avoidance.control_points import ControlPoint, pack_points
 from hierarchy.avoidance.measurement import Pairs
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect_each
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import add_row, dot, less, moving_point, place, triple
+from hierarchy.kinematics import (
+    add_row,
+    crossed,
+    dot,
+    less,
+    moving_point,
+    place,
+    times,
+    turned,
+)
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Writer, Written
+from hierarchy.task import Kind, Level, NamedRows, Rows, Writer, Written
 
 _SHARPEST = 1e-3  # [m] smallest radius of turning that is used
 
 
 @dataclass(frozen=True)
-class Separation(Written):
+class Separation(NamedRows, Written):
     """Keep every point at `barrier.distance` or more from every obstacle (m = points x obstacles).
 
     `points` are those of the sensor in its order, the end effector last; `obstacles` is how many
@@ -55,11 +84,6 @@ class Separation(Written):
     obstacles: int | None = None
     name: str = "separation"
     kind: Kind = "inequality"
-
-    @property
-    def dimension(self) -> int:
-        """One row per pair, or per point."""
-        return len(self.points) * (1 if self.obstacles is None else self.obstacles)
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -78,13 +102,11 @@ class Separation(Written):
         pairs = self._pairs(state)
         return np.asarray((pairs[:, 1:4] * pairs[:, 4:7]).sum(axis=1))
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         parameters = (*pack_points(self.points), self.barrier.packed(), self.obstacles is None,
                       level == "acceleration")
-        return bind(_write, state.kinematics, parameters, self._seen(state).table, A, lower, upper,
-                    row)
+        return bind(_write_points, state.kinematics, parameters, self._seen(state).table, *rows)
 
     def _pairs(self, state: State) -> Array:
         """The pair of each row (m, 14)."""
@@ -99,21 +121,19 @@ class Separation(Written):
             raise HierarchyError(f"task {self.name!r}: the state carries no measurement of pairs")
         points, obstacles, _ = seen.table.shape
         fits = obstacles > 0 if self.obstacles is None else obstacles == self.obstacles
-        if points != len(self.points) or not fits:
-            raise HierarchyError(
-                f"task {self.name!r}: {points} points are measured against {obstacles} obstacles, "
-                f"expected {len(self.points)} against {self.obstacles or 'one at least'}")
+        self.refuse(points != len(self.points) or not fits, f"{points} points are measured "
+                    f"against {obstacles} obstacles, expected {len(self.points)} against "
+                    f"{self.obstacles or 'one at least'}")
         return seen
 
 
 @compiled
-def _write(kinematics, parameters, pairs, A, lower, upper, row):
+def _write_points(kinematics, parameters, pairs, A, lower, upper):
     joints, offsets, settings, nearest, acceleration = parameters
-    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    distance, influence = settings[0], settings[2]
+    row, distance, influence = 0, settings[0], settings[2]
     for k in range(joints.size):
         joint = joints[k]
-        point = place(placements[joint], offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        point = place(kinematics.placements[joint], offsets[k])
         velocity, drift, _ = moving_point(kinematics, joint, offsets[k])
         first, end = 0, pairs.shape[1]
         if nearest:
@@ -123,19 +143,113 @@ def _write(kinematics, parameters, pairs, A, lower, upper, row):
             end = first + 1
         for j in range(first, end):
             pair = pairs[k, j]
-            r = triple(pair, 1)
+            r = pair[1:4]
             A[row, :] = 0.0
-            add_row(J, supports, joint, point, r, A, row)
-            drop_rounding(A, row)
+            add_row(kinematics, joint, point, r, A[row])
+            drop_rounding(A[row])
             lower[row], upper[row] = -np.inf, np.inf
             h = pair[0] - distance
             if pair[0] <= influence and acceleration:
-                w = less(velocity, triple(pair, 4))
-                rate, straight = dot(r, w), dot(triple(pair, 10), w)
+                w = less(velocity, pair[4:7])
+                rate, straight = dot(r, w), dot(pair[10:13], w)
                 across = dot(w, w) - rate * rate - straight * straight
                 bend = max(across, 0.0) / max(pair[13], distance, _SHARPEST)
                 lower[row] = (least_acceleration(h, rate, bend, settings)
-                              + dot(r, less(triple(pair, 7), drift)))
+                              + dot(r, less(pair[7:10], drift)))
             elif pair[0] <= influence:
-                lower[row] = least_rate(h, settings) + dot(r, triple(pair, 4))
+                lower[row] = least_rate(h, settings) + dot(r, pair[4:7])
             row += 1
+
+
+@dataclass(frozen=True)
+class SelfSeparation(NamedRows, Written):
+    """Keep pairs of capsules of the robot at `barrier.distance` or more (m = pairs).
+
+    `pairs` are indices of `capsules`; None takes every pair of the chain except neighbours. No
+    sensor is needed. See the module for the rows. Axes that cross (d is minus the two radii) have
+    no direction; the row then uses z.
+
+    Raises HierarchyError if there is no pair or an index is out of range.
+    """
+
+    capsules: Sequence[Capsule]
+    barrier: Barrier
+    pairs: Sequence[tuple[int, int]] | None = None
+    name: str = "self-separation"
+    kind: Kind = "inequality"
+    indices: NDArray[np.int64] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        expect_each("capsules", self.capsules, Capsule, "see robot.capsules")
+        pairs = pairs_of_chain(self.capsules) if self.pairs is None else self.pairs
+        count = len(self.capsules)
+        self.refuse(not pairs, f"no pair among {count} capsules")
+        for i, j in pairs:
+            self.refuse(not (0 <= i < count and 0 <= j < count and i != j),
+                        f"pair ({i}, {j}) is no pair among {count} capsules")
+        set_frozen(self, indices=np.array(pairs, dtype=np.int64))
+
+    @property
+    def dimension(self) -> int:
+        """One row per pair."""
+        return len(self.indices)
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """The two capsules of each row."""
+        return tuple(f"{self.capsules[i].name} to {self.capsules[j].name}"
+                     for i, j in self.indices)
+
+    def distances(self, state: State) -> Array:
+        """Distances d (m,) [m], negative where capsules overlap."""
+        return measure_capsules(state.placements, *pack_capsules(self.capsules), self.indices)[:, 0]
+
+    def error(self, state: State) -> Array:
+        """distance - d (m,) [m], positive where two capsules are too close."""
+        return self.barrier.distance - self.distances(state)
+
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
+        """See `Task.writer`."""
+        parameters = (*pack_capsules(self.capsules), self.indices, self.barrier.packed(),
+                      level == "acceleration")
+        return bind(_write_capsules, state.kinematics, parameters, *rows)
+
+
+@compiled
+def _write_capsules(kinematics, parameters, A, lower, upper):
+    joints, capsules, pairs, settings, acceleration = parameters
+    for row in range(pairs.shape[0]):
+        i, j = pairs[row, 0], pairs[row, 1]
+        a, b = capsules[i], capsules[j]
+        T_a, T_b = kinematics.placements[joints[i]], kinematics.placements[joints[j]]
+        seen = nearest_of_capsules(T_a, a, T_b, b)
+        D, r, s, t = seen
+        A[row, :] = 0.0
+        add_row(kinematics, joints[i], place(T_a, on_axis(a, s)), r, A[row])
+        add_row(kinematics, joints[j], place(T_b, on_axis(b, t)), times(-1.0, r), A[row])
+        drop_rounding(A[row])
+        lower[row], upper[row] = -np.inf, np.inf
+        if D <= settings[2]:
+            if acceleration:
+                rate, drift, bend = _motion(kinematics, joints, capsules, i, j, seen)
+                lower[row] = least_acceleration(D - settings[0], rate, bend, settings) - drift
+            else:
+                lower[row] = least_rate(D - settings[0], settings)
+
+
+@compiled
+def _motion(kinematics, joints, capsules, i, j, seen):
+    """dd/dt, r^T (dJ_a/dt - dJ_b/dt) v and bend of one pair."""
+    D, r, s, t = seen
+    a, b = capsules[i], capsules[j]
+    v_a, drift_a, w_a = moving_point(kinematics, joints[i], on_axis(a, s))
+    v_b, drift_b, w_b = moving_point(kinematics, joints[j], on_axis(b, t))
+    v, length = less(v_a, v_b), D + a[6] + b[6]
+    rate, drift = dot(r, v), dot(r, less(drift_a, drift_b))
+    if length < ON_AXIS:
+        return rate, drift, 0.0
+    u = turned(kinematics.placements[joints[i]], a[3:6])
+    w = turned(kinematics.placements[joints[j]], b[3:6])
+    return rate, drift, bend_of_nearest(length, r, v, (u, crossed(w_a, u), s),
+                                        (w, crossed(w_b, w), t))

@@ -13,11 +13,21 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Task, Writer, Written, in_turn, writer_in_stack
+from hierarchy.task import (
+    Kind,
+    Level,
+    NamedRows,
+    Rows,
+    Task,
+    Writer,
+    Written,
+    in_turn,
+    writer_in_stack,
+)
 
 
 @dataclass(frozen=True)
-class Together(Written):
+class Together(NamedRows, Written):
     """The rows of several tasks as one level: m is the sum of theirs.
 
     What cannot all be met is missed by the smallest sum of squares over all rows, so the rows
@@ -31,12 +41,10 @@ class Together(Written):
     def __post_init__(self) -> None:
         super().__post_init__()
         expect_each(f"task {self.name!r}: tasks", self.tasks, Task, "see hierarchy.tasks")
-        if not self.tasks:
-            raise HierarchyError(f"task {self.name!r}: there are no tasks in it")
+        self.refuse(not self.tasks, "there are no tasks in it")
         for task in self.tasks:
-            if task.of_forces and task.contacts is not self.contacts:
-                raise HierarchyError(f"task {self.name!r}: its tasks have different contacts; give "
-                                     "all of them the same object")
+            self.refuse(task.of_forces and task.contacts is not self.contacts,
+                        "its tasks have different contacts; give all of them the same object")
 
     def on(self, robot: Robot) -> Task:
         """Return the task with its tasks for a robot."""
@@ -58,11 +66,6 @@ class Together(Written):
         return next((task.contacts for task in self.tasks if task.of_forces), None)
 
     @property
-    def dimension(self) -> int:
-        """The rows of all tasks."""
-        return sum(task.dimension for task in self.tasks)
-
-    @property
     def row_names(self) -> tuple[str, ...]:
         """Task and row of each row."""
         return tuple(f"{task.name} {row}" for task in self.tasks for row in task.row_names)
@@ -71,18 +74,16 @@ class Together(Written):
         """The errors of the tasks (m,)."""
         return np.concatenate([task.error(state) for task in self.tasks])
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        writers = []
-        for task in self.tasks:
-            writers.append(writer_in_stack(task, state, level, A, lower, upper, row))
-            row += task.dimension
-        return in_turn(*writers)
+        ends = np.cumsum([task.dimension for task in self.tasks]).tolist()
+        return in_turn(*(
+            writer_in_stack(task, state, level, rows.some(end - task.dimension, task.dimension))
+            for task, end in zip(self.tasks, ends, strict=True)))
 
 
 @dataclass(frozen=True)
-class TangentCone(Written):
+class TangentCone(NamedRows, Written):
     """Keep an inequality task in its set by its rate alone, at velocity level.
 
     A row of `task` whose error is negative, strictly inside, has no bounds; one on the bound or
@@ -110,11 +111,6 @@ class TangentCone(Written):
         set_frozen(self, name=self.task.name)
 
     @property
-    def dimension(self) -> int:
-        """One row per row of `task`."""
-        return self.task.dimension
-
-    @property
     def row_names(self) -> tuple[str, ...]:
         """The names of the rows of `task`."""
         return self.task.row_names
@@ -131,17 +127,14 @@ class TangentCone(Written):
         """The least rate (m,): that of the bound, -inf inside."""
         return np.where(self.error(state) >= 0.0, self.desired_velocity(state), -np.inf)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Writer:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        if level != "velocity":
-            raise HierarchyError(f"task {self.name!r}: set-based tasks are defined at velocity "
-                                 f"level, got level = {level!r}")
-        write_rows = self.task.writer(state, level, A, lower, upper, row)
-        rows = slice(row, row + self.dimension)
+        self.refuse(level != "velocity", "set-based tasks are defined at velocity level, got "
+                    f"level = {level!r}")
+        write_rows = self.task.writer(state, level, rows)
 
         def write() -> None:
             write_rows()
-            lower[rows], upper[rows] = self.reference_velocity(state), np.inf
+            rows.lower[:], rows.upper[:] = self.reference_velocity(state), np.inf
 
         return write

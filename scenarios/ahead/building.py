@@ -27,8 +27,8 @@ PARTS = {"solvers": ("solvers",), "robots": ("hierarchy", "scenarios")}
 
 def main() -> None:
     """Write the object files of the parts that are named, or all, unless they are current."""
-    from hierarchy.jit.ahead import FOLDER
-    from hierarchy.jit.building import ENVIRONMENT
+    from hierarchy.jit.caching import FOLDER
+    from hierarchy.jit.exporting import ENVIRONMENT
 
     names = sys.argv[1:]
     if names == ["record"]:
@@ -46,15 +46,15 @@ def main() -> None:
 
 def is_current(part: str) -> bool:
     """Whether the object file of a part was made of the calls and sources as they are."""
-    from hierarchy.jit import building
-    from hierarchy.jit.ahead import FOLDER
+    from hierarchy.jit import exporting
+    from hierarchy.jit.caching import FOLDER
 
-    return building.is_current(FOLDER / f"{part}.o", _listed())
+    return exporting.is_current(FOLDER / f"{part}.o", _listed())
 
 
 def record(job: str) -> list[str]:
     """Return the calls of kernels that a job makes, and those of this process before it."""
-    from hierarchy.jit.dispatching import asked
+    from hierarchy.jit.compiling import asked
 
     with (redirect_stdout(StringIO()), redirect_stderr(StringIO()),
           tempfile.TemporaryDirectory() as folder):
@@ -64,7 +64,7 @@ def record(job: str) -> list[str]:
 
 def compile_part(part: tuple[Path, Sequence[str]]) -> int:
     """Write one object file and return its size [B]."""
-    from hierarchy.jit.building import build
+    from hierarchy.jit.exporting import build
 
     file, calls = part
     build(file, _listed(), calls, lambda count: None if count % 20 else _say(

@@ -18,7 +18,7 @@ from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
 from hierarchy.tasks import Pointing, Separation
-from hierarchy.tasks.self_separation import SelfSeparation
+from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.tasks.together import TangentCone
 from scenarios.cell.plants import Plant
 from scenarios.cell.plants.plant import plant_of

@@ -9,7 +9,6 @@ other end of each link than the points do, and entry (2, 1) of the upper-arm Jac
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +19,7 @@ from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import row_times, write_point_jacobian
 from hierarchy.measured import measured
 from hierarchy.problem import Array
-from hierarchy.task import Level
+from hierarchy.task import Level, Rows, Writer
 from hierarchy.tasks import Avoidance
 
 _UPPER_ARM_POINTS = 4
@@ -53,12 +52,11 @@ class PublishedAvoidance(Avoidance):
         _expect_differences(state)
         return super().jacobian_derivative(state)
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         if level == "acceleration":
             _expect_differences(state)
-        return super().writer(state, level, A, lower, upper, row)
+        return super().writer(state, level, rows)
 
 
 def _expect_differences(state: State) -> None:
@@ -73,8 +71,7 @@ def _published(kinematics, reads, goal, J, motion):
     joints, offsets, seen = reads
     k, placements = max(seen.active[0], 0), kinematics.placements
     offset, r, of_point = offsets[k], seen.direction[k], np.empty((3, J.shape[1]))
-    write_point_jacobian(kinematics.J, placements, kinematics.supports, joints[k], offset,
-                         of_point, 0)
+    write_point_jacobian(kinematics, joints[k], offset, of_point)
     if k < _UPPER_ARM_POINTS:
         c1, c2 = placements[1, 0], placements[2, 5]
         of_point[1, 0] = -offset[1] * c1 * c2  # the published entry; c1 s2 is right

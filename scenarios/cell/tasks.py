@@ -26,7 +26,7 @@ from hierarchy.tasks import (
     TorqueLimits,
 )
 from hierarchy.tasks.mechanism import above, model_rows
-from hierarchy.tasks.self_separation import SelfSeparation
+from hierarchy.tasks.separation import SelfSeparation
 from scenarios.cell.published import PublishedAvoidance
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError

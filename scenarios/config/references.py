@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hierarchy import Robot, State
-from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules, pairs_of_tree
+from hierarchy.avoidance.body import measure_capsules, pack_capsules, pairs_of_tree
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 from hierarchy.robot import Frame

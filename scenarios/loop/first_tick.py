@@ -8,7 +8,7 @@ from math import isfinite, tau
 
 import numpy as np
 
-from hierarchy.tasks.self_separation import SelfSeparation
+from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.words import listed
 from scenarios.cell.build import Cell
 from scenarios.cell.robot import doubts

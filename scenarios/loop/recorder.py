@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hierarchy.allocation import AVOIDANCE
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import point_at
+from hierarchy.kinematics import place
 from hierarchy.problem import Array
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
@@ -242,8 +242,8 @@ def _write(log, seen, joint, offset, k, chosen, measured):
     for j in range(len(seen.v)):
         log.v[k, j] = seen.v[j]
         finite &= abs(seen.v[j]) <= FASTEST
-    for j in range(3):
-        log.ee_position[k, j] = point_at(seen.placements, joint, offset, j)
+    at = place(seen.placements[joint], offset)
+    log.ee_position[k, 0], log.ee_position[k, 1], log.ee_position[k, 2] = at
     for j in range(len(seen.distance)):
         log.distance[k, j] = seen.distance[j]
     for j in range(len(chosen)):

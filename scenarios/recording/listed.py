@@ -9,7 +9,7 @@ import numpy as np
 from hierarchy import HierarchyError, Robot, State, Task
 from hierarchy.problem import Array
 from hierarchy.tasks import Along, CentreOfMass, Position
-from hierarchy.tasks.pose import PoseTask
+from hierarchy.tasks.pose import Pose
 from scenarios.config.tasks import ListedTask
 from scenarios.recording.recording import Recording
 
@@ -58,7 +58,7 @@ def _error_reader(task: Task, state: State) -> Callable[[], Array | float]:
 def _position(task: Task, state: State) -> Array | None:
     if isinstance(task, Along):
         task = task.task
-    if isinstance(task, Position | PoseTask):
+    if isinstance(task, Position | Pose):
         return state.position(task.frame)
     return task.position(state) if isinstance(task, CentreOfMass) else None
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from hierarchy.gate import check_rows
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from hierarchy.state import State
-from hierarchy.task import Level, Task
+from hierarchy.task import Level, Rows, Task, Writer
 from solvers.adapters import displacements
 from solvers.adapters.displacements import Packed, Pull, Solve, Tasks
 
@@ -72,21 +72,19 @@ class PinkTask(Task):
         """Return pink's Jacobian, times the costs: (m, n)."""
         return self._residual(state)[0]
 
-    def writer(self, state: State, level: Level, A: Array, lower: Array, upper: Array,
-               row: int) -> Callable[[], object]:
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; a call asks pink once."""
         if level == "acceleration":
             self.jacobian_derivative(state)
-        own = slice(row, row + self.rows)
 
         def write() -> None:
             J, r = self._residual(state)
             if len(r) != self.rows:
                 raise HierarchyError(f"task {self.name!r}: {len(r)} of its rows cost something, "
                                      f"{self.rows} did when it was created; create it again")
-            A[own] = J
-            lower[own] = upper[own] = self.gain * r
-            check_rows(f"task {self.name!r}", A[own], lower[own], upper[own])
+            rows.A[:] = J
+            rows.lower[:] = rows.upper[:] = self.gain * r
+            check_rows(f"task {self.name!r}", *rows)
 
         return write
 

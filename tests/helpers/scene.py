@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hierarchy import Robot, State, Task
-from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
+from hierarchy.avoidance import Obstacle, Obstacles, Pairs, Repulsion, measure_pairs
 from hierarchy.measured import Measured, measured
 from hierarchy.paths import Ellipse, Still
+from hierarchy.task import Rows
 from hierarchy.tasks import (
     Along,
     Avoidance,
@@ -137,13 +138,20 @@ def driven(stack, ticks, period, start, resolver=None, differences=False, sensor
         plant.act(res.x)
 
 
+def distance(obstacle, point):
+    """Signed distance of a point to an obstacle, and the direction away from it (3,)."""
+    pairs = Pairs(1, 1)
+    measure_pairs(pairs, np.array([point]), Obstacles([obstacle]))
+    return pairs.distance[0, 0], pairs.direction[0, 0]
+
+
 def compiled_rows(task, state, level, rtol=1e-12):
     """The rows that a task writes (A, lower, upper), checked against those of its plain methods."""
     count = task.dimension + 2
-    written, plain = [(np.full((count, state.n), 5.0), np.full(count, 5.0), np.full(count, 5.0))
-                      for _ in range(2)]
-    task.writer(state, level, *written, row=1)()
-    Task.writer(task, state, level, *plain, row=1)()
+    written, plain = [Rows(np.full((count, state.n), 5.0), np.full(count, 5.0),
+                           np.full(count, 5.0)) for _ in range(2)]
+    task.writer(state, level, written.some(1, task.dimension))()
+    Task.writer(task, state, level, plain.some(1, task.dimension))()
     for a, b in zip(written, plain, strict=True):
         np.testing.assert_allclose(a, b, rtol=rtol, atol=1e-9)  # dJ by differences
         assert (a[[0, -1]] == 5.0).all(), "rows of others are left alone"

@@ -6,6 +6,7 @@ import pinocchio as pin
 from hierarchy import Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.paths import Still
+from hierarchy.task import Rows
 from hierarchy.tasks import (
     BaseDynamics,
     CentreOfMass,
@@ -68,9 +69,18 @@ def external_forces(state, contacts, forces):
     return wrenches
 
 
+def drift_of(contacts, state):
+    """Accelerations (3 p,) of the contact points with a = 0, by pinocchio."""
+    model = contacts.robot.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, state.q, state.v, np.zeros(model.nv))
+    return np.concatenate([pin.getFrameClassicalAcceleration(
+        model, data, int(joint), pin.SE3(np.eye(3), offset), pin.LOCAL_WORLD_ALIGNED).linear
+        for joint, offset in zip(*contacts.points, strict=True)])
+
+
 def written(task, state, level="acceleration", n=ROBOT.n):
     """Return the rows A (dimension, n), lower and upper that a task writes."""
-    m = task.dimension
-    rows = np.zeros((m, n)), np.zeros(m), np.zeros(m)
-    task.writer(state, level, *rows, 0)()
+    rows = Rows.empty(task.dimension, n)
+    task.writer(state, level, rows)()
     return rows

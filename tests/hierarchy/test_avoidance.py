@@ -2,12 +2,11 @@ from math import inf, nan
 
 import numpy as np
 import pytest
-from scene import BODY, OBSTACLES, ROBOT, TIP, place_of, states
+from scene import BODY, OBSTACLES, ROBOT, TIP, distance, place_of, states
 
 from hierarchy import State
 from hierarchy.allocation import allocate
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion, SurveillanceAreas
-from hierarchy.avoidance.obstacles import distance_to_obstacle
 from hierarchy.paths import Waypoints
 from scenarios.cell.sensors import ExactDistances
 
@@ -18,11 +17,6 @@ SHAPES = {
     "capsule": Obstacle("capsule", (0.1, -0.2, 0.3), (0.1, 0.25), TURN),
     "box": Obstacle("box", (0.1, -0.2, 0.3), (0.2, 0.1, 0.3), TURN),
 }
-
-
-def distance(obstacle, point):
-    away = np.empty(3)
-    return distance_to_obstacle(obstacle.packed(), *point, away), away
 
 
 def surface_points(obstacle, count):

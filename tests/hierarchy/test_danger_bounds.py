@@ -7,7 +7,7 @@ from standing import written
 
 from hierarchy import Stack
 from hierarchy.tasks import CumulatedRepulsion, JointDamping, JointLimits, Posture
-from hierarchy.tasks.danger_bounds import DangerBounds
+from hierarchy.tasks.avoidance import DangerBounds
 
 PERIOD, REACH, SHAPE = 1e-3, 0.5, 6.0
 LIMITS = JointLimits(ROBOT, 30.0, PERIOD)

@@ -35,7 +35,7 @@ def drive(q, v, limits, acceleration, picks, low, up, seen, log):
     for k in range(len(picks)):
         for j in range(len(q)):
             T = limits[4, j]
-            write_box(q[j:j + 1], v[j:j + 1], limits[:, j:j + 1], acceleration, low, up, j)
+            write_box(q[j:j + 1], v[j:j + 1], limits[:, j:j + 1], acceleration, low[j:], up[j:])
             x = low[j] * (1.0 - picks[k, j]) + up[j] * picks[k, j]
             a = x if acceleration else (x - v[j]) / T
             high, deep = q[j], q[j]
@@ -167,7 +167,7 @@ def test_beyond_the_box_a_limit_is_exceeded_or_the_joint_cannot_stop_in_time(lev
     q, v = viable_starts(rng, limits, T, level)
     for sign in (-1, 1):
         box = np.empty((2, JOINTS))
-        write_box(q, v, np.vstack([limits, T, T]), level == "acceleration", box[0], box[1], 0)
+        write_box(q, v, np.vstack([limits, T, T]), level == "acceleration", box[0], box[1])
         x = box[(sign + 1) // 2]
         more = 1e-4 * A if level == "acceleration" else 1e-4 * A * T
         x = x + sign * more

@@ -9,8 +9,7 @@ import pytest
 
 from hierarchy import Robot as Kuka
 from hierarchy import Stack, State
-from hierarchy.loop import Loop
-from hierarchy.loop.watchdog import Watchdog
+from hierarchy.loop import Loop, Watchdog
 from hierarchy.tasks import Posture
 from solvers import Resolution, Status
 

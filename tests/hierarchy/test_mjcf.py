@@ -301,6 +301,8 @@ def test_a_difference_from_mujoco_names_the_body(written, monkeypatch):
     with pytest.raises(RobotError, match=r"body 'a' is 3e-09 from where MuJoCo has it"):
         Robot.load(path)
     monkeypatch.setattr(model, "pose", exact)
-    monkeypatch.setattr(model, "_turned", lambda _, diagonal: np.diag(diagonal * (1.0 + 1e-6)))
+    inertia = model.pin.Inertia
+    monkeypatch.setattr(model.pin, "Inertia", lambda mass, centre, about: inertia(
+        mass, centre, about * (1.0 + 1e-6)))
     with pytest.raises(RobotError, match=r"the inertia at body '[ab]' is "):
         Robot.load(path)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hierarchy import Robot, State
-from hierarchy.avoidance.self_collision import pairs_of_tree
+from hierarchy.avoidance.body import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
 from scenarios.cell.robot import make_robot
 from scenarios.config.references import separable_pairs
@@ -183,7 +183,7 @@ LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"
 
 @pytest.mark.parametrize(("changed", "said"), [
     ({"axis": "0 0 0"}, "joint 'shoulder': its axis is zero"),
-    ({"axis": "0 1"}, "joint 'shoulder': its axis '0 1' is not three finite numbers"),
+    ({"axis": "0 1"}, "joint 'shoulder': its axis xyz = '0 1' is not three finite numbers"),
     ({"parent": "nobody"}, "joint 'shoulder': its parent link 'nobody' does not exist"),
     ({"limit": '<limit lower="nan" upper="2"/>'}, "joint 'shoulder': its limit lower = 'nan'"),
     ({"link": '<inertial><mass value="-1"/></inertial>'}, "link 'upper': its mass '-1'"),

@@ -78,7 +78,7 @@ def test_a_path_of_a_csv_file_passes_its_points_with_continuous_acceleration(nam
     ("t,x,y,z\n0,0,0,0\n1,0,0\n", "line 3: expected t, x, y, z, got '1,0,0'"),
     ("0,0,0,0\n1,a,0,0\n", "line 2: expected t, x, y, z, got '1,a,0,0'"),
     ("0,0,0,0\n0,1,0,0\n", "times must increase"),
-    ("0,0,0,0\n1,nan,0,0\n", "points[1] must be three finite numbers"),
+    ("0,0,0,0\n1,nan,0,0\n", "points[1] [m]: expected 3 finite numbers"),
     ("0,0,0,0\n", "one point is no motion"), ("", "0 times for 0 points")])
 def test_a_wrong_csv_file_is_named_with_its_line(text, said, tmp_path):
     (tmp_path / "a.csv").write_text(text)

@@ -7,9 +7,9 @@ from scipy.optimize import lsq_linear
 
 from hierarchy import State
 from hierarchy.avoidance import Barrier, Capsule
-from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules
+from hierarchy.avoidance.body import measure_capsules, pack_capsules
 from hierarchy.robots import TABLES, link_capsules
-from hierarchy.tasks.self_separation import SelfSeparation
+from hierarchy.tasks.separation import SelfSeparation
 
 LEVELS = ["velocity", "acceleration"]
 ARM = link_capsules(TABLES["kuka_lwr"], foot=0.3105)

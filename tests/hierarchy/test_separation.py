@@ -5,6 +5,7 @@ from scene import BODY, FRAME, ROBOT, TIP, compiled_rows, driven, states
 from hierarchy import HierarchyError, Stack, State
 from hierarchy.avoidance import Barrier, Measurement, Obstacle, Obstacles, Pairs
 from hierarchy.paths import Ellipse, Still
+from hierarchy.task import Rows
 from hierarchy.tasks import JointDamping, Position, Separation
 from scenarios.cell.sensors import ExactDistances
 
@@ -39,10 +40,6 @@ def seen_at(q, v, t=0.7, differences=None):
 
 def distances(q, t):
     return SENSOR.measure(State.at(ROBOT, q, t=t)).pairs.distance.ravel().copy()
-
-
-def rows(count, n=7):
-    return np.full((count, n), 5.0), np.full(count, 5.0), np.full(count, 5.0)
 
 
 def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
@@ -109,8 +106,8 @@ def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
     state = State.at(ROBOT, START)
     task = Separation(SENSOR.points, EVERYWHERE, obstacles)
     with pytest.raises(HierarchyError, match="measurement of pairs"):
-        task.writer(state, "velocity", *rows(18), row=0)()
+        task.writer(state, "velocity", Rows.empty(18, 7))()
     state.measurement = Measurement(8)
     state.measurement.pairs = pairs
     with pytest.raises(HierarchyError, match=said):
-        task.writer(state, "velocity", *rows(18), row=0)()
+        task.writer(state, "velocity", Rows.empty(18, 7))()

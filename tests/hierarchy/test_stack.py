@@ -109,12 +109,12 @@ def test_an_empty_stack_is_an_error_and_an_empty_order_is_not():
 class Crossed(JointLimits):
     """Limits whose kernel writes sides that cross in the third row."""
 
-    def writer(self, state, level, A, lower, upper, row):
-        write = super().writer(state, level, A, lower, upper, row)
+    def writer(self, state, level, rows):
+        write = super().writer(state, level, rows)
 
         def crossed():
             write()
-            lower[row + 2], upper[row + 2] = 3.0, 2.0
+            rows.lower[2], rows.upper[2] = 3.0, 2.0
 
         return crossed
 

@@ -19,9 +19,11 @@ from scipy.linalg import expm
 
 from hierarchy import HierarchyError, State
 from hierarchy.avoidance import Barrier
+from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
 from hierarchy.robots import TABLES as ROBOT_TABLES
 from hierarchy.robots import link_capsules
+from hierarchy.task import Rows
 from hierarchy.tasks import (
     DangerBounds,
     FrameLog,
@@ -33,8 +35,6 @@ from hierarchy.tasks import (
     Separation,
     TorqueLimits,
 )
-from hierarchy.tasks.geometric import cross
-from hierarchy.tasks.pose import rotation_vector
 from scenarios.config.kinds.frames import ListedFrame, ListedPointing, ListedPose, ListedPosition
 from scenarios.config.kinds.whole import ListedCentreOfMass, ListedPosture
 
@@ -106,8 +106,8 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
 def test_a_fast_task_of_a_user_writes_the_rows_of_the_plain_one(level):
     state, rows = state_at(*STATES[1]), []
     for task in (Elbow(), FastElbow()):
-        rows.append((np.zeros((1, 7)), np.zeros(1), np.zeros(1)))
-        task.writer(state, level, *rows[-1], 0)()
+        rows.append(Rows.empty(1, 7))
+        task.writer(state, level, rows[-1])()
         np.testing.assert_array_equal(task.jacobian(state), Elbow().jacobian(state))
         np.testing.assert_array_equal(task.jacobian_derivative(state), np.zeros((1, 7)))
     for plain, fast in zip(*rows, strict=True):
@@ -197,8 +197,7 @@ def pose(state):
 def test_a_wrong_task_is_named(method, value, said, monkeypatch):
     monkeypatch.setattr(Elbow, method, lambda self, state: value)
     with pytest.raises(HierarchyError) as error:
-        Elbow().writer(State.at(ROBOT, *STATES[0]), "velocity", np.zeros((1, 7)), np.zeros(1),
-                      np.zeros(1), 0)()
+        Elbow().writer(State.at(ROBOT, *STATES[0]), "velocity", Rows.empty(1, 7))()
     assert said in str(error.value)
 
 

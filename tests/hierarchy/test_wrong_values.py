@@ -45,7 +45,7 @@ def limits(**settings):
 
 
 @pytest.mark.parametrize(("make", "said"), [
-    (lambda: Still("a"), "must be three finite numbers [m], got"),
+    (lambda: Still("a"), "position [m]: expected 3 finite numbers, got str"),
     (lambda: Position(FRAME, None), "task 'position': path: expected a Path, got NoneType None"),
     (lambda: Position(FRAME, THERE, damping=INF), "damping = inf, expected a number >= 0"),
     (lambda: ROBOT.integrate(np.zeros(7), np.zeros(6)), "step: expected 7 finite numbers"),

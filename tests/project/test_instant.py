@@ -10,7 +10,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from hierarchy.jit.ahead import parts
+from hierarchy.jit.caching import parts
 from scenarios.ahead.building import PARTS, is_current
 
 ROOT = Path(__file__).parents[2]

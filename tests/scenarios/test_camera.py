@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from scene import distance
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles
-from hierarchy.avoidance.obstacles import distance_to_obstacle
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.config.sensor import CameraSection, DepthErrors
 from tests.helpers.camera_by_hand import bound, deproject
@@ -46,15 +46,14 @@ def depths(taken):
 
 def traced(obstacle, pinhole, u, v):
     """Depth by sphere tracing, from the distance function alone; 0 for a miss."""
-    away, row = np.zeros(3), obstacle.packed()
     ray = deproject(pinhole, (u, v, 1.0)) - pinhole.position
     share = 0.0
     for _ in range(2000):
         point = pinhole.position + share * ray
-        distance = distance_to_obstacle(row, *point, away)
-        if distance < 1e-9:
+        off, _ = distance(obstacle, point)
+        if off < 1e-9:
             return share
-        share += distance / np.linalg.norm(ray)
+        share += off / np.linalg.norm(ray)
         if share > 20.0:
             break
     return 0.0

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
+from hierarchy.task import Rows
 from hierarchy.tasks import CumulatedRepulsion, DangerBounds, Pointing
 from hierarchy.tasks.together import TangentCone
 from scenarios import load
@@ -51,9 +52,8 @@ def test_the_tangent_cone_of_the_letters_cone_has_its_jacobian_and_refuses_accel
         np.testing.assert_array_equal(cone.reference_velocity(state),
                                       [0.0 if outside else -np.inf])
         np.testing.assert_array_equal(cone.jacobian(state), cone.task.jacobian(state))
-    A, lower, upper = np.zeros((1, ROBOT.n)), np.zeros(1), np.zeros(1)
     with pytest.raises(HierarchyError, match="velocity level, got level = 'acceleration'"):
-        cone.writer(state, "acceleration", A, lower, upper, 0)
+        cone.writer(state, "acceleration", Rows.empty(1, ROBOT.n))
     with pytest.raises(HierarchyError, match="kind = 'equality'"):
         TangentCone(Pointing(FRAME, (1.0, 0.0, 0.0), 0.3))
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from standing import drift_of
 
 from hierarchy import Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
@@ -50,7 +51,7 @@ def test_a_sliding_contact_is_held_along_its_normal_only():
     h = Stack([motion], "torque", contacts=contacts).hierarchy(state)
     J = contacts.jacobian(state)
     np.testing.assert_allclose(h.A[:, :7], normal @ J[None], atol=1e-12)
-    expected = -30.0 * normal @ J @ state.v - normal @ contacts.drift(state)
+    expected = -30.0 * normal @ J @ state.v - normal @ drift_of(contacts, state)
     np.testing.assert_allclose(h.lower, expected)
     assert motion.row_names == ("end_effector along its normal",)
 

@@ -5,19 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import coal
+import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.robots.found import Found, neutral_within_limits, proposed_end_effector
-from hierarchy.robots.mjcf.compare import compare
-from hierarchy.robots.mjcf.compiled import compiled
-from hierarchy.robots.mjcf.equalities import couplings, loops, pairs_apart
-from hierarchy.robots.mjcf.geometry import shapes_of
-from hierarchy.robots.mjcf.limits import effort_limits, left_out, refuse, set_limits
-from hierarchy.robots.mjcf.model import build, configuration
-from hierarchy.robots.mjcf.part import part_of
+from hierarchy.robots.mjcf import constraints
+from hierarchy.robots.mjcf.model import Built, build, compare, configuration, pose
+from hierarchy.robots.mjcf.part import compiled, part_of
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
+
+_PLANE, _HEIGHTS, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX = range(7)  # mjtGeom
+_KINDS = ("plane", "height field", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh",
+          "signed distance")
 
 
 def read(path: Path, base: Base | None, shapes: bool, locked: Mapping[str, ArrayLike],
@@ -28,22 +32,62 @@ def read(path: Path, base: Base | None, shapes: bool, locked: Mapping[str, Array
     and where kinematics or inertia differ from MuJoCo's; UnknownNameError for a joint or body.
     """
     file = compiled(path)
-    refuse(file)
+    constraints.refuse(file)
     part = part_of(file, base, locked, root)
     built = build(part)
-    said = (*part.said, *set_limits(built), *effort_limits(built))
+    said = (*part.said, *constraints.set_limits(built), *constraints.effort_limits(built))
     compare(built)
     end_effector = proposed_end_effector(built.model)  # before the loops add frames
-    coupled, unkept = couplings(part)
-    closed, unclosed = loops(built)
+    coupled, unkept = constraints.couplings(part)
+    closed, unclosed = constraints.loops(built)
     found = Found(
-        built.model, end_effector, coupled=coupled, loops=closed, apart=pairs_apart(built),
+        built.model, end_effector, coupled=coupled, loops=closed,
+        apart=constraints.pairs_apart(built),
         rest=neutral_within_limits(built.model, configuration(built, file.model.qpos0)),
         starts={name: configuration(built, qpos)
                 for name, qpos in zip(file.keys, file.model.key_qpos, strict=True)},
-        missing=(*file.missing, *said, *unkept, *unclosed, *left_out(part)))
+        missing=(*file.missing, *said, *unkept, *unclosed, *constraints.left_out(part)))
     if not shapes:
         return found
-    geometries, without = shapes_of(built)
+    geometries, without = _shapes(built)
     capsules, shapeless = capsules_of(geometries)
     return replace(found, capsules=capsules, missing=(*found.missing, *without, *shapeless))
+
+
+def _shapes(built: Built) -> tuple[list[Any], list[str]]:
+    """Return the geoms that collide, as `capsules_of` takes them, and sentences on the others."""
+    mj, shapes, said = built.part.compiled.model, [], []
+    paired = {*mj.pair_geom1.tolist(), *mj.pair_geom2.tolist()}
+    for geom in range(mj.ngeom):
+        body = int(mj.geom_bodyid[geom])
+        collides = mj.geom_contype[geom] or mj.geom_conaffinity[geom] or geom in paired
+        if not collides or body not in built.part.bodies:
+            continue
+        kind = int(mj.geom_type[geom])
+        name = mj.geom(geom).name or (
+            f"{built.part.compiled.bodies[body]} {_KINDS[kind]} {geom}")
+        if kind in (_PLANE, _HEIGHTS):
+            said.append(f"collision geometry {name!r} is a {_KINDS[kind]}, for which there is no "
+                        "capsule")
+            continue
+        joint, place = built.placed[body]
+        shapes.append(SimpleNamespace(
+            name=name, parentJoint=joint, geometry=_shape(mj, geom, kind),
+            placement=place * pose(mj.geom_pos[geom], mj.geom_quat[geom])))
+    return shapes, said
+
+
+def _shape(mj: Any, geom: int, kind: int) -> Any:
+    size = mj.geom_size[geom]
+    if kind == _SPHERE:
+        return coal.Sphere(size[0])
+    if kind in (_CAPSULE, _CYLINDER):
+        return (coal.Capsule if kind == _CAPSULE else coal.Cylinder)(size[0], 2 * size[1])
+    if kind == _ELLIPSOID:
+        return coal.Ellipsoid(*size)
+    if kind == _BOX:
+        return coal.Box(*(2 * size))
+    mesh = mj.geom_dataid[geom]
+    first = mj.mesh_vertadr[mesh]
+    return SimpleNamespace(vertices=np.array(mj.mesh_vert[first:first + mj.mesh_vertnum[mesh]],
+                                             dtype=float))

@@ -1,9 +1,13 @@
-"""Which part of a compiled scene is the robot: its bodies, the joints that move, those held."""
+"""An MJCF as MuJoCo compiles it, with a name for everything in it; which part is the robot."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import warnings
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,9 +16,101 @@ from hierarchy.errors import HierarchyError, RobotError, UnknownNameError
 from hierarchy.problem import Array
 from hierarchy.robots.joints import Part as JointPart
 from hierarchy.robots.joints import set_joint
-from hierarchy.robots.mjcf.compiled import WORLD, Compiled
 from hierarchy.robots.table import Base
 from hierarchy.words import each
+
+KINDS = ("free", "ball", "slide", "hinge")  # as MuJoCo numbers the types of joints
+WORLD = 0                                   # index of the body that does not move
+_REMEDY = "pip install 'task-hierarchy[sim]'"
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A compiled `model` (mujoco.MjModel), and a name for each of its joints, bodies, sites, keys.
+
+    What the file leaves nameless is called after its body or its index. `missing` are sentences.
+    """
+
+    file: str
+    model: Any
+    joints: tuple[str, ...]
+    bodies: tuple[str, ...]
+    sites: tuple[str, ...]
+    keys: tuple[str, ...]
+    missing: tuple[str, ...]
+
+    def kind(self, joint: int) -> str:
+        """Return "free", "ball", "slide" or "hinge"."""
+        return KINDS[self.model.jnt_type[joint]]
+
+    def error(self, said: str) -> RobotError:
+        """Return an error that names the file."""
+        return RobotError(f"robot file {self.file!r}: {said}")
+
+
+def compiled(path: Path) -> Compiled:
+    """Let MuJoCo compile a file; raises RobotError if it is not installed or refuses the file."""
+    file = str(path)
+    try:
+        import mujoco
+    except ImportError as error:
+        raise RobotError(f"robot file {file!r}: an MJCF is compiled by MuJoCo, which is not "
+                         f"installed: {_REMEDY}") from error
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        try:
+            model = _compiled(mujoco.MjSpec.from_file(file))
+        except ValueError as error:
+            said = _in_one_line(str(error))
+            raise RobotError(f"robot file {file!r} cannot be read: {said}") from error
+    missing = tuple(dict.fromkeys(f"MuJoCo warns: {_in_one_line(str(one.message))}"
+                                  for one in warned))
+    bodies = _names(model, "body", model.nbody)
+    of_body = [f"{bodies[body]} {KINDS[kind]}"
+               for body, kind in zip(model.jnt_bodyid, model.jnt_type, strict=True)]
+    return Compiled(file, model, _names(model, "joint", model.njnt, of_body), bodies,
+                    _names(model, "site", model.nsite), _names(model, "key", model.nkey), missing)
+
+
+def _compiled(spec: Any) -> Any:
+    """Compile without visual meshes, which take most of the time and may be missing.
+
+    MuJoCo refuses that where it would change a mass; then with it.
+    """
+    spec.compiler.discardvisual, asked = True, spec.compiler.discardvisual
+    try:
+        return spec.compile()
+    except ValueError:
+        spec.compiler.discardvisual = asked
+        return spec.compile()
+
+
+def _in_one_line(text: str) -> str:
+    return " ".join(text.removeprefix("Error: ").split())
+
+
+def name_of(model: Any, kind: str, index: int) -> str:
+    """Return the name of a thing of a model, of a kind such as "body"; else kind and index."""
+    import mujoco
+
+    named = mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), int(index))
+    return named or f"{kind} {index}"
+
+
+def _names(model: Any, kind: str, count: int, instead: Iterable[str] = ()) -> tuple[str, ...]:
+    """Return a name for each of `count` things of a kind, nameless ones numbered where they recur.
+
+    `instead` are names for those without, one for each; without it they are kind and index.
+    """
+    given = [getattr(model, kind)(i).name for i in range(count)]
+    known = Counter(given)
+    names = []
+    for name, other in zip(given, instead or [f"{kind} {i}" for i in range(count)], strict=True):
+        if not name:
+            known[other] += 1
+            name = other if known[other] == 1 else f"{other} {known[other]}"
+        names.append(name)
+    return tuple(names)
 
 
 @dataclass(frozen=True)
@@ -69,25 +165,22 @@ def _from(file: Compiled, root: Sequence[str]) -> tuple[set[int], tuple[str, ...
     for body in range(1, file.model.nbody):  # parents come first
         if parents[body] in bodies:
             bodies.add(body)
-    others = [file.bodies[top] for top in _tops(file) if not bodies & set(_below(file, top))]
-    above = {body for body in _above(parents, bodies) if body not in bodies}
-    held = [name for j, name in enumerate(file.joints) if file.model.jnt_bodyid[j] in above]
+    others = [file.bodies[top] for top, below in _trees(file).items() if not bodies & below]
+    above = set[int]()
+    for body in bodies:
+        while (body := int(parents[body])) != WORLD:
+            above.add(body)
+    held = [name for j, name in enumerate(file.joints)
+            if file.model.jnt_bodyid[j] in above - bodies]
     return bodies, tuple(each(("left out, since it is not under root", others),
                               ("held at the reference, since it is above root", held)))
 
 
-def _above(parents: Array, bodies: Iterable[int]) -> Iterator[int]:
-    for body in bodies:
-        while body != WORLD:
-            body = int(parents[body])
-            yield body
-
-
 def _scene(file: Compiled) -> tuple[set[int], tuple[str, ...]]:
     """Return all bodies, without those that only float beside a robot, and those of a mocap."""
-    model = file.model
-    moves = {top: [file.kind(j) for j in range(model.njnt)
-                   if model.body_rootid[model.jnt_bodyid[j]] == top] for top in _tops(file)}
+    model, trees = file.model, _trees(file)
+    moves = {top: [file.kind(j) for j in range(model.njnt) if model.jnt_bodyid[j] in below]
+             for top, below in trees.items()}
     loose = [top for top, kinds in moves.items() if kinds == ["free"]]
     if len(loose) == sum(map(bool, moves.values())):
         loose = []
@@ -96,18 +189,15 @@ def _scene(file: Compiled) -> tuple[set[int], tuple[str, ...]]:
     told = (("bodies that only float are left out (root = \"NAME\" takes one as the robot)", loose),
             ("mocap bodies are left out", targets),
             ("mocap bodies stay where the file has them", sorted({*mocap} - {*targets})))
-    gone = {body for top in (*loose, *targets) for body in _below(file, top)}
-    return set(range(model.nbody)) - gone, tuple(
+    gone = [trees[top] for top in (*loose, *targets)]
+    return set(range(model.nbody)).difference(*gone), tuple(
         each(*((what, [file.bodies[top] for top in tops]) for what, tops in told)))
 
 
-def _tops(file: Compiled) -> Iterator[int]:
-    yield from (body for body in range(1, file.model.nbody)
-                if file.model.body_parentid[body] == WORLD)
-
-
-def _below(file: Compiled, top: int) -> list[int]:
-    return np.flatnonzero(file.model.body_rootid == top).tolist()
+def _trees(file: Compiled) -> dict[int, set[int]]:
+    """Return the bodies of each tree by the one of them that is on the world."""
+    tops = file.model.body_rootid
+    return {int(top): set(np.flatnonzero(tops == top).tolist()) for top in np.unique(tops[1:])}
 
 
 def _lock(file: Compiled, joints: Sequence[int], held: Array, name: str,

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacle
-from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules, pairs_of_tree
+from hierarchy.avoidance.body import measure_capsules, pack_capsules, pairs_of_tree
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.problem import Array
 from hierarchy.robot import Body

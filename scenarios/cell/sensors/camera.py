@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy import HierarchyError, State
 from hierarchy.avoidance import Capsule, Obstacles
-from hierarchy.avoidance.self_collision import pack_capsules
+from hierarchy.avoidance.body import pack_capsules
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
 from hierarchy.problem import Array

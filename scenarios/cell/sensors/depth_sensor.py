@@ -11,8 +11,7 @@ import numpy as np
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule, ControlPoint, Measurement, Pairs
-from hierarchy.avoidance.control_points import pack_points
-from hierarchy.avoidance.self_collision import pack_capsules
+from hierarchy.avoidance.body import pack_capsules, pack_points
 from hierarchy.jit import bind
 from hierarchy.problem import Array
 from scenarios.cell.sensors.camera import DepthCamera, Image, Pinhole, looking_at

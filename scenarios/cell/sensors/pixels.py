@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.avoidance.repulsion import repulsion
+from hierarchy.avoidance.laws import repulsion
 from hierarchy.jit import compiled
 from hierarchy.kinematics import dot, place
 from hierarchy.problem import Array
@@ -59,7 +59,7 @@ def farthest(placements, joints, offsets, eye):
     """Return the depth [m] of the point that is farthest from the camera's plane."""
     most = 0.0
     for k in range(len(joints)):
-        x, y, z = place(placements[joints[k]], offsets[k, 0], offsets[k, 1], offsets[k, 2])
+        x, y, z = place(placements[joints[k]], offsets[k])
         most = max(most, in_camera(eye, x, y, z)[2])
     return most
 
@@ -116,8 +116,7 @@ def measure_pixels(placements, space, image, seen, pairs):
     count = len(space.joints)
     active, D_minimal = -1, np.inf
     for k in range(count):
-        offset = space.offsets[k]
-        point = place(placements[space.joints[k]], offset[0], offset[1], offset[2])
+        point = place(placements[space.joints[k]], space.offsets[k])
         seen.points[k, 0], seen.points[k, 1], seen.points[k, 2] = point
         which = 1 if k == count - 1 else 0
         D_min, at = _nearest(space, image, space.mean[which], point, seen.direction[k], pairs[k, 0])

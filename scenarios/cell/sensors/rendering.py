@@ -14,9 +14,8 @@ from math import ceil, floor, sqrt
 
 import numpy as np
 
-from hierarchy.avoidance.self_collision import turned
 from hierarchy.jit import compiled, inlined
-from hierarchy.kinematics import dot, place
+from hierarchy.kinematics import dot, place, turned
 
 _ALONG = 1e-12  # squared sine between ray and axis below which the side of a capsule is not met
 
@@ -54,8 +53,8 @@ def draw_robot(depth, eye, placements, joints, capsules, margin):
 def _draw_robot(depth, eye, placements, joints, capsules, margin):
     for k in range(len(joints)):
         T, capsule = placements[joints[k]], capsules[k]
-        x, y, z = place(T, capsule[0], capsule[1], capsule[2])
-        ax, ay, az = turned(T, capsule)
+        x, y, z = place(T, capsule)
+        ax, ay, az = turned(T, capsule[3:6])
         _draw_capsule(depth, eye, in_camera(eye, x, y, z), turned_into_camera(eye, ax, ay, az),
                       capsule[6] + margin)
 

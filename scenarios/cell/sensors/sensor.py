@@ -9,9 +9,9 @@ import numpy as np
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Measurement, Obstacles, Pairs, Repulsion, measure_pairs
-from hierarchy.avoidance.control_points import pack_points
+from hierarchy.avoidance.body import pack_points
+from hierarchy.avoidance.laws import laws
 from hierarchy.avoidance.measurement import exact_measurer
-from hierarchy.avoidance.repulsion import laws
 from hierarchy.problem import Array
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError

@@ -15,7 +15,7 @@ import numpy as np
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
-from hierarchy.tasks.pose import PoseTask
+from hierarchy.tasks.pose import Pose
 from scenarios.config import Scenario
 from scenarios.config.resolvers import default_resolvers
 from scenarios.draw.figures.palette import looks
@@ -204,7 +204,7 @@ class LivePage:
         times = np.linspace(0.0, self.live.scenario.control.duration, _POINTS)
         self._paths = [np.array([task.path(t)[0] for t in times])
                        for task in (cell.tasks.position, *cell.tasks.listed)
-                       if isinstance(task, Position | PoseTask)]
+                       if isinstance(task, Position | Pose)]
         first = self._paths[0] if self._paths else np.zeros((1, 3))
         self.middle = (first.min(axis=0) + first.max(axis=0)) / 2 - self._path_offset()
 

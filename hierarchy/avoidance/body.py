@@ -1,4 +1,4 @@
-"""Capsules fixed to the links of a robot, and the distances between them."""
+"""Points and capsules fixed to the links of a robot, and the distances between capsules."""
 
 from __future__ import annotations
 
@@ -12,8 +12,26 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import expect_each, finite_numbers, number
 from hierarchy.jit import compiled, inlined
-from hierarchy.kinematics import dot, less, place, plus, times, triple
+from hierarchy.kinematics import dot, less, place, plus, times, turned
 from hierarchy.problem import Array
+
+
+@dataclass(frozen=True)
+class ControlPoint:
+    """A point fixed to the body that `joint` (an index) moves; offset (3,) [m] in its frame."""
+
+    name: str
+    joint: int
+    offset: Array
+
+
+def pack_points(points: Sequence[ControlPoint]) -> tuple[NDArray[np.int64], Array]:
+    """Joint indices (K,) and offsets (K, 3) [m] of control points, for the kernels."""
+    expect_each("control points", points, ControlPoint, "make one with robot.control_point(...)")
+    joints = np.array([point.joint for point in points], dtype=np.int64)
+    offsets = np.array([point.offset for point in points], dtype=float).reshape(-1, 3)
+    return joints, offsets
+
 
 Vector = tuple[float, float, float]
 _PARALLEL = 1e-12  # squared sine of the angle between two axes below which they count as parallel
@@ -98,8 +116,8 @@ def _measure(placements, joints, capsules, pairs, seen):
 @inlined
 def nearest_of_capsules(T_a, a, T_b, b):
     """Distance, direction from b to a, and positions s, t on the axes; see `measure_capsules`."""
-    u, w = turned(T_a, a), turned(T_b, b)
-    apart = less(place(T_a, a[0], a[1], a[2]), place(T_b, b[0], b[1], b[2]))
+    u, w = turned(T_a, a[3:6]), turned(T_b, b[3:6])
+    apart = less(place(T_a, a), place(T_b, b))
     s, t = nearest_shares(dot(u, u), dot(u, w), dot(w, w), dot(u, apart), dot(w, apart))
     x, y, z = less(plus(apart, times(s, u)), times(t, w))
     length = sqrt(x * x + y * y + z * z)
@@ -160,17 +178,9 @@ def bend_of_nearest(length, r, v, a_axis, b_axis):
 
 
 @inlined
-def turned(T, capsule):
-    """Start to end of a capsule (7,) in the world, on the body whose placement is T (12,)."""
-    x, y, z = capsule[3], capsule[4], capsule[5]
-    return (T[0] * x + T[3] * y + T[6] * z, T[1] * x + T[4] * y + T[7] * z,
-            T[2] * x + T[5] * y + T[8] * z)
-
-
-@inlined
 def on_axis(capsule, share):
     """The point of a capsule's axis at a share of its length, in the body."""
-    return plus(triple(capsule, 0), times(share, triple(capsule, 3)))
+    return plus(capsule, times(share, capsule[3:6]))
 
 
 @inlined

@@ -1,7 +1,8 @@
-"""Constraints of an MJCF: couplings of joints, closed chains, pairs of bodies that may touch."""
+"""What an MJCF limits and couples: ranges, efforts, joints, closed chains; what a robot lacks."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any
 
@@ -10,10 +11,106 @@ from numpy.polynomial import Polynomial
 
 from hierarchy.problem import Array
 from hierarchy.robots.found import Coupled, Loop
-from hierarchy.robots.mjcf.compiled import WORLD
-from hierarchy.robots.mjcf.model import Built, add_frame, pose
-from hierarchy.robots.mjcf.part import Part
-from hierarchy.words import each
+from hierarchy.robots.mjcf.model import Built, add_frame, address, armature, joint_actuators, pose
+from hierarchy.robots.mjcf.part import WORLD, Compiled, Part, name_of
+from hierarchy.words import each, listed, some
+
+_FREE: Array = np.array([-np.inf, np.inf])
+
+
+def set_limits(built: Built) -> Iterator[str]:
+    """Set the ranges of hinges and slides; yield a sentence for each missing limit."""
+    file, model, balls = built.part.compiled, built.model, []
+    lower, upper = np.full(model.nq, -np.inf), np.full(model.nq, np.inf)
+    for j, joint in built.pairs():
+        if file.model.jnt_limited[j] and joint.nq == 1:
+            lower[joint.idx_q], upper[joint.idx_q] = file.model.jnt_range[j]
+        elif file.model.jnt_limited[j]:
+            balls.append(file.joints[j])
+    model.lowerPositionLimit, model.upperPositionLimit = lower, upper
+    model.upperVelocityLimit = np.full(model.nv, np.inf)
+    yield "velocity limits: an MJCF has none"
+    yield from each(("limits of the angle of ball joints are ignored", balls))
+
+
+def effort_limits(built: Built) -> Iterator[str]:
+    """Set effort limits; yield sentences on joints without, and on limits that differ by sign.
+
+    Actuators on a joint add up; each has the tightest of its force range and, for a motor, its
+    control range, times its gear. The joint's own force range caps their sum.
+    """
+    file, model = built.part.compiled, built.model
+    mj, efforts = file.model, np.full(model.nv, np.inf)
+    ranges: dict[int, list[Array]] = defaultdict(list)
+    for i, j, gear in joint_actuators(mj):
+        ranges[j].append(np.sort(gear * _force(mj, i)) if gear else np.zeros(2))
+    idle, uneven = [], []
+    for j, joint in built.pairs():
+        if joint.nv > 1:
+            continue
+        total = sum(ranges[j], np.zeros(2)) if j in ranges else _FREE
+        if mj.jnt_actfrclimited[j]:
+            total = np.clip(total, *mj.jnt_actfrcrange[j])
+        idle += [] if j in ranges else [file.joints[j]]
+        least = float(np.abs(total).min()) if total[0] < 0.0 < total[1] else np.inf
+        uneven += [] if -total[0] == total[1] else [
+            f"{file.joints[j]} ({total[0]:g} to {total[1]:g})"]
+        efforts[joint.idx_v] = least
+    model.effortLimit = efforts
+    known = {i for i, _, _ in joint_actuators(mj)}
+    others = [name_of(mj, "actuator", i) for i in range(len(mj.actuator_trnid)) if i not in known]
+    yield from each(
+        ("no actuator moves the joint, and nothing limits its effort here", idle if mj.nu else []),
+        ("effort limits that differ by sign; the smaller counts both ways, and one of a single "
+         "sign not at all", uneven),
+        ("actuators that act on a tendon, a site, a body, a crank or a joint of several velocities "
+         "are left out", others))
+
+
+def _force(mj: Any, i: int) -> Array:
+    """Return the least and the most force (2,) of an actuator, before its gear."""
+    force = np.array(mj.actuator_forcerange[i]) if mj.actuator_forcelimited[i] else _FREE
+    motor = not mj.actuator_gaintype[i] and not mj.actuator_biastype[i]  # fixed gain, no bias
+    k = address(mj, "ctrl", i)
+    if motor and mj.actuator_dyntype[i] != _INTEGRATOR and mj.actuator_ctrllimited[k]:
+        control = np.sort(mj.actuator_gainprm[i, 0] * mj.actuator_ctrlrange[k])
+        force = np.clip(control, *force)
+    return force
+
+
+_INTEGRATOR = 1  # mjDYN_INTEGRATOR: control is a rate of the activation
+
+
+def left_out(part: Part) -> Iterator[str]:
+    """Yield a sentence for each thing that the file has and the robot lacks."""
+    mj = part.compiled.model
+    yield from each(*((said, [name_of(mj, kind, i) for i in range(n)]) for kind, n, said in (
+        ("tendon", mj.ntendon, "of tendons only couplings of joints are here"),
+        ("flex", mj.nflex, "of flexes only the joints are here"),
+        ("skin", mj.nskin, "skins are left out"))))
+    if mj.nplugin:
+        yield f"plugins of MuJoCo do nothing here: {mj.nplugin}"
+    yield from each(("compensation of gravity is left out", [
+        part.compiled.bodies[body] for body in np.flatnonzero(mj.body_gravcomp)]))
+    passive = {"stiffness": mj.jnt_stiffness, "damping": mj.dof_damping,
+               "friction": mj.dof_frictionloss}
+    if found := [what for what, values in passive.items() if np.any(values)]:
+        yield f"{listed(found)} of joints: not in the equations of motion"
+
+
+def refuse(file: Compiled) -> None:
+    """Raise RobotError for inertia that no body or joint has: that of a tendon, or of its drive."""
+    mj = file.model
+    drives = armature(mj, "actuator", len(mj.actuator_trnid))
+    on_joint = {i for i, _, _ in joint_actuators(mj)}
+    heavy = [f"tendon {name_of(mj, 'tendon', i)!r}" for i in range(mj.ntendon)
+             if armature(mj, "tendon", mj.ntendon)[i]]
+    heavy += [f"actuator {name_of(mj, 'actuator', i)!r}" for i in range(len(drives))
+              if i not in on_joint and drives[i]]
+    if heavy:
+        raise file.error("an armature acts on several joints, which a robot here cannot have: "
+                         f"{some(heavy)}; give it to the joints")
+
 
 _CONNECT, _WELD, _JOINT, _TENDON = 0, 1, 2, 3  # mjtEq
 _WRAP_JOINT = 1                    # mjtWrap
@@ -28,7 +125,7 @@ def couplings(part: Part) -> tuple[tuple[Coupled, ...], list[str]]:
     """
     file, found = part.compiled, []
     mj, said = file.model, []
-    for name, one, other, moved in (*_polynomials(mj), *_tendons(part)):
+    for name, one, other, moved in _followers(part):
         if one not in part.joints:
             if other in part.joints:
                 said.append(f"{name!r} is left out: joint {file.joints[one]!r} does not move")
@@ -49,15 +146,14 @@ def couplings(part: Part) -> tuple[tuple[Coupled, ...], list[str]]:
 _Follows = tuple[str, int, int, Polynomial]  # name, a joint, another or -1, and how one follows it
 
 
-def _polynomials(mj: Any) -> Iterator[_Follows]:
-    """Yield couplings of joints, as polynomials of differences from the reference."""
+def _followers(part: Part) -> Iterator[_Follows]:
+    """Yield couplings of joints, and fixed tendons of one or two that keep their length.
+
+    Their polynomials are of differences from the reference.
+    """
+    mj = part.compiled.model
     for name, i in _active(mj, _JOINT):
         yield name, int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i]), Polynomial(mj.eq_data[i, :5])
-
-
-def _tendons(part: Part) -> Iterator[_Follows]:
-    """Yield fixed tendons of one or two joints that keep their length, as lines of the same."""
-    mj = part.compiled.model
     for name, i in _active(mj, _TENDON):
         if weights := _fixed(mj, i):
             weights.sort(key=lambda weight: weight[0] not in part.joints)  # what moves follows
@@ -132,15 +228,11 @@ def _anchor(built: Built, i: int, end: int, name: str) -> str:
     if mj.eq_objtype[i] == _SITE:
         return built.sites[int((mj.eq_obj1id, mj.eq_obj2id)[end][i])]
     joint, place = built.placed[body]
-    return add_frame(built.model, f"{name} {end + 1}", joint, place * _place_of(
-        int(mj.eq_type[i]), mj.eq_data[i], end), "anchor")
-
-
-def _place_of(kind: int, data: Array, end: int) -> Any:
-    """Return where on its body an end is: MuJoCo stores the anchors of a weld in reverse."""
-    if kind == _CONNECT:
-        return pose(data[3 * end:3 * end + 3], _UPRIGHT)
-    return pose(data[3:6], data[6:10]) if end == 0 else pose(data[:3], _UPRIGHT)
+    data, welded = mj.eq_data[i], mj.eq_type[i] == _WELD
+    at = 3 * (1 - end if welded else end)  # MuJoCo stores the anchors of a weld in reverse
+    turn = data[6:10] if welded and end == 0 else _UPRIGHT
+    return add_frame(built.model, f"{name} {end + 1}", joint, place * pose(data[at:at + 3], turn),
+                     "anchor")
 
 
 _UPRIGHT: Array = np.array([1.0, 0.0, 0.0, 0.0])

@@ -1,4 +1,9 @@
-"""The loop: planned times, overruns, priority, and how it ends."""
+"""A control loop for your hardware: fixed period, overruns, watchdog, and a log of every tick.
+
+No robot interface is assumed: the user provides functions that compute the command, send it and
+stop safely. This is Python on an ordinary operating system: the log shows how well the period is
+kept, and the robot's own controller must be able to stop it.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +12,154 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from threading import Event, Lock, Thread
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, ReadingError, UnknownNameError, brief, number
-from hierarchy.loop.log import Log
-from hierarchy.loop.watchdog import Once, Watchdog
+from hierarchy.errors import ReadingError, UnknownNameError, brief, number, refuse
+from hierarchy.problem import Array
+
+
+class Watchdog:
+    """Context manager that calls `stop` once, in a thread, if not fed for `limit` [s].
+
+    The thread belongs to this process: it cannot act while compiled code holds the interpreter.
+    """
+
+    def __init__(self, limit: float, stop: Callable[[], object],
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        self.limit, self.fired = limit, False
+        self.error: BaseException | None = None
+        self._stop, self._clock, self._over, self._stopped = stop, clock, Event(), Event()
+        self._fed = clock()
+        self._thread = Thread(target=self._watch, name="watchdog", daemon=True)
+
+    def feed(self) -> None:
+        """Reset the timer."""
+        self._fed = self._clock()
+
+    def check(self) -> bool:
+        """Call `stop` if the limit has passed; return whether it has been called."""
+        if not self.fired and self._clock() - self._fed > self.limit:
+            self.fired = True
+            try:
+                self._stop()
+            except BaseException as error:
+                self.error = error
+            self._stopped.set()
+        return self.fired
+
+    def settle(self) -> None:
+        """Wait until `stop` has returned, for at most the limit."""
+        self._stopped.wait(self.limit)
+
+    def __enter__(self) -> Watchdog:
+        self.feed()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join(self.limit)
+
+    def _watch(self) -> None:
+        while not self._over.wait(self.limit / 4) and not self.check():
+            pass
+
+
+class Once:
+    """A function that runs only the first time it is called, from any thread."""
+
+    def __init__(self, function: Callable[[], object]) -> None:
+        self._function, self._lock, self._done = function, Lock(), False
+
+    def __call__(self) -> None:
+        """Call the function unless it has already been called."""
+        with self._lock:
+            first, self._done = not self._done, True
+        if first:
+            self._function()
+
+
+PERCENTILES = {"median": 50.0, "p95": 95.0, "p99.9": 99.9, "max": 100.0}
+
+
+class Log:
+    """Times and commands of each tick that ran; memory is allocated before the loop starts.
+
+    tick (K,) is the planned number, which jumps where ticks were skipped; late (K,) [s] the delay
+    of the start after its planned time; duration (K,) [s] the time until the command was sent;
+    command (K, n) if recorded. `due` is the number of planned ticks up to the last that ran, or all
+    where the loop ran to its end. `ended` says why the loop ended, `notes` which settings could not
+    be applied.
+    """
+
+    def __init__(self, period: float, ticks: int, width: int = 0) -> None:
+        self.period, self.planned, self.count, self.due = period, ticks, 0, 0
+        self.ended, self.notes = "not begun", list[str]()
+        self._tick = np.full(ticks, -1, dtype=np.int64)
+        self._times = np.full((ticks, 2), np.nan)
+        self._command = np.full((ticks, width), np.nan)
+
+    def write(self, tick: int, late: float, duration: float, command: Any) -> None:
+        """Record one tick."""
+        k = self.count
+        self._tick[k], self._times[k] = tick, (late, duration)
+        if self._command.shape[1]:
+            self._command[k] = command
+        self.count, self.due = k + 1, tick + 1
+
+    @property
+    def tick(self) -> NDArray[np.int64]:
+        """Planned number of each tick: (K,)."""
+        return self._tick[:self.count]
+
+    @property
+    def late(self) -> Array:
+        """Delay of the start of each tick: (K,) [s]."""
+        return self._times[:self.count, 0]
+
+    @property
+    def duration(self) -> Array:
+        """Duration of each tick: (K,) [s]."""
+        return self._times[:self.count, 1]
+
+    @property
+    def command(self) -> Array:
+        """Command of each tick: (K, n)."""
+        return self._command[:self.count]
+
+    @property
+    def overruns(self) -> int:
+        """Number of ticks that ended after the planned start of the next one."""
+        return int(np.count_nonzero(self.late + self.duration > self.period))
+
+    @property
+    def skipped(self) -> int:
+        """Number of ticks that were due and did not run."""
+        return self.due - self.count
+
+    def summary(self) -> dict[str, dict[str, float]]:
+        """Return median, p95, p99.9 and max of `late` and `duration` [s]; NaN without a tick."""
+        return {name: {label: float(np.percentile(values, p)) if self.count else np.nan
+                       for label, p in PERCENTILES.items()}
+                for name, values in (("late", self.late), ("duration", self.duration))}
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays of the log by name, for `numpy.savez`."""
+        return {"tick": self.tick, "late": self.late, "duration": self.duration,
+                "command": self.command}
+
+    def __str__(self) -> str:
+        rows = [f"{name:9}" + "".join(f"{label:>9} {1e6 * value:8.1f} us"
+                                      for label, value in row.items())
+                for name, row in self.summary().items()]
+        head = (f"{self.count} ticks of {1e3 * self.period:g} ms, {self.overruns} overruns, "
+                f"{self.skipped} skipped; {self.ended}")
+        return "\n".join([head, *rows, *self.notes])
+
 
 Overrun = Literal["skip", "catch up", "stop"]
 OVERRUNS = ("skip", "catch up", "stop")
@@ -44,11 +190,11 @@ class Loop:
         for name, value in (("period", period), ("behind", behind), ("spin", spin),
                             ("watchdog", period if watchdog is None else watchdog)):
             number(f"loop: {name}", value)
-        _require(period > 0.0, f"period {period} s must be positive")
-        _require(behind >= 1, f"behind = {behind}, expected 1 or more ticks")
-        _require(spin >= 0.0, f"spin {spin} s must not be negative")
-        _require(watchdog is None or watchdog > period,
-                 f"watchdog {watchdog} s must be longer than the period {period} s")
+        refuse(not period > 0.0, f"loop: period {period} s must be positive")
+        refuse(not behind >= 1, f"loop: behind = {behind}, expected 1 or more ticks")
+        refuse(not spin >= 0.0, f"loop: spin {spin} s must not be negative")
+        refuse(not (watchdog is None or watchdog > period),
+               f"loop: watchdog {watchdog} s must be longer than the period {period} s")
         self.period, self.overrun, self.behind = period, overrun, behind
         self.watchdog, self.spin, self.priority, self.pause_gc = watchdog, spin, priority, pause_gc
         self.clock, self.sleep = clock, sleep
@@ -70,11 +216,11 @@ class Loop:
         it and a command may have been sent since. An exception in any of the functions, or Ctrl-C,
         then propagates to the caller.
         """
-        _require(number("loop: duration", duration) > 0.0,
-                 f"duration {duration} s must be positive")
+        refuse(not number("loop: duration", duration) > 0.0,
+               f"loop: duration {duration} s must be positive")
         for name, function in (("step", step), ("safe_stop", safe_stop), ("send", send)):
-            _require(callable(function) or (name == "send" and function is None),
-                     f"{name}: expected a function, got {brief(function)}")
+            refuse(not (callable(function) or (name == "send" and function is None)),
+                   f"loop: {name}: expected a function, got {brief(function)}")
         ticks = max(1, round(duration / self.period))
         self.log = log = Log(self.period, ticks, record)
         stop = Once(safe_stop)
@@ -194,8 +340,3 @@ def _raise_priority(priority: int | None, notes: list[str]) -> tuple[int, Any] |
         notes.append(f"SCHED_FIFO at priority {priority} was not given: {error}")
         return None
     return before
-
-
-def _require(condition: bool, text: str) -> None:
-    if not condition:
-        raise HierarchyError(f"loop: {text}")

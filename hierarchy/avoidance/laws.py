@@ -1,4 +1,4 @@
-"""Bound of a row that keeps h >= 0.
+"""Laws of avoidance: the bound of a row that keeps h >= 0, and the magnitude (23) of repulsion.
 
 h is a distance minus the distance to keep. The bound is a control barrier function: of first order
 at velocity level, dh/dt >= -rate h, of second order at acceleration level, (d/dt + rate)^2 h >= 0.
@@ -19,10 +19,11 @@ Ames et al., "Control barrier functions: theory and applications" (2019); Nguyen
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass
+from math import exp
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, number
+from hierarchy.errors import number, refuse
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 
@@ -51,11 +52,11 @@ class Barrier:
     def __post_init__(self) -> None:
         for name in ("distance", "rate", "recovery", "limit"):
             value = number(f"barrier: {name}", getattr(self, name), 0.0)
-            if name in ("rate", "limit") and value == 0.0:
-                raise HierarchyError(f"barrier: {name} = {value} is out of range")
-        if not self.distance < number("barrier: influence", self.influence):
-            raise HierarchyError(f"barrier: influence = {self.influence} m must be more than the "
-                                 f"distance to keep, {self.distance} m")
+            refuse(name in ("rate", "limit") and value == 0.0, f"barrier: {name} = {value} is out "
+                   "of range")
+        refuse(not self.distance < number("barrier: influence", self.influence),
+               f"barrier: influence = {self.influence} m must be more than the distance to keep, "
+               f"{self.distance} m")
 
     def packed(self) -> Array:
         """The settings as one array (5,) for the kernels."""
@@ -79,8 +80,51 @@ def least_acceleration(h, rate_of_h, bend, settings):
 
 
 @inlined
-def drop_rounding(A, row):
+def drop_rounding(row):
     """Set entries to zero that differ from it by rounding: joints that do not move along r."""
-    for c in range(A.shape[1]):
-        if abs(A[row, c]) < _ROUNDING:
-            A[row, c] = 0.0
+    for c in range(len(row)):
+        if abs(row[c]) < _ROUNDING:
+            row[c] = 0.0
+
+
+@dataclass(frozen=True)
+class Repulsion:
+    """r(D) = maximum / (1 + exp((D scale / reach - 1) shape)).
+
+    `maximum` r_max [m/s^2, or m/s at velocity level], `reach` rho [m], `shape` gamma > 0. With
+    `scale` = 2 this is eq. (23) read as D (2 / rho), so that r(0) is near r_max and r(rho) near 0
+    for a large gamma; the letter's printed D / (2 / rho) contradicts its (24). The authors' code
+    uses scale 3 (body) and 1.5 (end effector).
+    """
+
+    maximum: float
+    reach: float
+    shape: float
+    scale: float = 2.0
+
+    def __post_init__(self) -> None:
+        for name in ("maximum", "reach", "shape", "scale"):
+            value = number(f"repulsion {name}", getattr(self, name))
+            refuse(value <= 0.0, f"repulsion {name} must be positive, got {value}")
+
+    def __call__(self, distance: float) -> float:
+        """Magnitude at a distance [m]."""
+        return float(repulsion(distance, self.maximum, self.reach, self.shape, self.scale))
+
+    def packed(self) -> tuple[float, float, float, float]:
+        """(maximum, reach, shape, scale) for the kernels."""
+        return self.maximum, self.reach, self.shape, self.scale
+
+
+@compiled
+def repulsion(D, r_max, rho, gamma, scale):
+    """Magnitude r(D) of eq. (23); see `Repulsion`."""
+    exponent = (D * scale / rho - 1.0) * gamma
+    if exponent > 700.0:  # exp would overflow; r is zero to rounding long before
+        return 0.0
+    return r_max / (1.0 + exp(exponent))  # (23)
+
+
+def laws(body: Repulsion, end_effector: Repulsion) -> Array:
+    """Both laws as one (2, 4) array: row 0 for the body, row 1 for the end effector."""
+    return np.array([body.packed(), end_effector.packed()])

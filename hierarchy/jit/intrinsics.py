@@ -1,4 +1,8 @@
-"""Loops over numbers in lanes: numba keeps the order of a sum, so it adds one after the other."""
+"""What kernels need and numba lacks: sums in lanes, and views of contiguous numbers.
+
+numba keeps the order of a sum, so it adds one number after the other; `reshape` and `view` are
+calls of their own.
+"""
 
 from __future__ import annotations
 
@@ -133,6 +137,33 @@ def _halved(builder: Any, lanes: Any, width: int) -> Any:
     return builder.fadd(*(builder.shuffle_vector(lanes, lanes, half) for half in halves))
 
 
+def _as_matrix(context: Any, numbers: Any, rows: Any, columns: Any) -> Any:
+    """Return the view (rows, columns) of contiguous numbers, of which there must be so many."""
+    return types.Array(numbers.dtype, 2, "C")(numbers, types.intp, types.intp), _view
+
+
+def _as_integers(context: Any, numbers: Any) -> Any:
+    """Return the view of contiguous numbers as int64."""
+    return types.Array(types.int64, 1, "C")(numbers), _view
+
+
+def _view(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """Write a view of contiguous numbers, of the shape that follows them or their own."""
+    from numba.np import arrayobj
+
+    kind, (numbers, *shape) = signature.return_type, arguments
+    flat = arrayobj.make_array(signature.args[0])(context, builder, numbers)
+    view = arrayobj.make_array(kind)(context, builder)
+    shape = shape or cgutils.unpack_tuple(builder, flat.shape, 1)
+    strides = [*(builder.mul(size, flat.itemsize) for size in shape[1:]), flat.itemsize]
+    arrayobj.populate_array(view, data=builder.bitcast(flat.data, view.data.type), shape=shape,
+                            strides=strides, itemsize=flat.itemsize, meminfo=flat.meminfo,
+                            parent=flat.parent)
+    if context.enable_nrt:
+        context.nrt.incref(builder, kind, view._getvalue())
+    return view._getvalue()
+
+
 if numba.config.DISABLE_JIT:
     def inner_product(left: Any, right: Any) -> Any:
         """See `_inner_product`."""
@@ -141,5 +172,14 @@ if numba.config.DISABLE_JIT:
     def add_multiple(w: Any, factor: Any, v: Any) -> None:
         """See `_add_multiple`."""
         w[:v.size] += factor * v
+
+    def as_matrix(numbers: Any, rows: int, columns: int) -> Any:
+        """See `_as_matrix`."""
+        return numbers.reshape((rows, columns))
+
+    def as_integers(numbers: Any) -> Any:
+        """See `_as_integers`."""
+        return numbers.view(np.int64)
 else:
-    inner_product, add_multiple = intrinsic(_inner_product), intrinsic(_add_multiple)
+    inner_product, add_multiple, as_matrix, as_integers = map(
+        intrinsic, (_inner_product, _add_multiple, _as_matrix, _as_integers))
