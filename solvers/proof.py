@@ -170,10 +170,9 @@ class _Attempt:
             self.t: Exact = self.A @ self.x - self.side
             self._check_sides()
             if self._check_gradients():
-                return self._found()
-        raise _NoProofError
-
-    def _found(self) -> Proof:
+                break
+        else:
+            raise _NoProofError
         complete, rounding = self.near is None, ZERO * self.reach
         x = np.array([float(value) if abs(value) > rounding else 0.0 for value in self.x])
         return Proof(x if complete else np.full(self.h.n, np.nan), self._least(),

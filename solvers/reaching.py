@@ -181,19 +181,19 @@ class _Search:
 
 
 def _above(h: Hierarchy, k: int, wanted: Array, limits: Sequence[Task]) -> list[str]:
-    """Name the tasks above level k that keep it from moving as `wanted` (n,)."""
-    own = {task.name for task in limits}
-    return [name for name, (A, lower, upper) in zip(h.names[:k], h.levels(), strict=False)
-            if name not in own and _blocks(A, lower, upper, wanted)]
+    """Name the tasks above level k that keep it from moving as `wanted` (n,).
 
-
-def _blocks(A: Array, lower: Array, upper: Array, wanted: Array) -> bool:
-    """Whether a row that has no room left on one of its sides would leave it along `wanted`."""
-    sizes = np.linalg.norm(A, axis=1) * np.linalg.norm(wanted)
-    along = A @ wanted / np.where(sizes > 0.0, sizes, 1.0)
-    equal = lower == upper
-    return bool(((along < -_AT) & (equal | (lower > -_AT))
-                 | (along > _AT) & (equal | (upper < _AT))).any())
+    A row does that has no room left on one of its sides, and would leave it.
+    """
+    own, names = {task.name for task in limits}, list[str]()
+    for name, (A, lower, upper) in zip(h.names[:k], h.levels(), strict=False):
+        sizes = np.linalg.norm(A, axis=1) * np.linalg.norm(wanted)
+        along, equal = A @ wanted / np.where(sizes > 0.0, sizes, 1.0), lower == upper
+        blocks = ((along < -_AT) & (equal | (lower > -_AT))
+                  | (along > _AT) & (equal | (upper < _AT)))
+        if name not in own and blocks.any():
+            names.append(name)
+    return names
 
 
 def _drawn(robot: Robot, q: Array, rng: np.random.Generator) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import length_of, reflect_by
+from solvers.kernels.space import fill
 
 
 @compiled
@@ -21,8 +22,7 @@ def least_squares(T, b, y):
     triangularise(T, y)
     turn(T, b, False)
     substitute_back(T, b, y)
-    for k in range(r):
-        b[k] = 0.0
+    fill(b[:r], 0.0)
     turn(T, b, True)
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product
+from solvers.kernels.space import fill
 from solvers.kernels.tolerances import LEAST_SQUARE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
@@ -175,6 +176,5 @@ def finish(x, code):
     if code == SOLVED and not all_finite(x):
         code = NUMERICAL_FAILURE
     if code != SOLVED:
-        for i in range(x.size):
-            x[i] = 0.0
+        fill(x, 0.0)
     return code

@@ -26,15 +26,7 @@ from solvers.kernels.rows import (
     reflect,
     reflect_back,
 )
-from solvers.kernels.space import (
-    Block,
-    Rows,
-    View,
-    carve_rows,
-    matrix,
-    shared,
-    vector,
-)
+from solvers.kernels.space import Block, Rows, View, assign, carve_rows, matrix, shared, vector
 from solvers.kernels.tolerances import FAR_LIGHTER, LIGHT_ROW, UNCLEAR_CUT, UNCLEAR_PIVOT
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
@@ -97,8 +89,7 @@ def climb(A, lower, upper, sizes, x, settings, work):
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
         reflect(basis, ZERO, above, rows.W, first, last)  # J_i Q: the level as seen from above
-        for i in range(first, last):
-            rows.miss[i] = lower[i]
+        assign(rows.miss[first:last], lower[first:])
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
         least = smallest_pivot(rows, block, least)
@@ -156,8 +147,6 @@ def _to_unknowns(basis, y, rank, x, of_x):
         zero_reference &= x[c] == 0.0
     if not zero_reference:
         reflect(basis, ZERO, rank, of_x, ZERO, ZERO + 1)
-    for c in range(rank):
-        of_x[0, c] = y[c]
+    assign(of_x[0, :rank], y)
     reflect_back(basis, rank, of_x, ZERO, ZERO + 1)
-    for c in range(x.size):
-        x[c] = of_x[0, c]
+    assign(x, of_x[0])

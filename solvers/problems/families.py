@@ -101,7 +101,8 @@ def _degenerate(rng: Random, _: float) -> list[Level]:
         box = (box[0], np.full(7, -10.0), np.full(7, 10.0))
         posture = equal(posture[0], rng.choice([-10.0, 10.0], 7))
     again, negated = rng.integers(7, size=2)
-    box = stacked(box, _row(box, again), _negative(_row(box, negated)),
+    A, lower, upper = _row(box, negated)
+    box = stacked(box, _row(box, again), (-A, -upper, -lower),
                    (np.zeros((1, 7)), np.array([-1.0]), np.array([1.0])))
     aside, clash = _PARALLEL * rng.normal(size=(2, 1, 7)), rng.integers(5)
     avoidance = stacked(avoidance, _moved(_row(avoidance, 0), aside[0], 0.5 * (clash == 0)),
@@ -142,11 +143,6 @@ def _one_sided(rng: Random, A: Array, side: Array, last: int) -> Level:
 def _row(level: Level, i: int) -> Level:
     A, lower, upper = level
     return A[i:i + 1].copy(), lower[i:i + 1].copy(), upper[i:i + 1].copy()
-
-
-def _negative(level: Level) -> Level:
-    A, lower, upper = level
-    return -A, -upper, -lower
 
 
 def _moved(level: Level, aside: Array, by: float) -> Level:

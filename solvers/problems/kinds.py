@@ -138,7 +138,9 @@ def _nested(rng: Random) -> Levels:
 def _mixed_units(rng: Random) -> Levels:
     """Rows of norm 0.001, 1 and 1000 in one level."""
     levels = _around(rng, int(rng.integers(1, 8)), int(rng.integers(1, 5)))
-    return [_scaled(level, 10.0**rng.choice([-3.0, 0.0, 3.0], len(level[0]))) for level in levels]
+    scales = (10.0**rng.choice([-3.0, 0.0, 3.0], len(level[0])) for level in levels)
+    return [(A * by[:, None], lower * by, upper * by)
+            for (A, lower, upper), by in zip(levels, scales, strict=True)]
 
 
 def _integers(rng: Random) -> Levels:
@@ -288,11 +290,6 @@ def equal(A: Array, b: Array) -> Level:
 
 def _at_least(A: Array, side: Array) -> Level:
     return A, side, np.full(len(A), np.inf)
-
-
-def _scaled(level: Level, by: Array) -> Level:
-    A, lower, upper = level
-    return A * by[:, None], lower * by, upper * by
 
 
 def stacked(*levels: Level) -> Level:

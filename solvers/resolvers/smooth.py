@@ -12,9 +12,7 @@ the answer is rho after the last level, starting from rho = 0 and Q = I:
     rho <- T rho + Q (J Q)^(#,A,I) W dx/dt                                                      (d)
     Q   <- Q (I - (J Q)^(#,A,I) J Q)                                                            (e)
 
-The last level is the identity, fully active, with the hierarchy's reference. In (a), V are the
-right singular vectors of the two terms before, and P falls from `damping` for a singular value of 0
-to 0 at `threshold`, as a half wave of the cosine.
+The last level is the identity. docs/theory/smooth.md has V and P.
 """
 
 from __future__ import annotations

@@ -111,10 +111,6 @@ class Weighted(Resolver):
             strict_levels=max(0, min(self.strict_levels, len(names) - 1)),
             damping=self.damping, threshold=self.threshold))
 
-    @cached_property
-    def _inside(self) -> Hcod:
-        return Hcod(rank_tolerance=self.rank_tolerance)
-
     def _weights(self, levels: int) -> Array:
         """Return weights (L,), 1 for the lowest; where they overflow, the status reports it."""
         if self.weights is None:
@@ -142,7 +138,7 @@ class Weighted(Resolver):
         """Return the feasible x nearest to the reference; INACCURATE if there is none."""
         limits = h.changed(A=h.A[hard], lower=h.lower[hard], upper=h.upper[hard],
                            sizes=[hard.sum()], names=("constraints",), give=None)
-        found = self._inside.solve(limits)
+        found = Hcod(rank_tolerance=self.rank_tolerance).solve(limits)
         x, status = found.x, found.status
         value, slack = limits.A @ x, limits.slacks(x)
         size = np.linalg.norm(limits.A, axis=1) * np.linalg.norm(x) + abs(value - slack)
