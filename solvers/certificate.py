@@ -70,8 +70,6 @@ Mask = NDArray[np.bool_]
 class Certificate:
     """The verdict on one x.
 
-    Attributes
-    ----------
     violations : (L,) Euclidean norm of each level's violation.
     stationarity : (L,) residual of each level: the smallest shift of its sides for which x is
         optimal, as a length (violation divided by the norm of the row), relative to 1 + |x|; or
@@ -155,9 +153,8 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
     tolerance : largest residual, relative to 1 + |x|.
     parallel : angle [rad] up to which rows count as dependent.
 
-    Raises
-    ------
-    HierarchyError : x has the wrong shape, or there is not one witness for each level that gives.
+    Raises HierarchyError: x has the wrong shape, or there is not one witness for each level that
+    gives.
     """
     expect("certify: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
     number("certify: tolerance", tolerance, 0.0)

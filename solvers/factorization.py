@@ -197,14 +197,11 @@ class Factorization:
 
         If squares of the numbers overflow, x is zero with Status.NUMERICAL_FAILURE.
 
-        Parameters
-        ----------
         targets : b (m,) in the current order; or b_k (m_k,) of each level by name, or in order.
         reference : (n,) or None for zero, the q0 of (14).
 
-        Raises
-        ------
-        HierarchyError : a wrong shape or an entry that is not finite; names level, row and value.
+        Raises HierarchyError: a wrong shape or an entry that is not finite; names level, row and
+        value.
         """
         (C, sizes), b, q0 = self._ordered, self._packed(targets), self._reference(reference)
         y0 = self._Q @ q0

@@ -49,8 +49,6 @@ Mask = NDArray[np.bool_]
 class Proof:
     """The answer of a hierarchy, or of its first levels.
 
-    Attributes
-    ----------
     x : (n,) the answer, rounded once from DIGITS digits to doubles; NaN unless it is proved.
     least : (L,) least violation of each level, its Euclidean norm, likewise; NaN where not proved.
     proved : number of levels, from the top, whose least violation is proved; L + 1 if x is, too.
@@ -89,9 +87,7 @@ def prove(h: Hierarchy, candidates: Iterable[ArrayLike], unclear: float = UNCLEA
 
     Slow: 0.02 s for 7 unknowns and 20 rows, 1 s for 38 unknowns and 106 rows.
 
-    Raises
-    ------
-    HierarchyError : h has a metric.
+    Raises HierarchyError: h has a metric.
     """
     if h.metric is not None:
         raise HierarchyError("prove: the hierarchy has a metric; only the identity is proved")

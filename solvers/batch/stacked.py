@@ -44,8 +44,6 @@ class Batch:
     Contiguous float64 arrays are used as they are, others are copied. Values are not checked here:
     a problem with numbers that are not finite, or lower > upper, gets Status.NUMERICAL_FAILURE.
 
-    Attributes
-    ----------
     A : (B, m, n) the rows of all levels, top level first.
     lower, upper : (B, m) their sides; an equality has lower == upper, a missing side is infinite.
     sizes : (L,) rows of each level, the same for all problems.
@@ -75,10 +73,8 @@ class Batch:
     def of(cls, hierarchies: Sequence[Hierarchy]) -> Batch:
         """Stack hierarchies of one shape.
 
-        Raises
-        ------
-        HierarchyError : no hierarchies, one with other sizes or unknowns than the first, or one
-            with a metric.
+        Raises HierarchyError: no hierarchies, one with other sizes or unknowns than the first, or
+        one with a metric.
         """
         if not hierarchies:
             raise HierarchyError("a batch of no hierarchies has no shape; pass arrays instead")
@@ -110,8 +106,6 @@ class Batch:
 class BatchResolution:
     """The result of a batch.
 
-    Attributes
-    ----------
     x : (B, n) the answers, always finite.
     status : (B,) int, values of `Status`.
     iterations : (B,) int, as in `Resolution`.
@@ -141,10 +135,8 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     memory : (B, ...) of an earlier resolution by this resolver, or None; ignored if its shape does
         not match.
 
-    Raises
-    ------
-    HierarchyError : another resolver; threads below 1; a row that the resolver cannot handle
-        (names problem, level and row).
+    Raises HierarchyError: another resolver; threads below 1; a row that the resolver cannot handle
+    (names problem, level and row).
     """
     expect("solve: batch", batch, Batch, "make one with Batch.of([h, ...])")
     resolver = make("tpm") if resolver is None else resolver

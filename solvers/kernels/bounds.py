@@ -155,7 +155,8 @@ def _refused(A, lower, upper, end):
         sane &= np.isfinite(square) and lower[i] <= upper[i]
         sane &= lower[i] < np.inf and upper[i] > -np.inf
         if i < end and entries == 1:
-            sane &= not (_overflows(lower[i], entry) or _overflows(upper[i], entry))
+            sane &= np.isfinite(lower[i] / entry) or not np.isfinite(lower[i])
+            sane &= np.isfinite(upper[i] / entry) or not np.isfinite(upper[i])
         mixed |= i < end and entries != 1
         if lower[i] == upper[i]:
             continue
@@ -168,12 +169,6 @@ def _refused(A, lower, upper, end):
     if refused == 0 and mixed:
         refused = bound
     return refused if refused < 0 else ZERO + SOLVED
-
-
-@inlined
-def _overflows(side, entry):
-    """Whether a bound on one unknown lies beyond the largest number."""
-    return np.isfinite(side) and not np.isfinite(side / entry)
 
 
 @inlined

@@ -347,29 +347,23 @@ def _copy_reflectors(source, target, k0, k1):
 
 @inlined
 def _improves(x, space, at, s):
-    """Write the step to x_k(s), also as the best if it is in the box; return whether it is."""
-    y, y_a, trial = space.y, space.y_a, space.trial
+    """Write the step to x_k(s), also as the best if it is in the box; return whether it is.
+
+    Up to cancellation in a large step.
+    """
+    y, y_a, trial, inside = space.y, space.y_a, space.trial, True
     for k in range(x.size):
         trial[0, k] = 0.0
         if at.above <= k < at.task:
             trial[0, k] = y[k] + s * y_a[k] if k >= at.joints else y[k]
     reflect_back(space.basis, at.task, trial, ZERO, ZERO + 1)
-    inside = _fits(x, trial[0], space)
+    for j in range(x.size):
+        low, up, value = space.low[j], space.up[j], x[j] + trial[0, j]
+        inside = inside and not value > up + 10.0 * BOUND_KEPT * (1.0 + abs(up))
+        inside = inside and not value < low - 10.0 * BOUND_KEPT * (1.0 + abs(low))
     if inside:
         assign(space.best, trial[0])
     return inside
-
-
-@inlined
-def _fits(x, step, space):
-    """Whether x + step is in the box, up to cancellation in a large step."""
-    for j in range(x.size):
-        low, up = space.low[j], space.up[j]
-        if x[j] + step[j] > up + 10.0 * BOUND_KEPT * (1.0 + abs(up)):
-            return False
-        if x[j] + step[j] < low - 10.0 * BOUND_KEPT * (1.0 + abs(low)):
-            return False
-    return True
 
 
 @compiled

@@ -95,7 +95,8 @@ def climb(A, lower, upper, sizes, x, settings, work):
         least = smallest_pivot(rows, block, least)
         if rank - above < last - first and is_doubtful(rows, block, least, settings.rank_tolerance):
             least = 0.0
-        subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
+        for i in range(first, last):
+            rows.miss[i] -= inner_product(y[:above], rows.W[i])  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
     _to_unknowns(basis, y, rank, x, of_x)
@@ -107,18 +108,12 @@ def climb(A, lower, upper, sizes, x, settings, work):
 def is_doubtful(rows, block, least, rank_tolerance):
     """Whether rounding in heavy rows of a level hides light ones, or a row is hardly dependent."""
     thin = min(np.sqrt(least) * rank_tolerance, 1.0)  # the smallest pivot
-    return (has_outlier(rows.zero[block.i0:block.i1], LIGHT_ROW * LIGHT_ROW)
-            or is_borderline(rows, block.i0 + block.k1 - block.k0, block.i1, block.k1,
-                             UNCLEAR_CUT * thin))
-
-
-@inlined
-def is_borderline(rows, begin, end, rank, share):
-    """Whether more than this share of the tolerance is left of a row that counts as dependent."""
-    borderline = False
-    for i in range(begin, end):
-        borderline |= length_of(rows.W[i, rank:]) ** 2 > share * share * rows.zero[i]
-    return borderline
+    share, doubtful = UNCLEAR_CUT * thin, False
+    if has_outlier(rows.zero[block.i0:block.i1], LIGHT_ROW * LIGHT_ROW):
+        return True
+    for i in range(block.i0 + block.k1 - block.k0, block.i1):
+        doubtful |= length_of(rows.W[i, block.k1:]) ** 2 > share * share * rows.zero[i]
+    return doubtful
 
 
 @inlined
@@ -129,13 +124,6 @@ def smallest_pivot(rows, block, least):
         square, zero = rows.W[i, k] * rows.W[i, k], rows.zero[i]
         least = min(least, square / zero) if zero > 0.0 else least
     return least
-
-
-@inlined
-def subtract(rows, y, first, last, above):
-    """Subtract the part that y reaches in columns 0 .. above - 1 from the residual of a level."""
-    for i in range(first, last):
-        rows.miss[i] -= inner_product(y[:above], rows.W[i])
 
 
 @inlined

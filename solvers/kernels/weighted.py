@@ -174,7 +174,8 @@ def weighted_steps(A, lower, upper, sizes, x, record, settings, work):
         if share < 1.0:
             if row == freed and share == 0.0:
                 s.doubt[row] = 1.0  # only the rounding of its multiplier released it
-            _turn(s, row)
+            over, under = _beyond(s, s.goal, row)
+            s.state[row] = FREE if s.state[row] != FREE else (UPPER if over > under else LOWER)
             freed = -1
             continue
         freed = _pulls_most(s)
@@ -223,14 +224,6 @@ def _begin_at(s, x):
             s.state[i] = FREE
             if s.weight[i] < np.inf and max(over, under) > 0.0:
                 s.state[i] = UPPER if over > 0.0 else LOWER
-
-
-@inlined
-def _turn(s, row):
-    """Toggle a row: activate it at the side that the goal violates, or release it."""
-    over, under = _beyond(s, s.goal, row)
-    state = s.state
-    state[row] = FREE if state[row] != FREE else (UPPER if over > under else LOWER)
 
 
 @inlined

@@ -58,10 +58,8 @@ class Emitted:
 def emitted(resolvers: Sequence[str], target: str) -> Emitted:
     """Return the object file of these resolvers for a target.
 
-    Raises
-    ------
-    HierarchyError : an unknown or missing resolver or target, kernels are not compiled, or this
-        LLVM or this machine cannot make code for the target.
+    Raises HierarchyError: an unknown or missing resolver or target, kernels are not compiled, or
+    this LLVM or this machine cannot make code for the target.
     """
     check(resolvers, target)
     if target == "native":

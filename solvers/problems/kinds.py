@@ -25,9 +25,7 @@ def structured(seed: int, kinds: Sequence[str] = (), equalities_only: bool = Fal
     kinds : names from KINDS to draw from; all of them if empty.
     equalities_only : whether each row keeps only one side, as an equality.
 
-    Raises
-    ------
-    HierarchyError : a name not in KINDS.
+    Raises HierarchyError: a name not in KINDS.
     """
     for kind in kinds:
         if kind not in _MAKERS:

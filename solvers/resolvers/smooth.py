@@ -31,6 +31,7 @@ from solvers.resolver import (
     Resolution,
     Resolver,
     number,
+    place_of,
     refuse_inequality,
     register,
 )
@@ -138,6 +139,4 @@ def _check(h: Hierarchy, activation: Array) -> None:
         raise HierarchyError(f"smooth: activations have shape {activation.shape}, expected "
                              f"({h.m},)")
     for (row,) in np.argwhere(~((activation >= 0.0) & (activation <= 1.0)))[:1]:
-        level = int((h.offsets[1:] <= row).sum())
-        raise HierarchyError(f"{h.names[level]}, row {row - h.offsets[level]}: activation "
-                             f"{activation[row]} is outside 0 .. 1")
+        raise HierarchyError(f"{place_of(h, row)}: activation {activation[row]} is outside 0 .. 1")

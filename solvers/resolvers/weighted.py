@@ -179,16 +179,12 @@ def lexicographic_weights(violations: ArrayLike, tolerance: float, regularised: 
     must not outweigh `tolerance` of a level. docs/theory/weighted.md has the bound. The
     lowest weight is 1.
 
-    Parameters
-    ----------
     violations : (L,) V_k, upper bounds on the violation of each level at the strict answer, in the
         unit of its rows; for instance `h.violations` of a strict resolution.
     tolerance : > 0, in the unit of the rows.
     regularised : upper bound on mu ||x* - reference||.
 
-    Raises
-    ------
-    HierarchyError : a violation that is not a number >= 0, or a tolerance that is not > 0.
+    Raises HierarchyError: a violation that is not a number >= 0, or a tolerance that is not > 0.
 
     Source: Sherali, Soyster, "Preemptive and nonpreemptive multi-objective programming:
     relationship and counterexamples", 1983.
