@@ -6,8 +6,6 @@ kernels release the GIL, so that other threads run their own part. Each returns 
 solves anything if `work` is too small.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from hierarchy.jit import unlocked

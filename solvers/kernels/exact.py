@@ -6,8 +6,6 @@ row, and then once more with small coefficients taken for zero. After each of th
 verified, and nothing is SOLVED otherwise.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 import numpy as np

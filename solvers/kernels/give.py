@@ -3,8 +3,6 @@
 `solvers.give` has the method, for any resolver; `solve_giving` is the same around the exact kernel.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple

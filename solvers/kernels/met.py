@@ -1,7 +1,5 @@
 """Whether levels are plainly met: with short steps, and without any inequality in the way."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 import numpy as np

@@ -6,8 +6,6 @@ of rows. It also compiles a function again for a literal argument, so counters s
 and flags are YES or NO.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 import numpy as np

@@ -7,8 +7,6 @@ joints, loses rank, the set with the largest s is the answer. Each task starts w
 No projector is formed here: saturated joints and the task have columns of Q, see `Space`.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple

@@ -6,8 +6,6 @@ levels are solved from the top by block forward substitution, least squares in e
 recursion (5), (13) in other coordinates. The columns of Q that no level takes carry (14).
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple

@@ -11,8 +11,6 @@ heavy ones. If its sign is in doubt the row is released on trial: it belongs in 
 moves outward, or by nothing measurable.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple
