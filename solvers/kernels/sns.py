@@ -131,7 +131,7 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
 
     record (n + L + 1,) on return: +1, -1, 2 where x is at its upper, lower, only bound, else 0; the
     scaling of each level; the number of saturated sets tried. settings: damping, threshold,
-    rank_tolerance, and the rest of `Options`. work: any contents. Returns SOLVED,
+    rank_tolerance, release, of_miss. work: any contents. Returns SOLVED,
     NUMERICAL_FAILURE, TOO_SMALL, CONTRADICTION with the row at the end of the record, or -(i + 1)
     if row i is an inequality that is not handled.
     """

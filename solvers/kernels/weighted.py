@@ -122,7 +122,7 @@ def weighted(A, lower, upper, sizes, x, record, settings, work):
 
     record (2 m + 1,): on entry zeros, or the row states of an earlier solve first; on return the
     state of each row (FREE, EQUAL, UPPER, LOWER), its weight, infinite for a hard row, and the
-    number of factorisations. settings: those of `Options`, the weights last. work: any contents.
+    number of factorisations. settings: those of `Space`, the weights last. work: any contents.
     Returns SOLVED, INACCURATE if an active row is nearly parallel to others, NUMERICAL_FAILURE,
     TOO_SMALL, or UNPROVED, when x has no meaning.
     """

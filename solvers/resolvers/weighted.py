@@ -82,7 +82,7 @@ class Weighted(Resolver):
 
     @cached_property
     def _settings_for(self) -> Callable[[int], Array]:
-        """The kernels' `Options`, followed by the weight of each level, by the number of these."""
+        """The settings of the kernels, the weight of each level last, by the number of these."""
         return cache(lambda levels: np.array([
             self.damping, self.threshold, self.rank_tolerance, self.regularisation,
             self.tolerance, self.hard_levels, self.guesses, self.max_iterations,
