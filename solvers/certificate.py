@@ -118,7 +118,6 @@ class Certificate:
         return (f"certified: optimal at every level and nearest to the reference, to "
                 f"{worst:.1e}")
 
-
     def __repr__(self) -> str:
         return f"Certificate({self})"
 

@@ -140,7 +140,6 @@ def _solved(robot: Robot, q: Array, h: Hierarchy, resolver: Settled,
     return found
 
 
-
 def _before(memory: Memory | None, v: ArrayLike | None,
             limits: bool | Task) -> tuple[Array | None, ArrayLike | None]:
     """Return the memory of the resolver, and the velocity of the previous tick if known."""

@@ -151,4 +151,3 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
 
 def _answer(resolver: Tpm, h: Hierarchy, b: Array, reference: Array) -> Array:
     return resolver.solve(h.changed(lower=b, upper=b, reference=reference, metric=None)).x
-
