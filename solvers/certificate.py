@@ -73,8 +73,6 @@ Mask = NDArray[np.bool_]
 class Certificate:
     """The verdict on one x.
 
-    Attributes
-    ----------
     violations : (L,) Euclidean norm of each level's violation.
     stationarity : (L,) residual of each level: the smallest shift of its sides for which x is
         optimal, as a length (violation divided by the norm of the row), relative to 1 + |x|; or
@@ -123,7 +121,6 @@ class Certificate:
         return (f"certified: optimal at every level and nearest to the reference, to "
                 f"{worst:.1e}")
 
-
     def __repr__(self) -> str:
         return f"Certificate({self})"
 
@@ -158,9 +155,8 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
     tolerance : largest residual, relative to 1 + |x|.
     parallel : angle [rad] up to which rows count as dependent.
 
-    Raises
-    ------
-    HierarchyError : x has the wrong shape, or there is not one witness for each level that gives.
+    Raises HierarchyError: x has the wrong shape, or there is not one witness for each level that
+    gives.
     """
     expect("certify: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
     number("certify: tolerance", tolerance, 0.0)

@@ -3,51 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from numbers import Integral
 from typing import NamedTuple, final
 
 import numpy as np
+from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, UnknownNameError, expect
-from hierarchy.gate import check_rows, level_names, readable, shaped
+from hierarchy.gate import Sizes, check_finite, check_rows, level_names, readable, shaped
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.factorization import (
-    EXTRA_ROWS,
-    factorization_work,
-    project_rows,
-    refactor,
-    resolve,
-    resolve_units,
-)
+from solvers.kernels.staircase import solve_by_staircase
 from solvers.resolver import Resolution
-from solvers.resolvers.tpm import Tpm
-from solvers.status import Status
+from solvers.resolvers.tpm import Tpm, task_priority_matrix
+from solvers.status import INACCURATE, SOLVED, Status
+from solvers.workspace import entry, run
 
-_FEWEST = 8  # rows for which there is always room
-_ROUND = 4   # the width of a staircase is a multiple of this, to reallocate less often
+_FEWEST = 8       # directions of the basis for which there is always room
+_PASSES = 3       # of the projection on the basis; two are enough unless the row is rounding
+_OUTSIDE = 1e-14  # share of a row outside the basis: less is no direction
 
 Level = int | str
 Targets = Array | Mapping[str, ArrayLike] | Sequence[ArrayLike]
 
 
 class _Held(NamedTuple):
-    """A level that occupies rows `slot` .. `slot + rows - 1` of the arrays."""
+    """A level: its rows A (m_k, n), and C (m_k, r) for the r directions known when it came."""
 
     name: str
-    slot: int
-    rows: int
+    A: Array
+    C: Array
 
 
 @final
 class Factorization:
     """Levels of equalities J x = b, factored as J = C Q^T while their priorities change.
 
-    Swap, reorder and delete work on C (m, r) alone, from the first changed level on, so their cost
-    does not depend on n; insert projects its rows on the basis Q (n, r). The next solve does the
-    work, so several edits cost one. It gives the x of `tpm` with the same settings, and leaves
-    nearly parallel rows and rows far lighter than others to it. Costs and the treatment of deleted
-    rows: docs/factorization.md.
+    Swap, reorder and delete change the order of C (m, r) alone, and a solve takes C and one product
+    with the basis Q (n, r); insert projects its rows on Q. The answer is the x of `tpm` with the
+    same settings, and nearly parallel rows and rows far lighter than others are left to it. Costs
+    and the treatment of deleted rows: docs/factorization.md.
 
     levels : A_k (m_k, n) of each level, most important first.
     names : one name per level; None for "level 1", "level 2", ...
@@ -77,19 +73,11 @@ class Factorization:
         self._factor_afresh([(name, self._checked(name, A))
                              for name, A in zip(names, levels, strict=True)])
 
-    def _factor_afresh(self, blocks: list[tuple[str, Array]], more: int = 0) -> None:
-        """Factor levels given by name and rows, with room for twice these and `more` rows."""
-        self._m = sum(len(block) for _, block in blocks)
-        room = max(2 * (self._m + more), _FEWEST)
-        widest = min(room, self._n)
-        self._J, self._used, self._r, self._width = np.empty((room, self._n)), 0, 0, 0
-        self._Q = np.empty((widest + 1, self._n))  # its rows are the columns of the letter's Q
-        self._C, self._squares = np.empty((room, _rounded_up(widest))), np.empty(room)
-        self._pivots = np.empty(room, dtype=np.int64)
-        self._table = np.empty((0, 3), dtype=np.int64)  # of the levels above `kept`
-        self._W, self._work, self._kept = np.empty((0, 0)), np.empty(0), 0
-        self._status = Status.SOLVED
-        self._levels = self._append(blocks)
+    def _factor_afresh(self, blocks: list[tuple[str, Array]]) -> None:
+        """Factor levels given by name and rows."""
+        self._Q = np.empty((0, self._n))  # its rows are the columns of the letter's Q
+        self._levels = [_Held(name, A.copy(), self._projected(A)) for name, A in blocks]
+        self._known: tuple[Array, Sizes] | None = None  # see `_ordered`
 
     @classmethod
     def of(cls, h: Hierarchy, settings: Tpm | None = None) -> Factorization:
@@ -106,7 +94,7 @@ class Factorization:
     @property
     def sizes(self) -> tuple[int, ...]:
         """Rows of each level."""
-        return tuple(level.rows for level in self._levels)
+        return tuple(len(level.A) for level in self._levels)
 
     @property
     def n(self) -> int:
@@ -116,52 +104,58 @@ class Factorization:
     @property
     def m(self) -> int:
         """Number of rows of all levels."""
-        return self._m
+        return sum(self.sizes)
 
     @property
     def rows(self) -> Array:
         """J (m, n) as given, in order of priority: a copy."""
-        return self._J[self._slots()]
+        return np.concatenate([np.empty((0, self._n)), *(level.A for level in self._levels)])
 
     @property
     def basis(self) -> Array:
         """Q (n, r): a copy. It may still span rows of deleted levels."""
-        return self._basis.T.copy()
+        return self._Q.T.copy()
 
     @property
     def coefficients(self) -> Array:
         """C (m, r) with J = C Q^T, in order of priority: a copy."""
-        return self._C[self._slots(), :self._r]
+        return self._ordered[0].copy()
 
     @property
     def ranks(self) -> tuple[int, ...]:
         """Rank that each level adds to the levels above it."""
-        self.update()
-        return tuple(np.diff(self._table[:, 2], prepend=0).tolist())
+        basis, ranks = np.empty((0, self._n)), []
+        for level in self._levels:
+            above, zero = len(basis), self._settings.rank_tolerance * norm(level.A, axis=1)
+            left = level.A.copy()
+            for _ in range(2):
+                left -= (left @ basis.T) @ basis
+            while len(left) and (size := norm(left, axis=1) * (norm(left, axis=1) > zero)).any():
+                q = left[size.argmax()] / size.max()
+                left -= np.outer(left @ q, q)
+                basis = np.vstack([basis, q])
+            ranks.append(len(basis) - above)
+        return tuple(ranks)
 
     @property
     def F(self) -> Array:  # noqa: N802
-        """The Task Priority Matrix (m, m) in the current order: F = C Z^T, from C alone.
+        """The Task Priority Matrix (m, m) in the current order, from C alone.
 
-        Row i of Z (m, r) is the answer to unit target i, in coordinates of Q. Raises HierarchyError
-        if the squares of the rows overflow.
+        Raises HierarchyError if the squares of the rows overflow.
         """
-        return np.asarray(self.coefficients @ self._units().T)
+        return self._matrices()[0]
 
     @property
     def G(self) -> Array:  # noqa: N802
-        """The map (n, m) = J^# F from targets to x, for a reference of zero: G = Q Z^T, see `F`."""
-        return np.asarray((self._units() @ self._basis).T)
+        """The map (n, m) = J^# F from targets to x, for a reference of zero."""
+        return self._matrices()[1]
 
     # -- edits ------------------------------------------------------------------------------------
 
     def swap(self, i: Level, j: Level) -> None:
         """Swap two levels, given by name or by index from 0."""
-        i, j = self._place(i), self._place(j)
-        levels = self._levels
-        levels[i], levels[j] = levels[j], levels[i]
-        if i != j:
-            self._changed(min(i, j))
+        i, j, levels = self._place(i), self._place(j), self._levels
+        levels[i], levels[j], self._known = levels[j], levels[i], None
 
     def reorder(self, order: Sequence[Level]) -> None:
         """Put all levels in a new order, given by name or by current index from 0.
@@ -172,14 +166,12 @@ class Factorization:
         if sorted(places) != list(range(len(self._levels))):
             raise HierarchyError(f"reorder needs each of {list(self.names)} once, got "
                                  f"{list(order)}")
-        self._levels = [self._levels[place] for place in places]
-        self._changed(next((k for k, place in enumerate(places) if k != place), len(places)))
+        self._levels, self._known = [self._levels[place] for place in places], None
 
     def delete(self, level: Level) -> None:
         """Delete a level, given by name or by index from 0."""
-        place = self._place(level)
-        self._m -= self._levels.pop(place).rows
-        self._changed(place)
+        del self._levels[self._place(level)]
+        self._known = None
 
     def insert(self, level: str, A: ArrayLike, at: int | None = None) -> None:
         """Insert a level with rows A (m_k, n) at an index, 0 the most important; None for last.
@@ -188,35 +180,15 @@ class Factorization:
         an entry that is not finite; the factorization is then unchanged.
         """
         place = len(self._levels) if at is None else at
-        if any(held.name == level for held in self._levels):
+        if level in self.names:
             raise HierarchyError(f"{level}: a level of this name exists")
         if not isinstance(place, Integral) or not 0 <= place <= len(self._levels):
             raise HierarchyError(f"{level}: index {at} is outside 0 .. {len(self._levels)}")
         block = self._checked(level, A)
-        used = self._used + len(block)
-        if used > len(self._J) or used > 2 * (self._m + len(block)) + _FEWEST:
-            self._factor_afresh([(held.name, self._J[held.slot:held.slot + held.rows])
-                                 for held in self._levels], len(block))
-        self._levels[place:place] = self._append([(level, block)])
-        self._m += len(block)
-        self._changed(place)
-
-    def update(self) -> Status:
-        """Refactor C from the first changed level on, now rather than at the next solve."""
-        count, kept = len(self._levels), self._kept
-        if kept < count or self._status is Status.NUMERICAL_FAILURE:
-            table = self._table  # slot, rows, rank so far
-            if len(table) != count:
-                table = np.vstack([table[:kept], np.empty((count - kept, 3), dtype=np.int64)])
-            for k in range(kept, count):
-                _, table[k, 0], table[k, 1] = self._levels[k]
-            self._table = table
-            self._status = Status(refactor(
-                self._C, self._squares, table, kept, self._W, self._pivots,
-                self._settings.rank_tolerance, self._work))
-            self._kept = 0 if self._status is Status.NUMERICAL_FAILURE else count
-        self._table = self._table[:count]
-        return self._status
+        if len(self._Q) + len(block) > 2 * (self.m + len(block)) + _FEWEST:
+            self._factor_afresh([(held.name, held.A) for held in self._levels])
+        self._levels.insert(place, _Held(level, block.copy(), self._projected(block)))
+        self._known = None
 
     # -- answers ----------------------------------------------------------------------------------
 
@@ -225,26 +197,23 @@ class Factorization:
 
         If squares of the numbers overflow, x is zero with Status.NUMERICAL_FAILURE.
 
-        Parameters
-        ----------
         targets : b (m,) in the current order; or b_k (m_k,) of each level by name, or in order.
         reference : (n,) or None for zero, the q0 of (14).
 
-        Raises
-        ------
-        HierarchyError : a wrong shape or an entry that is not finite; names level, row and value.
+        Raises HierarchyError: a wrong shape or an entry that is not finite; names level, row and
+        value.
         """
-        b, x = self._packed(targets), self._reference(reference)
-        status = self.update()
-        if status is Status.NUMERICAL_FAILURE:
-            return Resolution(np.zeros(self._n), status)
-        code = int(resolve(b, x, self._basis, self._table, self._W, self._pivots,
-                           self._settings._settings, self._work))
-        if code < 0:
-            self._refuse(b, x, -code - 1)
-        if status is Status.INACCURATE and self._settings.damping == 0.0:
+        (C, sizes), b, q0 = self._ordered, self._packed(targets), self._reference(reference)
+        y0 = self._Q @ q0
+        y = y0.copy()
+        code = run(entry(solve_by_staircase), C, b, b, sizes, y, self._settings._settings)
+        if code == INACCURATE:
             return self._settings.solve(self.hierarchy(b, reference))  # by the exact engine
-        return Resolution(x, Status(code))
+        x = q0 + (y - y0) @ self._Q  # (14)
+        if code == SOLVED and np.isfinite(x).all():
+            return Resolution(x)
+        self._check_targets(b)
+        return Resolution(np.zeros(self._n), Status.NUMERICAL_FAILURE)
 
     def hierarchy(self, targets: Targets, reference: ArrayLike | None = None) -> Hierarchy:
         """Return the problem in the current order, for `certify` or another resolver."""
@@ -255,73 +224,72 @@ class Factorization:
 
     def _place(self, level: Level) -> int:
         if isinstance(level, str):
-            for k, held in enumerate(self._levels):
-                if held.name == level:
-                    return k
-            raise UnknownNameError("level", level, self.names)
+            if level not in self.names:
+                raise UnknownNameError("level", level, self.names)
+            return self.names.index(level)
         if not isinstance(level, Integral) or not 0 <= level < len(self._levels):
             raise HierarchyError(f"index {level} is outside 0 .. {len(self._levels) - 1}")
         return level
 
-    def _changed(self, place: int) -> None:
-        self._kept = min(self._kept, place)
+    def _projected(self, A: Array) -> Array:
+        """Return C (m_k, r) with A = C Q^T, after adding the new directions of A to the basis.
 
-    def _slots(self) -> list[int]:
-        return [i for _, slot, rows in self._levels for i in range(slot, slot + rows)]
-
-    def _append(self, blocks: list[tuple[str, Array]]) -> list[_Held]:
-        """Put levels into the next slots, and add their new directions to the basis."""
-        held, slot = [], self._used
-        for name, block in blocks:
-            held.append(_Held(name, slot, len(block)))
-            self._J[slot:slot + len(block)] = block
-            slot += len(block)
-        self._r = project_rows(self._J, self._used, slot, self._r, self._Q, self._C, self._squares)
-        self._used = slot
-        if _rounded_up(self._r) > self._width:
-            self._widen(_rounded_up(self._r))
-        return held
-
-    def _widen(self, width: int) -> None:
-        """Make room for a wider basis; factored rows get zeros in the new columns."""
-        old, before, room = self._W, self._width, len(self._J)
-        self._W, self._width = np.zeros((room + width + EXTRA_ROWS, width)), width
-        if before:
-            self._W[:room + before, :before] = old[:room + before]
-        self._work = np.empty(factorization_work(room, width))
+        NaN for a row whose square overflows: no answer is found with it.
+        """
+        C = np.zeros((len(A), len(self._Q) + len(A)))
+        for row, c in zip(A, C, strict=True):
+            w, size, r = row.copy(), norm(row), len(self._Q)
+            for _ in range(_PASSES):
+                along = self._Q @ w
+                c[:r] += along
+                w -= along @ self._Q
+            left = norm(w)
+            if left > _OUTSIDE * size and r < self._n:
+                c[r], self._Q = left, np.vstack([self._Q, w / left])
+        return C[:, :len(self._Q)]
 
     @property
-    def _basis(self) -> Array:
-        """Q^T (r, n), a view."""
-        return self._Q[:self._r]
+    def _ordered(self) -> tuple[Array, Sizes]:
+        """C and the sizes of the levels, in order of priority."""
+        if self._known is None:
+            sizes = np.array(self.sizes, dtype=np.int64)
+            C, last = np.zeros((sizes.sum(), len(self._Q))), 0
+            for _, _, own in self._levels:
+                first, last = last, last + len(own)
+                C[first:last, :own.shape[1]] = own
+            self._known = C, sizes
+        return self._known
 
-    def _units(self) -> Array:
-        """Return the answers to the m unit targets, in coordinates of the basis: (m, r)."""
-        if self.update() is Status.NUMERICAL_FAILURE:
-            raise HierarchyError(f"no task priority matrix: {self._status}")
-        Z = np.empty((self._m, self._width))
-        resolve_units(Z, self._table, self._W, self._pivots, self._settings._settings, self._work)
-        return Z[:, :self._r]
+    def _matrices(self) -> tuple[Array, Array]:
+        """Return F and G."""
+        (C, sizes), b = self._ordered, np.zeros(self.m)
+        if not C.shape[1]:
+            return np.zeros((self.m, self.m)), np.zeros((self._n, self.m))
+        h = Hierarchy.trusted(C, b, b, sizes, np.zeros(C.shape[1]), self.names)
+        found = task_priority_matrix(h, **asdict(self._settings))
+        return found.F, np.asarray(self._Q.T @ found.G)
 
     def _checked(self, name: str, A: ArrayLike) -> Array:
         block = readable(f"{name}: A", A)
         if block.ndim != 2 or block.shape[1] != self._n or self._n < 1:
             raise HierarchyError(f"{name}: A has shape {block.shape}, expected (rows, "
                                  f"{self._n if self._n > 0 else 'n'})")
-        if not np.isfinite(block).all():
-            check_rows(name, block, np.zeros(len(block)), np.zeros(len(block)))
+        check_rows(name, block, np.zeros(len(block)), np.zeros(len(block)))
         return block
 
     def _reference(self, reference: ArrayLike | None) -> Array:
         if reference is None:
             return np.zeros(self._n)
-        return shaped("reference", reference, (self._n,)).copy()
+        q0 = shaped("reference", reference, (self._n,))
+        check_finite("reference", q0)
+        return q0.copy()
 
     def _packed(self, targets: Targets) -> Array:
         """Return b (m,) in the current order."""
         if isinstance(targets, np.ndarray) and targets.ndim < 2:
-            if targets.shape != (self._m,):
-                raise HierarchyError(f"targets have shape {targets.shape}, expected ({self._m},)")
+            m = len(self._ordered[0])
+            if targets.shape != (m,):
+                raise HierarchyError(f"targets have shape {targets.shape}, expected ({m},)")
             return readable("targets", targets)
         if isinstance(targets, Mapping):
             targets = self._in_order(targets)
@@ -331,8 +299,15 @@ class Factorization:
         if len(targets) != len(self._levels):
             raise HierarchyError(f"{len(targets)} targets for {len(self._levels)} levels")
         return np.concatenate([np.empty(0), *(
-            shaped(f"{level.name}: b", b, (level.rows,))
+            shaped(f"{level.name}: b", b, (len(level.A),))
             for level, b in zip(self._levels, targets, strict=True))])
+
+    def _check_targets(self, b: Array) -> None:
+        """Raise a HierarchyError that names the level and row of a target that is not finite."""
+        for (i,) in np.argwhere(~np.isfinite(b))[:1]:
+            k = int(np.searchsorted(np.cumsum(self.sizes), i, side="right"))
+            raise HierarchyError(f"{self.names[k]}, row {i - sum(self.sizes[:k])}: target is "
+                                 f"{b[i]}")
 
     def _in_order(self, targets: Mapping[str, ArrayLike]) -> list[ArrayLike]:
         for name in targets:
@@ -341,17 +316,3 @@ class Factorization:
             if name not in targets:
                 raise HierarchyError(f"{name}: no target given")
         return [targets[name] for name in self.names]
-
-    def _refuse(self, b: Array, x: Array, i: int) -> None:
-        """Raise a HierarchyError that names the invalid target or entry of the reference."""
-        if i >= len(b):
-            raise HierarchyError(f"reference, entry {i - len(b)}: {x[i - len(b)]} is not finite")
-        row = i
-        for level in self._levels:
-            if row < level.rows:
-                raise HierarchyError(f"{level.name}, row {row}: target is {b[i]}")
-            row -= level.rows
-
-
-def _rounded_up(width: int) -> int:
-    return max(-(-width // _ROUND), 1) * _ROUND

@@ -73,8 +73,6 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     Move on with `q = robot.integrate(q, step.v * dt)`. A loop at a fixed rate saves the set-up of
     each call with a `Stack` and a `State` of its own, see docs/loop.md.
 
-    Parameters
-    ----------
     q : (nq,) joint positions [rad or m].
     tasks : tasks of `hierarchy.tasks`, plugins or your own, at velocity level.
     dt : period [s] for which the velocity will be held; that of all tasks which have one.
@@ -91,11 +89,9 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     until : if given, the configuration in which the errors are at most this is looked for instead
         of a velocity, see `solvers.reaching.reach`; `limits` is then True or False.
 
-    Raises
-    ------
-    HierarchyError : q does not fit the robot, a task is none, dt is not positive or not the period
-        of a task, a gain times dt is above 2, or the resolver cannot handle a row. A numerical
-        failure is a status, with a finite v.
+    Raises HierarchyError: q does not fit the robot, a task is none, dt is not positive or not the
+    period of a task, a gain times dt is above 2, or the resolver cannot handle a row. A numerical
+    failure is a status, with a finite v.
     """
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
     expect("solve_ik: tasks", tasks, Sequence, "give a list of tasks")
@@ -142,7 +138,6 @@ def _solved(robot: Robot, q: Array, h: Hierarchy, resolver: Settled,
         upper[rows] += bend
         found, before = resolver.solve(h.changed(lower=lower, upper=upper), found.memory), bend
     return found
-
 
 
 def _before(memory: Memory | None, v: ArrayLike | None,

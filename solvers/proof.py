@@ -49,8 +49,6 @@ Mask = NDArray[np.bool_]
 class Proof:
     """The answer of a hierarchy, or of its first levels.
 
-    Attributes
-    ----------
     x : (n,) the answer, rounded once from DIGITS digits to doubles; NaN unless it is proved.
     least : (L,) least violation of each level, its Euclidean norm, likewise; NaN where not proved.
     proved : number of levels, from the top, whose least violation is proved; L + 1 if x is, too.
@@ -89,9 +87,7 @@ def prove(h: Hierarchy, candidates: Iterable[ArrayLike], unclear: float = UNCLEA
 
     Slow: 0.02 s for 7 unknowns and 20 rows, 1 s for 38 unknowns and 106 rows.
 
-    Raises
-    ------
-    HierarchyError : h has a metric.
+    Raises HierarchyError: h has a metric.
     """
     if h.metric is not None:
         raise HierarchyError("prove: the hierarchy has a metric; only the identity is proved")
@@ -170,10 +166,9 @@ class _Attempt:
             self.t: Exact = self.A @ self.x - self.side
             self._check_sides()
             if self._check_gradients():
-                return self._found()
-        raise _NoProofError
-
-    def _found(self) -> Proof:
+                break
+        else:
+            raise _NoProofError
         complete, rounding = self.near is None, ZERO * self.reach
         x = np.array([float(value) if abs(value) > rounding else 0.0 for value in self.x])
         return Proof(x if complete else np.full(self.h.n, np.nan), self._least(),

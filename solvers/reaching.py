@@ -23,6 +23,7 @@ from solvers.resolver import Resolver
 from solvers.resolvers.settled import Settled
 from solvers.status import Status
 
+_STARTS, _MOST = 20, 200  # starts, and iterations of each
 _STEP = 0.3       # [rad or m] the largest change of a joint in one iteration
 _STILL = 1e-3     # relative decrease of the errors in `_PATIENCE` iterations that goes on
 _AT_REST = 1e-9   # the same at the end
@@ -53,33 +54,31 @@ class Reached:
 
 
 def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, limits: bool = True,
-          resolver: Resolver, t: float = 0.0, damping: float = 1.0, starts: int = 20,
-          most: int = 200, seed: int = 0) -> Reached:
+          resolver: Resolver, t: float = 0.0, damping: float = 1.0) -> Reached:
     """Return the configuration near q in which the tasks are met, in strict order, at time t.
 
     Gauss-Newton steps of the same problem as `solve_ik`, each at most 0.3 rad or m, with a gain of
     1 for the fastest task. Where the errors stop falling, they start again from a random
-    configuration within the limits; `seed` makes that repeatable. These steps are undamped, which
+    configuration within the limits, the same ones in each call. These steps are undamped, which
     finds more; from the best of all starts damped ones go on to the nearest. Joint tasks such as a
     posture are preferences: they do not decide whether the others are met, but where.
 
     until : largest norm of the error of each task that decides, in its unit.
-    starts : largest number of starts. most : iterations of each.
 
     Raises HierarchyError as `solve_ik` does, and if no task decides.
     """
     if not number("solve_ik: until", until) > 0.0:
         raise HierarchyError(f"solve_ik: until = {until:g} must be positive")
     search = _Search(robot, tasks, until, limits, resolver, damping, t)
-    rng, start = np.random.default_rng(seed), State.at(robot, q, t=t).q.copy()
-    best = search.descend(start, most, resolver)
+    rng, start = np.random.default_rng(0), State.at(robot, q, t=t).q.copy()
+    best = search.descend(start, resolver)
     iterations, count = best[2], 1
-    while max(best[0]) > until and count < starts:
-        found = search.descend(_drawn(robot, start, rng), most, resolver)
+    while max(best[0]) > until and count < _STARTS:
+        found = search.descend(_drawn(robot, start, rng), resolver)
         iterations, count = iterations + found[2], count + 1
         best = min(best, found, key=lambda one: one[0])
     if max(best[0]) > until:
-        best = search.descend(best[1], most, search.settled, _AT_REST)
+        best = search.descend(best[1], search.settled, _AT_REST)
     return search.answer(best[1], iterations + best[2], count)
 
 
@@ -116,11 +115,11 @@ class _Search:
                                  "preferences; give a task of a frame too")
         self.state, self.status = State(robot), Status.SOLVED
 
-    def descend(self, q: Array, most: int, resolver: Resolver,
-                still: float = _STILL) -> tuple[list[float], Array, int]:
+    def descend(self, q: Array, resolver: Resolver, still: float = _STILL
+                ) -> tuple[list[float], Array, int]:
         """Return the errors of the deciding tasks, where they are least, and the iterations."""
         best, memory, history = ([np.inf], q), None, list[float]()
-        for k in range(most):
+        for k in range(_MOST):
             errors = self._errors(q)
             if errors < best[0]:
                 best = errors, q
@@ -134,7 +133,7 @@ class _Search:
             step = found.x * self.period
             q = self.mechanism.closed(self.robot.integrate(
                 q, step * min(1.0, _STEP / max(abs(step).max(), 1e-300))))
-        return (*best, most)
+        return (*best, _MOST)
 
     def _errors(self, q: Array) -> list[float]:
         """Move to q and return the norm of the error of each deciding task."""
@@ -181,19 +180,19 @@ class _Search:
 
 
 def _above(h: Hierarchy, k: int, wanted: Array, limits: Sequence[Task]) -> list[str]:
-    """Name the tasks above level k that keep it from moving as `wanted` (n,)."""
-    own = {task.name for task in limits}
-    return [name for name, (A, lower, upper) in zip(h.names[:k], h.levels(), strict=False)
-            if name not in own and _blocks(A, lower, upper, wanted)]
+    """Name the tasks above level k that keep it from moving as `wanted` (n,).
 
-
-def _blocks(A: Array, lower: Array, upper: Array, wanted: Array) -> bool:
-    """Whether a row that has no room left on one of its sides would leave it along `wanted`."""
-    sizes = np.linalg.norm(A, axis=1) * np.linalg.norm(wanted)
-    along = A @ wanted / np.where(sizes > 0.0, sizes, 1.0)
-    equal = lower == upper
-    return bool(((along < -_AT) & (equal | (lower > -_AT))
-                 | (along > _AT) & (equal | (upper < _AT))).any())
+    A row does that has no room left on one of its sides, and would leave it.
+    """
+    own, names = {task.name for task in limits}, list[str]()
+    for name, (A, lower, upper) in zip(h.names[:k], h.levels(), strict=False):
+        sizes = np.linalg.norm(A, axis=1) * np.linalg.norm(wanted)
+        along, equal = A @ wanted / np.where(sizes > 0.0, sizes, 1.0), lower == upper
+        blocks = ((along < -_AT) & (equal | (lower > -_AT))
+                  | (along > _AT) & (equal | (upper < _AT)))
+        if name not in own and blocks.any():
+            names.append(name)
+    return names
 
 
 def _drawn(robot: Robot, q: Array, rng: np.random.Generator) -> Array:

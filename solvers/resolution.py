@@ -18,8 +18,6 @@ from solvers.workspace import run
 class Resolution:
     """The result of a solve.
 
-    Attributes
-    ----------
     x : (n,) the answer, always finite.
     status : how the solve ended.
     iterations : number of iterations, counted in the resolver's own way; 1 for a direct resolver.

@@ -95,9 +95,7 @@ class Resolver(ABC):
     rank_tolerance : a row counts as dependent on the rows above it when the norm of what is left
         of it is at most rank_tolerance times its norm as given. The scale of a row does not matter.
 
-    Raises
-    ------
-    HierarchyError : a setting is not a number or is out of range.
+    Raises HierarchyError: a setting is not a number or is out of range.
     """
 
     damping: float = number(0.0)
@@ -164,9 +162,7 @@ class Resolver(ABC):
         Implementations get hierarchies without a metric: those with one come in the variables of
         `solvers.metric.in_metric`. None gives: see `solvers.give.giving`.
 
-        Raises
-        ------
-        HierarchyError : the resolver cannot handle a row. A numerical outcome is a status.
+        Raises HierarchyError: the resolver cannot handle a row. A numerical outcome is a status.
         """
 
     def _solve_giving(self, h: Hierarchy, memory: Array | None) -> Resolution:
@@ -263,15 +259,20 @@ class Around(Resolver):
         return self.inner.label
 
 
+def place_of(h: Hierarchy, row: int) -> str:
+    """Return the level and the row in it of a row, counted over all levels, for messages."""
+    level = int((h.offsets[1:] <= row).sum())
+    return f"{h.names[level]}, row {row - h.offsets[level]}"
+
+
 def refuse_inequality(resolver: Resolver, h: Hierarchy, row: int) -> None:
     """Raise a HierarchyError that names the level and row of a row (counted over all levels)."""
-    level = int((h.offsets[1:] <= row).sum())
     able = {handles: ", ".join(sorted(name for name, kind in _REGISTRY.items()
                                       if kind.handles == handles))
             for handles in ("inequalities", "bounds")}
     raise HierarchyError(
-        f"{h.names[level]}, row {row - h.offsets[level]}: an inequality, {h.lower[row]:g} <= a x "
-        f"<= {h.upper[row]:g}; {resolver.label} resolves {_RESOLVED[resolver.handles]}"
+        f"{place_of(h, row)}: an inequality, {h.lower[row]:g} <= a x <= {h.upper[row]:g}; "
+        f"{resolver.label} resolves {_RESOLVED[resolver.handles]}"
         f" (inequalities: {able['inequalities']}; bounds in a first level: {able['bounds']})")
 
 
@@ -327,9 +328,7 @@ def _find_elsewhere(name: str) -> None:
 def make(name: str, /, **settings: Any) -> Resolver:
     """Return the resolver called `name` with these settings and defaults for the rest.
 
-    Raises
-    ------
-    HierarchyError : no such resolver or setting (suggests the nearest), or an invalid value.
+    Raises HierarchyError: no such resolver or setting (suggests the nearest), or an invalid value.
     """
     expect("make", name, str, "give one of solvers.names()")
     if name in _VARIANTS:

@@ -281,9 +281,7 @@ def residual(task: Task, configuration: object) -> tuple[Array, Array]:
 
     Rows with zero cost are left out.
 
-    Raises
-    ------
-    HierarchyError : the task is not of the form J dq = -gain e, or has lm_damping.
+    Raises HierarchyError: the task is not of the form J dq = -gain e, or has lm_damping.
     """
     _, J, e = _read(task, configuration, False)
     cost = np.broadcast_to(_costs(task, len(e)), e.shape)

@@ -28,11 +28,9 @@ def hierarchy(configuration: Configuration, tasks: Tasks, dt: float,
 
     damping, solve : as `solvers.adapters.from_pink.hierarchy` takes them.
 
-    Raises
-    ------
-    HierarchyError : limits of a joint that contradict each other (ContradictionError), as when it
-        is further outside its range than its velocity limit makes good in dt; lm_damping without
-        `damping`, or a task that has neither rows nor a cost that is positive definite.
+    Raises HierarchyError: limits of a joint that contradict each other (ContradictionError), as
+    when it is further outside its range than its velocity limit makes good in dt; lm_damping
+    without `damping`, or a task that has neither rows nor a cost that is positive definite.
     """
     return packed(configuration, tasks, dt, limits, constraints, damping, solve).hierarchy()
 

@@ -123,11 +123,9 @@ def hierarchy(configuration: Configuration,
     solve : returns the x (n,) of a hierarchy; needed if a level before the last one is damped,
         since it keeps what it reaches.
 
-    Raises
-    ------
-    HierarchyError : limits of a joint that contradict each other (ContradictionError); without
-        `damping`, for lm_damping and safe_displacement_gain: both are weights
-        against all tasks, which exact levels have no place for.
+    Raises HierarchyError: limits of a joint that contradict each other (ContradictionError);
+    without `damping`, for lm_damping and safe_displacement_gain: both are weights against all
+    tasks, which exact levels have no place for.
     """
     return packed(configuration, tasks, dt, limits, barriers, constraints, damping,
                   solve).hierarchy()

@@ -5,8 +5,6 @@ the solve. All that is given stands in one table, a row for each row of a limit 
 of G or J, then h or e, and of a task its cost, gain and lm_damping.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 import numpy as np

@@ -35,9 +35,7 @@ def solve(batch: Batch, resolver: Resolver | None = None) -> BatchResolution:
     The answers agree with those of `solvers.batch.solve` up to rounding. Compiled once for each
     shape and each combination of settings.
 
-    Raises
-    ------
-    HierarchyError : another resolver; an inequality (names problem, level and row).
+    Raises HierarchyError: another resolver; an inequality (names problem, level and row).
     """
     resolver = make("tpm") if resolver is None else resolver
     if not isinstance(resolver, Tpm) or not resolver.strict:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from hierarchy.gate import checked_sizes, readable, shaped
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.kernels.batch import batch_exact, batch_merged, batch_within_bounds
-from solvers.kernels.merged import NOTHING, record_size
+from solvers.kernels.merged import record_size
 from solvers.resolver import Resolver, make, refuse_inequality
 from solvers.resolvers.hcod import Hcod
 from solvers.resolvers.merged import Merged, refuse_safety_alone
@@ -44,8 +44,6 @@ class Batch:
     Contiguous float64 arrays are used as they are, others are copied. Values are not checked here:
     a problem with numbers that are not finite, or lower > upper, gets Status.NUMERICAL_FAILURE.
 
-    Attributes
-    ----------
     A : (B, m, n) the rows of all levels, top level first.
     lower, upper : (B, m) their sides; an equality has lower == upper, a missing side is infinite.
     sizes : (L,) rows of each level, the same for all problems.
@@ -75,10 +73,8 @@ class Batch:
     def of(cls, hierarchies: Sequence[Hierarchy]) -> Batch:
         """Stack hierarchies of one shape.
 
-        Raises
-        ------
-        HierarchyError : no hierarchies, one with other sizes or unknowns than the first, or one
-            with a metric.
+        Raises HierarchyError: no hierarchies, one with other sizes or unknowns than the first, or
+        one with a metric.
         """
         if not hierarchies:
             raise HierarchyError("a batch of no hierarchies has no shape; pass arrays instead")
@@ -110,8 +106,6 @@ class Batch:
 class BatchResolution:
     """The result of a batch.
 
-    Attributes
-    ----------
     x : (B, n) the answers, always finite.
     status : (B,) int, values of `Status`.
     iterations : (B,) int, as in `Resolution`.
@@ -141,10 +135,8 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     memory : (B, ...) of an earlier resolution by this resolver, or None; ignored if its shape does
         not match.
 
-    Raises
-    ------
-    HierarchyError : another resolver; threads below 1; a row that the resolver cannot handle
-        (names problem, level and row).
+    Raises HierarchyError: another resolver; threads below 1; a row that the resolver cannot handle
+    (names problem, level and row).
     """
     expect("solve: batch", batch, Batch, "make one with Batch.of([h, ...])")
     resolver = make("tpm") if resolver is None else resolver
@@ -156,66 +148,44 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
         raise HierarchyError(f"threads = {threads}, expected at least 1")
     batch = replace(batch)  # numpy lets its holder change the shape of an array: through the gate
     (_, m, n), levels = batch.A.shape, len(batch.sizes)
-    begun = partial(_Run, batch, cores() if threads is None else threads, memory)
-    if isinstance(resolver, Merged):
-        names = tuple(f"level {k + 1}" for k in range(levels))
-        run = begun(resolver._settings_for(names), record_size(n, m), True)
-        run.solve(batch_merged, np.arange(len(batch)), run.record)
-        for p in np.flatnonzero(run.codes == NOTHING)[:1]:
-            refuse_safety_alone(batch[int(p)])
-        return run.answer(run.record[:, m], run.record)
+    kernel: Callable[..., int] = batch_exact
     size, warm = 3 * m + 3, resolver.damping == 0.0
+    if isinstance(resolver, Merged):
+        kernel, size, warm = batch_merged, record_size(n, m), True
+        settings = resolver._settings_for(tuple(f"level {k + 1}" for k in range(levels)))
+    else:
+        settings = resolver._settings
     if isinstance(resolver, Tpm):
-        return begun(resolver._settings, n + levels + size, warm).by_tpm(resolver)
-    run = begun(resolver._settings, size, warm)
-    run.solve(batch_exact, np.arange(len(batch)), run.record)
-    return run.answer(run.record[:, -3] + run.record[:, -2], run.record)
+        kernel, size = batch_within_bounds, n + levels + size
+    x, codes = np.zeros(batch.A.shape[::2]), np.zeros(len(batch), dtype=np.int64)
+    record = np.zeros((len(batch), size))
+    before = None if memory is None else readable("memory", memory)
+    if before is not None and before.shape == record.shape and warm:
+        record[:] = before
+    problems = batch.A, batch.lower, batch.upper, batch.sizes, batch.reference
+    _in_parallel(partial(run, kernel, problems, x, codes, record, settings), batch,
+                 cores() if threads is None else threads)
+    for p in np.flatnonzero(codes < 0)[:1]:
+        if isinstance(resolver, Merged):
+            refuse_safety_alone(batch[int(p)])
+        refuse_inequality(resolver, batch[int(p)], -int(codes[p]) - 1)
+    steps = record[:, m] if kernel is batch_merged else record[:, -3] + record[:, -2]
+    if kernel is batch_within_bounds:  # only an unknown at a bound is worth a memory
+        saturated = (record[:, :n] != 0.0).any(axis=1)
+        record[~saturated], steps = 0.0, np.maximum(steps, 1.0)
+        if not saturated.any():
+            return BatchResolution(x, codes, steps.astype(np.int64), None)
+    return BatchResolution(x, codes, steps.astype(np.int64), record)
 
 
-class _Run:
-    """The arrays that the kernels write; the record (B, size) starts as the memory if it fits."""
-
-    def __init__(self, batch: Batch, threads: int, memory: Array | None, settings: Array,
-                 size: int, warm: bool) -> None:
-        self.batch, self.threads, self.settings = batch, threads, settings
-        self.x, self.codes = np.zeros(batch.A.shape[::2]), np.zeros(len(batch), dtype=np.int64)
-        self.record = np.zeros((len(batch), size))
-        before = None if memory is None else readable("memory", memory)
-        if before is not None and before.shape == self.record.shape and warm:
-            self.record[:] = before
-
-    def by_tpm(self, resolver: Tpm) -> BatchResolution:
-        """Resolve all like `Tpm`; those with an unknown at a bound have a memory."""
-        b = self.batch
-        self._call(batch_within_bounds, np.arange(len(b)), self.x, self.codes, self.record,
-                   self.settings, b.reference)
-        for p in np.flatnonzero(self.codes < 0)[:1]:
-            refuse_inequality(resolver, b[p], -int(self.codes[p]) - 1)
-        steps = np.maximum(self.record[:, -3] + self.record[:, -2], 1.0)
-        saturated = (self.record[:, :b.A.shape[2]] != 0.0).any(axis=1)
-        self.record[~saturated] = 0.0
-        return self.answer(steps, self.record if saturated.any() else None)
-
-    def answer(self, steps: Array, memory: Array | None) -> BatchResolution:
-        """Return the answers, with the iterations (B,)."""
-        return BatchResolution(self.x, self.codes, steps.astype(np.int64), memory)
-
-    def solve(self, kernel: Callable[..., int], which: Indices, *records: Array) -> None:
-        """Solve the problems `which` with a kernel."""
-        self.x[which] = self.batch.reference[which]
-        self._call(kernel, which, self.x, self.codes, *records, self.settings)
-
-    def _call(self, kernel: Callable[..., int], which: Indices, *arguments: Any) -> None:
-        """Run a kernel over the problems `which`, on several threads if there are many."""
-        b = self.batch
-        call = partial(run, kernel, (b.A, b.lower, b.upper, b.sizes), *arguments)
-        threads = min(self.threads, len(which) * b.A[:1].size // ENOUGH)
-        if threads < 2:
-            call(which)
-            return
-        parts = np.array_split(which, PARTS * threads)
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(call, parts))
+def _in_parallel(call: Callable[[Indices], int], batch: Batch, threads: int) -> None:
+    """Run a call over all problems, in parts on several threads if there are many."""
+    which, threads = np.arange(len(batch)), min(threads, batch.A.size // ENOUGH)
+    if threads < 2:
+        call(which)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(call, np.array_split(which, PARTS * threads)))
 
 
 def cores() -> int:

@@ -1,12 +1,10 @@
 """Loops over the problems of a batch, for one thread.
 
-problems: A (B, m, n), lower, upper (B, m), sizes (L,). The other arrays also have the problem as
-their first axis: x (B, n), the reference on entry, the records of the resolver, and the codes. The
-kernels release the GIL, so that other threads run their own part. Each kernel returns TOO_SMALL
-before it solves anything if `work` is too small.
+problems: A (B, m, n), lower, upper (B, m), sizes (L,), references (B, n). The other arrays also
+have the problem as their first axis: x (B, n), the codes, and the records of the resolver. The
+kernels release the GIL, so that other threads run their own part. Each returns TOO_SMALL before it
+solves anything if `work` is too small.
 """
-
-# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
@@ -14,13 +12,14 @@ from hierarchy.jit import unlocked
 from solvers.kernels.bounds import solve_within_bounds
 from solvers.kernels.exact import DAMPING, solve, work_size
 from solvers.kernels.merged import merged
+from solvers.kernels.space import assign
 from solvers.status import SOLVED, TOO_SMALL
 
 
 @unlocked
-def batch_within_bounds(problems, x, codes, records, settings, references, which, work):
+def batch_within_bounds(problems, x, codes, records, settings, which, work):
     """Solve the problems `which` like `Tpm`."""
-    A, lower, upper, sizes = problems
+    A, lower, upper, sizes, references = problems
     for p in which:
         codes[p] = solve_within_bounds(A[p], lower[p], upper[p], sizes, references[p], x[p],
                                        records[p], settings, work)
@@ -32,10 +31,11 @@ def batch_within_bounds(problems, x, codes, records, settings, references, which
 @unlocked
 def batch_exact(problems, x, codes, records, settings, which, work):
     """Solve the problems `which` with the exact kernel."""
-    A, lower, upper, sizes = problems
+    A, lower, upper, sizes, references = problems
     if work_size(A.shape[2], A.shape[1], sizes.size, settings[DAMPING] > 0.0) > work.size:
         return TOO_SMALL
     for p in which:
+        assign(x[p], references[p])
         codes[p] = solve(A[p], lower[p], upper[p], sizes, x[p], records[p], settings, work)
     return SOLVED
 
@@ -43,8 +43,9 @@ def batch_exact(problems, x, codes, records, settings, which, work):
 @unlocked
 def batch_merged(problems, x, codes, records, settings, which, work):
     """Solve the problems `which` with the kernel of `merged`."""
-    A, lower, upper, sizes = problems
+    A, lower, upper, sizes, references = problems
     for p in which:
+        assign(x[p], references[p])
         codes[p] = merged(A[p], lower[p], upper[p], sizes, x[p], records[p], settings, work)
         if codes[p] == TOO_SMALL:
             return TOO_SMALL

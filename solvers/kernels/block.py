@@ -1,7 +1,5 @@
 """The small problem of one level: min ||M y - r||^2 + lambda^2 ||y||^2, lambda from damping."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 import numpy as np

@@ -4,8 +4,6 @@ Where no bound is active the staircase solves them, else the exact resolver, in 
 cost nothing. This file also finds the saturation of each unknown and the scaling of each level.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -15,7 +13,7 @@ import numpy as np
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.exact import DAMPING, solve, work_size
 from solvers.kernels.rows import ZERO, all_equal, finish
-from solvers.kernels.space import View, vector
+from solvers.kernels.space import View, fill, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL, UNPROVED
@@ -51,13 +49,13 @@ def solve_within_bounds(A, lower, upper, sizes, reference, x, record, settings, 
         code = solve(A, lower, upper, sizes, x, inner, settings, work)
         if code == NUMERICAL_FAILURE or _is_at_bound(A, lower, upper, sizes, x, record, work):
             return code
-        _clear(record)
+        fill(record, 0.0)
     _begin(x, reference)
     code = solve_by_staircase(A, lower, upper, sizes, x, settings, work)
     if code == INACCURATE:
         _begin(x, reference)
         code = solve(A, lower, upper, sizes, x, inner, settings, work)
-        _clear(record)
+        fill(record, 0.0)
     if code >= 0:
         return code
     _begin(x, reference)
@@ -75,12 +73,6 @@ def _begin(x, reference):
     """Write the reference."""
     for c in range(x.size):
         x[c] = reference[c] if reference.size > 0 else 0.0
-
-
-@inlined
-def _clear(record):
-    for i in range(record.size):
-        record[i] = 0.0
 
 
 @inlined
@@ -161,7 +153,8 @@ def _refused(A, lower, upper, end):
         sane &= np.isfinite(square) and lower[i] <= upper[i]
         sane &= lower[i] < np.inf and upper[i] > -np.inf
         if i < end and entries == 1:
-            sane &= not (_overflows(lower[i], entry) or _overflows(upper[i], entry))
+            sane &= np.isfinite(lower[i] / entry) or not np.isfinite(lower[i])
+            sane &= np.isfinite(upper[i] / entry) or not np.isfinite(upper[i])
         mixed |= i < end and entries != 1
         if lower[i] == upper[i]:
             continue
@@ -177,16 +170,10 @@ def _refused(A, lower, upper, end):
 
 
 @inlined
-def _overflows(side, entry):
-    """Whether a bound on one unknown lies beyond the largest number."""
-    return np.isfinite(side) and not np.isfinite(side / entry)
-
-
-@inlined
 def _intersect(A, lower, upper, box):
     """Write the bounds of each unknown; low exceeds high where its rows contradict each other."""
-    for c in range(box.low.size):
-        box.low[c], box.high[c] = -np.inf, np.inf
+    fill(box.low, -np.inf)
+    fill(box.high, np.inf)
     for i in range(box.end):
         c = _unknown(A, i)
         one, other = lower[i] / A[i, c], upper[i] / A[i, c]
@@ -207,8 +194,7 @@ def _unknown(A, i):
 def _scale(A, b, sizes, box, x, record):
     """Write the scaling of each level: 1 - |A_k x - b_k| / |b_k|, not below zero."""
     begin, n = ZERO + box.end, x.size
-    for k in range(sizes.size):
-        record[n + k] = 1.0
+    fill(record[n:n + sizes.size], 1.0)
     for c in range(n):
         if box.low[c] > box.high[c]:
             record[n + box.top] = 0.0

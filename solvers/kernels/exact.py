@@ -5,8 +5,6 @@ earlier solve, or from a pass level by level. It is factored anew and pivoted in
 row. After each of these the claims are verified, and nothing is SOLVED otherwise.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 import numpy as np

@@ -3,8 +3,6 @@
 `solvers.give` has the method, for any resolver; `solve_giving` is the same around the exact kernel.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -12,7 +10,7 @@ from typing import NamedTuple
 from hierarchy.jit import as_matrix, compiled, inlined, inner_product
 from solvers.kernels.exact import DAMPING, solve, work_size
 from solvers.kernels.rows import ZERO, length_of
-from solvers.kernels.space import View, vector
+from solvers.kernels.space import View, assign, fill, vector
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 _ROUNDING = 1e-10  # of a violation, relative to 1 + |a| |x|
@@ -71,16 +69,14 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
     low, at = vector(work, ZERO, m)
     up, at = vector(work, at, m)
     reference, at = vector(work, at, n)
-    for i in range(m):
-        low[i], up[i] = lower[i], upper[i]
-    for c in range(n):
-        reference[c] = x[c]
+    assign(low, lower)
+    assign(up, upper)
+    assign(reference, x)
     witnesses = as_matrix(x[n + m:], (x.size - n - m) // n, n)
     g = Giving(A, low, up, sizes, reference, x[n:n + m], witnesses)
     code, last = _find_witnesses(g, x[:n], record[:whole], settings, work[at:])
     if code not in (SOLVED, INACCURATE):
-        for i in range(3):
-            record[record.size - 3 + i] = record[last + i]
+        assign(record[record.size - 3:], record[last:])
         return code
     found = _solve(g, levels, x[:n], record[whole:], settings, work[at:])
     return code if found == SOLVED else found
@@ -101,13 +97,11 @@ def _find_witnesses(g, x, record, settings, work):
                 code = _solve(g, count, x, record[at:at + size], settings, work)
                 accurate, at = accurate and code == SOLVED, at + size
             if code in (SOLVED, INACCURATE):
-                for c in range(x.size):
-                    g.witnesses[found, c] = x[c]
+                assign(g.witnesses[found], x)
                 relax(g.A, g.lower, g.upper, g.give, x, first, last)
                 found += 1
         first = last
-    for i in range(at, record.size):
-        record[i] = 0.0
+    fill(record[at:], 0.0)
     return INACCURATE if code == SOLVED and not accurate else code, at - 3
 
 
@@ -126,7 +120,6 @@ def _solve(g, count, x, record, settings, work):
     rows = ZERO
     for k in range(count):
         rows += g.sizes[k]
-    for c in range(x.size):
-        x[c] = g.reference[c]
+    assign(x, g.reference)
     return solve(g.A[:rows], g.lower[:rows], g.upper[:rows], g.sizes[:count], x, record, settings,
                  work)

@@ -4,14 +4,13 @@ T (r, s) has the columns of the problem as its rows. With the equations in pivot
 first, each residual is as accurate as its own equation (Cox, Higham 1998).
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.rows import length_of, reflect_by
+from solvers.kernels.space import fill
 
 
 @compiled
@@ -21,8 +20,7 @@ def least_squares(T, b, y):
     triangularise(T, y)
     turn(T, b, False)
     substitute_back(T, b, y)
-    for k in range(r):
-        b[k] = 0.0
+    fill(b[:r], 0.0)
     turn(T, b, True)
 
 

@@ -13,8 +13,6 @@ The basis vectors of the tableau belong, in this order, to rows that are permane
 `hard` rows held at their side, to the `soft` rows of the level, and to none.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 import numpy as np

@@ -12,8 +12,6 @@ does to a multiplier, y + step (b - a x), in the unit of the row; a miss beyond 
 step times cap. docs/theory/merged.md has the bounds.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -21,33 +19,29 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, inner_product
-from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy, work_size
+from solvers.kernels.exact import DAMPING, solve, work_size
 from solvers.kernels.rows import ZERO
-from solvers.kernels.space import View, integers, matrix, vector
+from solvers.kernels.space import View, fill, integers, matrix, vector
 from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
 
 NOTHING = -1     # code: every level is strict
-BY_RULE = -1.0   # of strict levels: see `strict_levels`
-EXACT = 5        # settings of `Hcod` at the start; then those of `Options`
+BY_RULE = -1.0   # of strict levels: see `_strict_levels`
+EXACT = 5        # settings of `Hcod` at the start; then those of `Merged`
 OWN = 8          # settings before the weights
 
 
-class Options(NamedTuple):
-    """The settings of `Merged`: weights and caps (L,), the others numbers."""
+class Merged(NamedTuple):
+    """The settings of `Merged`, weights and caps (L,), and the rows that are solved.
+
+    A (m + n, n), of which the first `m` and some more are written. own (n,): 1 for an unknown that
+    a row to merge names alone.
+    """
 
     strict: View
     regularisation: View
     step: View
     weights: View
     caps: View
-
-
-class Merged(NamedTuple):
-    """The rows that are solved: A (m + n, n), of which the first `m` and some more are written.
-
-    own (n,): 1 for an unknown that a row to merge names alone.
-    """
-
     A: View
     lower: View
     upper: View
@@ -81,46 +75,39 @@ def merged(A, lower, upper, sizes, x, record, settings, work):
     """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
     record: y (m,), iterations, and the record of the exact kernel, (3 (m + n) + 3,); on entry that
-    of an earlier solve, or zeros. settings: those of `Hcod`, then `Options`. work: any contents.
+    of an earlier solve, or zeros. settings: those of `Hcod`, then of `Merged`. work: any contents.
     Returns the codes of `solve_hierarchy`, or NOTHING if no level is left to merge.
     """
     (m, n), levels = A.shape, sizes.size
-    options = _options(settings, levels)
-    strict = strict_levels(lower, upper, sizes, options)
+    s, at = _carve(settings, work, m, n, levels)
+    strict = _strict_levels(lower, upper, sizes, s.strict)
     if strict >= levels > 0:
         return ZERO + NOTHING
     if merged_size(n, m, levels, settings[DAMPING] > 0.0) > work.size:
         return ZERO + TOO_SMALL
-    s, at = _carve(work, m, n, levels)
-    y, inner = record[:m], record[m + 1:]
-    _merge(s, A, lower, upper, sizes, strict, options, y)
-    rows = _draw(s, m, x, options.regularisation)
+    y, last = record[:m], min(strict + 1, levels)
+    _merge(s, A, lower, upper, sizes, strict, y)
+    rows = _draw(s, m, x)
     if strict < levels:
         s.sizes[strict] += rows - m
-    inner = inner[:3 * rows + 3]
-    code = _solve(s, rows, min(strict + 1, levels), x, inner, settings[:EXACT], work[at:])
+    inner = record[m + 1:m + 3 * rows + 4]
+    code = solve(s.A[:rows], s.lower[:rows], s.upper[:rows], s.sizes[:last], x, inner,
+                 settings[:EXACT], work[at:])
     record[m] = inner[3 * rows] + inner[3 * rows + 1]
     if code != NUMERICAL_FAILURE:
-        _carry(A, lower, upper, sizes, x, y, strict, options)
+        _carry(s, A, lower, upper, sizes, x, y, strict)
     return code
 
 
-@inlined
-def _options(settings, levels):
-    """Return the Options in an array of settings."""
-    return Options(settings[EXACT], settings[EXACT + 1], settings[EXACT + 2],
-                   settings[OWN:OWN + levels], settings[OWN + levels:])
-
-
 @compiled
-def strict_levels(lower, upper, sizes, options):
+def _strict_levels(lower, upper, sizes, given):
     """Return how many levels stay strict: those that are set, or by the rule of `Merged`.
 
     The rule: the first run of levels with inequalities and all levels above it; none if no level
     has inequalities.
     """
-    if options.strict != BY_RULE:
-        return ZERO + np.int64(options.strict)
+    if given != BY_RULE:
+        return ZERO + np.int64(given)
     first, strict = ZERO, ZERO
     for k in range(sizes.size):
         last, bounded = first + sizes[k], False
@@ -135,28 +122,29 @@ def strict_levels(lower, upper, sizes, options):
 
 
 @inlined
-def _carve(work, m, n, levels):
+def _carve(settings, work, m, n, levels):
     """Return Merged without content, and where it ends in the work space."""
+    strict, regularisation, step = settings[EXACT], settings[EXACT + 1], settings[EXACT + 2]
+    weights, caps = settings[OWN:OWN + levels], settings[OWN + levels:]
     A, at = matrix(work, ZERO, m + n, n)
     lower, at = vector(work, at, m + n)
     upper, at = vector(work, at, m + n)
     sizes, at = integers(work, at, levels)
     own, at = vector(work, at, n)
-    return Merged(A, lower, upper, sizes, own), at
+    return Merged(strict, regularisation, step, weights, caps, A, lower, upper, sizes, own), at
 
 
 @compiled
-def _merge(s, A, lower, upper, sizes, strict, options, y):
+def _merge(s, A, lower, upper, sizes, strict, y):
     """Write the rows of all levels, those to merge times their weights and at moved sides."""
     first, hard = ZERO, ZERO
-    for c in range(s.own.size):
-        s.own[c] = 0.0
+    fill(s.own, 0.0)
     for k in range(sizes.size):
         hard = first if k == strict else hard
         for i in range(first, first + sizes[k]):
             moved, weight = 0.0, 1.0
             if k >= strict:
-                moved, weight, only = y[i], options.weights[k], _only_entry(A[i])
+                moved, weight, only = y[i], s.weights[k], _only_entry(A[i])
                 if only >= 0 and lower[i] == upper[i]:
                     s.own[only] = 1.0
                 if only < 0 and _repeats(A, lower, upper, i, hard):
@@ -198,9 +186,9 @@ def _repeats(A, lower, upper, i, hard):
 
 
 @compiled
-def _draw(s, m, x, mu):
+def _draw(s, m, x):
     """Add a row mu (x - reference) for each unknown without one; return the number of all rows."""
-    rows = m
+    rows, mu = m, s.regularisation
     for c in range(x.size):
         if mu > 0.0 and s.own[c] == 0.0:
             for e in range(x.size):
@@ -210,23 +198,14 @@ def _draw(s, m, x, mu):
     return rows
 
 
-@inlined
-def _solve(s, rows, levels, x, inner, settings, work):
-    """Solve what was written with the exact kernel."""
-    A, lower, upper, sizes = s.A[:rows], s.lower[:rows], s.upper[:rows], s.sizes[:levels]
-    if settings[DAMPING] > 0.0:
-        return solve_damped(A, lower, upper, sizes, x, inner, settings, work)
-    return solve_hierarchy(A, lower, upper, sizes, x, inner, settings, work)
-
-
 @compiled
-def _carry(A, lower, upper, sizes, x, y, strict, options):
+def _carry(s, A, lower, upper, sizes, x, y, strict):
     """Move the memory of each row, (a); strict rows and the lowest level have none."""
     first = ZERO
     for k in range(sizes.size):
-        cap = options.caps[k] if strict <= k < sizes.size - 1 else 0.0
+        cap = s.caps[k] if strict <= k < sizes.size - 1 else 0.0
         for i in range(first, first + sizes[k]):
             value = inner_product(A[i], x)
             miss = min(max(value - y[i], lower[i]), upper[i]) - value
-            y[i] = min(max(y[i] + options.step * min(max(miss, -cap), cap), -cap), cap)
+            y[i] = min(max(y[i] + s.step * min(max(miss, -cap), cap), -cap), cap)
         first += sizes[k]

@@ -1,14 +1,12 @@
 """Whether levels are plainly met: with short steps, and without any inequality in the way."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.rows import ZERO, all_equal, factor_level, length_of, reflect, reflect_back
-from solvers.kernels.space import Rows
+from solvers.kernels.space import Rows, assign
 
 _PIVOT = 1e-6  # of the norm of a row: a smaller one depends on others
 
@@ -45,8 +43,7 @@ def plainly_met(A, lower, upper, offsets, least):
                 y[t] = mu[i] = (rows.miss[i] - inner_product(y[:t], rows.W[i])) / rows.W[i, t]
             if least[k] >= 0.0 and not _is_short(rows, mu, first, end, above, least[k]):
                 return False
-            for c in range(n):
-                x[0, c] = y[c]
+            assign(x[0], y)
             reflect_back(basis, rank, x, ZERO, ZERO + 1)
         if not _within(A, lower, upper, x[0], end):
             return False

@@ -5,8 +5,6 @@ remains: a level occupies as many columns of Q as it has rows, whether it can us
 m > n, zero columns extend J to a square matrix.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -16,13 +14,7 @@ import numpy as np
 from hierarchy.jit import as_matrix, compiled, inlined, inner_product
 from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_square
 from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
-from solvers.kernels.space import (
-    View,
-    integers,
-    matrix,
-    shared,
-    vector,
-)
+from solvers.kernels.space import View, assign, fill, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import SOLVED, TOO_SMALL
 
@@ -31,7 +23,9 @@ class Matrices(NamedTuple):
     """The matrices from which F is computed, and F; N = max(m, n).
 
     R (m, N): R^T, the rows of J reflected. basis: the m reflectors of Q. F (m, m): F^T. T (m, m):
-    R^-1. zero (m,): squared norm at or below which a row is zero. rest: m + 3 m^2 numbers.
+    R^-1. zero (m,): squared norm at or below which a row is zero. rest: m + 3 m^2 numbers. u (m,),
+    of_x (1, N), least (n,): intermediate results. whole (1,): all rows as one level. undamped (3,):
+    settings.
     """
 
     R: View
@@ -40,32 +34,40 @@ class Matrices(NamedTuple):
     T: View
     zero: View
     rest: View
+    u: View
+    of_x: View
+    least: View
+    whole: View
+    undamped: View
 
 
 @inlined
-def _carve(work, at, m, n):
+def _carve(work, m, n):
     """Return Matrices for m rows of n unknowns, and where they end."""
     N = max(m, n)
-    R, at = matrix(work, at, m, N)
+    R, at = matrix(work, 0, m, N)
     basis, at = matrix(work, at, m, N)
     F, at = matrix(work, at, m, m)
     T, at = matrix(work, at, m, m)
     zero, at = vector(work, at, m)
     rest, at = vector(work, at, m + 3 * m * m)
-    return Matrices(R, basis, F, T, zero, rest), at
+    u, at = vector(work, at, m)
+    of_x, at = matrix(work, at, 1, N)
+    least, at = vector(work, at, n)
+    whole, at = integers(work, at, 1)
+    undamped, at = vector(work, at, 3)
+    return Matrices(R, basis, F, T, zero, rest, u, of_x, least, whole, undamped), at
 
 
 @compiled
 def solve_as_published(A, lower, upper, sizes, x, settings, work):
     """Solve (14) with F of (10); arguments and return codes as in `solve_by_staircase`."""
     m, n = A.shape
-    matrices, at = _carve(work, 0, m, n)
-    u, at = vector(work, at, m)
-    of_x, at = matrix(work, at, 1, max(m, n))
-    _, end = _carve_inverse(work, at, m, n)
+    matrices, at = _carve(work, m, n)
+    _, end = carve_staircase(work, at, m, n)
     if end > work.size:
         return TOO_SMALL
-    settings = shared(settings)
+    settings, u = shared(settings), matrices.u
     code = _fill(A, lower, upper, sizes, x, matrices, settings)
     if code != SOLVED:
         return finish(x, code)
@@ -78,17 +80,16 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
         for i in range(m):
             u[i] += matrices.F[k, i] * lower[k]  # F p - J q0, of (14); F here is its transpose
     if square * tolerance * tolerance < 1.0:  # sigma_min(R) >= 1 / ||R^-1||_F > tolerance
-        _add_inverse(matrices, u, of_x, x)
+        _add_inverse(matrices, x)
         return finish(x, SOLVED)
-    return finish(x, _add_least(A, u, x, settings, work[at:]))
+    return finish(x, _add_least(A, matrices, x, settings, work[at:]))
 
 
 @inlined
-def _add_inverse(matrices, u, of_x, x):
+def _add_inverse(matrices, x):
     """Add J^# u = Q [R^-T u; 0] to x (11)."""
-    m = u.size
-    for c in range(of_x.shape[1]):
-        of_x[0, c] = 0.0
+    u, of_x, m = matrices.u, matrices.of_x, matrices.u.size
+    fill(of_x[0], 0.0)
     for i in range(m):
         u[i] = (u[i] - inner_product(u[:i], matrices.R[i])) / matrices.R[i, i]
         of_x[0, i] = u[i]
@@ -98,26 +99,14 @@ def _add_inverse(matrices, u, of_x, x):
 
 
 @inlined
-def _carve_inverse(work, at, m, n):
-    """Return the work space of `_add_least`, and where it ends."""
-    undamped, at = vector(work, at, 3)
-    least, at = vector(work, at, n)
-    whole, at = integers(work, at, 1)
-    _, end = carve_staircase(work, at, m, n)
-    return (undamped, least, whole, work[at:]), end
-
-
-@inlined
-def _add_least(A, u, x, settings, work):
+def _add_least(A, matrices, x, settings, work):
     """Add J^# u, at any rank, to x; return the code of the staircase that finds it."""
-    m, n = A.shape
-    (undamped, least, whole, rest), _ = _carve_inverse(work, 0, m, n)
+    u, least, whole, undamped = matrices.u, matrices.least, matrices.whole, matrices.undamped
     undamped[0], undamped[1], undamped[2] = 0.0, settings.threshold, settings.rank_tolerance
-    whole[0] = m
-    for c in range(n):
-        least[c] = 0.0
-    code, _ = climb(A, u, u, whole, least, undamped, rest)
-    for c in range(n):
+    whole[0] = u.size
+    fill(least, 0.0)
+    code, _ = climb(A, u, u, whole, least, undamped, work)
+    for c in range(x.size):
         x[c] += least[c]
     return code
 
@@ -126,7 +115,7 @@ def _add_least(A, u, x, settings, work):
 def _fill(A, lower, upper, sizes, x, matrices, settings):
     """Write R, its reflectors, F and T; return a code."""
     m, n = A.shape
-    R, basis, F, T, zero, rest = matrices
+    R, basis, F, T, zero, rest = matrices[:6]
     code = load_rows(R, zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
         return code
@@ -152,16 +141,14 @@ def _factor(R, basis, zero, n):
     """Compute the QR of J^T; R is J on entry and R^T on return (8)."""
     m, N = R.shape
     for i in range(m):
-        for c in range(n, N):
-            R[i, c] = 0.0
+        fill(R[i, n:], 0.0)
     for k in range(m):
         square = 0.0
-        for c in range(N):
-            basis[k, c] = 0.0
-            square += R[k, c] * R[k, c] if c >= k else 0.0
+        fill(basis[k], 0.0)
+        for c in range(k, N):
+            square += R[k, c] * R[k, c]
         if square <= zero[k]:  # no remainder: rounding must not choose a direction
-            for c in range(k, N):
-                R[k, c] = 0.0
+            fill(R[k, k:], 0.0)
         else:
             make_reflector(basis, k, R[k], square)
             reflect(basis, k, k + 1, R, k, m)
@@ -179,8 +166,7 @@ def _eliminate(F, D, entries, first, last):
             for j in range(p):
                 F[first + i, k] += D[i, j] * entries[j]
     for i in range(first):  # step 3
-        for j in range(p):
-            entries[j] = F[i, first + j]
+        assign(entries[:p], F[i, first:])
         for j in range(p):
             for k in range(first, F.shape[1]):
                 F[i, k] -= entries[j] * F[first + j, k]
@@ -231,12 +217,10 @@ def _invert_pivot(F, T, first, settings, tolerance, D, work):
 def matrix_as_published(A, lower, upper, sizes, F, settings, work):
     """Write F^T of (10) into F (m, m); return SOLVED, NUMERICAL_FAILURE or TOO_SMALL."""
     m, n = A.shape
-    matrices, at = _carve(work, 0, m, n)
-    zero, at = vector(work, at, 0)
+    matrices, at = _carve(work, m, n)
     if at > work.size:
         return TOO_SMALL
-    code = _fill(A, lower, upper, sizes, zero, matrices, shared(settings))
+    code = _fill(A, lower, upper, sizes, work[:0], matrices, shared(settings))
     for i in range(m):
-        for k in range(m):
-            F[i, k] = matrices.F[i, k]
+        assign(F[i], matrices.F[i])
     return code

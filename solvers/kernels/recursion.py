@@ -2,22 +2,40 @@
 
 (J_i P_{i-1})^# comes from an orthogonal decomposition J_i P_{i-1} = C V that reveals its rank: rows
 of V orthonormal, C lower trapezoidal, pivoted by the largest remainder. Then P_i = P_{i-1} - V^T V.
-"""
 
-# mypy: disable-error-code="no-untyped-def"
+The dampings of Nakamura, Chiaverini, and Buss and Kim act in the singular value decomposition
+B = J_i P_{i-1} = sum_k s_k u_k v_k^T. Projectors stay undamped: no level disturbs those above it.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product
-from solvers.kernels.block import solve_level
-from solvers.kernels.damped import LEVEL, Inverse, invert
+from solvers.kernels.block import (
+    orthogonalise_rows,
+    smallest_square,
+    solve_damped_level,
+    solve_level,
+)
 from solvers.kernels.rows import ZERO, finish, largest_row, length_of, load_rows, swap, swap_rows
-from solvers.kernels.space import Block, View, matrix, shared, vector
+from solvers.kernels.space import Block, View, assign, fill, matrix, shared, vector
 from solvers.status import SOLVED, TOO_SMALL
 
+LEVEL, NAKAMURA, CHIAVERINI, SELECTIVE = 0.0, 1.0, 2.0, 3.0  # methods of `Recursive`, in order
 SHRUNK = 0.01  # squared norm of a remainder: smaller ones are projected a second time
+
+
+class Inverse(NamedTuple):
+    """How to invert: the method, and settings as in `Recursive`, after the shared ones."""
+
+    method: View
+    damping: View
+    threshold: View
+    isotropic: View
+    largest: View
 
 
 class Projected(NamedTuple):
@@ -81,22 +99,19 @@ def recursion(A, lower, upper, sizes, x, settings, work):
         first = last
     for i in range(n):
         add_multiple(q, x[i], rows.P[i])  # (14): I - J^# J = P_l
-    for c in range(n):
-        x[c] = q[c]
+    assign(x, q)
     return finish(x, SOLVED)
 
 
 @inlined
 def _begin(rows, q):
     """Set C and q to zero, and P_0 to I."""
-    n = q.size
+    fill(q, 0.0)
     for i in range(rows.C.shape[0]):
-        for c in range(n):
-            rows.C[i, c] = 0.0
-    for i in range(n):
-        q[i] = 0.0
-        for c in range(n):
-            rows.P[i, c] = 1.0 if i == c else 0.0
+        fill(rows.C[i], 0.0)
+    for i in range(q.size):
+        fill(rows.P[i], 0.0)
+        rows.P[i, i] = 1.0
 
 
 @inlined
@@ -129,8 +144,7 @@ def _decompose(rows, A, first, last, rank, rank_tolerance):
 @compiled
 def _project(w, a, P):
     """Set w to a P."""
-    for c in range(w.size):
-        w[c] = 0.0
+    fill(w, 0.0)
     for k in range(w.size):
         add_multiple(w, a[k], P[k])
 
@@ -145,8 +159,7 @@ def _take_direction(rows, i, last, k, again):
     if again:
         _project(v, rows.W[i], rows.P)
     else:
-        for c in range(v.size):
-            v[c] = rows.W[i, c]
+        assign(v, rows.W[i])
     norm = length_of(v)
     for c in range(v.size):
         v[c] /= norm
@@ -155,3 +168,142 @@ def _take_direction(rows, i, last, k, again):
         add_multiple(rows.W[j], -rows.C[j, k], v)
     for j in range(v.size):
         add_multiple(rows.P[j], -v[j], v)  # (6)
+
+
+class Singular(NamedTuple):
+    """The decomposition of a level with p rows and rank r, and a step.
+
+    S (r, p): row k is s_k u_k. Y (r, r): row k is v_k in coordinates of V. sizes (n,): norms of the
+    columns of B. step, total (n,): of one singular vector, and of the level.
+    """
+
+    S: View
+    Y: View
+    sizes: View
+    step: View
+    total: View
+
+
+@compiled
+def invert(rows, y, at, inverse, work):
+    """Write the damped step of one level into y.
+
+    work: what `recursion` has for it.
+    """
+    if at.k1 == at.k0:
+        return
+    if inverse.method == NAKAMURA:  # lambda = lambda_0 (1 - w / w_0) for w = sqrt(det B B^T) < w_0
+        w = 1.0 if at.i1 - at.i0 == at.k1 - at.k0 else 0.0
+        for k in range(at.k1 - at.k0):
+            w *= abs(rows.C[at.i0 + k, at.k0 + k])
+        damped = inverse.damping * max(0.0, 1.0 - w / inverse.threshold)
+        solve_damped_level(rows.C, rows.miss, y, at, damped, work)
+        return
+    space, of_step = _decomposed(rows, at, work)
+    if inverse.method == SELECTIVE:
+        _selective(rows, y, at, inverse, space)
+        return
+    square = smallest_square(space.S) if at.i1 - at.i0 == at.k1 - at.k0 else 0.0
+    ratio = square / (inverse.threshold * inverse.threshold)
+    if (inverse.damping == 0.0 or ratio >= 1.0) and inverse.isotropic == 0.0:
+        solve_damped_level(rows.C, rows.miss, y, at, 0.0, of_step)
+        return
+    _filtered(rows, y, at, inverse, space)
+
+
+@inlined
+def _decomposed(rows, at, work):
+    """Decompose the block of a level; return it and the rest of `work`."""
+    p, r, n = at.i1 - at.i0, at.k1 - at.k0, rows.V.shape[1]
+    S, end = matrix(work, ZERO, r, p)
+    Y, end = matrix(work, end, r, r)
+    sizes, end = vector(work, end, n)
+    step, end = vector(work, end, n)
+    total, end = vector(work, end, n)
+    for k in range(r):
+        for i in range(p):
+            S[k, i] = rows.C[at.i0 + i, at.k0 + k]
+        for c in range(r):
+            Y[k, c] = 1.0 if k == c else 0.0
+    orthogonalise_rows(S, Y)
+    return Singular(S, Y, sizes, step, total), work[end:]
+
+
+@inlined
+def _along(rows, at, space, k):
+    """Return s_k^2, and s_k u_k^T times the residual of the level."""
+    s = space.S[k]
+    return inner_product(s, s), inner_product(s, rows.miss[at.i0:])
+
+
+@inlined
+def _filtered(rows, y, at, inverse, space):
+    """Write sum_k s_k / (s_k^2 + beta^2 + [k smallest] lambda^2) v_k u_k^T r into y.
+
+    With lambda^2 = (1 - (s_m / epsilon)^2) lambda_max^2 for s_m < epsilon. A level that has lost
+    rank has s_m = 0, and nothing remains in that direction.
+    """
+    r, lost = at.k1 - at.k0, at.i1 - at.i0 > at.k1 - at.k0
+    least, smallest = np.inf, ZERO
+    for k in range(r):
+        square, _ = _along(rows, at, space, k)
+        if square < least:
+            least, smallest = square, ZERO + k
+    ratio = least / (inverse.threshold * inverse.threshold)
+    extra = inverse.damping * inverse.damping * max(0.0, 1.0 - ratio)  # lambda^2
+    fill(y[at.k0:at.k1], 0.0)
+    for k in range(r):
+        square, part = _along(rows, at, space, k)
+        below = square + inverse.isotropic * inverse.isotropic
+        below += extra if k == smallest and not lost else 0.0
+        add_multiple(y[at.k0:], part / below, space.Y[k])
+
+
+@inlined
+def _selective(rows, y, at, inverse, space):
+    """Write the selectively damped step: each singular vector has a largest step of its own.
+
+    gamma_k = min(1, N_k / M_k) gamma_max, M_k = (1 / s_k) sum_j |v_kj| |b_j|, b_j the columns of B,
+    and N_k = |u_k| = 1: a level counts as one end effector.
+    """
+    r, n = at.k1 - at.k0, rows.V.shape[1]
+    _write_sizes(rows, at, space)
+    fill(y[at.k0:at.k1], 0.0)
+    fill(space.total, 0.0)
+    for k in range(r):
+        square, part = _along(rows, at, space, k)
+        reach = 0.0  # M_k s_k
+        fill(space.step, 0.0)
+        for j in range(r):
+            add_multiple(space.step, space.Y[k, j], rows.V[at.k0 + j])
+        for c in range(n):
+            reach += abs(space.step[c]) * space.sizes[c]
+        own = min(1.0, np.sqrt(square) / reach) * inverse.largest
+        share = _share(space.step, part / square, own)
+        add_multiple(y[at.k0:], share * part / square, space.Y[k])
+        add_multiple(space.total, share * part / square, space.step)
+    share = _share(space.total, 1.0, inverse.largest)
+    for j in range(r):
+        y[at.k0 + j] *= share
+
+
+@inlined
+def _share(v, factor, largest):
+    """Return the share of factor v whose largest entry is `largest`, at most 1."""
+    size = 0.0
+    for c in range(v.size):
+        size = max(size, abs(factor * v[c]))
+    return largest / size if size > largest else 1.0
+
+
+@inlined
+def _write_sizes(rows, at, space):
+    """Write the norms of the columns of B = C V."""
+    for c in range(space.sizes.size):
+        total = 0.0
+        for i in range(at.i0, at.i1):
+            entry = 0.0
+            for k in range(at.k0, at.k1):
+                entry += rows.C[i, k] * rows.V[k, c]
+            total += entry * entry
+        space.sizes[c] = np.sqrt(total)

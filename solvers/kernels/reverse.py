@@ -9,13 +9,11 @@ hierarchy of two levels: the rows of k with their residual, and all rows below w
 staircase finds it at any rank, and no pseudoinverse is formed.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.rows import finish
-from solvers.kernels.space import integers, vector
+from solvers.kernels.space import assign, fill, integers, vector
 from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
@@ -54,11 +52,9 @@ def reverse(A, lower, upper, sizes, x, settings, work):
             return finish(x, code)
         for c in range(n):
             x[c] += d[c]
-        for i in range(first, last):
-            asked[i] = 0.0
+        fill(asked[first:last], 0.0)
     if sizes.size == 0:
-        for c in range(n):
-            x[c] = reference[c]
+        assign(x, reference)
     return finish(x, SOLVED)
 
 

@@ -6,13 +6,12 @@ of rows. It also compiles a function again for a literal argument, so counters s
 and flags are YES or NO.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 import numpy as np
 
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product
+from solvers.kernels.space import fill
 from solvers.kernels.tolerances import LEAST_SQUARE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
@@ -175,6 +174,5 @@ def finish(x, code):
     if code == SOLVED and not all_finite(x):
         code = NUMERICAL_FAILURE
     if code != SOLVED:
-        for i in range(x.size):
-            x[i] = 0.0
+        fill(x, 0.0)
     return code

@@ -1,19 +1,11 @@
 """Saturation in the null space: task by task, joints that would pass a bound are saturated.
 
-For task k (Flacco, De Luca, Khatib 2015) let x_{k-1} be the answer of the tasks above and P_{k-1}
-the projector onto their null space. A diagonal W_k has ones for the joints that are not saturated,
-Pbar_k = (I - ((I - W_k) P_{k-1})^#) P_{k-1} is the freedom of the remaining joints, and
-
-    x_k(s) = x' + (J_k Pbar_k)^# (s b_k - J_k x'),   x' = x_{k-1} + ((I - W_k) P_{k-1})^# x_N,
-
-x_N the steps of the saturated joints to their bounds. So x_k(s) = s a + c. While x_k(1) leaves the
-box, the joint that leaves it at the smallest s, the most critical one, is saturated too; when
-J_k Pbar_k loses rank, the set with the largest s is the answer. Each task starts with W_k = I.
-
-No projector is formed here: saturated joints and the task have columns of Q, see `held`.
+Of task k, x_k(s) = s a + c (Flacco, De Luca, Khatib 2015; docs/theory/sns.md). While x_k(1) leaves
+the box, the joint that leaves it at the smallest s, the most critical one, is saturated too; when
+J_k Pbar_k, the rows of the task in the freedom P_{k-1} of the tasks above without the saturated
+joints, loses rank, the set with the largest s is the answer. Each task starts with none saturated.
+No projector is formed here: saturated joints and the task have columns of Q, see `Space`.
 """
-
-# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
@@ -23,51 +15,33 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.block import solve_level
-from solvers.kernels.held import (
-    NO_JOINT,
-    Held,
-    carve_box,
-    carve_held,
-    hold,
-    hold_again,
-    side_of_box,
-    to_reference,
+from solvers.kernels.rows import (
+    ZERO,
+    factor_level,
+    finish,
+    load_rows,
+    make_reflector,
+    reflect,
+    reflect_back,
 )
-from solvers.kernels.rows import ZERO, factor_level, finish, load_rows, reflect, reflect_back
 from solvers.kernels.space import (
     Block,
     Rows,
     Settings,
     View,
+    assign,
     carve_rows,
+    fill,
+    integers,
     matrix,
     shared,
     vector,
 )
 from solvers.kernels.staircase import carve_staircase, climb
-from solvers.kernels.tolerances import BOUND_KEPT
+from solvers.kernels.tolerances import BOUND_KEPT, TERMS
 from solvers.status import CONTRADICTION, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
-
-class Options(NamedTuple):
-    """The settings that all resolvers share, and two more.
-
-    release: whether saturated joints are released. of_miss: whether s scales the residual of a
-    task instead of b.
-    """
-
-    shared: Settings
-    release: View
-    of_miss: View
-
-
-class Tasks(NamedTuple):
-    """Rows of all levels below the bounds."""
-
-    J: View
-    lower: View
-    upper: View
-    sizes: View
+NO_JOINT = -1
 
 
 class Task(NamedTuple):
@@ -87,16 +61,33 @@ class Columns(NamedTuple):
 
 
 class Space(NamedTuple):
-    """Intermediate results.
+    """Settings, the box, and intermediate results.
 
-    held: saturated joints, and Q. kept: the reflectors of the tasks alone. rows: the factored rows
-    of the task. seen (m, n): the same in Q, not factored. now (m,): J_k x_{k-1}. zero (m,): of all
-    tasks. line (2, n): a and c of x_k(s) = s a + c. y_a (n,): a in Q. trial (1, n), best (n,):
-    steps. of_block: work space of `solve_level`.
+    release: whether saturated joints are released. of_miss: whether s scales the residual of a
+    task instead of b. low, up, reference (n,).
+
+    Q has columns for the tasks above, then one for each held joint in the order of holding; the
+    rest is free. basis: its reflectors; kept: those of the tasks alone. E (n, n): unit vectors of
+    the held joints, in coordinates of Q. joint (n,): their indices. side (n,): +1, -1 for a joint
+    held at its upper, lower bound, else 0. y (n,): the step in each column of Q.
+
+    rows: the factored rows of the task. seen (m, n): the same in Q, not factored. now (m,):
+    J_k x_{k-1}. zero (m,): of all tasks. line (2, n): a and c of x_k(s) = s a + c. y_a (n,): a in
+    Q. trial (1, n), best (n,): steps. of_block: work space of `solve_level`.
     """
 
-    held: Held
+    shared: Settings
+    release: View
+    of_miss: View
+    low: View
+    up: View
+    reference: View
+    basis: View
     kept: View
+    E: View
+    joint: View
+    side: View
+    y: View
     rows: Rows
     seen: View
     now: View
@@ -109,10 +100,17 @@ class Space(NamedTuple):
 
 
 @inlined
-def _carve(work, at, m, n):
-    """Return Space for m rows of n joints, and where it ends."""
-    held, at = carve_held(work, at, n)
+def _carve(settings, work, m, n):
+    """Return Space for m rows of n joints, and where it ends; the box takes the first 3 n."""
+    low, at = vector(work, 0, n)
+    up, at = vector(work, at, n)
+    reference, at = vector(work, at, n)
+    basis, at = matrix(work, at, n, n)
     kept, at = matrix(work, at, n, n)
+    E, at = matrix(work, at, n, n)
+    joint, at = integers(work, at, n)
+    side, at = vector(work, at, n)
+    y, at = vector(work, at, n)
     rows, at = carve_rows(work, at, m, n)
     seen, at = matrix(work, at, m, n)
     now, at = vector(work, at, m)
@@ -122,7 +120,9 @@ def _carve(work, at, m, n):
     trial, at = matrix(work, at, 1, n)
     best, at = vector(work, at, n)
     of_block, at = vector(work, at, (m + n) * (n + 1))
-    return Space(held, kept, rows, seen, now, zero, line, y_a, trial, best, of_block), at
+    return Space(shared(settings), settings[3] > 0.0, settings[4] > 0.0, low, up, reference, basis,
+                 kept, E, joint, side, y, rows, seen, now, zero, line, y_a, trial, best,
+                 of_block), at
 
 
 @compiled
@@ -131,45 +131,43 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
 
     record (n + L + 1,) on return: +1, -1, 2 where x is at its upper, lower, only bound, else 0; the
     scaling of each level; the number of saturated sets tried. settings: damping, threshold,
-    rank_tolerance, and the rest of `Options`. work: any contents. Returns SOLVED,
+    rank_tolerance, release, of_miss. work: any contents. Returns SOLVED,
     NUMERICAL_FAILURE, TOO_SMALL, CONTRADICTION with the row at the end of the record, or -(i + 1)
     if row i is an inequality that is not handled.
     """
     m, n = A.shape
     bounds = _bounds_above(lower, upper, sizes)
-    tasks = Tasks(A[bounds:], lower[bounds:], upper[bounds:], sizes[min(bounds, 1):])
-    box, at = carve_box(work, 0, n)
-    _, of_equalities = carve_staircase(work, at, m - bounds, n)
-    _, of_tasks = _carve(work, at, m - bounds, n)
+    _, of_equalities = carve_staircase(work, 3 * n, m - bounds, n)
+    space, of_tasks = _carve(settings, work, m - bounds, n)
     if max(of_equalities, of_tasks) > work.size:
         return TOO_SMALL
-    for i in range(record.size):
-        record[i] = 1.0 if i >= n else 0.0
-    code = _read_box(A, lower, upper, bounds, box, record)
+    fill(record[:n], 0.0)
+    fill(record[n:], 1.0)
+    code = _read_box(A, lower, upper, bounds, space, record)
     if code < 0 or code == CONTRADICTION:
         return code
     if code != SOLVED:
         return finish(x, code)
-    for c in range(n):
-        box.reference[c] = x[c]
+    assign(space.reference, x)
     if bounds == 0:
-        code, _ = climb(A, lower, upper, sizes, x, settings, work[at:])
+        code, _ = climb(A, lower, upper, sizes, x, settings, work[3 * n:])
     else:
-        code = _saturate(tasks, x, box, record[n + 1:], settings, work[at:])
+        code = _saturate(A[bounds:], lower[bounds:], upper[bounds:], sizes[1:], x, space,
+                         record[n + 1:])
     if code != SOLVED:
         return code - bounds if code < 0 else finish(x, code)
-    _record_bounds(x, box, record)
+    _record_bounds(x, space, record)
     return finish(x, SOLVED)
 
 
 @inlined
-def _record_bounds(x, box, record):
+def _record_bounds(x, space, record):
     """Put x exactly on the bounds that it touches, and write which."""
     for c in range(x.size):
-        if _touches(x[c], box.up[c]):
-            x[c], record[c] = box.up[c], 2.0 if box.low[c] == box.up[c] else 1.0
-        elif _touches(x[c], box.low[c]):
-            x[c], record[c] = box.low[c], -1.0
+        if _touches(x[c], space.up[c]):
+            x[c], record[c] = space.up[c], 2.0 if space.low[c] == space.up[c] else 1.0
+        elif _touches(x[c], space.low[c]):
+            x[c], record[c] = space.low[c], -1.0
 
 
 @inlined
@@ -189,10 +187,10 @@ def _bounds_above(lower, upper, sizes):
 
 
 @inlined
-def _read_box(A, lower, upper, bounds, box, record):
+def _read_box(A, lower, upper, bounds, space, record):
     """Write the sides of the box; return a code of `sns`."""
-    for c in range(A.shape[1]):
-        box.low[c], box.up[c] = -np.inf, np.inf
+    fill(space.low, -np.inf)
+    fill(space.up, np.inf)
     refused = bounds  # the first inequality, if an equality of the level is no bound
     for i in range(bounds - 1, -1, -1):
         refused = i if lower[i] < upper[i] else refused
@@ -209,49 +207,44 @@ def _read_box(A, lower, upper, bounds, box, record):
         if entries != 1:
             return -((i if low < up else refused) + 1)
         low, up = low / A[i, at], up / A[i, at]
-        box.low[at] = max(min(low, up), box.low[at])
-        box.up[at] = min(max(low, up), box.up[at])
-        if box.low[at] > box.up[at]:
-            if box.low[at] - box.up[at] > BOUND_KEPT * (1.0 + abs(box.low[at])):
+        space.low[at] = max(min(low, up), space.low[at])
+        space.up[at] = min(max(low, up), space.up[at])
+        if space.low[at] > space.up[at]:
+            if space.low[at] - space.up[at] > BOUND_KEPT * (1.0 + abs(space.low[at])):
                 record[record.size - 1] = i
                 return CONTRADICTION
-            box.low[at] = box.up[at]
+            space.low[at] = space.up[at]
     return SOLVED
 
 
 @compiled
-def _saturate(tasks, x, box, record, settings, work):
+def _saturate(J, lower, upper, sizes, x, space, record):
     """Solve level by level inside the box, then move to the reference; see `sns`."""
-    m, n = tasks.J.shape
-    space, _ = _carve(work, 0, m, n)
-    options = Options(shared(settings), settings[3] > 0.0, settings[4] > 0.0)
-    code = load_rows(space.rows.W, space.zero, tasks.J, tasks.lower, tasks.upper, box.reference,
-                     options.shared.rank_tolerance)
+    code = load_rows(space.rows.W, space.zero, J, lower, upper, space.reference,
+                     space.shared.rank_tolerance)
     if code != SOLVED:
         return code
-    for c in range(n):
-        x[c] = min(max(0.0, box.low[c]), box.up[c])  # x_0, zero in the paper
+    for c in range(x.size):
+        x[c] = min(max(0.0, space.low[c]), space.up[c])  # x_0, zero in the paper
     first = above = tried = ZERO
-    for k in range(tasks.sizes.size):
-        last = first + tasks.sizes[k]
-        task = Task(tasks.J[first:last], tasks.lower[first:last], space.zero[first:last])
-        record[k], above, sets = _level(task, x, box, space, above, options)
+    for k in range(sizes.size):
+        last = first + sizes[k]
+        task = Task(J[first:last], lower[first:last], space.zero[first:last])
+        record[k], above, sets = _level(task, x, space, above)
         first, tried = last, tried + sets
-    steps = to_reference(space.held, box, x, space.line, above, options.release)
-    record[tasks.sizes.size] = tried + steps
+    record[sizes.size] = tried + _to_reference(space, x, above)
     return SOLVED
 
 
 @inlined
-def _level(task, x, box, space, above, options):
+def _level(task, x, space, above):
     """Move x by one task, in the columns of Q from `above` on.
 
     Returns its scaling, the columns of Q including those of the task alone, and the sets tried.
     """
-    held, tolerance = space.held, options.shared.rank_tolerance
-    seen = space.seen[:task.b.size]
+    seen, tolerance = space.seen[:task.b.size], space.shared.rank_tolerance
     _begin(task, x, space)
-    _see(task, held.basis, seen, above)
+    _see(task, space.basis, seen, above)
     rank, taken, largest, sets = above, ZERO, -1.0, 0
     while sets < 2 * x.size + 2:  # the basic form saturates at most n joints
         sets += 1
@@ -259,35 +252,34 @@ def _level(task, x, box, space, above, options):
         end = _factor(task, space, begin)  # J_k Pbar_k
         if sets == 1:
             rank = end
-            _copy_reflectors(held.basis, space.kept, above, rank)
+            _copy_reflectors(space.basis, space.kept, above, rank)
         elif end - begin < rank - above:  # rank(J_k Pbar_k) < rank(J_k P_{k-1})
             break
         at = Columns(above, begin, end)
-        _write_line(task, x, space, at, options)
-        s, critical = _scaling(space.line[0], space.line[1], box, held.side)
-        if s >= max(largest, 0.0) and _improves(x, box, space, at, s):
+        _write_line(task, x, space, at)
+        s, critical = _scaling(space)
+        if s >= max(largest, 0.0) and _improves(x, space, at, s):
             largest = s
-        if options.release and _release(space, at, s if s >= 0.0 else 1.0):
-            _see(task, held.basis, seen, above)
-            taken = hold_again(held, seen, x, box, above, taken, tolerance)
+        if space.release and _release(space, at, s if s >= 0.0 else 1.0):
+            _see(task, space.basis, seen, above)
+            taken = _hold_again(space, seen, x, above, taken, tolerance)
             continue
         if s == 1.0 or critical == NO_JOINT:
             break
-        taken = _hold_critical(critical, x, box, space, seen, at, tolerance)
+        taken = _hold_critical(critical, x, space, seen, at, tolerance)
         if above + taken == begin:  # tasks above and saturated joints already hold it
             break
-    _copy_reflectors(space.kept, held.basis, above, rank)
+    _copy_reflectors(space.kept, space.basis, above, rank)
     if largest >= 0.0:
         for j in range(x.size):
-            x[j] = min(max(x[j] + space.best[j], box.low[j]), box.up[j])
+            x[j] = min(max(x[j] + space.best[j], space.low[j]), space.up[j])
     return max(largest, 0.0), rank, sets
 
 
 @inlined
 def _begin(task, x, space):
-    """Start with no joint saturated, W_k = I; write the current value of the task."""
-    for j in range(x.size):
-        space.held.side[j] = 0.0
+    """Start with no joint saturated; write the current value of the task."""
+    fill(space.side, 0.0)
     for i in range(task.b.size):
         space.now[i] = inner_product(task.J[i], x)
 
@@ -296,8 +288,7 @@ def _begin(task, x, space):
 def _see(task, basis, seen, above):
     """Write the rows of the task, reflected by the columns of the tasks above."""
     for i in range(task.b.size):
-        for j in range(seen.shape[1]):
-            seen[i, j] = task.J[i, j]
+        assign(seen[i], task.J[i])
     reflect(basis, ZERO, above, seen, ZERO, task.b.size)
 
 
@@ -307,41 +298,40 @@ def _factor(task, space, begin):
     rows = space.rows
     for i in range(task.b.size):
         rows.row[i], rows.zero[i] = i, task.zero[i]
-        for j in range(rows.W.shape[1]):
-            rows.W[i, j] = space.seen[i, j]
-    return factor_level(rows, space.held.basis, ZERO, task.b.size, begin)
+        assign(rows.W[i], space.seen[i])
+    return factor_level(rows, space.basis, ZERO, task.b.size, begin)
 
 
 @inlined
-def _hold_critical(j, x, box, space, seen, at, least):
+def _hold_critical(j, x, space, seen, at, least):
     """Saturate the critical joint; return the new number of saturated joints."""
-    held, a, c = space.held, space.line[0], space.line[1]
-    held.side[j] = 1.0 if a[j] + c[j] > box.up[j] else -1.0
-    way = side_of_box(box, held, j) - x[j]
-    return hold(held, seen, j, way, at.above, at.joints - at.above, least)
+    a, c = space.line[0], space.line[1]
+    space.side[j] = 1.0 if a[j] + c[j] > space.up[j] else -1.0
+    way = _bound_of(space, j) - x[j]
+    return _hold(space, seen, j, way, at.above, at.joints - at.above, least)
 
 
 @compiled
-def _write_line(task, x, space, at, options):
+def _write_line(task, x, space, at):
     """Write a and c with x_k(s) = s a + c, and their steps y_a and y in coordinates of Q.
 
     On entry y has the columns of the saturated joints.
     """
-    rows, now, y, y_a, of_miss = space.rows, space.now, space.held.y, space.y_a, options.of_miss
+    rows, now, y, y_a, of_miss = space.rows, space.now, space.y, space.y_a, space.of_miss
     size, line = task.b.size, space.line
     block = Block(ZERO, size, at.joints, at.task)
     for i in range(size):
         rows.miss[i] = task.b[rows.row[i]] - (now[rows.row[i]] if of_miss else 0.0)
-    solve_level(rows.W, rows.miss, y_a, block, options.shared, space.of_block)
+    solve_level(rows.W, rows.miss, y_a, block, space.shared, space.of_block)
     for i in range(size):
         rows.miss[i] = 0.0 if of_miss else -now[rows.row[i]]
         for k in range(at.above, at.joints):
             rows.miss[i] -= rows.W[i, k] * y[k]
-    solve_level(rows.W, rows.miss, y, block, options.shared, space.of_block)
+    solve_level(rows.W, rows.miss, y, block, space.shared, space.of_block)
     for k in range(x.size):
         line[0, k] = y_a[k] if at.joints <= k < at.task else 0.0
         line[1, k] = y[k] if at.above <= k < at.task else 0.0
-    reflect_back(space.held.basis, at.task, line, ZERO, ZERO + 2)
+    reflect_back(space.basis, at.task, line, ZERO, ZERO + 2)
     for j in range(x.size):
         line[1, j] += x[j]
 
@@ -350,52 +340,45 @@ def _write_line(task, x, space, at, options):
 def _copy_reflectors(source, target, k0, k1):
     """Copy reflectors k0 .. k1 - 1."""
     for k in range(k0, k1):
-        for j in range(source.shape[1]):
-            target[k, j] = source[k, j]
+        assign(target[k], source[k])
 
 
 @inlined
-def _improves(x, box, space, at, s):
-    """Write the step to x_k(s), also as the best if it is in the box; return whether it is."""
-    y, y_a, trial = space.held.y, space.y_a, space.trial
+def _improves(x, space, at, s):
+    """Write the step to x_k(s), also as the best if it is in the box; return whether it is.
+
+    Up to cancellation in a large step.
+    """
+    y, y_a, trial, inside = space.y, space.y_a, space.trial, True
     for k in range(x.size):
         trial[0, k] = 0.0
         if at.above <= k < at.task:
             trial[0, k] = y[k] + s * y_a[k] if k >= at.joints else y[k]
-    reflect_back(space.held.basis, at.task, trial, ZERO, ZERO + 1)
-    inside = _fits(x, trial[0], box)
+    reflect_back(space.basis, at.task, trial, ZERO, ZERO + 1)
+    for j in range(x.size):
+        low, up, value = space.low[j], space.up[j], x[j] + trial[0, j]
+        inside = inside and not value > up + 10.0 * BOUND_KEPT * (1.0 + abs(up))
+        inside = inside and not value < low - 10.0 * BOUND_KEPT * (1.0 + abs(low))
     if inside:
-        for k in range(x.size):
-            space.best[k] = trial[0, k]
+        assign(space.best, trial[0])
     return inside
 
 
-@inlined
-def _fits(x, step, box):
-    """Whether x + step is in the box, up to cancellation in a large step."""
-    for j in range(x.size):
-        low, up = box.low[j], box.up[j]
-        if x[j] + step[j] > up + 10.0 * BOUND_KEPT * (1.0 + abs(up)):
-            return False
-        if x[j] + step[j] < low - 10.0 * BOUND_KEPT * (1.0 + abs(low)):
-            return False
-    return True
-
-
 @compiled
-def _scaling(a, c, box, side):
+def _scaling(space):
     """Return the largest s <= 1 with s a + c in the box, or -1, and the most critical joint.
 
     A joint that is outside at s = 1 is critical at the largest s at which it is inside; if all such
     joints enter only beyond s = 1, the last of them to enter is critical.
     """
+    a, c, side = space.line[0], space.line[1], space.side
     smallest, largest, critical, late = -np.inf, np.inf, NO_JOINT, NO_JOINT
     for j in range(a.size):
         if not np.isfinite(a[j] + c[j]):
             return -1.0, NO_JOINT
         if side[j] != 0.0:
             continue
-        low, up = box.low[j], box.up[j]
+        low, up = space.low[j], space.up[j]
         low = low - c[j] - BOUND_KEPT * (1.0 + abs(low)) if low > -np.inf else low
         up = up - c[j] + BOUND_KEPT * (1.0 + abs(up)) if up < np.inf else up
         if a[j] != 0.0:
@@ -420,8 +403,7 @@ def _release(space, at, s):
     The multipliers are those of the least ||x_k - x_{k-1}|| with J_k x_k and the joints as they
     are: y + F^T nu + E^T mu = 0, where mu must push a joint against its bound.
     """
-    held, W, y_a = space.held, space.rows.W, space.y_a
-    E, y, above, begin = held.E, held.y, at.above, at.joints
+    W, E, y, y_a, above, begin = space.rows.W, space.E, space.y, space.y_a, at.above, at.joints
     size = 0.0
     for k in range(above, at.task):
         size = max(size, abs(y[k] + s * y_a[k]) if k >= begin else abs(y[k]))
@@ -434,8 +416,133 @@ def _release(space, at, s):
         y_a[k] = pull / (W[k - begin, k] if k >= begin else E[k - above, k])
     wrong = False
     for t in range(begin - above):
-        j = held.joint[t]
-        if y_a[above + t] * held.side[j] < -BOUND_KEPT * size:
-            held.side[j] = 0.0
+        j = space.joint[t]
+        if y_a[above + t] * space.side[j] < -BOUND_KEPT * size:
+            space.side[j] = 0.0
             wrong = True
     return wrong
+
+
+@inlined
+def _bound_of(space, j):
+    """Return the bound at which joint j is held."""
+    return space.up[j] if space.side[j] > 0.0 else space.low[j]
+
+
+@compiled
+def _hold(space, seen, j, way, above, count, least):
+    """Give joint j, whose side is written, a column of Q, and write its step there into y.
+
+    way: its distance to the bound. seen: the rows of a task in coordinates of Q, reflected too.
+    Returns the number of held joints: still `count` if the remainder of its unit vector is at most
+    `least`.
+    """
+    k, e, basis = above + count, space.E[count], space.basis
+    fill(e, 0.0)
+    e[j] = 1.0
+    reflect(basis, ZERO, k, space.E, count, count + 1)
+    square = inner_product(e[k:], e[k:])
+    if not square > least * least:
+        space.side[j] = 0.0
+        return count
+    make_reflector(basis, k, e, square)
+    reflect(basis, k, k + 1, space.E, count, count + 1)
+    reflect(basis, k, k + 1, seen, ZERO, seen.shape[0])
+    space.y[k] = (way - inner_product(e[above:k], space.y[above:])) / e[k]
+    space.joint[count] = j
+    return count + 1
+
+
+@compiled
+def _hold_again(space, seen, x, above, count, least):
+    """Give columns of Q to the joints among the first `count` that remain held; see `_hold`."""
+    holding = ZERO
+    for t in range(count):
+        j = space.joint[t]
+        if space.side[j] != 0.0:
+            way = _bound_of(space, j) - x[j]
+            holding = _hold(space, seen, j, way, above, holding, least)
+    return holding
+
+
+@compiled
+def _to_reference(space, x, rank):
+    """Move x inside the box, in the columns of Q that no task has; return the number of steps.
+
+    Without release: to x plus the reference as far as the bounds allow, holding joints that reach
+    one. With release: to the x nearest to the reference.
+    """
+    n, ways, release = x.size, space.line, space.release
+    d, target, no_rows = ways[0], ways[1], ways[:0]
+    for j in range(n):
+        space.side[j], target[j] = 0.0, space.reference[j] + (0.0 if release else x[j])
+    count, steps = ZERO, 0
+    while steps < 4 * n + 2:
+        steps += 1
+        begin = rank + count
+        _free_way(space, x, target, begin)
+        stopped = _step(x, d, space)
+        if stopped != NO_JOINT:
+            space.side[stopped] = 1.0 if d[stopped] > 0.0 else -1.0
+            count = _hold(space, no_rows, stopped, 0.0, rank, count, TERMS)
+            if rank + count == begin:
+                break
+        elif release and _drop(space, rank, begin):
+            count = _hold_again(space, no_rows, x, rank, count, TERMS)
+        else:
+            break
+    return steps
+
+
+@inlined
+def _free_way(space, x, target, begin):
+    """Write the step from x to the target in columns `begin` and on; the other columns to y."""
+    ways, d = space.line, space.line[0]
+    for j in range(x.size):
+        d[j] = target[j] - x[j]
+    reflect(space.basis, ZERO, begin, ways, ZERO, ZERO + 1)
+    for k in range(begin):
+        space.y[k], d[k] = d[k], 0.0
+    reflect_back(space.basis, begin, ways, ZERO, ZERO + 1)
+
+
+@inlined
+def _step(x, d, space):
+    """Move x along d as far as the box allows, at most x + d; return the joint that stops it."""
+    side, size, share, stopped = space.side, 0.0, 1.0, NO_JOINT
+    for j in range(x.size):
+        size = max(size, abs(d[j]))
+    for j in range(x.size):
+        if side[j] == 0.0 and abs(d[j]) > TERMS * size:
+            room = (space.up[j] if d[j] > 0.0 else space.low[j]) - x[j]
+            if room / d[j] < share:
+                share, stopped = room / d[j], j
+    for j in range(x.size):
+        if side[j] == 0.0:
+            x[j] = min(max(x[j] + share * d[j], space.low[j]), space.up[j])
+    if stopped != NO_JOINT:
+        x[stopped] = space.up[stopped] if d[stopped] > 0.0 else space.low[stopped]
+    return stopped
+
+
+@inlined
+def _drop(space, rank, begin):
+    """Release the held joint that the step to the reference pulls inward most, if there is one.
+
+    y[rank:begin] is that step in the columns of the held joints on entry, multipliers on return.
+    """
+    y, E = space.y, space.E
+    size, worst, at = 0.0, 0.0, NO_JOINT
+    for k in range(rank, begin):
+        size = max(size, abs(y[k]))
+    for k in range(begin - 1, rank - 1, -1):
+        for i in range(k + 1, begin):
+            y[k] -= E[i - rank, k] * y[i]
+        y[k] /= E[k - rank, k]
+        j = space.joint[k - rank]
+        if y[k] * space.side[j] < worst - BOUND_KEPT * size:
+            worst, at = y[k] * space.side[j], j
+    if at == NO_JOINT:
+        return False
+    space.side[at] = 0.0
+    return True

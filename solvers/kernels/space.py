@@ -10,8 +10,6 @@ learns how much it needs before it uses any of it. Such a tuple of views, made i
 passed to inlined helpers, costs nothing.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import Any, NamedTuple
@@ -86,3 +84,17 @@ def carve_rows(work, at, m, n):
     zero, at = vector(work, at, m)
     miss, at = vector(work, at, m)
     return Rows(W, row, zero, miss), at
+
+
+@inlined
+def fill(x, value):
+    """Write this value into every entry."""
+    for c in range(x.size):
+        x[c] = value
+
+
+@inlined
+def assign(x, source):  # not `copy`: for `hierarchy.jit` that makes an array
+    """Write the source into x, which has the size."""
+    for c in range(x.size):
+        x[c] = source[c]

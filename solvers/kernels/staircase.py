@@ -6,8 +6,6 @@ levels are solved from the top by block forward substitution, least squares in e
 recursion (5), (13) in other coordinates. The columns of Q that no level takes carry (14).
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -26,15 +24,7 @@ from solvers.kernels.rows import (
     reflect,
     reflect_back,
 )
-from solvers.kernels.space import (
-    Block,
-    Rows,
-    View,
-    carve_rows,
-    matrix,
-    shared,
-    vector,
-)
+from solvers.kernels.space import Block, Rows, View, assign, carve_rows, matrix, shared, vector
 from solvers.kernels.tolerances import FAR_LIGHTER, LIGHT_ROW, UNCLEAR_CUT, UNCLEAR_PIVOT
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
@@ -97,14 +87,14 @@ def climb(A, lower, upper, sizes, x, settings, work):
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
         reflect(basis, ZERO, above, rows.W, first, last)  # J_i Q: the level as seen from above
-        for i in range(first, last):
-            rows.miss[i] = lower[i]
+        assign(rows.miss[first:last], lower[first:])
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
         least = smallest_pivot(rows, block, least)
         if rank - above < last - first and is_doubtful(rows, block, least, settings.rank_tolerance):
             least = 0.0
-        subtract(rows, y, first, last, above)  # p_i - J_i x_{i-1}, in (13)
+        for i in range(first, last):
+            rows.miss[i] -= inner_product(y[:above], rows.W[i])  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
     _to_unknowns(basis, y, rank, x, of_x)
@@ -116,18 +106,12 @@ def climb(A, lower, upper, sizes, x, settings, work):
 def is_doubtful(rows, block, least, rank_tolerance):
     """Whether rounding in heavy rows of a level hides light ones, or a row is hardly dependent."""
     thin = min(np.sqrt(least) * rank_tolerance, 1.0)  # the smallest pivot
-    return (has_outlier(rows.zero[block.i0:block.i1], LIGHT_ROW * LIGHT_ROW)
-            or is_borderline(rows, block.i0 + block.k1 - block.k0, block.i1, block.k1,
-                             UNCLEAR_CUT * thin))
-
-
-@inlined
-def is_borderline(rows, begin, end, rank, share):
-    """Whether more than this share of the tolerance is left of a row that counts as dependent."""
-    borderline = False
-    for i in range(begin, end):
-        borderline |= length_of(rows.W[i, rank:]) ** 2 > share * share * rows.zero[i]
-    return borderline
+    share, doubtful = UNCLEAR_CUT * thin, False
+    if has_outlier(rows.zero[block.i0:block.i1], LIGHT_ROW * LIGHT_ROW):
+        return True
+    for i in range(block.i0 + block.k1 - block.k0, block.i1):
+        doubtful |= length_of(rows.W[i, block.k1:]) ** 2 > share * share * rows.zero[i]
+    return doubtful
 
 
 @inlined
@@ -141,13 +125,6 @@ def smallest_pivot(rows, block, least):
 
 
 @inlined
-def subtract(rows, y, first, last, above):
-    """Subtract the part that y reaches in columns 0 .. above - 1 from the residual of a level."""
-    for i in range(first, last):
-        rows.miss[i] -= inner_product(y[:above], rows.W[i])
-
-
-@inlined
 def _to_unknowns(basis, y, rank, x, of_x):
     """Replace the reference x by Q [y; rest], with the rest of the reference: (7) and (14)."""
     zero_reference = True
@@ -156,8 +133,6 @@ def _to_unknowns(basis, y, rank, x, of_x):
         zero_reference &= x[c] == 0.0
     if not zero_reference:
         reflect(basis, ZERO, rank, of_x, ZERO, ZERO + 1)
-    for c in range(rank):
-        of_x[0, c] = y[c]
+    assign(of_x[0, :rank], y)
     reflect_back(basis, rank, of_x, ZERO, ZERO + 1)
-    for c in range(x.size):
-        x[c] = of_x[0, c]
+    assign(x, of_x[0])

@@ -12,8 +12,6 @@ Saunders 1974), never a new factorisation. The columns of a row depend on that r
 very different norm do not disturb each other.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from typing import NamedTuple

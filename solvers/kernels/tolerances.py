@@ -42,7 +42,6 @@ REPIVOT = 1e-4       # share of a row in its own basis vector: smaller ones pivo
 UNCLEAR_PIVOT = 1e-5  # of a row in the staircase, or less: the exact engine decides
 LIGHT_ROW = 1e-5     # norm of a row over the largest in a level that is missed: the same
 UNCLEAR_CUT = 0.3    # remainder of a dependent row over the smallest pivot: the same
-OUTSIDE = 1e-14      # share of a row outside the basis of `Factorization`: less is no direction
 EXACTLY_DEPENDENT, NEARLY_DEPENDENT = 1e-12, 1e-7  # in `weighted`: ill-posed in between
 ORTHOGONAL = 1e-30   # squared cosine of two rows: Jacobi rotations stop
 LONGEST = 1e150      # x of `weighted`: squares of longer ones overflow

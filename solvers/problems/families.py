@@ -5,7 +5,7 @@ the same sizes, ranks, row norms, sides and kinds of ties, but no seed repeats a
 
 INEQ7 and HUM38 have easy and hard problems. An easy problem looks like the stored ones. A hard
 problem has more bounds that exclude zero and more distant targets, so more rows are active at the
-answer. The share of hard problems is an argument.
+answer.
 """
 
 from __future__ import annotations
@@ -18,37 +18,30 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.problems.kinds import Level, Random, equal, stacked
 
-HARD = 0.8  # share of hard problems in INEQ7 and HUM38
+_HARD = 0.8  # share of hard problems in INEQ7 and HUM38
 _PARALLEL = 1e-9  # angle [rad] of the nearly parallel rows of DEGEN7
 
 
-def family(name: str, seed: int, hard: float = HARD) -> Hierarchy:
+def family(name: str, seed: int) -> Hierarchy:
     """Return one fresh problem of a reference family, reproducible from its seed.
 
-    name : one of FAMILIES.
-    hard : chance that a problem of INEQ7 or HUM38 is hard; the other families ignore it.
-
-    Raises
-    ------
-    HierarchyError : a name not in FAMILIES, or `hard` outside 0..1.
+    Raises HierarchyError: a name not in FAMILIES.
     """
     if name not in _MAKERS:
         raise HierarchyError(f"no family of problems is called {name!r}; there are "
                              f"{', '.join(_MAKERS)}")
-    if not 0.0 <= hard <= 1.0:
-        raise HierarchyError(f"hard = {hard!r} is not a share between 0 and 1")
     rng = np.random.default_rng([seed, FAMILIES.index(name)])
-    return Hierarchy.from_levels(_MAKERS[name](rng, hard))
+    return Hierarchy.from_levels(_MAKERS[name](rng))
 
 
-def _equalities(n: int, *sizes: int) -> Callable[[Random, float], list[Level]]:
+def _equalities(n: int, *sizes: int) -> Callable[[Random], list[Level]]:
     """Return a maker of rows and targets from the standard normal distribution."""
-    def make(rng: Random, _: float) -> list[Level]:
+    def make(rng: Random) -> list[Level]:
         return [equal(rng.normal(size=(size, n)), rng.normal(size=size)) for size in sizes]
     return make
 
 
-def _singular(rng: Random, _: float) -> list[Level]:
+def _singular(rng: Random) -> list[Level]:
     """Repeated rows and rows in the span of the rows above, with conflicting targets."""
     n = 7
     first = rng.normal(size=(2, n))
@@ -64,7 +57,7 @@ def _singular(rng: Random, _: float) -> list[Level]:
     return [equal(A, rng.normal(size=len(A))) for A in (first, second, third, last)]
 
 
-def _arm(rng: Random, hard: float) -> list[Level]:
+def _arm(rng: Random, hard: float = _HARD) -> list[Level]:
     """Joint limits, avoidance, position, cone and posture of an arm with 7 joints."""
     n, tough = 7, bool(rng.random() < hard)
     lower, upper = _box(rng, n, (5.0, 15.0), (-0.6, 0.3), 0.4 if tough else 0.12)
@@ -80,9 +73,9 @@ def _arm(rng: Random, hard: float) -> list[Level]:
             equal(np.eye(n), reach * rng.uniform(-8.0, 8.0, n))]
 
 
-def _humanoid(rng: Random, hard: float) -> list[Level]:
+def _humanoid(rng: Random) -> list[Level]:
     """Joint limits and four tasks of a humanoid with 38 joints, then its posture."""
-    n, tough = 38, bool(rng.random() < hard)
+    n, tough = 38, bool(rng.random() < _HARD)
     lower, upper = _box(rng, n, (3.0, 12.0), (-0.4, 0.3), 0.3 if tough else 0.15)
     reach = 1.3 if tough else 1.0
     rows = [rng.normal(0.0, n**-0.5, (size, n)) for size in (6, 12, 6, 6)]
@@ -94,14 +87,15 @@ def _humanoid(rng: Random, hard: float) -> list[Level]:
             equal(np.eye(n), reach * rng.uniform(-8.0, 8.0, n))]
 
 
-def _degenerate(rng: Random, _: float) -> list[Level]:
+def _degenerate(rng: Random) -> list[Level]:
     """An easy arm with rows repeated, negated, summed, zero and nearly parallel."""
     box, avoidance, position, cone, posture = _arm(rng, 0.0)
     if rng.random() < 1.0 / 3.0:  # equal boxes, and a posture in their corner
         box = (box[0], np.full(7, -10.0), np.full(7, 10.0))
         posture = equal(posture[0], rng.choice([-10.0, 10.0], 7))
     again, negated = rng.integers(7, size=2)
-    box = stacked(box, _row(box, again), _negative(_row(box, negated)),
+    A, lower, upper = _row(box, negated)
+    box = stacked(box, _row(box, again), (-A, -upper, -lower),
                    (np.zeros((1, 7)), np.array([-1.0]), np.array([1.0])))
     aside, clash = _PARALLEL * rng.normal(size=(2, 1, 7)), rng.integers(5)
     avoidance = stacked(avoidance, _moved(_row(avoidance, 0), aside[0], 0.5 * (clash == 0)),
@@ -144,17 +138,12 @@ def _row(level: Level, i: int) -> Level:
     return A[i:i + 1].copy(), lower[i:i + 1].copy(), upper[i:i + 1].copy()
 
 
-def _negative(level: Level) -> Level:
-    A, lower, upper = level
-    return -A, -upper, -lower
-
-
 def _moved(level: Level, aside: Array, by: float) -> Level:
     A, lower, upper = level
     return A + aside, lower + by, upper + by
 
 
-_MAKERS: dict[str, Callable[[Random, float], list[Level]]] = {
+_MAKERS: dict[str, Callable[[Random], list[Level]]] = {
     "EQ7": _equalities(7, 3, 1, 1), "EQ7over": _equalities(7, 3, 3, 3), "EQ7sing": _singular,
     "EQ30L8": _equalities(30, *[3] * 8), "EQ30L10": _equalities(30, *[3] * 10),
     "INEQ7": _arm, "HUM38": _humanoid, "DEGEN7": _degenerate}

@@ -44,8 +44,6 @@ class ProblemFileError(HierarchyError):
 class Head:
     """What a file says of its problems.
 
-    Attributes
-    ----------
     family, what : name, and one sentence.
     half : PUBLIC or FRESH.
     seed : from which they were made; 0 for the public half.
@@ -101,10 +99,8 @@ class Collection:
 def read(path: str | Path) -> Collection:
     """Read a file of problems.
 
-    Raises
-    ------
-    ProblemFileError : it does not exist, has another format or version, lacks an array, or has one
-        of a wrong type or length; its problems are not those that were written, or not valid.
+    Raises ProblemFileError: it does not exist, has another format or version, lacks an array, or
+    has one of a wrong type or length; its problems are not those that were written, or not valid.
     """
     head, arrays = _opened(Path(path))
     try:

@@ -25,9 +25,7 @@ def structured(seed: int, kinds: Sequence[str] = (), equalities_only: bool = Fal
     kinds : names from KINDS to draw from; all of them if empty.
     equalities_only : whether each row keeps only one side, as an equality.
 
-    Raises
-    ------
-    HierarchyError : a name not in KINDS.
+    Raises HierarchyError: a name not in KINDS.
     """
     for kind in kinds:
         if kind not in _MAKERS:
@@ -138,7 +136,9 @@ def _nested(rng: Random) -> Levels:
 def _mixed_units(rng: Random) -> Levels:
     """Rows of norm 0.001, 1 and 1000 in one level."""
     levels = _around(rng, int(rng.integers(1, 8)), int(rng.integers(1, 5)))
-    return [_scaled(level, 10.0**rng.choice([-3.0, 0.0, 3.0], len(level[0]))) for level in levels]
+    scales = (10.0**rng.choice([-3.0, 0.0, 3.0], len(level[0])) for level in levels)
+    return [(A * by[:, None], lower * by, upper * by)
+            for (A, lower, upper), by in zip(levels, scales, strict=True)]
 
 
 def _integers(rng: Random) -> Levels:
@@ -288,11 +288,6 @@ def equal(A: Array, b: Array) -> Level:
 
 def _at_least(A: Array, side: Array) -> Level:
     return A, side, np.full(len(A), np.inf)
-
-
-def _scaled(level: Level, by: Array) -> Level:
-    A, lower, upper = level
-    return A * by[:, None], lower * by, upper * by
 
 
 def stacked(*levels: Level) -> Level:

@@ -17,6 +17,8 @@ from solvers.qp.refinement import Rows, split
 if TYPE_CHECKING:
     import qpsolvers
 
+_RANK, _SETTLED = 1e-8, 1e-7  # of `level_problem`: rank tolerance, and miss of a row that is kept
+
 
 @final
 @dataclass(frozen=True)
@@ -109,9 +111,8 @@ def slack_program(goal: Rows, limits: Rows, kept: Rows, F: Array, lam: float, *,
                    np.concatenate([goal.lower[:m], np.zeros(len(F)) if f is None else f]), begin)
 
 
-def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None,
-                  rank_tolerance: float = 1e-8, settled: float = 1e-7, sparse: bool = False
-                  ) -> qpsolvers.Problem:
+def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None, *,
+                  sparse: bool = False) -> qpsolvers.Problem:
     """Return one level of a hierarchy as a `qpsolvers.Problem`, given an optimum of those above.
 
     The unknowns are x (n,), then w, the miss of each row of the level: equalities first, then
@@ -119,31 +120,24 @@ def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None,
     inequalities that `above` violates, at their value there; the others within their sides. So
     `above` itself is always feasible. P is singular in x, which not every backend accepts.
 
-    Parameters
-    ----------
     level : index of the level, 0 the most important; `len(h.sizes)` for the last step, which finds
         the x nearest to `h.reference` and has no w.
     above : (n,) an optimum of the levels above, None for level 0.
-    rank_tolerance : as in `Resolver`.
-    settled : a row that `above` violates by more, relative to 1 + |A x|, keeps its value.
     sparse : whether the matrices are sparse, as some backends require.
 
-    Raises
-    ------
-    HierarchyError : no such level; `above` missing, of a wrong shape or not finite.
+    Raises HierarchyError: no such level; `above` missing, of a wrong shape or not finite.
     """
     x = _checked(h, level, above)
     m = int(h.offsets[level])
-    kept, F = _above(Rows(h.A[:m], h.lower[:m], h.upper[:m]), x, rank_tolerance, settled)
-    if level == len(h.sizes):
-        goal = Rows(np.eye(h.n), h.reference, h.reference)
-        last = slack_program(goal, Rows.none(h.n), kept, F, 0.0, last=True, f=F @ x)
-        return last.problem(sparse)
-    own = slice(m, int(h.offsets[level + 1]))
-    rows = Rows(h.A[own], h.lower[own], h.upper[own])
-    equal = rows.lower == rows.upper
-    program = slack_program(rows.where(equal), rows.where(~equal), kept, F, 0.0, f=F @ x)
-    return program.problem(sparse)
+    kept, F = _above(Rows(h.A[:m], h.lower[:m], h.upper[:m]), x)
+    last = level == len(h.sizes)
+    goal, limits = Rows(np.eye(h.n), h.reference, h.reference), Rows.none(h.n)
+    if not last:
+        own = slice(m, int(h.offsets[level + 1]))
+        rows = Rows(h.A[own], h.lower[own], h.upper[own])
+        equal = rows.lower == rows.upper
+        goal, limits = rows.where(equal), rows.where(~equal)
+    return slack_program(goal, limits, kept, F, 0.0, last=last, f=F @ x).problem(sparse)
 
 
 def _checked(h: Hierarchy, level: int, above: ArrayLike | None) -> Array:
@@ -158,11 +152,11 @@ def _checked(h: Hierarchy, level: int, above: ArrayLike | None) -> Array:
     return x
 
 
-def _above(rows: Rows, x: Array, rank_tolerance: float, settled: float) -> tuple[Rows, Array]:
+def _above(rows: Rows, x: Array) -> tuple[Rows, Array]:
     """Return the rows above that remain inequalities, and a basis F of those that are fixed."""
     value = rows.A @ x
-    fixed = (rows.lower == rows.upper) | (abs(rows.excess(x)) > settled * (1.0 + abs(value)))
-    F = split(rows.A[fixed], np.linalg.norm(rows.A[fixed], axis=1), rank_tolerance)[0].T
+    fixed = (rows.lower == rows.upper) | (abs(rows.excess(x)) > _SETTLED * (1.0 + abs(value)))
+    F = split(rows.A[fixed], np.linalg.norm(rows.A[fixed], axis=1), _RANK)[0].T
     kept = rows.where(~fixed)
     return Rows(kept.A, np.minimum(kept.lower, value[~fixed]),
                 np.maximum(kept.upper, value[~fixed])), F

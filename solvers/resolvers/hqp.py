@@ -121,18 +121,14 @@ class _Cascade:
             for A, lower, upper in self.h.levels():
                 self._level(A, lower, upper)
             self._step(self._nearest())
-            self._check_kept()
+            side = np.minimum(abs(self.kept.lower), abs(self.kept.upper))
+            near = _BROKEN * (1.0 + side) + EXACT * norm(self.x)
+            if (abs(self.kept.excess(self.x)) > near).any():  # its numbers overflowed
+                self.x, status = np.zeros(self.h.n), Status.NUMERICAL_FAILURE
         except _StopError as stop:
             status = stop.status
         memory = np.array(self.steps).reshape(-1, self.h.n)
         return Resolution(self.x, status, self.programs, memory)
-
-    def _check_kept(self) -> None:
-        """Stop, with x = 0, if a row that must still hold does not: its numbers overflowed."""
-        side = np.minimum(abs(self.kept.lower), abs(self.kept.upper))
-        if (abs(self.kept.excess(self.x)) > _BROKEN * (1.0 + side) + EXACT * norm(self.x)).any():
-            self.x = np.zeros(self.h.n)
-            raise _StopError(Status.NUMERICAL_FAILURE)
 
     def _step(self, z: Array) -> None:
         x = self.x + self.N @ z

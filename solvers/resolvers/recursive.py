@@ -34,7 +34,7 @@ class Recursive(Direct):
 
     name: ClassVar[str] = "recursive"
     kernel: ClassVar[Callable[..., int]] = staticmethod(recursion)
-    method: str = one_of("level", *_DAMPS)  # in the order of `solvers.kernels.damped`
+    method: str = one_of("level", *_DAMPS)  # in the order of `solvers.kernels.recursion`
     isotropic: float = number(0.0)
     largest: float | None = number(None, open_below=True)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
-from solvers.resolver import Around, Handles, Resolution, number, whole_number
+from solvers.resolver import Around, Handles, Resolution, number, place_of, whole_number
 from solvers.status import EQUAL, FREE, LOWER, UPPER
 
 
@@ -69,10 +69,9 @@ def _states(h: Hierarchy) -> NDArray[np.int8]:
     """Return what each row (m,) is: an equality, at its lower or upper side, or inside."""
     low, up, equal = np.isfinite(h.lower), np.isfinite(h.upper), h.lower == h.upper
     for (row,) in np.argwhere(low & up & ~equal)[:1]:
-        level = int((h.offsets[1:] <= row).sum())
-        raise HierarchyError(f"{h.names[level]}, row {row - h.offsets[level]}: two sides, "
-                             f"{h.lower[row]:g} <= a x <= {h.upper[row]:g}; a set-based task is at "
-                             "one of its bounds or at none")
+        raise HierarchyError(f"{place_of(h, row)}: two sides, {h.lower[row]:g} <= a x <= "
+                             f"{h.upper[row]:g}; a set-based task is at one of its bounds or at "
+                             "none")
     return np.select([equal, low, up], [EQUAL, LOWER, UPPER], FREE).astype(np.int8)
 
 

@@ -1,24 +1,17 @@
 """Tasks out of reach come to rest: the speed that a level may ask for, at velocity level.
 
-A level A x = b of a task with the curvature kappa misses what its rows say by about
-T kappa |x|^2 / 2 over a period T. So it takes the x that, within the levels above, minimises
+A level A x = b of a task takes the x that, within the levels above, minimises
 
-    |b - A x| + alpha |x - x0|^2 / 2,    alpha = damping T |A| / 2                           (a)
+    |b - A x| + alpha |x - x0|^2 / 2,    alpha = softness T |A| / 2                         (a)
 
-x0 being the x of the levels above and |A| (Frobenius) the estimate of kappa. The norm is not
-squared, so this is an exact penalty: as long as the multiplier y of A x = b has |y| <= 1 / alpha,
-the level is met exactly, to the last digit. Beyond, the minimum of (a) is that of
-|b - A x|^2 + mu |x - x0|^2 with mu = alpha |b - A x|, a damping in proportion to what stays out of
-reach, as Newton's method has it and as Sugihara's (T-RO 2011) has it for the square. It is unique,
-hence continuous in the data, with bounds too.
-
-What the level then reaches is its new right-hand side. To second order the levels below disturb it
-although they keep A x: joint j may leave its speed by
+x0 being the x of the levels above: the minimum of |b - A x|^2 + mu |x - x0|^2 with mu = alpha
+|b - A x|, or A x = b where mu would be smaller. See docs/theory/settled.md. What the level reaches
+is its new right-hand side. To second order the levels below disturb it although they keep A x:
+joint j may leave its speed by
 
     |x - x0| (|b0| / |b - A x| - 1) max_i |A_i| / |A_j|, b0 = b - A x0                       (b)
 
-with the columns A_i of what the levels above leave of A. It falls to zero at rest and is infinite
-for joints that the level does not use.
+with the columns A_i of what the levels above leave of A.
 """
 
 from __future__ import annotations

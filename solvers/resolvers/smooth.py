@@ -12,9 +12,7 @@ the answer is rho after the last level, starting from rho = 0 and Q = I:
     rho <- T rho + Q (J Q)^(#,A,I) W dx/dt                                                      (d)
     Q   <- Q (I - (J Q)^(#,A,I) J Q)                                                            (e)
 
-The last level is the identity, fully active, with the hierarchy's reference. In (a), V are the
-right singular vectors of the two terms before, and P falls from `damping` for a singular value of 0
-to 0 at `threshold`, as a half wave of the cosine.
+The last level is the identity. docs/theory/smooth.md has V and P.
 """
 
 from __future__ import annotations
@@ -33,6 +31,7 @@ from solvers.resolver import (
     Resolution,
     Resolver,
     number,
+    place_of,
     refuse_inequality,
     register,
 )
@@ -140,6 +139,4 @@ def _check(h: Hierarchy, activation: Array) -> None:
         raise HierarchyError(f"smooth: activations have shape {activation.shape}, expected "
                              f"({h.m},)")
     for (row,) in np.argwhere(~((activation >= 0.0) & (activation <= 1.0)))[:1]:
-        level = int((h.offsets[1:] <= row).sum())
-        raise HierarchyError(f"{h.names[level]}, row {row - h.offsets[level]}: activation "
-                             f"{activation[row]} is outside 0 .. 1")
+        raise HierarchyError(f"{place_of(h, row)}: activation {activation[row]} is outside 0 .. 1")

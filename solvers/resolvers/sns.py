@@ -48,15 +48,12 @@ class Sns(Resolver):
         record = np.empty(len(x) + levels + 1)
         code = sns(*h.rows, x, record, self._settings, WORKSPACE.array)
         if code == CONTRADICTION:
-            _refuse_contradiction(h, int(record[-1]))
+            row = int(record[-1])
+            unknown = int(np.flatnonzero(h.A[row])[0])
+            raise HierarchyError(
+                f"{h.names[0]}, row {row}: {h.lower[row]:g} <= {h.A[row, unknown]:g} x[{unknown}] "
+                f"<= {h.upper[row]:g} leaves nothing of the range that the rows above allow for "
+                f"x[{unknown}]")
         if code < 0 or code == TOO_SMALL:
             return self._otherwise(h, x, code)
         return SaturatedResolution(x, Status(code), int(record[-1]), record, levels)
-
-
-def _refuse_contradiction(h: Hierarchy, row: int) -> None:
-    unknown = int(np.flatnonzero(h.A[row])[0])
-    raise HierarchyError(
-        f"{h.names[0]}, row {row}: {h.lower[row]:g} <= {h.A[row, unknown]:g} x[{unknown}] <= "
-        f"{h.upper[row]:g} leaves nothing of the range that the rows above allow for "
-        f"x[{unknown}]")

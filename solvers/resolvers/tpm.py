@@ -110,8 +110,6 @@ register_variant("tpm-published", "tpm", form="published")
 class TaskPriorityMatrix:
     """The matrix F of one hierarchy, and the contribution of each level to x.
 
-    Attributes
-    ----------
     F : (m, m) with x = J^# F b + null_space_term, eq. (7).
     G : (n, m) = J^# F.
     contributions : (L, n) G times the targets of each level.
@@ -129,9 +127,7 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
 
     In the staircase form F = J G. Where J has dependent rows, other matrices F give the same G.
 
-    Raises
-    ------
-    HierarchyError : an inequality, an invalid setting, or rows that are not finite.
+    Raises HierarchyError: an inequality, an invalid setting, or rows that are not finite.
     """
     resolver = Tpm(**settings)
     if (h.lower < h.upper).any():  # worded as for the published form, which takes no bounds
@@ -155,4 +151,3 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
 
 def _answer(resolver: Tpm, h: Hierarchy, b: Array, reference: Array) -> Array:
     return resolver.solve(h.changed(lower=b, upper=b, reference=reference, metric=None)).x
-

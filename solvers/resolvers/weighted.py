@@ -82,7 +82,7 @@ class Weighted(Resolver):
 
     @cached_property
     def _settings_for(self) -> Callable[[int], Array]:
-        """The kernels' `Options`, followed by the weight of each level, by the number of these."""
+        """The settings of the kernels, the weight of each level last, by the number of these."""
         return cache(lambda levels: np.array([
             self.damping, self.threshold, self.rank_tolerance, self.regularisation,
             self.tolerance, self.hard_levels, self.guesses, self.max_iterations,
@@ -111,10 +111,6 @@ class Weighted(Resolver):
             strict_levels=max(0, min(self.strict_levels, len(names) - 1)),
             damping=self.damping, threshold=self.threshold))
 
-    @cached_property
-    def _inside(self) -> Hcod:
-        return Hcod(rank_tolerance=self.rank_tolerance)
-
     def _weights(self, levels: int) -> Array:
         """Return weights (L,), 1 for the lowest; where they overflow, the status reports it."""
         if self.weights is None:
@@ -142,7 +138,7 @@ class Weighted(Resolver):
         """Return the feasible x nearest to the reference; INACCURATE if there is none."""
         limits = h.changed(A=h.A[hard], lower=h.lower[hard], upper=h.upper[hard],
                            sizes=[hard.sum()], names=("constraints",), give=None)
-        found = self._inside.solve(limits)
+        found = Hcod(rank_tolerance=self.rank_tolerance).solve(limits)
         x, status = found.x, found.status
         value, slack = limits.A @ x, limits.slacks(x)
         size = np.linalg.norm(limits.A, axis=1) * np.linalg.norm(x) + abs(value - slack)
@@ -183,16 +179,12 @@ def lexicographic_weights(violations: ArrayLike, tolerance: float, regularised: 
     must not outweigh `tolerance` of a level. docs/theory/weighted.md has the bound. The
     lowest weight is 1.
 
-    Parameters
-    ----------
     violations : (L,) V_k, upper bounds on the violation of each level at the strict answer, in the
         unit of its rows; for instance `h.violations` of a strict resolution.
     tolerance : > 0, in the unit of the rows.
     regularised : upper bound on mu ||x* - reference||.
 
-    Raises
-    ------
-    HierarchyError : a violation that is not a number >= 0, or a tolerance that is not > 0.
+    Raises HierarchyError: a violation that is not a number >= 0, or a tolerance that is not > 0.
 
     Source: Sherali, Soyster, "Preemptive and nonpreemptive multi-objective programming:
     relationship and counterexamples", 1983.
