@@ -8,20 +8,17 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from itertools import product
 from math import inf
 from pathlib import Path
-from threading import Event, Thread
-from time import monotonic
 from typing import Any, final
 
 from benchmark.packages import Entrant, MissingError, python_of
+from benchmark.worker import ENDS, START_LIMIT
 
-START_LIMIT = 180.0  # [s] for imports, including compilation of kernels
 CRASHED, HUNG, LEFT_OUT, SLOW = "crashed", "time limit", "left out after crashes", "too slow"
 _ROOT = Path(__file__).parents[1]  # from which every environment can import the benchmark
-_WAITING = 10.0  # times the limit that an answer may take where other work has the processor
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -41,10 +38,7 @@ class Process:
     """
 
     def __init__(self, entrant: Entrant, questions: str) -> None:
-        self.entrant, self.questions = entrant, questions
-        self._hung, self._fresh, self._starts = False, False, 0
-        self._process: subprocess.Popen[str] | None = None
-        self.about: dict[str, Any] = {}
+        self.entrant, self.questions, self._starts = entrant, questions, 0
         self._begin()
 
     def __enter__(self) -> Process:
@@ -52,34 +46,27 @@ class Process:
 
     def __exit__(self, *raised: object) -> None:
         """End the process."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.communicate()
-            self._log.close()
-            self._process = None
+        self._process.kill()
+        self._process.communicate()
+        self._log.close()
 
     def ask(self, question: tuple[Any, ...], limit: float) -> Any:
         """Return the answer to (METHOD, ARGUMENTS...); EndedError if none comes in `limit` [s].
 
-        The limit is of processor time, so that other work on the machine ends nobody.
-
-        The first question to a process may load and compile, and has more time; the next one after
-        an end starts a new process.
+        The limit is of processor time, so that other work on the machine ends nobody. The first
+        question to a process may load and compile, and has more time; the next one after an end
+        starts a new process.
         """
-        if self._process is None:
+        if self._log.closed:
             self._begin()
-        assert self._process is not None
-        assert self._process.stdin is not None
-        wait, more = _WAITING * limit, START_LIMIT if self._starts == 1 else 2.0 * limit
         if self._fresh:
-            limit, wait = limit + more, wait + more
+            limit += START_LIMIT if self._starts == 1 else 2.0 * limit
         self._fresh = False
-        try:
-            self._process.stdin.write(json.dumps(question) + "\n")
+        assert self._process.stdin is not None
+        with suppress(OSError):  # it has ended; why, the log says
+            self._process.stdin.write(json.dumps([limit, *question]) + "\n")
             self._process.stdin.flush()
-        except OSError:  # it has ended; why, the log says
-            pass
-        return self._next(limit, wait)
+        return self._next()
 
     def _begin(self) -> None:
         entrant = self.entrant
@@ -99,52 +86,20 @@ class Process:
             self._log.close()
             raise MissingError(f"{python}: {error.strerror}") from error
         self._starts, self._fresh = self._starts + 1, True
-        self.about = self._next(START_LIMIT, START_LIMIT)
+        self.about: dict[str, Any] = self._next()
 
-    def _next(self, limit: float, wait: float) -> Any:
-        """Return the next line; raises EndedError if there is none within the limits [s]."""
-        assert self._process is not None
+    def _next(self) -> Any:
+        """Return the next line; EndedError, with the last words of the process, without one."""
         assert self._process.stdout is not None
-        self._hung = False
-        done = Event()
-        Thread(target=self._watch, args=(self._process, done, limit, wait)).start()
-        try:
-            line = self._process.stdout.readline()
-        finally:
-            done.set()
+        line = self._process.stdout.readline()
         if line.endswith("\n"):
             return json.loads(line)
-        kind, why = HUNG if self._hung else CRASHED, self._last_words()
-        self.__exit__()
-        raise EndedError(kind, why)
-
-    def _watch(self, process: subprocess.Popen[str], done: Event, limit: float, wait: float
-               ) -> None:
-        """End a process that works for `limit` [s], or for which `wait` [s] pass, before `done`."""
-        begin, until, left = _busy(process.pid), monotonic() + wait, limit
-        while not done.wait(left):
-            left = min(begin + limit - _busy(process.pid), until - monotonic())
-            if left <= 0.0:
-                self._hung = True
-                process.kill()
-                return
-
-    def _last_words(self) -> str:
-        assert self._process is not None
         code = self._process.wait()
         self._log.seek(0)
-        lines = self._log.read().strip().splitlines()
-        return f"ended with code {code}" + (f": {lines[-1]}" if lines else "")
-
-
-def _busy(process: int) -> float:
-    """Return the processor time of a process [s]; the time that has passed if it is not known."""
-    file = Path(f"/proc/{process}/stat")
-    try:
-        ticks = file.read_text().rpartition(")")[2].split()[11:13]
-    except OSError:
-        return monotonic()
-    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
+        words = self._log.read().strip().splitlines()[-1:]
+        self.__exit__()
+        raise EndedError(HUNG if code in ENDS else CRASHED,
+                         ": ".join([f"ended with code {code}", *words]))
 
 
 @final
