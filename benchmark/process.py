@@ -38,7 +38,7 @@ class Process:
     """
 
     def __init__(self, entrant: Entrant, questions: str) -> None:
-        self.entrant, self.questions, self._starts = entrant, questions, 0
+        self.entrant, self.questions, self._starts, self._fresh = entrant, questions, 0, True
         self._begin()
 
     def __enter__(self) -> Process:

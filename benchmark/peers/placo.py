@@ -40,10 +40,10 @@ def arm(scene: Arm, posture: bool, priority: str = "soft") -> tuple[Any, None]:
         robot.state.q[_BASE + 1:] = q
         robot.update_kinematics()
         p = robot.get_T_world_frame(scene.frame)[:3, 3]
-        position.target_world = p + scene.period * (rate + scene.gain * (goal - p))
+        position.target_world = scene.after(p, goal, rate)
         if joints is not None:
-            wanted = q + scene.period * scene.posture_gain * (np.array(scene.posture) - q)
-            joints.set_joints(dict(zip(scene.joints, wanted, strict=True)))
+            joints.set_joints(dict(zip(scene.joints, q + scene.period * scene.still(q),
+                                       strict=True)))
         return np.asarray(solver.solve(False)[-len(q):] / scene.period)
 
     return velocity, None
@@ -62,7 +62,13 @@ def stand(scene: Stand) -> tuple[Any, Any, None]:
         robot.update_kinematics()
 
     place(np.array(scene.rest), np.zeros(len(scene.rest) - 1))
-    solver = _dynamics(scene, robot)
+    solver = placo.DynamicsSolver(robot)
+    solver.dt = scene.period
+    solver.enable_joint_limits(False)
+    solver.enable_velocity_limits(False)
+    solver.enable_torque_limits(True)
+    for name, limit in zip(scene.joints, scene.torque, strict=True):
+        robot.set_torque_limit(name, limit)
     soles = [_contact(scene, robot, solver, sole) for sole in scene.soles]
     tasks = [_added(solver.add_com_task(np.zeros(3)), "com", scene.com),
              *(_added(solver.add_position_task(hand, np.zeros(3)), hand, scene.hand)
@@ -91,34 +97,23 @@ def stand(scene: Stand) -> tuple[Any, Any, None]:
     return tick, answer, None
 
 
-def _dynamics(scene: Stand, robot: Any) -> Any:
-    solver = placo.DynamicsSolver(robot)
-    solver.dt = scene.period
-    solver.enable_joint_limits(False)
-    solver.enable_velocity_limits(False)
-    solver.enable_torque_limits(True)
-    for name, limit in zip(scene.joints, scene.torque, strict=True):
-        robot.set_torque_limit(name, limit)
-    return solver
-
-
 def _contact(scene: Stand, robot: Any, solver: Any, sole: str) -> Any:
     task = solver.add_frame_task(sole, robot.get_T_world_frame(sole))
     task.configure(sole, "hard", 1.0, 1.0)
     for part in (task.position(), task.orientation()):
-        part.kp, part.kd = scene.contact.stiffness, scene.contact.damping
+        part.kp, part.kd = scene.contact[:2]
     contact = solver.add_planar_contact(task)
     contact.length, contact.width = 2 * scene.half[0], 2 * scene.half[1]
     contact.mu = scene.friction
     contact.unilateral = True
-    contact.weight_forces = scene.force**2
-    contact.weight_moments = contact.weight_tangentials = scene.force**2
+    contact.weight_forces = contact.weight_moments = scene.force**2
+    contact.weight_tangentials = scene.force**2
     return contact
 
 
 def _added(task: Any, name: str, gains: Gains) -> Any:
-    task.configure(name, "soft", gains.weight**2)
-    task.kp, task.kd = gains.stiffness, gains.damping
+    task.kp, task.kd, weight = gains
+    task.configure(name, "soft", weight**2)
     return task
 
 

@@ -104,7 +104,7 @@ class Standing(_Ticks):
 
     def open(self, numbers: dict[str, Any], states: dict[str, Any]) -> None:
         """Take the scene and its states: lists t, q and v."""
-        self.scene, self.at = Stand.of(numbers), 0
+        self.scene, self.at = Stand(**numbers), 0
         self.states = [(t, np.array(q), np.array(v), self.scene.targets(t)) for t, q, v in zip(
             *(states[key] for key in ("t", "q", "v")), strict=True)]
         joints = len(self.scene.joints)

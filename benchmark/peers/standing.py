@@ -16,7 +16,7 @@ from scipy.optimize import nnls
 
 from benchmark.packages import OWN, PLACO, TSID, Entrant
 from benchmark.peers.compare import TICK, Log, measure, times, turns
-from benchmark.peers.ours import TASKS, robot_of, stack_of
+from benchmark.peers.hierarchy import TASKS, robot_of, stack_of
 from benchmark.peers.scenes import Stand
 from benchmark.report import Report, Section
 from benchmark.store import Row
@@ -38,15 +38,14 @@ _RATE = 2 * np.pi     # [rad/s]
 _SOLE = 0.055         # [m] from the foot's frame forward to the middle of the sole
 _NOISE = 1e-4, 1e-3   # standard deviation of q [rad, m] and v [rad/s, m/s], as from sensors
 _SEED = 16
-_HERE = "benchmark.peers"
 _WEIGHTS = "2 levels, weights"
 
 ENTRANTS = (
-    Entrant("hcod", OWN, f"{_HERE}.ours:stand", {"resolver": "hcod"}, "7 strict levels"),
-    Entrant("weighted", OWN, f"{_HERE}.ours:stand", {"resolver": "weighted"}, _WEIGHTS),
-    Entrant("tsid fast", TSID, f"{_HERE}.tsid:stand", {"solver": "SolverHQuadProgFast"}, _WEIGHTS),
-    Entrant("tsid", TSID, f"{_HERE}.tsid:stand", {"solver": "SolverHQuadProg"}, _WEIGHTS),
-    Entrant("placo", PLACO, f"{_HERE}.placo:stand", {}, _WEIGHTS),
+    OWN.peer("stand", "hcod", "7 strict levels", resolver="hcod"),
+    OWN.peer("stand", "weighted", _WEIGHTS, resolver="weighted"),
+    TSID.peer("stand", "tsid fast", _WEIGHTS, solver="SolverHQuadProgFast"),
+    TSID.peer("stand", "tsid", _WEIGHTS, solver="SolverHQuadProg"),
+    PLACO.peer("stand", "placo", _WEIGHTS),
 )
 NOTES = """\
 tick: kinematics, dynamics, rows, solve, torques, from Python [us]. solve: the solve alone, where \

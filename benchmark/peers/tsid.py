@@ -60,10 +60,10 @@ def arm(scene: Arm, posture: bool, hard: bool = False) -> tuple[Any, Any]:
         # The position is needed before computeProblemData, which computes it as well.
         data = formulation.data()
         pin.framesForwardKinematics(robot.model(), data, q)
-        off = goal - data.oMf[position.frame_id].translation
-        wanted.derivative(np.append(rate + scene.gain * off, _STILL))
+        p = data.oMf[position.frame_id].translation
+        wanted.derivative(np.append(scene.wanted(p, goal, rate), _STILL))
         position.setReference(wanted)
-        rates.derivative(scene.posture_gain * (np.array(scene.posture) - q))
+        rates.derivative(scene.still(q))
         joints.setReference(rates)
         sized, problem = problem is not None, formulation.computeProblemData(t, q, v)
         if not sized:
@@ -123,18 +123,18 @@ def _tasks(scene: Stand, robot: Any, formulation: Any) -> list[Any]:
         (tsid.TaskComEquality("com", robot), scene.com, 3),
         *((_position(robot, hand), scene.hand, 6) for hand in scene.hands),
         (tsid.TaskJointPosture("posture", robot), scene.joint, len(scene.joints))]
-    for task, gains, rows in asked:
-        task.setKp(np.full(rows, gains.stiffness))
-        task.setKd(np.full(rows, gains.damping))
-        formulation.addMotionTask(task, gains.weight**2, 1, 0.0)
+    for task, (stiffness, damping, weight), rows in asked:
+        task.setKp(np.full(rows, stiffness))
+        task.setKd(np.full(rows, damping))
+        formulation.addMotionTask(task, weight**2, 1, 0.0)
     return [task for task, _, _ in asked]
 
 
 def _contact(scene: Stand, robot: Any, formulation: Any, sole: str) -> Any:
     contact = tsid.Contact6d(sole, robot, sole, np.ascontiguousarray(scene.corners.T),
                              np.array([0.0, 0.0, 1.0]), scene.friction, 0.0, _LARGEST)
-    contact.setKp(np.full(6, scene.contact.stiffness))
-    contact.setKd(np.full(6, scene.contact.damping))
+    contact.setKp(np.full(6, scene.contact[0]))
+    contact.setKd(np.full(6, scene.contact[1]))
     frame = robot.model().getFrameId(sole)
     contact.setReference(robot.framePosition(formulation.data(), frame))
     formulation.addRigidContact(contact, scene.force**2, 1.0, 0)
