@@ -12,13 +12,16 @@ from contextlib import ExitStack, suppress
 from itertools import product
 from math import inf
 from pathlib import Path
+from threading import Event, Thread
+from time import monotonic
 from typing import Any, final
 
 from benchmark.packages import Entrant, MissingError, python_of
-from benchmark.worker import ENDS, START_LIMIT
 
+START_LIMIT = 180.0  # [s] for imports, including compilation of kernels
 CRASHED, HUNG, LEFT_OUT, SLOW = "crashed", "time limit", "left out after crashes", "too slow"
 _ROOT = Path(__file__).parents[1]  # from which every environment can import the benchmark
+_WAITING = 10.0  # times the limit that an answer may take where other work has the processor
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -64,9 +67,9 @@ class Process:
         self._fresh = False
         assert self._process.stdin is not None
         with suppress(OSError):  # it has ended; why, the log says
-            self._process.stdin.write(json.dumps([limit, *question]) + "\n")
+            self._process.stdin.write(json.dumps(question) + "\n")
             self._process.stdin.flush()
-        return self._next()
+        return self._next(limit)
 
     def _begin(self) -> None:
         entrant = self.entrant
@@ -86,20 +89,49 @@ class Process:
             self._log.close()
             raise MissingError(f"{python}: {error.strerror}") from error
         self._starts, self._fresh = self._starts + 1, True
-        self.about: dict[str, Any] = self._next()
+        self.about: dict[str, Any] = self._next(START_LIMIT)
 
-    def _next(self) -> Any:
-        """Return the next line; EndedError, with the last words of the process, without one."""
+    def _next(self, limit: float) -> Any:
+        """Return the next line; EndedError, with the last words, if none comes in `limit` [s]."""
         assert self._process.stdout is not None
-        line = self._process.stdout.readline()
+        self._hung, done = False, Event()
+        Thread(target=self._watch, args=(done, limit)).start()
+        try:
+            line = self._process.stdout.readline()
+        finally:
+            done.set()
         if line.endswith("\n"):
             return json.loads(line)
         code = self._process.wait()
         self._log.seek(0)
         words = self._log.read().strip().splitlines()[-1:]
         self.__exit__()
-        raise EndedError(HUNG if code in ENDS else CRASHED,
+        raise EndedError(HUNG if self._hung else CRASHED,
                          ": ".join([f"ended with code {code}", *words]))
+
+    def _watch(self, done: Event, limit: float) -> None:
+        """End a process that works for `limit` [s], or for which ten times as long passes.
+
+        A timer in the process itself would make its clock of processor time a coarse one.
+        """
+        process, left = self._process, limit
+        begin, until = _busy(process.pid), monotonic() + _WAITING * limit
+        while not done.wait(left):
+            left = min(begin + limit - _busy(process.pid), until - monotonic())
+            if left <= 0.0:
+                self._hung = True
+                process.kill()
+                return
+
+
+def _busy(process: int) -> float:
+    """Return the processor time of a process [s]; the time that has passed if it is not known."""
+    file = Path(f"/proc/{process}/stat")
+    try:
+        ticks = file.read_text().rpartition(")")[2].split()[11:13]
+    except OSError:
+        return monotonic()
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
 
 
 @final

@@ -3,10 +3,9 @@
     python -m benchmark.worker QUESTIONS ADAPTER OPTIONS PACKAGE CORE
 
 QUESTIONS is MODULE:CLASS of what asks: `QUESTIONS(ADAPTER, OPTIONS)` makes it. The first line of
-the answers has the version, its own or that of PACKAGE, and each line of stdin, [LIMIT, METHOD,
-ARGUMENTS...] in JSON, is a call whose result is the next: the system ends the process after LIMIT
-[s] of processor time, or ten times as long. ADAPTER is MODULE:NAME or FILE.py:NAME of a class or
-function, OPTIONS its arguments in JSON.
+the answers has the version, its own or that of PACKAGE, and each line of stdin, [METHOD,
+ARGUMENTS...] in JSON, is a call whose result is the next. ADAPTER is MODULE:NAME or FILE.py:NAME of
+a class or function, OPTIONS its arguments in JSON.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
-import signal
 import sys
 from collections.abc import Callable
 from importlib import import_module
@@ -23,9 +21,6 @@ from pathlib import Path
 from time import get_clock_info, perf_counter_ns, process_time_ns
 from typing import Any, NamedTuple
 
-START_LIMIT = 180.0  # [s] for imports, including compilation of kernels
-ENDS = -signal.SIGPROF, -signal.SIGALRM  # exit codes at a limit
-_WAITING = 10.0  # times the limit that an answer may take where other work has the processor
 _FINE = get_clock_info("process_time").resolution < 1e-6  # coarse on some systems
 
 
@@ -46,25 +41,15 @@ def main() -> None:
     questions, adapter, options, package, core = sys.argv[1:]
     pipe = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # output of a package must not mix with answers
-    _allow(START_LIMIT)
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {int(core)})
     asked = load(questions)(load(adapter), json.loads(options))
     own = getattr(asked, "version", None)
     print(json.dumps({"version": own() if own else version(package)}), file=pipe, flush=True)
-    _allow(0.0)
     for line in sys.stdin:
-        limit, method, *arguments = json.loads(line)
-        _allow(limit)
+        method, *arguments = json.loads(line)
         answer = getattr(asked, method)(*arguments)
-        _allow(0.0)
         print(json.dumps(answer, default=_plain), file=pipe, flush=True)
-
-
-def _allow(limit: float) -> None:
-    """Let the system end this process after so many seconds of work; 0 for any number."""
-    signal.setitimer(signal.ITIMER_PROF, limit)
-    signal.setitimer(signal.ITIMER_REAL, _WAITING * limit)
 
 
 def load(place: str) -> Any:

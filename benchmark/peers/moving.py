@@ -13,12 +13,11 @@ from benchmark import figures, packages
 from benchmark.packages import Entrant
 from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
 from benchmark.peers.scenes import Arm
-from benchmark.process import EndedError
+from benchmark.process import START_LIMIT, EndedError
 from benchmark.report import Report, Section
 from benchmark.store import Row
 from benchmark.tables import Column, Table, power, text
 from benchmark.urdf import urdf
-from benchmark.worker import START_LIMIT
 from hierarchy import Robot, State
 from hierarchy.paths import Still
 from hierarchy.tasks import Position

@@ -8,7 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from scenarios.results.store import Store
 
 ENDED = "reached_end"
 _DIGITS = 6  # kept of each value
+_NUMBERS = re.compile(r"\S*\d\S*")
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,7 @@ def made(runs: Sequence[Run], out: Path, workers: Workers, progress: Progress | 
     with store.opened():
         kept = store.outcomes()
         complete([one.job() for one in runs if one.key not in kept], store, workers, out.name,
-                 progress, work)
+                 progress, partial(outcome, measured=measured))
         return store.outcomes()
 
 
@@ -194,32 +195,19 @@ def _rows(protocol: Protocol, runs: Sequence[tuple[int, str, Run]],
         found = kept[one.key]
         of = values[noisy].setdefault(column, {})
         of.setdefault(ENDED, []).append(float(found.reason is None))
-        if found.reason is not None:
-            told = reasons[noisy].setdefault(column, {})
-            told[_kind(found.reason)] = told.get(_kind(found.reason), 0) + 1
+        if found.reason is not None:  # without its numbers, so that alike ones are counted together
+            kind, told = _NUMBERS.sub("#", found.reason), reasons[noisy].setdefault(column, {})
+            told[kind] = told.get(kind, 0) + 1
+        known = {} if found.reason else {one.name: one.value for one in found.metrics}
         for name in sorted(protocol.metrics):
-            of.setdefault(name, []).append(_value(found, name))
+            value = known.get(name)
+            of.setdefault(name, []).append(
+                None if value is None or not np.isfinite(value) else float(f"{value:.{_DIGITS}g}"))
         metrics |= {metric.name: {"label": metric.label, "unit": metric.unit,
                                   "lower": metric.lower_is_better is not False}
                     for metric in found.metrics if metric.name in protocol.metrics}
     return Rows(list(protocol.layouts), list(protocol.seeds), protocol.starts, metrics, values,
                 reasons)
-
-
-def work(job: Job) -> Outcome:
-    """Make a run in a process of the pool."""
-    return outcome(job, measured)
-
-
-def _value(found: Outcome, name: str) -> float | None:
-    value = next((one.value for one in found.metrics if one.name == name), None)
-    bad = found.reason is not None or value is None or not np.isfinite(value)
-    return None if bad else float(f"{value:.{_DIGITS}g}")
-
-
-def _kind(reason: str) -> str:
-    """Return a reason without its numbers, so that alike ones are counted together."""
-    return re.sub(r"\S*\d\S*", "#", reason)
 
 
 def _runs(protocol: Protocol) -> Iterator[tuple[int, str, Run]]:
@@ -246,11 +234,6 @@ def _with_noise(values: Mapping[str, Value], noise: float, seed: tuple[int, int]
         return value + noise * random.standard_normal() if isinstance(value, float) else value
 
     return {key: moved(value) for key, value in values.items()}
-
-
-def quick(protocol: Protocol) -> Protocol:
-    """Return the protocol with its first seed only."""
-    return replace(protocol, seeds=protocol.seeds[:1])
 
 
 def write(rows: Rows, path: Path) -> None:

@@ -22,7 +22,7 @@ from benchmark.solve.judge import RIGHT, by, summary
 from benchmark.solve.resolvers import asked
 from benchmark.store import Row
 from benchmark.tables import Column, Table, percent, power, whole
-from benchmark.timing import machine, one_core
+from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
 from scenarios.problems.reference import Problem
 from solvers import certify, make, names
@@ -82,19 +82,16 @@ FAMILIES = tuple(
                        ("hard, severe" if hard else "severe", 0.4)))
 
 
-def run(count: int = 400, resolvers: Sequence[str] = (), families: Sequence[Family] = FAMILIES
-        ) -> Report:
+def run(count: int, resolvers: Sequence[str]) -> Report:
     """Judge and time resolvers by name, or all that take bounds, on `count` stacks of a family."""
     chosen = resolvers or [name for name in names()
                            if make(name).handles in ("bounds", "inequalities")]
     entrants = [Entrant(make(name).label, OWN, "benchmark.solve.ours:Ours", {"resolver": name})
                 for name in chosen]
-    rows: list[Row] = []
-    tables = []
-    for family in families:
-        with one_core():
-            problems = family.problems(count)
-            raw = asked(family.name, problems, entrants, _SECONDS)
+    rows, tables = list[Row](), []
+    for family in FAMILIES:
+        problems = family.problems(count)
+        raw = asked(family.name, problems, entrants, _SECONDS)
         found = [_row(own, len(family.sizes)) for _, own in by(raw, "entrant")]
         bound = np.mean([((one.x <= one.h.lower[:one.h.n]) | (one.x >= one.h.upper[:one.h.n])).sum()
                          for one in problems])
