@@ -108,16 +108,11 @@ class Case(NamedTuple):
 
 
 class Done(NamedTuple):
-    """Output of a process, wall and processor seconds."""
+    """Wall and processor seconds of a process, and the last line of its output, as JSON."""
 
-    said: str
     seconds: float
     processor: float
-
-    @property
-    def last(self) -> Any:
-        """The last line of the output, read as JSON."""
-        return json.loads(self.said.splitlines()[-1])
+    said: Any = None
 
 
 def run() -> Report:
@@ -128,12 +123,12 @@ def run() -> Report:
             done = _measured(case)
             rows.append(_row(case.what, done.seconds, "s", case.ceiling, done.processor))
             if case.arguments[-1] == _COMPILE:
-                kernels = own_seconds(done.last)
+                kernels = own_seconds(done.said)
                 rows.append(_row(f"compilation of {len(kernels)} kernels", sum(kernels.values()),
                                  "s"))
     (run,) = _measured(Case("memory", None, ["-c", _MEMORY, "run", "ellipse", "--duration", "2"],
-                            repeated=0)).last
-    worker = _measured(Case("memory of a worker", None, ["-c", _WORKER], repeated=0)).last
+                            repeated=0)).said
+    worker = _measured(Case("memory of a worker", None, ["-c", _WORKER], repeated=0)).said
     rows += [_row("hierarchy run ellipse --duration 2", run, "MB", _MOST),
              _row("a worker of a sweep of 20 runs", max(worker), "MB", _MOST),
              _row("growth over the last 15 runs", worker[-1] - worker[4], "MB")]
@@ -226,12 +221,13 @@ def _measured(case: Case) -> Done:
         began, before = perf_counter(), _busy()
         done = subprocess.run([sys.executable, *case.arguments], capture_output=True, text=True,
                               check=False, env={**kept, **case.environment})
-        found.append(Done(done.stdout, perf_counter() - began, _busy() - before))
+        found.append((perf_counter() - began, _busy() - before))
         if done.returncode != 0:
             raise RuntimeError(f"{case.arguments}: {done.stderr.strip()}")
-    counted = found[1:] or found
-    return Done(found[-1].said, min(one.seconds for one in counted),
-                min(one.processor for one in counted))
+    last = done.stdout.splitlines()[-1:]
+    seconds, processor = map(min, zip(*(found[1:] or found), strict=True))
+    return Done(seconds, processor,
+                json.loads(last[0]) if last and last[0].startswith("[") else None)
 
 
 def _busy() -> float:

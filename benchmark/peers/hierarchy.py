@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -92,7 +93,7 @@ def stack_of(scene: Stand, robot: Robot, state: State) -> tuple[Stack, Contacts]
         tasks.LeastForce(contacts)], "torque", contacts=contacts), contacts
 
 
-def stand(scene: Stand, resolver: str) -> tuple[Any, Any, Any]:
+def stand(scene: Stand, resolver: str) -> tuple[Any, Any]:
     """Strict levels, or with `weighted` physics and limits strict and the rest as one level."""
     robot = robot_of(scene)
     state = State.at(robot, scene.rest)
@@ -101,21 +102,19 @@ def stand(scene: Stand, resolver: str) -> tuple[Any, Any, Any]:
         *(1.0,) * _STRICT, scene.com[2], scene.hand[2], scene.hand[2], scene.joint[2],
         scene.force)}
     solver = _Solver(state, stack, make(resolver, **weights).solve)
-    last: list[Array] = [np.empty(0)] * 2
 
-    def tick(t: float, q: Array, v: Array, targets: Array) -> None:
-        last[0] = solver.solve(t, q, v).x
-        last[1] = contacts.torques(state, last[0])
+    def tick(t: float, q: Array, v: Array, targets: Array) -> Callable[[], Answer]:
+        x = solver.solve(t, q, v).x
+        return partial(answer, x, contacts.torques(state, x))
 
-    def answer() -> Answer:
-        wrenches, x = [], last[0]
-        forces = contacts.forces(x).reshape(2, 4, 3)
+    def answer(x: Array, torques: Array) -> Answer:
+        wrenches, forces = [], contacts.forces(x).reshape(2, 4, 3)
         for contact, of in zip(contacts.contacts, forces, strict=True):
             R = state.rotation(contact.frame)
             wrenches.append(wrench(R, np.array(contact.points), of @ R))
-        return Answer(contacts.accelerations(x), last[1], np.array(wrenches))
+        return Answer(contacts.accelerations(x), torques, np.array(wrenches))
 
-    return tick, answer, solver.again
+    return tick, solver.again
 
 
 def reach(file: str, frames: list[str], tolerance: float) -> Callable[..., tuple[Array, bool]]:

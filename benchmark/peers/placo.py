@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -49,7 +51,7 @@ def arm(scene: Arm, posture: bool, priority: str = "soft") -> tuple[Any, None]:
     return velocity, None
 
 
-def stand(scene: Stand) -> tuple[Any, Any, None]:
+def stand(scene: Stand) -> tuple[Any, None]:
     """Planar contacts and limits hard; a task for the centre of mass, each hand and the joints."""
     robot = placo.RobotWrapper(scene.file, placo.Flags.ignore_collisions)
     to_theirs = [list(robot.joint_names()).index(name) for name in scene.joints]
@@ -75,18 +77,17 @@ def stand(scene: Stand) -> tuple[Any, Any, None]:
                for hand in scene.hands)]
     joints = _added(solver.add_joints_task(), "posture", scene.joint)
     joints.set_joints(dict(zip(scene.joints, scene.posture, strict=True)))
-    found: Any = None
 
-    def tick(t: float, q: Array, v: Array, targets: Array) -> None:
-        nonlocal found
+    def tick(t: float, q: Array, v: Array, targets: Array) -> Callable[[], Answer]:
         place(q, v)
         for task, (p, dp, ddp) in zip(tasks, targets, strict=True):
             task.target_world, task.dtarget_world, task.ddtarget_world = p, dp, ddp
         found = solver.solve(False)
         if not found.success:
             raise RefusedError("no success")
+        return partial(answer, found)
 
-    def answer() -> Answer:
+    def answer(found: Any) -> Answer:
         a, torques, wrenches = np.array(found.qdd), np.array(found.tau), []
         for contact, sole in zip(soles, scene.soles, strict=True):
             R, w = robot.get_T_world_frame(sole)[:3, :3], np.array(contact.wrench)
@@ -94,7 +95,7 @@ def stand(scene: Stand) -> tuple[Any, Any, None]:
         return Answer(np.concatenate([a[:_BASE], a[_BASE:][to_theirs]]),
                       torques[_BASE:][to_theirs], np.array(wrenches))
 
-    return tick, answer, None
+    return tick, None
 
 
 def _contact(scene: Stand, robot: Any, solver: Any, sole: str) -> Any:

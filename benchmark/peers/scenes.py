@@ -1,18 +1,18 @@
 """What is asked, as plain numbers that go through JSON, and what an adapter is. Needs only numpy.
 
     arm(scene, posture, **options)           -> velocity, resolve
-    stand(scene, **options)                  -> tick, answer, resolve
+    stand(scene, **options)                  -> tick, resolve
     reach(file, frames, tolerance, **options) -> solve
 
 velocity(t, q, v, goal, rate) returns joint velocities (n,), one whole tick: q, v (n,) are joint
 positions and the velocities with which they were reached, goal (3,) [m] and rate (3,) [m/s] those
 of the path at t [s]; `posture` says whether the posture is asked for. tick(t, q, v, targets) does
-one whole tick and answer() returns its `Answer`: q (n + 1,) has the base's position and quaternion
-(x, y, z, w) first, v (n,) the base's velocity in its own axes; targets (3, 3, 3) are position,
-velocity and acceleration of the centre of mass and both hands. resolve() solves the last tick's
-problem again and nothing else; None where a package cannot. solve(poses, starts) returns the best
-configuration for poses (frames, 4, 4) from starts (s, nq), and whether it is within the tolerance.
-Any exception is a failure.
+one whole tick and returns what reads its `Answer`: q (n + 1,) has the base's position and
+quaternion (x, y, z, w) first, v (n,) the base's velocity in its own axes; targets (3, 3, 3) are
+position, velocity and acceleration of the centre of mass and both hands. resolve() solves the last
+tick's problem again and nothing else; None where a package cannot. solve(poses, starts) returns the
+best configuration for poses (frames, 4, 4) from starts (s, nq), and whether it is within the
+tolerance. Any exception is a failure.
 """
 
 from __future__ import annotations

@@ -5,6 +5,8 @@ It holds no references of its own: tasks, contacts and samples are kept by what 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -74,7 +76,7 @@ def arm(scene: Arm, posture: bool, hard: bool = False) -> tuple[Any, Any]:
     return velocity, lambda: solver.solve(problem)
 
 
-def stand(scene: Stand, solver: str) -> tuple[Any, Any, Any]:
+def stand(scene: Stand, solver: str) -> tuple[Any, Any]:
     """Physics, contacts, friction and torque limits hard; the tasks weighted below."""
     robot = tsid.RobotWrapper(scene.file, [], pin.JointModelFreeFlyer(), False)
     if list(robot.model().names)[2:] != list(scene.joints):
@@ -90,12 +92,11 @@ def stand(scene: Stand, solver: str) -> tuple[Any, Any, Any]:
     rest = tsid.TrajectorySample(len(scene.joints))
     rest.value(np.array(scene.posture))
     joints.setReference(rest)
-    solving, problem, found = getattr(tsid, solver)("solver"), None, None
+    solving, problem = getattr(tsid, solver)("solver"), None
     solving.resize(formulation.nVar, formulation.nEq, formulation.nIn)
-    torques = a = np.empty(0)
 
-    def tick(t: float, q: Array, v: Array, targets: Array) -> None:
-        nonlocal problem, found, torques, a
+    def tick(t: float, q: Array, v: Array, targets: Array) -> Callable[[], Answer]:
+        nonlocal problem
         for k, (task, sample, (p, dp, ddp)) in enumerate(zip(tasks, samples, targets, strict=True)):
             sample.value(np.concatenate((p, _UNTURNED)) if k else p)
             sample.derivative(np.concatenate((dp, _STILL)) if k else dp)
@@ -103,9 +104,10 @@ def stand(scene: Stand, solver: str) -> tuple[Any, Any, Any]:
             task.setReference(sample)
         problem = formulation.computeProblemData(t, q, v)
         found = _solved(solving, problem)
-        torques, a = formulation.getActuatorForces(found), formulation.getAccelerations(found)
+        return partial(answer, found, formulation.getActuatorForces(found),
+                       formulation.getAccelerations(found))
 
-    def answer() -> Answer:
+    def answer(found: Any, torques: Array, a: Array) -> Answer:
         wrenches = []
         for sole in scene.soles:
             R = robot.framePosition(formulation.data(), robot.model().getFrameId(sole)).rotation
@@ -114,7 +116,7 @@ def stand(scene: Stand, solver: str) -> tuple[Any, Any, Any]:
         return Answer(np.array(a), np.array(torques), np.array(wrenches))
 
     tick.kept = soles, limits, joints, rest  # type: ignore[attr-defined]
-    return tick, answer, lambda: solving.solve(problem)
+    return tick, lambda: solving.solve(problem)
 
 
 def _tasks(scene: Stand, robot: Any, formulation: Any) -> list[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Callable, Mapping
@@ -44,7 +45,8 @@ class Stored:
         """Return what a checkout has stored."""
         rows, points = root / ROWS, root / POINTS
         return cls(protocol.read(rows) if rows.is_file() else None,
-                   fronts.read(points) if points.is_file() else [])
+                   [Point(**one) for one in json.loads(points.read_text(encoding="utf-8"))]
+                   if points.is_file() else [])
 
 
 def block(name: str, stored: Stored, output: Callable[[str], str]) -> str:

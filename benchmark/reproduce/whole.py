@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 
@@ -15,7 +15,7 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json, shown
-from scenarios.files import make_folder, reason, write_text
+from scenarios.files import make_folder, reason, write_json, write_text
 from scenarios.results.sampled import Workers
 
 NAME, TUNED = "protocol", "fronts"  # of the runs
@@ -76,7 +76,7 @@ def _made(asked: Sequence[str], out: Path, quick: bool, workers: Workers) -> Ite
             return
         if TUNED in asked:
             points = fronts.run(out / TUNED, workers, progress)
-            fronts.write(points, root / POINTS)
+            write_json(root / POINTS, [asdict(one) for one in points])
             fronts.figure(points).savefig(root / PICTURE, dpi=120)
             yield None
     found = dict.fromkeys(command for page in asked if page not in (NAME, TUNED)

@@ -68,12 +68,11 @@ def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
 
 
 def test_everything_measured_is_told(monkeypatch):
-    events = json.dumps([[0.0, True, "solvers.kernels.a.b"], [2.0, False, "solvers.kernels.a.b"]])
+    events = [[0.0, True, "solvers.kernels.a.b"], [2.0, False, "solvers.kernels.a.b"]]
     cases = [Case("help", 0.5, ["a"]), Case("first", None, [start._COMPILE]),
              Case("library", 10.0, ["b"])]
-    said = {"help": Done("", 0.1, 0.09), "first": Done(f"noise\n{events}\n", 20.0, 19.0),
-            "library": Done("", 11.0, 8.0), "memory": Done("[301.0]", 1.0, 1.0),
-            "memory of a worker": Done(json.dumps([250.0] * 20), 1.0, 1.0)}
+    said = {"help": Done(0.1, 0.09), "first": Done(20.0, 19.0, events), "library": Done(11.0, 8.0),
+            "memory": Done(1.0, 1.0, [301.0]), "memory of a worker": Done(1.0, 1.0, [250.0] * 20)}
     monkeypatch.setattr(start, "_cases", lambda folder: cases)
     monkeypatch.setattr(start, "_measured", lambda case: said[case.what])
     found = run()
@@ -85,8 +84,9 @@ def test_everything_measured_is_told(monkeypatch):
 
 
 def test_a_process_is_measured_and_one_that_fails_is_named():
-    done = start._measured(Case("a sum", None, ["-c", "print([sum(range(10**6))])"], repeated=1))
-    assert done.last == [499999500000]
+    done = start._measured(Case("a sum", None, [
+        "-c", "print('noise'); print([sum(range(10**6))])"], repeated=1))
+    assert done.said == [499999500000]
     assert 0.0 < done.processor
     with pytest.raises(RuntimeError, match="no such thing"):
         start._measured(Case("a fault", None, ["-c", "raise SystemExit('no such thing')"]))
