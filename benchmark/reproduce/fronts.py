@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmark.reproduce.protocol import Run, made
+from benchmark.reproduce.protocol import made, planned
 from hierarchy.problem import Array
 from scenarios.config import load
 from scenarios.config.sampling import drawn
@@ -123,7 +123,8 @@ def _scores(name: str, method: Method, trials: Sequence[Mapping[str, float]],
     for settings in trials:
         scenario = load(front.scenario, GIVEN["plant"].get(front.plant, {})).with_resolver(
             method.resolver).with_changes({**method.set, **settings})
-        runs += [Run.of(scenario, start, drawn(scenario, scenario.variation, seed, start))
+        text = scenario.to_toml()
+        runs += [planned(scenario, text, start, drawn(scenario, scenario.variation, seed, start))
                  for start in range(count)]
     kept = made(runs, *where)
     outcomes = [kept[one.key] for one in runs]

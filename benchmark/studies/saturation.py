@@ -60,11 +60,9 @@ class Family:
     def problem(self, seed: int) -> Hierarchy:
         """Return the stack of a seed."""
         rng = np.random.default_rng(seed)
-        if self.hard:
-            free = written(rng, self.joints, self.sizes, _HARD)
-        else:
-            free = Hierarchy.from_levels(
-                [(rng.normal(size=(m, self.joints)), rng.normal(size=m)) for m in self.sizes])
+        free = written(rng, self.joints, self.sizes, _HARD) if self.hard else (
+            Hierarchy.from_levels([(rng.normal(size=(m, self.joints)), rng.normal(size=m))
+                                   for m in self.sizes]))
         largest = np.abs(make("tpm").solve(free).x).max()
         half = self.room * largest * rng.uniform(0.3, 1.0, (2, self.joints))
         reference = 0.1 * self.room * largest * rng.normal(size=self.joints)
