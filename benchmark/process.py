@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 from itertools import product
 from math import inf
 from pathlib import Path
@@ -44,10 +44,7 @@ class Process:
         self.entrant, self.questions, self._starts, self._fresh = entrant, questions, 0, True
         self._begin()
 
-    def __enter__(self) -> Process:
-        return self
-
-    def __exit__(self, *raised: object) -> None:
+    def close(self) -> None:
         """End the process."""
         self._process.kill()
         self._process.communicate()
@@ -105,7 +102,7 @@ class Process:
         code = self._process.wait()
         self._log.seek(0)
         words = self._log.read().strip().splitlines()[-1:]
-        self.__exit__()
+        self.close()
         raise EndedError(HUNG if self._hung else CRASHED,
                          ": ".join([f"ended with code {code}", *words]))
 
@@ -147,7 +144,7 @@ class Field(ExitStack):
         self.missing: dict[str, str] = {}
         for one in entrants:
             try:
-                self.running[one.label] = self.enter_context(Process(one, questions))
+                self.running[one.label] = self.enter_context(closing(Process(one, questions)))
             except MissingError as error:
                 self.missing[one.label] = str(error)
 

@@ -6,7 +6,6 @@ Every answer is judged by our model, and from its accelerations, torques and wre
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import nnls
 
-from benchmark.packages import OWN, PLACO, TSID, Entrant
+from benchmark.packages import OWN, PLACO, TSID
 from benchmark.peers.compare import TICK, Log, measure, times, turns
 from benchmark.peers.hierarchy import TASKS, robot_of, stack_of
 from benchmark.peers.scenes import Stand
@@ -60,19 +59,19 @@ _MISSES = (*(Column("\n".join((*task.split(), of)), f"{task} {of}", power)
            Column("priorities", "kind", text), Column("version", "version", str))
 
 
-def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = TICKS) -> Report:
+def run() -> Report:
     """Ask all entrants at the same states, and judge their answers by our model.
 
-    They take turns until each has been asked `ticks` times, after one turn over all states, which
+    They take turns until each has been asked TICKS times, after one turn over all states, which
     compiles, fills caches and is not counted.
     """
     with tempfile.TemporaryDirectory() as temporary:
         scene = make_scene(Path(temporary))
-        states = followed(scene, ticks)
+        states = followed(scene, TICKS)
         asked = {key: values.tolist() for key, values in states.items()}
         of = Judge(scene, states)
-        rows, missing = measure(entrants, QUESTIONS, [("open", asdict(scene), asked),
-                                                      *turns(ticks, ticks, 250, 20)],
+        rows, missing = measure(ENTRANTS, QUESTIONS, [("open", asdict(scene), asked),
+                                                      *turns(TICKS, TICKS, 250, 20)],
                                 lambda log, _: judge(log, of))
     title = "One tick of inverse dynamics of a humanoid on two feet"
     tables = [Table(title, rows, _COLUMNS), Table("Missed by each task", rows, _MISSES)]
