@@ -49,7 +49,7 @@ def arm(scene: Arm, posture: bool, resolver: str | Callable[..., Resolution], **
     """Velocity limits, position and posture, with any resolver; the path is our own."""
     robot = Robot.from_file(scene.file, scene.frame)
     robot.lower, robot.upper = np.full(robot.n, -np.inf), np.full(robot.n, np.inf)
-    path = _ellipse(scene.centre, scene.cosine, scene.sine, scene.turning)
+    path = Ellipse(scene.centre, scene.cosine, scene.sine, scene.turning)
     asked = [tasks.JointLimits(robot, _UNLIMITED, scene.period),
              tasks.Position(robot.frame(scene.frame), path, gain=scene.gain),
              tasks.Posture(tuple(scene.posture), gain=scene.posture_gain)]
@@ -63,10 +63,6 @@ def arm(scene: Arm, posture: bool, resolver: str | Callable[..., Resolution], **
     return velocity, solver.again
 
 
-def _ellipse(centre: Any, cosine: Any, sine: Any, rate: float) -> Ellipse:
-    return Ellipse(tuple(centre), tuple(cosine), tuple(sine), rate)
-
-
 def robot_of(scene: Stand) -> Robot:
     """Read the robot of the scene."""
     return Robot.from_file(scene.file, scene.hands[1], base="floating", shapes=False)
@@ -78,7 +74,7 @@ def stack_of(scene: Stand, robot: Robot, state: State) -> tuple[Stack, Contacts]
     contacts = Contacts(robot, [Contact.rectangle(robot.frame(sole), (-half[0], half[0]),
                                                   (-half[1], half[1]), mu)
                                 for sole in scene.soles])
-    com, *hands = (_ellipse(*circle) for circle in scene.circles)
+    com, *hands = (Ellipse(*circle) for circle in scene.circles)
     stiffness, damping, _ = scene.com
     wanted: list[Task] = [
         tasks.CentreOfMass(robot, com, stiffness=stiffness, damping=damping),

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import placo
 
 from benchmark.peers.common import PERIOD, iterated
@@ -135,19 +136,12 @@ def reach(file: str, frames: list[str], tolerance: float) -> Any:
     def at(q: Array) -> float:
         robot.state.q[_BASE + 1:] = q
         robot.update_kinematics()
-        return float(np.linalg.norm([_apart(robot.get_T_world_frame(name), pose)
-                                     for name, pose in zip(frames, goals, strict=True)]))
+        return float(np.linalg.norm([
+            [pose[:3, 3] - here[:3, 3], pin.log3(pose[:3, :3] @ here[:3, :3].T)]
+            for here, pose in zip(map(robot.get_T_world_frame, frames), goals, strict=True)]))
 
     def step(q: Array) -> Array:
         solver.solve(True)
         return np.array(robot.state.q[_BASE + 1:])
 
     return iterated(aim, at, step, tolerance)
-
-
-def _apart(here: Array, there: Array) -> float:
-    """Return the length of position [m] and rotation error [rad] together."""
-    turn = there[:3, :3] @ here[:3, :3].T
-    angle = np.arctan2(np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0],
-                                       turn[1, 0] - turn[0, 1]]) / 2, (np.trace(turn) - 1.0) / 2)
-    return float(np.hypot(np.linalg.norm(here[:3, 3] - there[:3, 3]), angle))
