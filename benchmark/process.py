@@ -59,14 +59,13 @@ class Process:
         """
         if self._log.closed:
             self._begin()
-        if self._fresh:
-            limit += START_LIMIT if self._starts == 1 else 2.0 * limit
-        self._fresh = False
+        more = START_LIMIT if self._starts == 1 else 2.0 * limit
+        more, self._fresh = more * self._fresh, False
         assert self._process.stdin is not None
         with suppress(OSError):  # it has ended; why, the log says
             self._process.stdin.write(json.dumps(question) + "\n")
             self._process.stdin.flush()
-        return self._next(limit)
+        return self._next(limit + more, _WAITING * limit + more)
 
     def _begin(self) -> None:
         entrant = self.entrant
@@ -86,13 +85,13 @@ class Process:
             self._log.close()
             raise MissingError(f"{python}: {error.strerror}") from error
         self._starts, self._fresh = self._starts + 1, True
-        self.about: dict[str, Any] = self._next(START_LIMIT)
+        self.about: dict[str, Any] = self._next(START_LIMIT, START_LIMIT)
 
-    def _next(self, limit: float) -> Any:
-        """Return the next line; EndedError, with the last words, if none comes in `limit` [s]."""
+    def _next(self, limit: float, wait: float) -> Any:
+        """Return the next line; EndedError, with the last words, if none comes in time."""
         assert self._process.stdout is not None
         self._hung, done = False, Event()
-        Thread(target=self._watch, args=(done, limit)).start()
+        Thread(target=self._watch, args=(done, limit, wait)).start()
         try:
             line = self._process.stdout.readline()
         finally:
@@ -106,13 +105,13 @@ class Process:
         raise EndedError(HUNG if self._hung else CRASHED,
                          ": ".join([f"ended with code {code}", *words]))
 
-    def _watch(self, done: Event, limit: float) -> None:
-        """End a process that works for `limit` [s], or for which ten times as long passes.
+    def _watch(self, done: Event, limit: float, wait: float) -> None:
+        """End a process that works for `limit` [s], or for which `wait` [s] pass, before `done`.
 
         A timer in the process itself would make its clock of processor time a coarse one.
         """
         process, left = self._process, limit
-        begin, until = _busy(process.pid), monotonic() + _WAITING * limit
+        begin, until = _busy(process.pid), monotonic() + wait
         while not done.wait(left):
             left = min(begin + limit - _busy(process.pid), until - monotonic())
             if left <= 0.0:
