@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmark.report import Report, Section
-from benchmark.store import Row
-from benchmark.tables import Column, Table
+from benchmark.tables import Column, Row, Table
 from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
 from scenarios.problems.reference import family

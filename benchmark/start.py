@@ -20,8 +20,7 @@ from zipfile import ZipFile
 
 from benchmark.report import Report, Section
 from benchmark.solve.questions import resident
-from benchmark.store import Row
-from benchmark.tables import Column, Table, digits
+from benchmark.tables import Column, Row, Table, digits
 
 _ROOT = Path(__file__).parents[1]
 _REPEATED = 5        # repetitions of short processes; the minimum counts

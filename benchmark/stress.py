@@ -22,8 +22,7 @@ import numpy as np
 
 from benchmark.report import Report, Section
 from benchmark.solve.judge import RIGHT, miss_of
-from benchmark.store import Row
-from benchmark.tables import Column, Table, whole
+from benchmark.tables import Column, Row, Table, whole
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cli.progress import bar
 from scenarios.problems.answers import answer

@@ -22,8 +22,7 @@ from benchmark.peers.hierarchy import arm
 from benchmark.peers.moving import QUESTIONS, STEP_TICKS, judge_step, make_scenes
 from benchmark.peers.scenes import Arm
 from benchmark.report import Report, Section
-from benchmark.store import Row
-from benchmark.tables import Column, Table, power, whole, yes
+from benchmark.tables import Column, Row, Table, power, whole, yes
 from hierarchy import Hierarchy
 from solvers import Resolution, make, names
 from solvers.qp.backends import BACKENDS, installed

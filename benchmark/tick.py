@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmark.report import Report, Section
-from benchmark.store import Row
-from benchmark.tables import TIMES, Column, Table, whole
+from benchmark.tables import TIMES, Column, Row, Table, whole
 from benchmark.timing import one_core, times_of
 from hierarchy import HierarchyError, State
 from hierarchy.allocation import allocate

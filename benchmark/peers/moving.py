@@ -15,8 +15,7 @@ from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, joined, measure,
 from benchmark.peers.scenes import Arm
 from benchmark.process import START_LIMIT, EndedError
 from benchmark.report import Report, Section
-from benchmark.store import Row
-from benchmark.tables import Column, Table, power, text
+from benchmark.tables import Column, Row, Table, power, text
 from benchmark.urdf import urdf
 from hierarchy import Robot, State
 from hierarchy.paths import Still

@@ -19,8 +19,7 @@ from benchmark.report import Report, Section
 from benchmark.solve.entrants import ENTRANTS, NUMPY
 from benchmark.solve.interface import Solver
 from benchmark.solve.resolvers import as_problem
-from benchmark.store import Row
-from benchmark.tables import Column, Table, percent, power, whole
+from benchmark.tables import Column, Row, Table, percent, power, whole
 from benchmark.worker import load
 from hierarchy.problem import Array, Hierarchy
 from scenarios.problems.answers import answer

@@ -12,8 +12,7 @@ from benchmark import figures
 from benchmark.report import Report, Section
 from benchmark.solve.accuracy import entrants
 from benchmark.solve.interface import Problem
-from benchmark.store import Row
-from benchmark.tables import Column, Table, short, wide
+from benchmark.tables import Column, Row, Table, short, wide
 from benchmark.timing import take_turns
 from benchmark.worker import load
 

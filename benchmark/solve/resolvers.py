@@ -20,8 +20,7 @@ from benchmark.solve.interface import Problem
 from benchmark.solve.judge import RIGHT, SOLVED, WRONG, by, judged, summary
 from benchmark.solve.questions import Questions
 from benchmark.solve.views import mark
-from benchmark.store import Row
-from benchmark.tables import TIMES, Column, Table, percent, power, whole
+from benchmark.tables import TIMES, Column, Row, Table, percent, power, whole
 from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
 from hierarchy.errors import UnknownNameError

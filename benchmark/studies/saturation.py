@@ -20,8 +20,7 @@ from benchmark.packages import OWN, Entrant
 from benchmark.report import Report, Section
 from benchmark.solve.judge import RIGHT, by, summary
 from benchmark.solve.resolvers import asked
-from benchmark.store import Row
-from benchmark.tables import Column, Table, percent, power, whole
+from benchmark.tables import Column, Row, Table, percent, power, whole
 from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
 from scenarios.problems.reference import Problem
