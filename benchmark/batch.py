@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmark.report import Report, Section
-from benchmark.store import Row
-from benchmark.tables import Column, Table
+from benchmark.tables import Column, Row, Table
 from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
 from scenarios.problems.reference import family
@@ -33,22 +32,15 @@ Millions of problems per second: from the fastest call, and per core from the pr
 all calls. Both are insensitive to other load on the machine; medians are in the CSV."""
 
 
-def run(counts: Sequence[int] = COUNTS, seconds: float = 1.0,
-        entries: Sequence[tuple[str, str]] = ENTRIES) -> Report:
-    """Time every method on every family and batch size.
+def run(counts: Sequence[int] | None = None, seconds: float = 1.0) -> Report:
+    """Time every method on every family and batch size, COUNTS by default.
 
     seconds : [s] for all methods together at one batch size; at least three calls of each.
-    entries : (family, resolver).
-
-    Raises
-    ------
-    HierarchyError : an unknown family.
     """
-    rows: list[Row] = []
-    tables = []
-    for name, resolver in entries:
+    rows, tables = list[Row](), []
+    for name, resolver in ENTRIES:
         sizes = []
-        for count in counts:
+        for count in counts or COUNTS:
             found = _timed(problems_like(name, count), make(resolver), seconds)
             sizes.append({"problems": f"{count:,}"} | {
                 key: row[of] for row in found for key, of in (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from importlib import import_module
-from inspect import signature
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -78,65 +78,44 @@ def main(ctx: typer.Context, out: Out = None) -> None:
         _run(out, *_USUAL)
 
 
-def _plain(name: str, words: str) -> None:
-    def command(out: Out = None) -> int:
-        return _run(out, name)
+def _add(name: str, words: str, *modules: str, **options: tuple[Any, Any]) -> None:
+    """Add a command that runs benchmarks; options : kinds and defaults of parameters of `run`."""
+    def command(**given: Any) -> int:
+        return _run(given.pop("out"), *modules, **given)
 
+    every = {**options, "out": (Out, None)}
+    command.__annotations__ = {key: kind for key, (kind, _) in every.items()} | {"return": int}
+    command.__signature__ = Signature([  # type: ignore[attr-defined]
+        Parameter(key, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+        for key, (kind, default) in every.items()], return_annotation=int)
     bench.command(name, help=words)(command)
 
 
-_plain("tick", "Time one control tick, compiled and in plain numpy.")
-_plain("start", "Measure start-up time, compilation and memory.")
-_plain("strictness", "Measure whether lower tasks disturb upper ones.")
-
-
-@bench.command()
-def resolvers(
-        fresh: Annotated[int | None, typer.Option(
-            "--fresh", metavar="SEED", help="Also time fresh problems, from this seed on.")] = None,
-        count: Annotated[int, typer.Option(
-            "--count", min=1, metavar="N", help="Fresh problems of each family.")] = 200,
-        family: Family = None,
-        resolver: Annotated[list[str] | None, typer.Option(
-            "--resolver", metavar="NAME",
-            help="Only this resolver, with its variants and backends, beside the yardsticks. May "
-                 "be repeated.")] = None,
-        seconds: Annotated[float, typer.Option(
-            "--seconds", min=0.001, metavar="S",
-            help="Time for each resolver in each family.")] = 0.5,
-        out: Out = None) -> int:
-    """Time every resolver on the reference problems."""
-    return _run(out, "solve.resolvers", seconds=seconds, seed=fresh, count=count,
-                resolvers=resolver, families=family)
-
-
-@bench.command()
-def accuracy(arms: Arms = 10_000, checked: Checked = 300, out: Out = None) -> int:
-    """Measure errors on random arms against proved answers."""
-    return _run(out, "solve.accuracy", arms=arms, checked=checked)
-
-
-@bench.command()
-def growth(seconds: Seconds = 40.0, larger: Annotated[bool, typer.Option(
-               "--larger", help="Up to 20 tasks, 300 joints and 20 rows a task.")] = False,
-           out: Out = None) -> int:
-    """Time a solve as the numbers of tasks and joints grow."""
-    return _run(out, "solve.growth", seconds=seconds, larger=larger)
-
-
-@bench.command("first-paper")
-def first_paper(arms: Arms = 10_000, checked: Checked = 300, seconds: Seconds = 40.0,
-                out: Out = None) -> int:
-    """Repeat the first TPM paper: accuracy and growth."""
-    return _run(out, "solve.accuracy", "solve.growth", arms=arms, checked=checked, seconds=seconds)
-
-
-@bench.command()
-def batch(count: Annotated[list[int] | None, typer.Option(
-              "--count", min=1, metavar="N", help="Problems in a batch. May be repeated.")] = None,
-          seconds: Seconds = 1.0, out: Out = None) -> int:
-    """Measure how many problems per second batches solve."""
-    return _run(out, "batch", seconds=seconds, **({"counts": count} if count else {}))
+_add("tick", "Time one control tick, compiled and in plain numpy.", "tick")
+_add("start", "Measure start-up time, compilation and memory.", "start")
+_add("strictness", "Measure whether lower tasks disturb upper ones.", "strictness")
+_add("resolvers", "Time every resolver on the reference problems.", "solve.resolvers",
+     seed=(Annotated[int | None, typer.Option(
+         "--fresh", metavar="SEED", help="Also time fresh problems, from this seed on.")], None),
+     count=(Annotated[int, typer.Option(
+         "--count", min=1, metavar="N", help="Fresh problems of each family.")], 200),
+     families=(Family, None),
+     resolvers=(Annotated[list[str] | None, typer.Option(
+         "--resolver", metavar="NAME", help="Only this resolver, with its variants and backends, "
+         "beside the yardsticks. May be repeated.")], None),
+     seconds=(Annotated[float, typer.Option(
+         "--seconds", min=0.001, metavar="S", help="Time for each resolver in each family.")], 0.5))
+_add("accuracy", "Measure errors on random arms against proved answers.", "solve.accuracy",
+     arms=(Arms, 10_000), checked=(Checked, 300))
+_add("growth", "Time a solve as the numbers of tasks and joints grow.", "solve.growth",
+     seconds=(Seconds, 40.0), larger=(Annotated[bool, typer.Option(
+         "--larger", help="Up to 20 tasks, 300 joints and 20 rows a task.")], False))
+_add("first-paper", "Repeat the first TPM paper: accuracy and growth.", "solve.accuracy",
+     "solve.growth", arms=(Arms, 10_000), checked=(Checked, 300), seconds=(Seconds, 40.0))
+_add("batch", "Measure how many problems per second batches solve.", "batch",
+     counts=(Annotated[list[int] | None, typer.Option(
+         "--count", min=1, metavar="N", help="Problems in a batch. May be repeated.")], None),
+     seconds=(Seconds, 1.0))
 
 
 @bench.command()
@@ -161,16 +140,12 @@ def peers(install: Install = False,
     return 0
 
 
-@bench.command()
-def ik(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
-                                          help="Poses of each kind and robot.")] = 1000,
-       out: Out = None) -> int:
-    """Compare inverse kinematics with pink, mink and placo.
+_add("ik", """Compare inverse kinematics with pink, mink and placo.
 
     Reachable and unreachable poses of UR5, Panda and both arms of G1, which need the extra
     `descriptions`; for placo run `hierarchy bench peers --install` first.
-    """
-    return _run(out, "peers.reaching", count=count)
+    """, "peers.reaching", count=(Annotated[int, typer.Option(
+         "--count", min=1, metavar="N", help="Poses of each kind and robot.")], 1000))
 
 
 @bench.command("open")

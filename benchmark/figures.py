@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator, ScalarFormatter
 
-from benchmark.store import Row
+from benchmark.tables import Row
 from hierarchy.problem import Array
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.palette import Look, looks

@@ -23,20 +23,6 @@ class MissingError(Exception):
 
 @final
 @dataclass(frozen=True)
-class Package:
-    """The requirements that pip installs into an environment of that name.
-
-    They require different versions of pinocchio, numpy and MuJoCo. `module` is what is imported. An
-    empty tuple of requirements: part of this project's own environment.
-    """
-
-    name: str
-    module: str
-    requirements: tuple[str, ...] = ()
-
-
-@final
-@dataclass(frozen=True)
 class Entrant:
     """One to be compared: what adapts it to the questions, and what is known of its limits.
 
@@ -51,6 +37,24 @@ class Entrant:
     options: Mapping[str, Any] = field(default_factory=dict)
     limits: str = ""
     python: str = ""
+
+
+@final
+@dataclass(frozen=True)
+class Package:
+    """The requirements that pip installs into an environment of that name.
+
+    They require different versions of pinocchio, numpy and MuJoCo. `module` is what is imported. An
+    empty tuple of requirements: part of this project's own environment.
+    """
+
+    name: str
+    module: str
+    requirements: tuple[str, ...] = ()
+
+    def peer(self, asked: str, label: str, limits: str = "", **options: Any) -> Entrant:
+        """Return an entrant of a scene of `peers`: the function `asked` of the module's adapter."""
+        return Entrant(label, self, f"benchmark.peers.{self.module}:{asked}", options, limits)
 
 
 OWN = Package("task-hierarchy", "hierarchy")

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing, suppress
 from itertools import product
 from math import inf
 from pathlib import Path
@@ -41,45 +41,31 @@ class Process:
     """
 
     def __init__(self, entrant: Entrant, questions: str) -> None:
-        self.entrant, self.questions = entrant, questions
-        self._hung, self._fresh, self._starts = False, False, 0
-        self._process: subprocess.Popen[str] | None = None
-        self.about: dict[str, Any] = {}
+        self.entrant, self.questions, self._starts, self._fresh = entrant, questions, 0, True
         self._begin()
 
-    def __enter__(self) -> Process:
-        return self
-
-    def __exit__(self, *raised: object) -> None:
+    def close(self) -> None:
         """End the process."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.communicate()
-            self._log.close()
-            self._process = None
+        self._process.kill()
+        self._process.communicate()
+        self._log.close()
 
     def ask(self, question: tuple[Any, ...], limit: float) -> Any:
         """Return the answer to (METHOD, ARGUMENTS...); EndedError if none comes in `limit` [s].
 
-        The limit is of processor time, so that other work on the machine ends nobody.
-
-        The first question to a process may load and compile, and has more time; the next one after
-        an end starts a new process.
+        The limit is of processor time, so that other work on the machine ends nobody. The first
+        question to a process may load and compile, and has more time; the next one after an end
+        starts a new process.
         """
-        if self._process is None:
+        if self._log.closed:
             self._begin()
-        assert self._process is not None
+        more = START_LIMIT if self._starts == 1 else 2.0 * limit
+        more, self._fresh = more * self._fresh, False
         assert self._process.stdin is not None
-        wait, more = _WAITING * limit, START_LIMIT if self._starts == 1 else 2.0 * limit
-        if self._fresh:
-            limit, wait = limit + more, wait + more
-        self._fresh = False
-        try:
+        with suppress(OSError):  # it has ended; why, the log says
             self._process.stdin.write(json.dumps(question) + "\n")
             self._process.stdin.flush()
-        except OSError:  # it has ended; why, the log says
-            pass
-        return self._next(limit, wait)
+        return self._next(limit + more, _WAITING * limit + more)
 
     def _begin(self) -> None:
         entrant = self.entrant
@@ -99,42 +85,39 @@ class Process:
             self._log.close()
             raise MissingError(f"{python}: {error.strerror}") from error
         self._starts, self._fresh = self._starts + 1, True
-        self.about = self._next(START_LIMIT, START_LIMIT)
+        self.about: dict[str, Any] = self._next(START_LIMIT, START_LIMIT)
 
     def _next(self, limit: float, wait: float) -> Any:
-        """Return the next line; raises EndedError if there is none within the limits [s]."""
-        assert self._process is not None
+        """Return the next line; EndedError, with the last words, if none comes in time."""
         assert self._process.stdout is not None
-        self._hung = False
-        done = Event()
-        Thread(target=self._watch, args=(self._process, done, limit, wait)).start()
+        self._hung, done = False, Event()
+        Thread(target=self._watch, args=(done, limit, wait)).start()
         try:
             line = self._process.stdout.readline()
         finally:
             done.set()
         if line.endswith("\n"):
             return json.loads(line)
-        kind, why = HUNG if self._hung else CRASHED, self._last_words()
-        self.__exit__()
-        raise EndedError(kind, why)
+        code = self._process.wait()
+        self._log.seek(0)
+        words = self._log.read().strip().splitlines()[-1:]
+        self.close()
+        raise EndedError(HUNG if self._hung else CRASHED,
+                         ": ".join([f"ended with code {code}", *words]))
 
-    def _watch(self, process: subprocess.Popen[str], done: Event, limit: float, wait: float
-               ) -> None:
-        """End a process that works for `limit` [s], or for which `wait` [s] pass, before `done`."""
-        begin, until, left = _busy(process.pid), monotonic() + wait, limit
+    def _watch(self, done: Event, limit: float, wait: float) -> None:
+        """End a process that works for `limit` [s], or for which `wait` [s] pass, before `done`.
+
+        A timer in the process itself would make its clock of processor time a coarse one.
+        """
+        process, left = self._process, limit
+        begin, until = _busy(process.pid), monotonic() + wait
         while not done.wait(left):
             left = min(begin + limit - _busy(process.pid), until - monotonic())
             if left <= 0.0:
                 self._hung = True
                 process.kill()
                 return
-
-    def _last_words(self) -> str:
-        assert self._process is not None
-        code = self._process.wait()
-        self._log.seek(0)
-        lines = self._log.read().strip().splitlines()
-        return f"ended with code {code}" + (f": {lines[-1]}" if lines else "")
 
 
 def _busy(process: int) -> float:
@@ -160,7 +143,7 @@ class Field(ExitStack):
         self.missing: dict[str, str] = {}
         for one in entrants:
             try:
-                self.running[one.label] = self.enter_context(Process(one, questions))
+                self.running[one.label] = self.enter_context(closing(Process(one, questions)))
             except MissingError as error:
                 self.missing[one.label] = str(error)
 

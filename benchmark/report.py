@@ -42,9 +42,9 @@ class Report:
     missing: Mapping[str, str] = field(default_factory=dict)
     failed: bool = False
 
-    def say(self, console: Console | None = None) -> None:
+    def say(self) -> None:
         """Print the tables and texts."""
-        console = console or Console(highlight=False, markup=False)
+        console = Console(highlight=False, markup=False)
         console.print(self.title, "", sep="\n")
         for section in self.sections:
             for table in section.tables:

@@ -7,36 +7,26 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from time import perf_counter
 from typing import Any, NamedTuple
 from zipfile import ZipFile
 
 from benchmark.report import Report, Section
 from benchmark.solve.questions import resident
-from benchmark.store import Row
-from benchmark.tables import Column, Table, digits
+from benchmark.tables import Column, Row, Table, digits
 
 _ROOT = Path(__file__).parents[1]
 _REPEATED = 5        # repetitions of short processes; the minimum counts
 _KERNELS = 12        # slowest to compile, listed
-_MB = 1024.0 if sys.platform == "linux" else 1024.0**2  # units of ru_maxrss per MB
+_MOST = 300.0        # [MB] of a run, and of a worker
 
-# The peak memory of a process includes that of its parent before exec, so a small process starts
-# it.
-_LAUNCH = """\
-import json, os, sys, time
-began = time.perf_counter()
-process = os.spawnv(os.P_NOWAIT, sys.argv[2], sys.argv[2:])
-_, status, usage = os.wait4(process, 0)
-spent = [time.perf_counter() - began, usage.ru_utime + usage.ru_stime, usage.ru_maxrss]
-with open(sys.argv[1], "w") as file:
-    json.dump(spent, file)
-sys.exit(os.waitstatus_to_exitcode(status))"""
 _SOLVE = """\
 import sys
 import numpy as np
@@ -77,7 +67,11 @@ _COMMAND = """\
 import sys, tempfile
 from scenarios.cli.main import run_command
 with tempfile.TemporaryDirectory() as folder:
-    sys.exit(run_command([*sys.argv[1:], "--out", folder + "/run"]))"""
+    code = run_command([*sys.argv[1:], "--out", folder + "/run"])"""
+_MEMORY = f"""\
+{_COMMAND}
+from benchmark.solve.questions import resident
+print("[", resident() / 1024.0, "]")"""
 _SHORT = ("run", "ellipse", "--duration", "0.02")
 _COMPILE = """\
 import json, sys
@@ -98,33 +92,45 @@ jobs = [Job(str(k), text, "tpm") for k in range(20)]
 print(json.dumps([found for _, found in ended(resident_after, jobs, 1)]))"""
 
 
-class Cost(NamedTuple):
-    """One number and its upper limit, None for no limit.
+class Case(NamedTuple):
+    """Arguments of Python, the most that its start may take [s], and variables of its own.
 
-    unit : "s" or "MB". processor : processor time [s], which does not depend on other load; None if
-    it is not measured.
+    repeated : the smallest of so many times counts, since other load can only add to it; one run
+        before them fills the caches. 0 : the first run counts.
     """
 
     what: str
-    value: float
-    unit: str
-    ceiling: float | None = None
-    processor: float | None = None
+    ceiling: float | None
+    arguments: Sequence[str]
+    environment: dict[str, str] = {}  # noqa: RUF012 - read only
+    repeated: int = _REPEATED
 
-    def row(self) -> Row:
-        """Return the row of the table: whether the limit is met, "" without one."""
-        met = "" if self.ceiling is None else "met" if self.value <= self.ceiling else "not met"
-        shown = f"{self.value:.{2 if self.unit == 's' else 0}f} {self.unit}"
-        return {**self._asdict(), "verdict": met, "shown": shown}
+
+class Done(NamedTuple):
+    """Wall and processor seconds of a process, and the last line of its output, as JSON."""
+
+    seconds: float
+    processor: float
+    said: Any = None
 
 
 def run() -> Report:
     """Measure all costs."""
     with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(temporary)
-        compiled, kernels = first_compilation(folder / "cache")
-        costs = [*beginnings(folder), *compiled, library(folder), *memory(folder)]
-    rows = [cost.row() for cost in costs]
+        rows: list[Row] = []
+        for case in _cases(Path(temporary)):
+            done = _measured(case)
+            rows.append(_row(case.what, done.seconds, "s", case.ceiling, done.processor))
+            if case.arguments[-1] == _COMPILE:
+                kernels = own_seconds(done.said)
+                rows.append(_row(f"compilation of {len(kernels)} kernels", sum(kernels.values()),
+                                 "s"))
+    (run,) = _measured(Case("memory", None, ["-c", _MEMORY, "run", "ellipse", "--duration", "2"],
+                            repeated=0)).said
+    worker = _measured(Case("memory of a worker", None, ["-c", _WORKER], repeated=0)).said
+    rows += [_row("hierarchy run ellipse --duration 2", run, "MB", _MOST),
+             _row("a worker of a sweep of 20 runs", max(worker), "MB", _MOST),
+             _row("growth over the last 15 runs", worker[-1] - worker[4], "MB")]
     slowest = ", ".join(f"{name.removeprefix('solvers.kernels.')} {s:.1f}"
                         for name, s in list(kernels.items())[:_KERNELS])
     return Report("Start-up costs", [Section("", [Table("Whole processes", rows, (
@@ -135,66 +141,45 @@ def run() -> Report:
                                         for name, s in kernels.items()]})
 
 
-def beginnings(folder: Path) -> Iterator[Cost]:
-    """Time whole processes from start to end, with compiled kernels; also of a wheel in dist/.
+def _cases(folder: Path) -> Iterator[Case]:
+    """Yield what is timed from start to end: with compiled kernels, of a wheel in dist/, without.
 
-    The minimum of several repetitions counts, since other load can only add to it.
+    TASK_HIERARCHY_NATIVE and a folder of its own leave a process without compiled kernels.
     """
-    cases: list[tuple[str, float | None, list[str]]] = [
-        ("python -c pass", None, ["-c", "pass"]),
-        ("import scenarios", None, ["-c", "import scenarios"]),
-        ("import hierarchy, solvers", None, ["-c", "import hierarchy, solvers"]),
-        ("hierarchy --help", 0.5, ["-m", "scenarios.cli.start", "--help"]),
-        *((f"first answer of {name}, verified, kernels cached", 0.5, ["-c", _SOLVE, name])
-          for name in ("hcod", "tpm")),
-        *((f"first answer of {name}", None, ["-c", code]) for name, code in _PEERS.items()
-          if find_spec(name)),
-        ("first tick of ellipse, cached", None, ["-c", _TICK]),
-        (f"hierarchy {' '.join(_SHORT)}", 1.5, ["-c", _COMMAND, *_SHORT]),
-        ("the same with --figures", None, ["-c", _COMMAND, *_SHORT, "--figures"])]
-    for what, most, arguments in cases:
-        yield _least(what, most, arguments)
+    yield Case("python -c pass", None, ["-c", "pass"])
+    yield Case("import scenarios", None, ["-c", "import scenarios"])
+    yield Case("import hierarchy, solvers", None, ["-c", "import hierarchy, solvers"])
+    yield Case("hierarchy --help", 0.5, ["-m", "scenarios.cli.start", "--help"])
+    for name in ("hcod", "tpm"):
+        yield Case(f"first answer of {name}, verified, kernels cached", 0.5, ["-c", _SOLVE, name])
+    for name, code in _PEERS.items():
+        if find_spec(name):
+            yield Case(f"first answer of {name}", None, ["-c", code])
+    yield Case("first tick of ellipse, cached", None, ["-c", _TICK])
+    yield Case(f"hierarchy {' '.join(_SHORT)}", 1.5, ["-c", _COMMAND, *_SHORT])
+    yield Case("the same with --figures", None, ["-c", _COMMAND, *_SHORT, "--figures"])
     for wheel in sorted(_ROOT.glob("dist/*linux*.whl"))[-1:]:
         ZipFile(wheel).extractall(folder / "wheel")
-        for what, most, arguments in (
-                ("first answer of hcod, verified", 0.5, ["-c", _SOLVE, "hcod"]),
-                ("run of ellipse", 1.5, ["-c", _COMMAND, *_SHORT])):
-            yield _least(f"{what}, from a wheel", most, ["-P", *arguments],
-                         PYTHONPATH=str(folder / "wheel"))
+        packed = {"PYTHONPATH": str(folder / "wheel")}
+        yield Case("first answer of hcod, verified, from a wheel", 0.5,
+                   ["-P", "-c", _SOLVE, "hcod"], packed)
+        yield Case("run of ellipse, from a wheel", 1.5, ["-P", "-c", _COMMAND, *_SHORT], packed)
+    native = {"TASK_HIERARCHY_NATIVE": "1"}
+    yield Case("first answer of hcod, empty cache", None, ["-c", _SOLVE, "hcod"],
+               {**native, "NUMBA_CACHE_DIR": str(folder / "hcod")}, 0)
+    yield Case("ellipse, empty cache", None, ["-c", _COMPILE],
+               {**native, "NUMBA_CACHE_DIR": str(folder / "ellipse")}, 0)
+    yield Case("the C library, empty cache", 10.0,
+               ["-m", "scenarios.cli.start", "library", "--out", str(folder / "library")],
+               {"NUMBA_CACHE_DIR": str(folder / "kernels")}, 0)
 
 
-def _least(what: str, most: float | None, arguments: list[str], **environment: str) -> Cost:
-    _say(what)
-    _run(arguments, **environment)  # fills the caches of files, bytecode and kernels
-    done = [_run(arguments, **environment) for _ in range(_REPEATED)]
-    return Cost(what, min(one.seconds for one in done), "s", most,
-                min(one.processor for one in done))
-
-
-def first_compilation(cache: Path) -> tuple[list[Cost], dict[str, float]]:
-    """Ask hcod and run ten ticks of ellipse without cached kernels; also each kernel's own seconds.
-
-    Raises
-    ------
-    RuntimeError : the process failed.
-    """
-    _say("hcod and ellipse, empty caches")
-    first = _run(["-c", _SOLVE, "hcod"], TASK_HIERARCHY_NATIVE="1",
-                 NUMBA_CACHE_DIR=str(cache / "hcod"))
-    done = _run(["-c", _COMPILE], TASK_HIERARCHY_NATIVE="1",
-                NUMBA_CACHE_DIR=str(cache / "ellipse"))
-    own = own_seconds(json.loads(done.said.splitlines()[-1]))
-    return [Cost("first answer of hcod, empty cache", first.seconds, "s", None, first.processor),
-            Cost("ellipse, empty cache", done.seconds, "s", None, done.processor),
-            Cost(f"compilation of {len(own)} kernels", sum(own.values()), "s")], own
-
-
-def library(folder: Path) -> Cost:
-    """Make the C library without cached kernels."""
-    _say("library, empty cache")
-    done = _run(["-m", "scenarios.cli.start", "library", "--out", str(folder / "library")],
-                NUMBA_CACHE_DIR=str(folder / "kernels"))
-    return Cost("the C library, empty cache", done.seconds, "s", 10.0, done.processor)
+def _row(what: str, value: float, unit: str, ceiling: float | None = None,
+         processor: float | None = None) -> Row:
+    """Return a row of the table: whether the ceiling is met, "" without one."""
+    met = "" if ceiling is None else "met" if value <= ceiling else "not met"
+    return {"what": what, "value": value, "unit": unit, "ceiling": ceiling, "processor": processor,
+            "verdict": met, "shown": f"{value:.{2 if unit == 's' else 0}f} {unit}"}
 
 
 def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
@@ -212,17 +197,6 @@ def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
     return dict(sorted(own.items(), key=lambda item: -item[1]))
 
 
-def memory(folder: Path) -> list[Cost]:
-    """Return the peak memory [MB] of processes."""
-    _say("memory")
-    command = ["-m", "scenarios.cli.start", "run", "ellipse", "--duration", "2", "--out",
-               str(folder / "run")]
-    costs = [Cost("hierarchy run ellipse --duration 2", _run(command).memory, "MB", 300.0)]
-    after = json.loads(_run(["-c", _WORKER]).said.splitlines()[-1])
-    return [*costs, Cost("a worker of a sweep of 20 runs", max(after), "MB", 300.0),
-            Cost("growth over the last 15 runs", after[-1] - after[4], "MB")]
-
-
 def resident_after(job: Any) -> float:
     """Return the most memory [MB] that this process has had after a run of a sweep."""
     from scenarios.results.run import outcome
@@ -231,34 +205,31 @@ def resident_after(job: Any) -> float:
     return resident() / 1024.0
 
 
-class _Done(NamedTuple):
-    """Output of a process, wall and processor seconds, peak memory [MB]."""
-
-    said: str
-    seconds: float
-    processor: float
-    memory: float
-
-
-def _run(arguments: list[str], **environment: str) -> _Done:
-    """Run Python with arguments; raises RuntimeError with its output if it fails.
+def _measured(case: Case) -> Done:
+    """Return what a case takes; raises RuntimeError with its output if it fails.
 
     It keeps bytecode, as Python does unless it is told otherwise: without, it compiles each module
     that it imports, which takes longer than all else.
     """
+    print(f"{case.what} ...", file=sys.stderr, flush=True)
     kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     kept["PYTHONPATH"] = os.pathsep.join(
         filter(None, [str(_ROOT), kept.get("PYTHONPATH")]))
-    with tempfile.TemporaryDirectory() as temporary:
-        measured = Path(temporary) / "measured.json"
-        done = subprocess.run([sys.executable, "-S", "-c", _LAUNCH, str(measured), sys.executable,
-                               *arguments], capture_output=True, text=True, check=False,
-                              env={**kept, **environment})
+    found = []
+    for _ in range(1 + case.repeated):
+        began, before = perf_counter(), _busy()
+        done = subprocess.run([sys.executable, *case.arguments], capture_output=True, text=True,
+                              check=False, env={**kept, **case.environment})
+        found.append((perf_counter() - began, _busy() - before))
         if done.returncode != 0:
-            raise RuntimeError(f"{arguments}: {done.stderr.strip()}")
-        seconds, processor, memory = json.loads(measured.read_text())
-    return _Done(done.stdout, seconds, processor, memory / _MB)
+            raise RuntimeError(f"{case.arguments}: {done.stderr.strip()}")
+    last = done.stdout.splitlines()[-1:]
+    seconds, processor = map(min, zip(*(found[1:] or found), strict=True))
+    return Done(seconds, processor,
+                json.loads(last[0]) if last and last[0].startswith("[") else None)
 
 
-def _say(what: str) -> None:
-    print(f"{what} ...", file=sys.stderr, flush=True)
+def _busy() -> float:
+    """Return the processor time of all processes that have ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime

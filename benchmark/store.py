@@ -7,12 +7,11 @@ import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, final
+from typing import final
 
+from benchmark.tables import Row
 from hierarchy.errors import HierarchyError
 from scenarios.files import make_folder, named, slug, write_json, written
-
-Row = dict[str, Any]
 
 
 class StoreError(HierarchyError):

@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmark.report import Report, Section
 from benchmark.solve.judge import RIGHT, miss_of
-from benchmark.tables import Column, Table, whole
+from benchmark.tables import Column, Row, Table, whole
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cli.progress import bar
 from scenarios.problems.answers import answer
@@ -62,12 +62,13 @@ class Tally:
         self.lost += other.lost
         self.effort.update(other.effort)
 
-    def iterations_per_row(self) -> dict[str, float]:
-        """Median, 99.9th percentile and largest of iterations divided by rows; zeros if none."""
-        every = np.repeat(np.array([*self.effort]) / 100.0, [*self.effort.values()])
-        found = (np.percentile(every, (50.0, 99.9, 100.0), method="lower") if every.size
-                 else [0.0, 0.0, 0.0])
-        return dict(zip(("median", "p99.9", "most"), map(float, found), strict=True))
+    def row(self, kind: str) -> Row:
+        """Return the row of a kind: counts, median and largest of iterations divided by rows."""
+        every = np.repeat(np.array([*self.effort, 0]) / 100.0, [*self.effort.values(), 0])
+        return {"kind": kind, "problems": self.counts.total(), **self.counts,
+                "failed": len(self.failing), "lost": self.counts[CRASHED],
+                "median": np.percentile(every, 50.0, method="lower") if every.size else 0.0,
+                "most": every.max(initial=0.0)}
 
 
 def outcome(resolver: Resolver, h: Hierarchy) -> tuple[str, int]:
@@ -151,17 +152,15 @@ def report(name: str, found: Mapping[str, Tally], out: Path) -> Report:
         lines += [f"{kind}, seeds {seeds.start} to {seeds.stop - 1}: {CRASHED}"
                   for seeds in sorted(one.lost, key=lambda seeds: seeds.start)[:_KEPT]]
     every = {**found, **({ALL: total} if len(found) > 1 else {})}
-    rows = [{"kind": kind, "problems": one.counts.total(), **one.counts,
-             "failed": len(one.failing), "lost": one.counts[CRASHED], **one.iterations_per_row()}
-            for kind, one in every.items()]
     others = sorted(set(total.counts) - {CERTIFIED, CRASHED, RAISED, NOT_FINITE})
     columns = [*(Column(key, key, whole) for key in ("problems", CERTIFIED, "failed", "lost")),
                *(Column(what.lower().replace("_", "\n").replace(" ", "\n"), what,
                         lambda n: whole(n or 0)) for what in others),
                *(Column(f"steps / row\n{key}", key) for key in ("median", "most"))]
     return Report(f"{name} on generated problems", [Section("", [Table(
-        f"{name}: outcomes, each answer certified", rows, columns, "kind")], "\n".join(lines))],
-        {"stress": rows}, failed=bool(total.failing or total.lost))
+        f"{name}: outcomes, each answer certified",
+        [one.row(kind) for kind, one in every.items()], columns, "kind")], "\n".join(lines))],
+        failed=bool(total.failing or total.lost))
 
 
 def keep(name: str, seed: int, what: str, out: Path, kind: str = RECIPE) -> Path:

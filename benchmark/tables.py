@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
@@ -13,7 +13,7 @@ from rich.table import Table as Rich
 
 from scenarios.files import make_folder, named, written
 
-Row = Mapping[str, Any]
+Row = dict[str, Any]
 NONE = "–"
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
 from benchmark.report import Report, Section
-from benchmark.store import Row
-from benchmark.tables import TIMES, Column, Table, whole
+from benchmark.tables import TIMES, Column, Row, Table, whole
 from benchmark.timing import one_core, times_of
 from hierarchy import HierarchyError, State
 from hierarchy.allocation import allocate
@@ -31,20 +31,18 @@ _COLUMNS = (*TIMES, *(Column(head, f"{part}_us") for head, part in zip(
     Column("failed", "failures", whole), Column("faster", "times_faster_than_plain"))
 
 
-def run(scenario: Scenario | None = None) -> Report:
+def run() -> Report:
     """Time every tick of the letter's run under each resolver, and the plain numpy tick.
 
     The plain tick is asked at the states of the run, and must command the same.
     """
-    scenario = scenario or load("ellipse")
+    scenario, rows = load("ellipse"), list[Row]()
     path = simulate(scenario)
-    runs = runs_in_turns({spec: scenario.with_resolver(spec) for spec in SPECS}, _ROUNDS)
-    rows: list[Row] = []
-    for spec, times in runs.items():
+    for spec, times in _in_turns({spec: scenario.with_resolver(spec) for spec in SPECS}).items():
         parts = {f"{part}_us": float(np.nanmedian(some)) for part, some in zip(
             PARTS, times.T, strict=False)}
-        rows.append({"tick": spec, **parts, **of_ticks(times[:, -1])})
-    rows.append({"tick": "plain numpy", **of_ticks(1e6 * _plain(scenario, path))})
+        rows.append({"tick": spec, **parts, **_of_ticks(times[:, -1])})
+    rows.append({"tick": "plain numpy", **_of_ticks(1e6 * _plain(scenario, path))})
     for row in rows:
         row["times_faster_than_plain"] = rows[-1]["median_us"] / row["median_us"]
     title = "One control tick of ellipse, microseconds, one core, warm kernels"
@@ -52,21 +50,18 @@ def run(scenario: Scenario | None = None) -> Report:
                   {"tick": rows})
 
 
-def runs_in_turns(scenarios: Mapping[str, Scenario], rounds: int) -> dict[str, Array]:
+def _in_turns(scenarios: Mapping[str, Scenario]) -> dict[str, Array]:
     """Return the times [us] of ticks of runs, which take turns on one core: (T, 5) by label.
 
     The columns are PARTS and the whole tick; NaN where there is no answer. One run of each before
     them is not counted: it compiles and fills caches.
     """
-    found: dict[str, list[Array]] = {label: [] for label in scenarios}
     with one_core():
-        for _ in range(rounds + 1):
-            for label, scenario in scenarios.items():
-                found[label].append(_times(simulate(scenario)))
-    return {label: np.concatenate(runs[1:]) for label, runs in found.items()}
+        runs = [[_times(simulate(one)) for one in scenarios.values()] for _ in range(_ROUNDS + 1)]
+    return {label: np.concatenate(own) for label, *own in zip(scenarios, *runs[1:], strict=True)}
 
 
-def of_ticks(times: Array) -> Row:
+def _of_ticks(times: Array) -> Row:
     """Return the row of times [us] of ticks: those answered, and how many are not."""
     answered = times[~np.isnan(times)]
     return {"ticks": len(times), "failures": len(times) - len(answered), **times_of(1e3 * answered)}
@@ -102,14 +97,12 @@ class PlainTick:
     """
 
     def __init__(self, scenario: Scenario, cell: Cell) -> None:
-        if not (cell.sensor and cell.tasks.areas and cell.tasks.position and cell.tasks.pointing):
+        sensor, tasks = cell.sensor, cell.tasks
+        if not (sensor and tasks.areas and tasks.position and tasks.pointing):
             raise HierarchyError("the plain tick needs all tasks of `ellipse`")
-        self.cell, self.areas = cell, cell.tasks.areas
-        self.position, self.pointing = cell.tasks.position, cell.tasks.pointing
-        self.period = scenario.control.period
-        self.obstacles = cell.sensor.obstacles.centres
-        self.frame = cell.tasks.position.frame
-        self.log: list[tuple[object, ...]] = []
+        self.areas, self.position, self.pointing = tasks.areas, tasks.position, tasks.pointing
+        self.obstacles, self.frame = sensor.obstacles.centres, tasks.position.frame
+        self.cell, self.period, self.log = cell, scenario.control.period, list[tuple[Any, ...]]()
 
     def step(self, t: float, q: Array, v: Array) -> Array:
         """Sense, allocate, stack, resolve, integrate, record; return the acceleration."""

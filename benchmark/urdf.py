@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import pinocchio as pin
 
 from hierarchy.errors import RobotError
 from hierarchy.problem import Array
@@ -44,29 +43,17 @@ def urdf(robot: Robot, frames: Sequence[Frame] | None = None) -> str:
         joint = _add_joint(root, bodies[i].name, "revolute", links[bodies[i].parent], links[i + 1],
                            bodies[i].position, bodies[i].rotation)
         ET.SubElement(joint, "axis", xyz=_AXES[axes[i - floating]])
-        _add_limits(joint, robot, i)
+        q, v = robot.model.joints[i + 1].idx_q, robot.model.joints[i + 1].idx_v
+        ET.SubElement(joint, "limit", lower=repr(float(robot.lower[q])),
+                      upper=repr(float(robot.upper[q])),
+                      velocity=repr(float(robot.velocity_limit[v])),
+                      effort=repr(float(robot.effort_limit[v])))
     for frame in [robot.frame(robot.end_effector)] if frames is None else frames:
         ET.SubElement(root, "link", name=frame.name)
         _add_joint(root, f"to {frame.name}", "fixed", links[frame.joint], frame.name,
                    frame.offset, frame.rotation)
     ET.indent(root)
     return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-
-
-def _add_limits(joint: ET.Element, robot: Robot, i: int) -> None:
-    """Add the limits of joint i, counted with the floating base."""
-    q, v = robot.model.joints[i + 1].idx_q, robot.model.joints[i + 1].idx_v
-    ET.SubElement(joint, "limit", lower=repr(float(robot.lower[q])),
-                  upper=repr(float(robot.upper[q])),
-                  velocity=repr(float(robot.velocity_limit[v])),
-                  effort=repr(float(robot.effort_limit[v])))
-
-
-def roll_pitch_yaw(R: Array) -> Array:
-    """Return the angles (3,) [rad] with R = Rz(yaw) Ry(pitch) Rx(roll), as URDF has them."""
-    with warnings.catch_warnings():  # of a pitch of 90 deg, where yaw is arbitrary and set to 0
-        warnings.simplefilter("ignore", UserWarning)
-        return np.asarray(Rotation.from_matrix(R).as_euler("xyz"))
 
 
 def _add_link(root: ET.Element, name: str, body: Body) -> None:
@@ -81,7 +68,8 @@ def _add_link(root: ET.Element, name: str, body: Body) -> None:
 def _add_joint(root: ET.Element, name: str, kind: str, parent: str, child: str, position: Array,
                rotation: Array) -> ET.Element:
     joint = ET.SubElement(root, "joint", name=name, type=kind)
-    ET.SubElement(joint, "origin", xyz=_numbers(position), rpy=_numbers(roll_pitch_yaw(rotation)))
+    ET.SubElement(joint, "origin", xyz=_numbers(position),
+                  rpy=_numbers(pin.rpy.matrixToRpy(rotation)))
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
     return joint

@@ -10,15 +10,15 @@ a class or function, OPTIONS its arguments in JSON.
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import sys
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import version
-from pathlib import Path
+from runpy import run_path
 from time import get_clock_info, perf_counter_ns, process_time_ns
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 _FINE = get_clock_info("process_time").resolution < 1e-6  # coarse on some systems
@@ -55,15 +55,8 @@ def main() -> None:
 def load(place: str) -> Any:
     """Return what MODULE:NAME or FILE.py:NAME names."""
     module, _, name = place.rpartition(":")
-    if not module.endswith(".py"):
-        return getattr(import_module(module), name)
-    spec = importlib.util.spec_from_file_location(Path(module).stem, module)
-    assert spec is not None
-    assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = made
-    spec.loader.exec_module(made)
-    return getattr(made, name)
+    own = SimpleNamespace(**run_path(module)) if module.endswith(".py") else import_module(module)
+    return getattr(own, name)
 
 
 def timed(call: Callable[[], Any], repeats: Repeats = Repeats()  # noqa: B008

@@ -59,10 +59,7 @@ def of_tasks(configuration: Any, tasks: Sequence[Any], limits: tuple[Array, Arra
         configuration.update(q)
         return float(np.linalg.norm([task.compute_error(configuration) for task in tasks]))
 
-    def step(q: Array) -> Array:
-        return np.asarray(np.clip(q + velocity() * PERIOD, *limits))
-
-    return iterated(aim, at, step, tolerance)
+    return iterated(aim, at, lambda q: np.clip(q + velocity() * PERIOD, *limits), tolerance)
 
 
 def position_only(task: type[Any]) -> type[Any]:
@@ -73,20 +70,25 @@ def position_only(task: type[Any]) -> type[Any]:
 
 
 def of_program(scene: Arm, configuration: Any, aim: Callable[[Array, Array], None],
-               build: Callable[[], Any]) -> tuple[Any, Any]:
+               build: Callable[..., Any], position: Any, still: Sequence[Any], hard: bool
+               ) -> tuple[Any, Any]:
     """Return velocity and resolve of pink or mink: the two steps of their `solve_ik`.
 
-    aim : takes goal and rate of the path. build : returns the program at the configuration.
+    aim : takes goal and rate of the path. build : their `build_ik`. position, still : the tasks,
+    of which the first is a constraint if `hard`.
     """
     import qpsolvers  # placo's environment has none
 
     problem: Any = None
+    for task in still:
+        task.set_target(np.array(scene.posture))
+    asked = {"tasks": still, "constraints": [position]} if hard else {"tasks": [position, *still]}
 
     def velocity(t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         nonlocal problem
         configuration.update(q)
         aim(goal, rate)
-        problem = build()
+        problem = build(configuration, dt=scene.period, **asked)
         found = resolve()
         if not found.found or found.x is None:
             raise RefusedError("no solution")

@@ -27,9 +27,9 @@ def arm(scene: Arm, posture: bool) -> tuple[Any, Any]:
         pin.computeJointJacobians(model, data, q)
         p = pin.updateFramePlacement(model, data, frame).translation
         A[:3] = pin.getFrameJacobian(model, data, frame, _AXES)[:3]
-        lower[n:n + 3] = upper[n:n + 3] = rate + scene.gain * (goal - p)
+        lower[n:n + 3] = upper[n:n + 3] = scene.wanted(p, goal, rate)
         if posture:
-            lower[n + 3:] = upper[n + 3:] = scene.posture_gain * (np.array(scene.posture) - q)
+            lower[n + 3:] = upper[n + 3:] = scene.still(q)
         x, _, flag, _ = daqp.solve(*asked)
         if flag <= 0:
             raise RefusedError(f"exit flag {flag}")

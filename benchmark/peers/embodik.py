@@ -26,9 +26,9 @@ def arm(scene: Arm, posture: bool) -> tuple[Any, None]:
     def velocity(t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         robot.update_kinematics(q)
         p = np.asarray(robot.get_frame_pose(scene.frame).translation)  # the task lags a tick
-        position.set_target_velocity(rate + scene.gain * (goal - p))
+        position.set_target_velocity(scene.wanted(p, goal, rate))
         if joints is not None:
-            joints.set_target_velocity(scene.posture_gain * (np.array(scene.posture) - q))
+            joints.set_target_velocity(scene.still(q))
         found: Any = solver.solve_velocity(q)
         if found.status != embodik.SolverStatus.SUCCESS:
             raise ArithmeticError(str(found.status))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import mink
@@ -18,22 +19,17 @@ def arm(scene: Arm, posture: bool, hard: bool = False) -> tuple[Any, Any]:
     configuration = mink.Configuration(model, np.array(scene.start))
     kind = position_only(mink.FrameTask) if hard else mink.FrameTask
     position = kind(scene.frame, "body", position_cost=scene.ratio, orientation_cost=0.0)
-    tasks = ([mink.PostureTask(model, cost=1.0, gain=scene.posture_gain * scene.period)]
-             if posture else [])
-    for task in tasks:
-        task.set_target(np.array(scene.posture))
+    still = [mink.PostureTask(model, cost=1.0, gain=scene.posture_gain * scene.period)] * posture
     limits = [mink.VelocityLimit(model, dict(zip(scene.joints, scene.limit, strict=True)))]
 
     def aim(goal: Array, rate: Array) -> None:
         now = configuration.get_transform_frame_to_world(scene.frame, "body")
-        p = now.translation()
         position.set_target(mink.SE3.from_rotation_and_translation(
-            now.rotation(), p + scene.period * (rate + scene.gain * (goal - p))))
+            now.rotation(), scene.after(now.translation(), goal, rate)))
         configuration.check_limits(safety_break=False)
 
-    return of_program(scene, configuration, aim, lambda: mink.build_ik(
-        configuration, tasks if hard else [position, *tasks], scene.period, limits=limits,
-        constraints=[position] if hard else None))
+    return of_program(scene, configuration, aim, partial(mink.build_ik, limits=limits), position,
+                      still, hard)
 
 
 def reach(file: str, frames: list[str], tolerance: float) -> Any:

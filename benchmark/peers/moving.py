@@ -9,25 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmark import figures
-from benchmark.packages import (
-    DAQP,
-    EMBODIK,
-    FRAX,
-    MINK,
-    OWN,
-    PINK,
-    PLACO,
-    ROBOPLAN,
-    TSID,
-    Entrant,
-)
+from benchmark import figures, packages
+from benchmark.packages import Entrant
 from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
 from benchmark.peers.scenes import Arm
 from benchmark.process import START_LIMIT, EndedError
 from benchmark.report import Report, Section
-from benchmark.store import Row
-from benchmark.tables import Column, Table, power, text
+from benchmark.tables import Column, Row, Table, power, text
 from benchmark.urdf import urdf
 from hierarchy import Robot, State
 from hierarchy.paths import Still
@@ -40,32 +28,27 @@ STEP = (-0.3, 0.15, -0.25)                                 # [m]
 POSTURE = (1.2, 0.6, -1.0, -1.2, 1.0, -0.9, 1.0)           # [rad] from the start
 _SETTLED = 3.0     # [s] after which the start off the path has no influence
 _AT_LIMIT = 1e-6   # [rad/s]
-_HERE = "benchmark.peers"
-_ANY, _KINDS = "any, in any level", "of its own kinds"
+_FIRST, _ANY, _OWN = "bounds of joints, first", "any, in any level", "of its own kinds, hard"
 
 ENTRANTS = (
-    *(Entrant(name, OWN, f"{_HERE}.ours:arm", {"resolver": name}, f"strict; {rows}")
-      for name, rows in (("tpm", "bounds of joints, first"), ("sns", "bounds of joints, first"),
-                         ("hcod", _ANY))),
-    Entrant("weighted", OWN, f"{_HERE}.ours:arm", {"resolver": "weighted", "ratio": 1000.0},
-            f"weights; {_ANY}"),
-    Entrant("DAQP by hand", DAQP, f"{_HERE}.daqp:arm", {}, f"strict, softened; {_ANY}"),
-    *(Entrant(f"placo{name}", PLACO, f"{_HERE}.placo:arm", {"priority": priority},
-              f"{words}; {_KINDS}, hard or soft")
-      for name, priority, words in (("", "soft", "weights"),
-                                    (" hard", "hard", "hard, then weights"),
-                                    (" scaled", "scaled", "scaled, then weights"))),
-    *(Entrant(label + " hard" * hard, package, f"{_HERE}.{module}:arm", {"hard": hard},
-              f"{'hard, then ' * hard}weights; {rows}, hard")
-      for label, package, module, rows in (("tsid", TSID, "tsid", _KINDS),
-                                           ("mink", MINK, "mink", "any"),
-                                           ("pink", PINK, "pink", "any"))
+    packages.OWN.peer("arm", "tpm", f"strict; {_FIRST}", resolver="tpm"),
+    packages.OWN.peer("arm", "sns", f"strict; {_FIRST}", resolver="sns"),
+    packages.OWN.peer("arm", "hcod", f"strict; {_ANY}", resolver="hcod"),
+    packages.OWN.peer("arm", "weighted", f"weights; {_ANY}", resolver="weighted", ratio=1000.0),
+    packages.DAQP.peer("arm", "DAQP by hand", f"strict, softened; {_ANY}"),
+    *(packages.PLACO.peer("arm", label, f"{words}; {_OWN} or soft", priority=priority)
+      for label, priority, words in (("placo", "soft", "weights"),
+                                     ("placo hard", "hard", "hard, then weights"),
+                                     ("placo scaled", "scaled", "scaled, then weights"))),
+    *(package.peer("arm", package.module + " hard" * hard, f"{'hard, then ' * hard}weights; {rows}",
+                   hard=hard)
+      for package, rows in ((packages.TSID, _OWN), (packages.MINK, "any, hard"),
+                            (packages.PINK, "any, hard"))
       for hard in (False, True)),
-    Entrant("embodiK", EMBODIK, f"{_HERE}.embodik:arm", {}, f"strict, scaled; {_KINDS}, hard"),
-    *(Entrant(label, ROBOPLAN, f"{_HERE}.roboplan:arm", {"levels": label != "OInK"},
-              f"{words}; {_KINDS}, hard")
-      for label, words in (("OInK", "weights"), ("OInK levels", "strict below a whole pose"))),
-    Entrant("frax", FRAX, f"{_HERE}.frax:arm", {}, "strict, then clipped; limits of joints"),
+    packages.EMBODIK.peer("arm", "embodiK", f"strict, scaled; {_OWN}"),
+    packages.ROBOPLAN.peer("arm", "OInK", f"weights; {_OWN}", levels=False),
+    packages.ROBOPLAN.peer("arm", "OInK levels", f"strict below a whole pose; {_OWN}", levels=True),
+    packages.FRAX.peer("arm", "frax", "strict, then clipped; limits of joints"),
 )
 NOTES = """\
 Times in microseconds, one core, from Python. tick: kinematics, rows, solve. solve: the solve \

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,20 +24,16 @@ def arm(scene: Arm, posture: bool, hard: bool = False) -> tuple[Any, Any]:
     configuration = Configuration(model, model.createData(), np.array(scene.start))
     kind = position_only(FrameTask) if hard else FrameTask
     position = kind(scene.frame, position_cost=scene.ratio, orientation_cost=0.0)
-    tasks = [PostureTask(cost=1.0, gain=scene.posture_gain * scene.period)] if posture else []
-    for task in tasks:
-        task.set_target(np.array(scene.posture))
+    still = [PostureTask(cost=1.0, gain=scene.posture_gain * scene.period)] * posture
     limits = [VelocityLimit(model, np.array(scene.limit))]
 
     def aim(goal: Array, rate: Array) -> None:
         now = configuration.get_transform_frame_to_world(scene.frame)
-        asked = rate + scene.gain * (goal - now.translation)
-        position.set_target(pin.SE3(now.rotation, now.translation + scene.period * asked))
+        position.set_target(pin.SE3(now.rotation, scene.after(now.translation, goal, rate)))
         configuration.check_limits(safety_break=True)
 
-    return of_program(scene, configuration, aim, lambda: build_ik(
-        configuration, tasks if hard else [position, *tasks], scene.period, limits=limits,
-        constraints=[position] if hard else None))
+    return of_program(scene, configuration, aim, partial(build_ik, limits=limits), position, still,
+                      hard)
 
 
 def reach(file: str, frames: list[str], tolerance: float) -> Any:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import placo
 
 from benchmark.peers.common import PERIOD, iterated
@@ -40,16 +43,16 @@ def arm(scene: Arm, posture: bool, priority: str = "soft") -> tuple[Any, None]:
         robot.state.q[_BASE + 1:] = q
         robot.update_kinematics()
         p = robot.get_T_world_frame(scene.frame)[:3, 3]
-        position.target_world = p + scene.period * (rate + scene.gain * (goal - p))
+        position.target_world = scene.after(p, goal, rate)
         if joints is not None:
-            wanted = q + scene.period * scene.posture_gain * (np.array(scene.posture) - q)
-            joints.set_joints(dict(zip(scene.joints, wanted, strict=True)))
+            joints.set_joints(dict(zip(scene.joints, q + scene.period * scene.still(q),
+                                       strict=True)))
         return np.asarray(solver.solve(False)[-len(q):] / scene.period)
 
     return velocity, None
 
 
-def stand(scene: Stand) -> tuple[Any, Any, None]:
+def stand(scene: Stand) -> tuple[Any, None]:
     """Planar contacts and limits hard; a task for the centre of mass, each hand and the joints."""
     robot = placo.RobotWrapper(scene.file, placo.Flags.ignore_collisions)
     to_theirs = [list(robot.joint_names()).index(name) for name in scene.joints]
@@ -62,36 +65,6 @@ def stand(scene: Stand) -> tuple[Any, Any, None]:
         robot.update_kinematics()
 
     place(np.array(scene.rest), np.zeros(len(scene.rest) - 1))
-    solver = _dynamics(scene, robot)
-    soles = [_contact(scene, robot, solver, sole) for sole in scene.soles]
-    tasks = [_added(solver.add_com_task(np.zeros(3)), "com", scene.com),
-             *(_added(solver.add_position_task(hand, np.zeros(3)), hand, scene.hand)
-               for hand in scene.hands)]
-    joints = _added(solver.add_joints_task(), "posture", scene.joint)
-    joints.set_joints(dict(zip(scene.joints, scene.posture, strict=True)))
-    found: Any = None
-
-    def tick(t: float, q: Array, v: Array, targets: Array) -> None:
-        nonlocal found
-        place(q, v)
-        for task, (p, dp, ddp) in zip(tasks, targets, strict=True):
-            task.target_world, task.dtarget_world, task.ddtarget_world = p, dp, ddp
-        found = solver.solve(False)
-        if not found.success:
-            raise RefusedError("no success")
-
-    def answer() -> Answer:
-        a, torques, wrenches = np.array(found.qdd), np.array(found.tau), []
-        for contact, sole in zip(soles, scene.soles, strict=True):
-            R, w = robot.get_T_world_frame(sole)[:3, :3], np.array(contact.wrench)
-            wrenches.append(np.concatenate([R @ w[:3], R @ w[3:]]))
-        return Answer(np.concatenate([a[:_BASE], a[_BASE:][to_theirs]]),
-                      torques[_BASE:][to_theirs], np.array(wrenches))
-
-    return tick, answer, None
-
-
-def _dynamics(scene: Stand, robot: Any) -> Any:
     solver = placo.DynamicsSolver(robot)
     solver.dt = scene.period
     solver.enable_joint_limits(False)
@@ -99,26 +72,50 @@ def _dynamics(scene: Stand, robot: Any) -> Any:
     solver.enable_torque_limits(True)
     for name, limit in zip(scene.joints, scene.torque, strict=True):
         robot.set_torque_limit(name, limit)
-    return solver
+    soles = [_contact(scene, robot, solver, sole) for sole in scene.soles]
+    tasks = [_added(solver.add_com_task(np.zeros(3)), "com", scene.com),
+             *(_added(solver.add_position_task(hand, np.zeros(3)), hand, scene.hand)
+               for hand in scene.hands)]
+    joints = _added(solver.add_joints_task(), "posture", scene.joint)
+    joints.set_joints(dict(zip(scene.joints, scene.posture, strict=True)))
+
+    def tick(t: float, q: Array, v: Array, targets: Array) -> Callable[[], Answer]:
+        place(q, v)
+        for task, (p, dp, ddp) in zip(tasks, targets, strict=True):
+            task.target_world, task.dtarget_world, task.ddtarget_world = p, dp, ddp
+        found = solver.solve(False)
+        if not found.success:
+            raise RefusedError("no success")
+        return partial(answer, found)
+
+    def answer(found: Any) -> Answer:
+        a, torques, wrenches = np.array(found.qdd), np.array(found.tau), []
+        for contact, sole in zip(soles, scene.soles, strict=True):
+            R, w = robot.get_T_world_frame(sole)[:3, :3], np.array(contact.wrench)
+            wrenches.append(np.concatenate([R @ w[:3], R @ w[3:]]))
+        return Answer(np.concatenate([a[:_BASE], a[_BASE:][to_theirs]]),
+                      torques[_BASE:][to_theirs], np.array(wrenches))
+
+    return tick, None
 
 
 def _contact(scene: Stand, robot: Any, solver: Any, sole: str) -> Any:
     task = solver.add_frame_task(sole, robot.get_T_world_frame(sole))
     task.configure(sole, "hard", 1.0, 1.0)
     for part in (task.position(), task.orientation()):
-        part.kp, part.kd = scene.contact.stiffness, scene.contact.damping
+        part.kp, part.kd = scene.contact[:2]
     contact = solver.add_planar_contact(task)
     contact.length, contact.width = 2 * scene.half[0], 2 * scene.half[1]
     contact.mu = scene.friction
     contact.unilateral = True
-    contact.weight_forces = scene.force**2
-    contact.weight_moments = contact.weight_tangentials = scene.force**2
+    contact.weight_forces = contact.weight_moments = scene.force**2
+    contact.weight_tangentials = scene.force**2
     return contact
 
 
 def _added(task: Any, name: str, gains: Gains) -> Any:
-    task.configure(name, "soft", gains.weight**2)
-    task.kp, task.kd = gains.stiffness, gains.damping
+    task.kp, task.kd, weight = gains
+    task.configure(name, "soft", weight**2)
     return task
 
 
@@ -139,19 +136,12 @@ def reach(file: str, frames: list[str], tolerance: float) -> Any:
     def at(q: Array) -> float:
         robot.state.q[_BASE + 1:] = q
         robot.update_kinematics()
-        return float(np.linalg.norm([_apart(robot.get_T_world_frame(name), pose)
-                                     for name, pose in zip(frames, goals, strict=True)]))
+        return float(np.linalg.norm([
+            [pose[:3, 3] - here[:3, 3], pin.log3(pose[:3, :3] @ here[:3, :3].T)]
+            for here, pose in zip(map(robot.get_T_world_frame, frames), goals, strict=True)]))
 
     def step(q: Array) -> Array:
         solver.solve(True)
         return np.array(robot.state.q[_BASE + 1:])
 
     return iterated(aim, at, step, tolerance)
-
-
-def _apart(here: Array, there: Array) -> float:
-    """Return the length of position [m] and rotation error [rad] together."""
-    turn = there[:3, :3] @ here[:3, :3].T
-    angle = np.arctan2(np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0],
-                                       turn[1, 0] - turn[0, 1]]) / 2, (np.trace(turn) - 1.0) / 2)
-    return float(np.hypot(np.linalg.norm(here[:3, 3] - there[:3, 3]), angle))

@@ -104,21 +104,21 @@ class Standing(_Ticks):
 
     def open(self, numbers: dict[str, Any], states: dict[str, Any]) -> None:
         """Take the scene and its states: lists t, q and v."""
-        self.scene, self.at = Stand.of(numbers), 0
+        self.scene, self.at = Stand(**numbers), 0
         self.states = [(t, np.array(q), np.array(v), self.scene.targets(t)) for t, q, v in zip(
             *(states[key] for key in ("t", "q", "v")), strict=True)]
         joints = len(self.scene.joints)
         self.none = np.full(joints + 6, np.nan), np.full(joints, np.nan), np.full((2, 6), np.nan)
-        self.call, self.answer, self.resolve = self.make(self.scene)
+        self.call, self.resolve = self.make(self.scene)
 
     def tick(self) -> dict[str, Any]:
         """Ask at the next state."""
         i = self.at % len(self.states)
         self.at += 1
-        done, spent = self._asked(lambda *state: (self.call(*state), True), *self.states[i])
-        again = self._again() if done else 0
-        a, torques, wrenches = self.answer() if done else self.none
-        return {"state": i, "failed": not done, "time": spent, "resolve": again, "a": a,
+        answer, spent = self._asked(self.call, *self.states[i])
+        again = 0 if answer is None else self._again()
+        a, torques, wrenches = self.none if answer is None else answer()
+        return {"state": i, "failed": answer is None, "time": spent, "resolve": again, "a": a,
                 "torques": torques, "wrenches": wrenches}
 
 

@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmark.packages import MINK, OWN, PINK, PLACO, Entrant
+from benchmark.packages import MINK, OWN, PINK, PLACO
 from benchmark.process import Field
 from benchmark.report import Report, Section
-from benchmark.store import Row
-from benchmark.tables import Column, Table, power
+from benchmark.tables import Column, Row, Table, power
 from benchmark.timing import times_of
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
@@ -28,8 +27,8 @@ STARTS = 20          # configurations that each problem may be started from
 LIMIT = 60.0         # [s] for one pose
 _OUT = 1.5           # how much further than the furthest of the reachable ones
 
-ENTRANTS = tuple(Entrant(name, package, f"benchmark.peers.{name}:reach") for name, package in (
-    ("ours", OWN), ("pink", PINK), ("mink", MINK), ("placo", PLACO)))
+ENTRANTS = (OWN.peer("reach", "ours"), *(
+    package.peer("reach", package.module) for package in (PINK, MINK, PLACO)))
 _COLUMNS = (Column("reached\n%", "reached %"), Column("beyond\nlimits %", "beyond limits %"),
             Column("error,\nmedian", "error, median", power), Column("ms,\nmedian", "ms, median"),
             Column("\np95", "ms, p95"))

@@ -32,7 +32,7 @@ def arm(scene: Arm, posture: bool, levels: bool = False) -> tuple[Any, None]:
 
     def velocity(t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         now = model.forwardKinematics(q, scene.frame)
-        now[:3, 3] += scene.period * (rate + scene.gain * (goal - now[:3, 3]))
+        now[:3, 3] = scene.after(now[:3, 3], goal, rate)
         position.setTargetFrameTransform(now)
         step = np.zeros(len(q))
         oink.solveIk(q, tasks, limits, step)

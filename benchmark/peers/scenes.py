@@ -1,18 +1,18 @@
 """What is asked, as plain numbers that go through JSON, and what an adapter is. Needs only numpy.
 
     arm(scene, posture, **options)           -> velocity, resolve
-    stand(scene, **options)                  -> tick, answer, resolve
+    stand(scene, **options)                  -> tick, resolve
     reach(file, frames, tolerance, **options) -> solve
 
 velocity(t, q, v, goal, rate) returns joint velocities (n,), one whole tick: q, v (n,) are joint
 positions and the velocities with which they were reached, goal (3,) [m] and rate (3,) [m/s] those
 of the path at t [s]; `posture` says whether the posture is asked for. tick(t, q, v, targets) does
-one whole tick and answer() returns its `Answer`: q (n + 1,) has the base's position and quaternion
-(x, y, z, w) first, v (n,) the base's velocity in its own axes; targets (3, 3, 3) are position,
-velocity and acceleration of the centre of mass and both hands. resolve() solves the last tick's
-problem again and nothing else; None where a package cannot. solve(poses, starts) returns the best
-configuration for poses (frames, 4, 4) from starts (s, nq), and whether it is within the tolerance.
-Any exception is a failure.
+one whole tick and returns what reads its `Answer`: q (n + 1,) has the base's position and
+quaternion (x, y, z, w) first, v (n,) the base's velocity in its own axes; targets (3, 3, 3) are
+position, velocity and acceleration of the centre of mass and both hands. resolve() solves the last
+tick's problem again and nothing else; None where a package cannot. solve(poses, starts) returns the
+best configuration for poses (frames, 4, 4) from starts (s, nq), and whether it is within the
+tolerance. Any exception is a failure.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Numbers = Sequence[float]
+Gains = tuple[float, float, float]
 
 
 class RefusedError(Exception):
@@ -59,10 +60,21 @@ class Arm:
     ratio: float = 1000.0
     period: float = 1e-3
 
-    def target(self, t: float) -> tuple[Array, Array]:
-        """Position (3,) [m] and velocity (3,) [m/s] of the path at t [s]."""
-        p, dp, _ = circle(t, self.centre, self.cosine, self.sine, self.turning)
-        return p, dp
+    def target(self, t: float) -> Array:
+        """Position [m] and velocity [m/s] of the path at t [s]: (2, 3)."""
+        return circle(t, self.centre, self.cosine, self.sine, self.turning)[:2]
+
+    def wanted(self, p: Array, goal: Array, rate: Array) -> Array:
+        """Velocity (3,) [m/s] asked of the end effector at p (3,) [m]."""
+        return rate + self.gain * (goal - p)
+
+    def after(self, p: Array, goal: Array, rate: Array) -> Array:
+        """Position (3,) [m] one period later with that velocity."""
+        return p + self.period * self.wanted(p, goal, rate)
+
+    def still(self, q: Array) -> Array:
+        """Velocity (n,) [rad/s] that the posture asks for at q (n,) [rad]."""
+        return self.posture_gain * (np.array(self.posture) - q)
 
 
 class Answer(NamedTuple):
@@ -79,16 +91,6 @@ class Answer(NamedTuple):
 
 @final
 @dataclass(frozen=True)
-class Gains:
-    """Stiffness [1/s^2], damping [1/s], and weight of the rows where there are no levels."""
-
-    stiffness: float
-    damping: float
-    weight: float = 1.0
-
-
-@final
-@dataclass(frozen=True)
 class Stand:
     """A humanoid on two soles: circles of its centre of mass and hands, a posture, least forces.
 
@@ -96,7 +98,8 @@ class Stand:
     limits (n - 6,) [N m]; soles, hands : frames. half : of length and width of a sole [m].
     friction : of the pyramid's faces, f_t <= friction f_n along each axis of the sole.
     circles : centre, cosine, sine (3,) [m] and rate [rad/s] of centre of mass, left and right hand.
-    rest (n + 1,) : where the soles touch the floor.
+    rest (n + 1,) : where the soles touch the floor. contact, com, hand, joint : stiffness [1/s^2],
+    damping [1/s], and weight of the rows where there are no levels; force : weight of the least.
     """
 
     file: str
@@ -109,18 +112,12 @@ class Stand:
     circles: Sequence[Any]
     half: Numbers = (0.105, 0.04)
     friction: float = 0.4
-    contact: Gains = Gains(100.0, 20.0)
-    com: Gains = Gains(40.0, 13.0)
-    hand: Gains = Gains(100.0, 20.0)
-    joint: Gains = Gains(30.0, 11.0, 0.3)
+    contact: Gains = (100.0, 20.0, 1.0)
+    com: Gains = (40.0, 13.0, 1.0)
+    hand: Gains = (100.0, 20.0, 1.0)
+    joint: Gains = (30.0, 11.0, 0.3)
     force: float = 3e-3
     period: float = 1e-3
-
-    @classmethod
-    def of(cls, numbers: dict[str, Any]) -> Stand:
-        """Return the scene of `dataclasses.asdict`, after JSON."""
-        gains = {key: Gains(**numbers[key]) for key in ("contact", "com", "hand", "joint")}
-        return cls(**numbers | gains)
 
     @property
     def corners(self) -> Array:

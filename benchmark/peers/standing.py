@@ -6,7 +6,6 @@ Every answer is judged by our model, and from its accelerations, torques and wre
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
@@ -14,13 +13,12 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import nnls
 
-from benchmark.packages import OWN, PLACO, TSID, Entrant
+from benchmark.packages import OWN, PLACO, TSID
 from benchmark.peers.compare import TICK, Log, measure, times, turns
-from benchmark.peers.ours import TASKS, robot_of, stack_of
+from benchmark.peers.hierarchy import TASKS, robot_of, stack_of
 from benchmark.peers.scenes import Stand
 from benchmark.report import Report, Section
-from benchmark.store import Row
-from benchmark.tables import Column, Table, power, text, whole
+from benchmark.tables import Column, Row, Table, power, text, whole
 from benchmark.urdf import urdf
 from hierarchy import Robot, Stack, State
 from hierarchy.paths import Ellipse, Still
@@ -38,15 +36,14 @@ _RATE = 2 * np.pi     # [rad/s]
 _SOLE = 0.055         # [m] from the foot's frame forward to the middle of the sole
 _NOISE = 1e-4, 1e-3   # standard deviation of q [rad, m] and v [rad/s, m/s], as from sensors
 _SEED = 16
-_HERE = "benchmark.peers"
 _WEIGHTS = "2 levels, weights"
 
 ENTRANTS = (
-    Entrant("hcod", OWN, f"{_HERE}.ours:stand", {"resolver": "hcod"}, "7 strict levels"),
-    Entrant("weighted", OWN, f"{_HERE}.ours:stand", {"resolver": "weighted"}, _WEIGHTS),
-    Entrant("tsid fast", TSID, f"{_HERE}.tsid:stand", {"solver": "SolverHQuadProgFast"}, _WEIGHTS),
-    Entrant("tsid", TSID, f"{_HERE}.tsid:stand", {"solver": "SolverHQuadProg"}, _WEIGHTS),
-    Entrant("placo", PLACO, f"{_HERE}.placo:stand", {}, _WEIGHTS),
+    OWN.peer("stand", "hcod", "7 strict levels", resolver="hcod"),
+    OWN.peer("stand", "weighted", _WEIGHTS, resolver="weighted"),
+    TSID.peer("stand", "tsid fast", _WEIGHTS, solver="SolverHQuadProgFast"),
+    TSID.peer("stand", "tsid", _WEIGHTS, solver="SolverHQuadProg"),
+    PLACO.peer("stand", "placo", _WEIGHTS),
 )
 NOTES = """\
 tick: kinematics, dynamics, rows, solve, torques, from Python [us]. solve: the solve alone, where \
@@ -61,19 +58,19 @@ _MISSES = (*(Column("\n".join((*task.split(), of)), f"{task} {of}", power)
            Column("priorities", "kind", text), Column("version", "version", str))
 
 
-def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = TICKS) -> Report:
+def run() -> Report:
     """Ask all entrants at the same states, and judge their answers by our model.
 
-    They take turns until each has been asked `ticks` times, after one turn over all states, which
+    They take turns until each has been asked TICKS times, after one turn over all states, which
     compiles, fills caches and is not counted.
     """
     with tempfile.TemporaryDirectory() as temporary:
         scene = make_scene(Path(temporary))
-        states = followed(scene, ticks)
+        states = followed(scene, TICKS)
         asked = {key: values.tolist() for key, values in states.items()}
         of = Judge(scene, states)
-        rows, missing = measure(entrants, QUESTIONS, [("open", asdict(scene), asked),
-                                                      *turns(ticks, ticks, 250, 20)],
+        rows, missing = measure(ENTRANTS, QUESTIONS, [("open", asdict(scene), asked),
+                                                      *turns(TICKS, TICKS, 250, 20)],
                                 lambda log, _: judge(log, of))
     title = "One tick of inverse dynamics of a humanoid on two feet"
     tables = [Table(title, rows, _COLUMNS), Table("Missed by each task", rows, _MISSES)]

@@ -5,6 +5,8 @@ It holds no references of its own: tasks, contacts and samples are kept by what 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -60,10 +62,10 @@ def arm(scene: Arm, posture: bool, hard: bool = False) -> tuple[Any, Any]:
         # The position is needed before computeProblemData, which computes it as well.
         data = formulation.data()
         pin.framesForwardKinematics(robot.model(), data, q)
-        off = goal - data.oMf[position.frame_id].translation
-        wanted.derivative(np.append(rate + scene.gain * off, _STILL))
+        p = data.oMf[position.frame_id].translation
+        wanted.derivative(np.append(scene.wanted(p, goal, rate), _STILL))
         position.setReference(wanted)
-        rates.derivative(scene.posture_gain * (np.array(scene.posture) - q))
+        rates.derivative(scene.still(q))
         joints.setReference(rates)
         sized, problem = problem is not None, formulation.computeProblemData(t, q, v)
         if not sized:
@@ -74,7 +76,7 @@ def arm(scene: Arm, posture: bool, hard: bool = False) -> tuple[Any, Any]:
     return velocity, lambda: solver.solve(problem)
 
 
-def stand(scene: Stand, solver: str) -> tuple[Any, Any, Any]:
+def stand(scene: Stand, solver: str) -> tuple[Any, Any]:
     """Physics, contacts, friction and torque limits hard; the tasks weighted below."""
     robot = tsid.RobotWrapper(scene.file, [], pin.JointModelFreeFlyer(), False)
     if list(robot.model().names)[2:] != list(scene.joints):
@@ -90,12 +92,11 @@ def stand(scene: Stand, solver: str) -> tuple[Any, Any, Any]:
     rest = tsid.TrajectorySample(len(scene.joints))
     rest.value(np.array(scene.posture))
     joints.setReference(rest)
-    solving, problem, found = getattr(tsid, solver)("solver"), None, None
+    solving, problem = getattr(tsid, solver)("solver"), None
     solving.resize(formulation.nVar, formulation.nEq, formulation.nIn)
-    torques = a = np.empty(0)
 
-    def tick(t: float, q: Array, v: Array, targets: Array) -> None:
-        nonlocal problem, found, torques, a
+    def tick(t: float, q: Array, v: Array, targets: Array) -> Callable[[], Answer]:
+        nonlocal problem
         for k, (task, sample, (p, dp, ddp)) in enumerate(zip(tasks, samples, targets, strict=True)):
             sample.value(np.concatenate((p, _UNTURNED)) if k else p)
             sample.derivative(np.concatenate((dp, _STILL)) if k else dp)
@@ -103,9 +104,10 @@ def stand(scene: Stand, solver: str) -> tuple[Any, Any, Any]:
             task.setReference(sample)
         problem = formulation.computeProblemData(t, q, v)
         found = _solved(solving, problem)
-        torques, a = formulation.getActuatorForces(found), formulation.getAccelerations(found)
+        return partial(answer, found, formulation.getActuatorForces(found),
+                       formulation.getAccelerations(found))
 
-    def answer() -> Answer:
+    def answer(found: Any, torques: Array, a: Array) -> Answer:
         wrenches = []
         for sole in scene.soles:
             R = robot.framePosition(formulation.data(), robot.model().getFrameId(sole)).rotation
@@ -114,7 +116,7 @@ def stand(scene: Stand, solver: str) -> tuple[Any, Any, Any]:
         return Answer(np.array(a), np.array(torques), np.array(wrenches))
 
     tick.kept = soles, limits, joints, rest  # type: ignore[attr-defined]
-    return tick, answer, lambda: solving.solve(problem)
+    return tick, lambda: solving.solve(problem)
 
 
 def _tasks(scene: Stand, robot: Any, formulation: Any) -> list[Any]:
@@ -123,18 +125,18 @@ def _tasks(scene: Stand, robot: Any, formulation: Any) -> list[Any]:
         (tsid.TaskComEquality("com", robot), scene.com, 3),
         *((_position(robot, hand), scene.hand, 6) for hand in scene.hands),
         (tsid.TaskJointPosture("posture", robot), scene.joint, len(scene.joints))]
-    for task, gains, rows in asked:
-        task.setKp(np.full(rows, gains.stiffness))
-        task.setKd(np.full(rows, gains.damping))
-        formulation.addMotionTask(task, gains.weight**2, 1, 0.0)
+    for task, (stiffness, damping, weight), rows in asked:
+        task.setKp(np.full(rows, stiffness))
+        task.setKd(np.full(rows, damping))
+        formulation.addMotionTask(task, weight**2, 1, 0.0)
     return [task for task, _, _ in asked]
 
 
 def _contact(scene: Stand, robot: Any, formulation: Any, sole: str) -> Any:
     contact = tsid.Contact6d(sole, robot, sole, np.ascontiguousarray(scene.corners.T),
                              np.array([0.0, 0.0, 1.0]), scene.friction, 0.0, _LARGEST)
-    contact.setKp(np.full(6, scene.contact.stiffness))
-    contact.setKd(np.full(6, scene.contact.damping))
+    contact.setKp(np.full(6, scene.contact[0]))
+    contact.setKd(np.full(6, scene.contact[1]))
     frame = robot.model().getFrameId(sole)
     contact.setReference(robot.framePosition(formulation.data(), frame))
     formulation.addRigidContact(contact, scene.force**2, 1.0, 0)

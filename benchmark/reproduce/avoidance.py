@@ -66,17 +66,18 @@ def measured(scenario: Scenario) -> tuple[Recording, tuple[Metric, ...]]:
     watch = Repulsion()
     watched = [watch] if scenario.avoidance is not None and scenario.sensor.kind == "exact" else []
     recording = simulate(scenario, audits=watched)
-    found = [*measure(recording).values(), *_rms(recording)]
+    found = [*measure(recording).values(),
+             Metric("speed_rms", "Joint speed, rms", _rms(recording["v"]), "rad/s"),
+             Metric("acceleration_rms", "Joint acceleration, rms", _rms(recording["a"]),
+                    "rad/s^2")]
     if watched:
-        errors = float(np.sqrt(np.mean(np.square(watch.errors)))) if watch.errors else None
-        found += [
-            Metric("avoidance_error_rms", "Error of the avoidance task, rms", errors, "m/s^2"),
-            Metric("direction_jumps", "Abrupt turns of the repulsion", float(watch.jumps), "")]
+        found += [Metric("avoidance_error_rms", "Error of the avoidance task, rms",
+                         _rms(np.array(watch.errors)), "m/s^2"),
+                  Metric("direction_jumps", "Abrupt turns of the repulsion",
+                         float(watch.jumps), "")]
     return recording, tuple(found)
 
 
-def _rms(recording: Recording) -> list[Metric]:
-    """Return the root of the mean square of joint speed and acceleration, over joints and time."""
-    return [Metric(f"{key}_rms", f"Joint {key}, rms", float(np.sqrt(np.mean(np.square(
-        recording[signal])))) if recording.ticks else None, unit)
-        for key, signal, unit in (("speed", "v", "rad/s"), ("acceleration", "a", "rad/s^2"))]
+def _rms(values: Array) -> float | None:
+    """Return the root of the mean square; None of no values."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else None

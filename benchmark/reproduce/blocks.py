@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Callable, Mapping
@@ -44,7 +45,8 @@ class Stored:
         """Return what a checkout has stored."""
         rows, points = root / ROWS, root / POINTS
         return cls(protocol.read(rows) if rows.is_file() else None,
-                   fronts.read(points) if points.is_file() else [])
+                   [Point(**one) for one in json.loads(points.read_text(encoding="utf-8"))]
+                   if points.is_file() else [])
 
 
 def block(name: str, stored: Stored, output: Callable[[str], str]) -> str:
@@ -53,15 +55,14 @@ def block(name: str, stored: Stored, output: Callable[[str], str]) -> str:
     output : returns what a command has printed.
     """
     rows = stored.rows
-    if name in ITEMS:
-        return "\n".join(_item(text) for text in _items(ITEMS[name], rows, output))
     known: dict[str, Callable[[], list[str]]] = {
         "asked-letter": _asked, "untested": _untested,
+        **{one: partial(_items, given, rows, output) for one, given in ITEMS.items()},
         **{f"front-{one}": partial(fronts.table, stored.points, one) for one in fronts.FRONTS}}
-    if name in known:
-        return "\n".join(known[name]())
     of_rows: dict[str, Callable[[Rows], list[str]]] = {
         "faults": _faults, **{f"found-{one}": partial(_found, family=one) for one in FAMILIES}}
+    if name in known:
+        return "\n".join(known[name]())
     return "\n".join(of_rows[name](rows)) if rows is not None else _NOTHING
 
 
@@ -75,13 +76,13 @@ def _items(given: Mapping[str, Any], rows: Rows | None, output: Callable[[str], 
     outputs = given.get("outputs", {})
     texts = [_CELL.sub(lambda found: cell(output(outputs[found["output"]]), found.groupdict()),
                        item) for item in given["items"]]
-    if not any(_CLAIM.search(text) for text in texts):
-        return texts
-    if rows is None:
-        return [_NOTHING]
-    known = {one.claim.name: said(one, rows) for one in every(rows)}
-    known["progress"] = _progress(rows)
-    return [_CLAIM.sub(lambda named: known[named["name"]], text) for text in texts]
+    if any(_CLAIM.search(text) for text in texts):
+        if rows is None:
+            return [_item(_NOTHING)]
+        known = {one.claim.name: said(one, rows) for one in every(rows)}
+        known["progress"] = _progress(rows)
+        texts = [_CLAIM.sub(lambda named: known[named["name"]], text) for text in texts]
+    return [_item(text) for text in texts]
 
 
 def every(rows: Rows) -> list[Found]:
@@ -112,18 +113,12 @@ def cell(output: str, asked: Mapping[str, str]) -> str:
 
 def _asked() -> list[str]:
     """Return the quotations, and below each what decides it."""
-    lines: list[str] = []
-    before = ""
+    decided: dict[str, list[str]] = {}
     for one in PROTOCOL.claims:
         if one.family == "letter":
-            said = f"{one.section}: “{one.quotation}”: "
-            decides = f"{_decider(one)}, {_least(one)}"
-            if said == before:
-                lines[-1] += f"; {decides}"
-            else:
-                lines.append(said + decides)
-            before = said
-    return [_item(line) for line in lines]
+            decided.setdefault(f"{one.section}: “{one.quotation}”: ", []).append(
+                f"{_decider(one)}, {_least(one)}")
+    return [_item(said + "; ".join(decides)) for said, decides in decided.items()]
 
 
 def _untested() -> list[str]:

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmark.reproduce.protocol import Run, made
+from benchmark.reproduce.protocol import made, planned
 from hierarchy.problem import Array
 from scenarios.config import load
 from scenarios.config.sampling import drawn
 from scenarios.draw.figures.palette import looks
-from scenarios.files import make_folder, write_json
 from scenarios.measure.metric import Metric, shown
 from scenarios.results.run import Outcome
 from scenarios.results.sampled import Progress, Workers
@@ -125,7 +123,8 @@ def _scores(name: str, method: Method, trials: Sequence[Mapping[str, float]],
     for settings in trials:
         scenario = load(front.scenario, GIVEN["plant"].get(front.plant, {})).with_resolver(
             method.resolver).with_changes({**method.set, **settings})
-        runs += [Run.of(scenario, start, drawn(scenario, scenario.variation, seed, start))
+        text = scenario.to_toml()
+        runs += [planned(scenario, text, start, drawn(scenario, scenario.variation, seed, start))
                  for start in range(count)]
     kept = made(runs, *where)
     outcomes = [kept[one.key] for one in runs]
@@ -155,19 +154,8 @@ def spread(best: Sequence[int], first: Array, count: int) -> list[int]:
     return [ordered[int(k)] for k in at]
 
 
-def write(points: Sequence[Point], path: Path) -> None:
-    """Write points as JSON."""
-    make_folder(path.parent)
-    write_json(path, [asdict(one) for one in points])
-
-
 def _plain(values: Array) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
-
-
-def read(path: Path) -> list[Point]:
-    """Return the points of a file."""
-    return [Point(**one) for one in json.loads(path.read_text(encoding="utf-8"))]
 
 
 def table(points: Sequence[Point], name: str) -> list[str]:

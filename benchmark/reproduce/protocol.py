@@ -29,6 +29,7 @@ from scenarios.results.store import Store
 
 ENDED = "reached_end"
 _DIGITS = 6  # kept of each value
+_NUMBERS = re.compile(r"\S*\d\S*")
 
 
 @dataclass(frozen=True)
@@ -141,35 +142,23 @@ class Rows:
         return np.asarray(np.array(self.values[noisy][column][ENDED]) == 1.0)
 
 
-@dataclass(frozen=True)
-class Run:
-    """A run: a scenario, what is sampled, and the key by which it is found again."""
-
-    scenario: Scenario
-    start: int
-    values: Mapping[str, Value]
-    key: str
-
-    @classmethod
-    def of(cls, scenario: Scenario, start: int, values: Mapping[str, Value], text: str = "") -> Run:
-        """Return a run; `text` is that of the scenario, which takes time to make."""
-        sampled = (text or scenario.to_toml()) + json.dumps(values)
-        return cls(scenario, start, values, key_of(sampled, OWN, digest()))
-
-    def job(self) -> Job:
-        """Return the run for a process."""
-        text = changed(self.scenario, self.values, self.scenario.name).to_toml()
-        return Job(self.key, text, OWN, self.scenario.name, self.start, self.values)
+def planned(scenario: Scenario, text: str, start: int, values: Mapping[str, Value]) -> Job:
+    """Return a run of a scenario, with its text, from a start; `work` applies what is sampled."""
+    key = key_of(text + json.dumps(values), OWN, digest())
+    return Job(key, text, OWN, scenario.name, start, values)
 
 
-def made(runs: Sequence[Run], out: Path, workers: Workers, progress: Progress | None = None
+def work(job: Job) -> Outcome:
+    """Make a run in a process of the pool."""
+    return outcome(job, lambda scenario: measured(changed(scenario, job.values, scenario.name)))
+
+
+def made(jobs: Sequence[Job], out: Path, workers: Workers, progress: Progress | None = None
          ) -> dict[str, Outcome]:
     """Make the runs that a folder does not have; return all of it by key. Raises as `sweep`."""
     store = Store(out)
     with store.opened():
-        kept = store.outcomes()
-        complete([one.job() for one in runs if one.key not in kept], store, workers, out.name,
-                 progress, work)
+        complete(jobs, store, workers, out.name, progress, work)
         return store.outcomes()
 
 
@@ -182,10 +171,10 @@ def run(protocol: Protocol, out: Path, workers: Workers, progress: Progress | No
     for count in range(1, len(protocol.seeds) + 1):
         some = replace(protocol, seeds=protocol.seeds[:count])
         runs = list(_runs(some))
-        yield _rows(some, runs, made([one for *_, one in runs], out, workers, progress))
+        yield _rows(some, runs, made([job for *_, job in runs], out, workers, progress))
 
 
-def _rows(protocol: Protocol, runs: Sequence[tuple[int, str, Run]],
+def _rows(protocol: Protocol, runs: Sequence[tuple[int, str, Job]],
           kept: Mapping[str, Outcome]) -> Rows:
     values: list[dict[str, dict[str, list[float | None]]]] = [{}, {}]
     reasons: list[dict[str, dict[str, int]]] = [{}, {}]
@@ -194,11 +183,14 @@ def _rows(protocol: Protocol, runs: Sequence[tuple[int, str, Run]],
         found = kept[one.key]
         of = values[noisy].setdefault(column, {})
         of.setdefault(ENDED, []).append(float(found.reason is None))
-        if found.reason is not None:
-            told = reasons[noisy].setdefault(column, {})
-            told[_kind(found.reason)] = told.get(_kind(found.reason), 0) + 1
+        if found.reason is not None:  # without its numbers, so that alike ones are counted together
+            kind, told = _NUMBERS.sub("#", found.reason), reasons[noisy].setdefault(column, {})
+            told[kind] = told.get(kind, 0) + 1
+        known = {} if found.reason else {one.name: one.value for one in found.metrics}
         for name in sorted(protocol.metrics):
-            of.setdefault(name, []).append(_value(found, name))
+            value = known.get(name)
+            of.setdefault(name, []).append(
+                None if value is None or not np.isfinite(value) else float(f"{value:.{_DIGITS}g}"))
         metrics |= {metric.name: {"label": metric.label, "unit": metric.unit,
                                   "lower": metric.lower_is_better is not False}
                     for metric in found.metrics if metric.name in protocol.metrics}
@@ -206,23 +198,7 @@ def _rows(protocol: Protocol, runs: Sequence[tuple[int, str, Run]],
                 reasons)
 
 
-def work(job: Job) -> Outcome:
-    """Make a run in a process of the pool."""
-    return outcome(job, measured)
-
-
-def _value(found: Outcome, name: str) -> float | None:
-    value = next((one.value for one in found.metrics if one.name == name), None)
-    bad = found.reason is not None or value is None or not np.isfinite(value)
-    return None if bad else float(f"{value:.{_DIGITS}g}")
-
-
-def _kind(reason: str) -> str:
-    """Return a reason without its numbers, so that alike ones are counted together."""
-    return re.sub(r"\S*\d\S*", "#", reason)
-
-
-def _runs(protocol: Protocol) -> Iterator[tuple[int, str, Run]]:
+def _runs(protocol: Protocol) -> Iterator[tuple[int, str, Job]]:
     """Yield the runs with whether they have noise, and their column."""
     for noisy, (name, column), (layout, changes) in product(
             (0, 1), protocol.columns.items(), protocol.layouts.items()):
@@ -232,7 +208,7 @@ def _runs(protocol: Protocol) -> Iterator[tuple[int, str, Run]]:
             values = drawn(scenario, scenario.variation, seed, start)
             if noisy:
                 values = _with_noise(values, protocol.noise, (seed, start))
-            yield noisy, name, Run.of(scenario, start, values, text)
+            yield noisy, name, planned(scenario, text, start, values)
 
 
 def _with_noise(values: Mapping[str, Value], noise: float, seed: tuple[int, int]
@@ -246,11 +222,6 @@ def _with_noise(values: Mapping[str, Value], noise: float, seed: tuple[int, int]
         return value + noise * random.standard_normal() if isinstance(value, float) else value
 
     return {key: moved(value) for key, value in values.items()}
-
-
-def quick(protocol: Protocol) -> Protocol:
-    """Return the protocol with its first seed only."""
-    return replace(protocol, seeds=protocol.seeds[:1])
 
 
 def write(rows: Rows, path: Path) -> None:

@@ -62,14 +62,12 @@ def judged(protocol: Protocol, rows: Rows, family: str) -> list[Found]:
 
 def _judged(protocol: Protocol, rows: Rows, claims: Sequence[Claim], noisy: int
             ) -> list[tuple[Effect, tuple[Effect, ...], float, str]]:
-    apart = [_apart(rows, claim, noisy) for claim in claims]
-    effects = [_effect(protocol, rows, claim, one, np.ones_like(one, dtype=bool))
-               for claim, one in zip(claims, apart, strict=True)]
-    layouts = [tuple(_effect(protocol, rows, claim, one, rows.layout(name))
-                     for name in rows.layouts) for claim, one in zip(claims, apart, strict=True)]
-    adjusted = holm([effect.p for effect in effects])
-    return [(effect, each, p, _verdict(protocol, claim, effect, each, p))
-            for claim, effect, each, p in zip(claims, effects, layouts, adjusted, strict=True)]
+    some = np.ones(rows.blocks.size, dtype=bool), *map(rows.layout, rows.layouts)
+    effects = [[_effect(protocol, rows, claim, apart, each) for each in some]
+               for claim, apart in ((claim, _apart(rows, claim, noisy)) for claim in claims)]
+    adjusted = holm([effect.p for effect, *_ in effects])
+    return [(effect, tuple(layouts), p, _verdict(protocol, claim, effect, layouts, p))
+            for claim, (effect, *layouts), p in zip(claims, effects, adjusted, strict=True)]
 
 
 def _apart(rows: Rows, claim: Claim, noisy: int) -> Array:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 
@@ -14,38 +15,40 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.progress import bar
 from scenarios.cli.terminal import print_json, shown
-from scenarios.files import make_folder, reason, write_text
+from scenarios.files import make_folder, reason, write_json, write_text
 from scenarios.results.sampled import Workers
 
 NAME, TUNED = "protocol", "fronts"  # of the runs
 PICTURE = "docs/images/fronts.png"
 
 
-def fill(root: Path | None = None) -> int:
+def fill() -> int:
     """Write the pages of the checkout from the rows and outputs that are stored."""
-    root = root or pages.ROOT
-    written, lacking = pages.fill(root, Stored.read(root))
+    written, lacking = pages.fill(pages.ROOT, Stored.read(pages.ROOT))
     print(*map(shown, written), sep="\n")
     return _lacking(lacking)
 
 
 def run(names: list[str], out: Path, quick: bool = False, workers: int | None = None,
-        as_json: bool = False, root: Path | None = None) -> int:
-    """Make runs and outputs; unless `quick`, write the pages as they end; print the verdicts."""
-    begun, root = perf_counter(), root or pages.ROOT
-    runs, asked = chosen(names, root)
-    if quick and NAME not in runs:
+        as_json: bool = False) -> int:
+    """Make runs and outputs, of all without names; print the verdicts.
+
+    Unless `quick`, the pages are written as each ends. Raises UnknownNameError.
+    """
+    begun, known = perf_counter(), (NAME, TUNED, *pages.marked(pages.ROOT))
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("page", name, known)
+    asked = [name for name in known if name in names or not names]
+    if quick and NAME not in asked:
         raise HierarchyError(f"--quick makes runs, and {', '.join(asked)} has the output of "
                              "commands; leave --quick out")
     make_folder(out)
     rows, lacking = None, list[str]()
     try:
-        for rows in _ran(out / NAME, quick, workers) if NAME in runs else ():
-            if not quick:
-                protocol.write(rows, root / ROWS)
-                lacking = pages.fill(root, Stored.read(root))[1]
-        for _ in () if quick else _others(runs, asked, out, workers, root):
-            lacking = pages.fill(root, Stored.read(root))[1]
+        for found in _made(asked, out, quick, Workers(workers)):
+            rows = found or rows
+            lacking = [] if quick else pages.fill(pages.ROOT, Stored.read(pages.ROOT))[1]
     except OSError as error:
         why = (f"{error.filename or 'a file'} cannot be written: {reason(error)}"
                if error.strerror else str(error))
@@ -56,65 +59,44 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
         return INTERRUPTED
     if rows is not None:
         _report(rows, as_json)
-    _say(f"{minutes(perf_counter() - begun)} in all")
+    _say(f"{_minutes(begun)} in all")
     return _lacking(lacking)
 
 
-def _others(runs: list[str], asked: list[str], out: Path, workers: int | None, root: Path
-            ) -> Iterator[None]:
-    """Make and store fronts and their figure, then outputs of commands; yield after each."""
-    if TUNED in runs:
-        with bar("runs") as progress:
-            points = fronts.run(out / TUNED, Workers(workers), progress)
-        fronts.write(points, root / POINTS)
-        fronts.figure(points).savefig(root / PICTURE, dpi=120)
-        yield
-    for command, printed in outputs(asked, root, out / "output"):
-        write_text(pages.file_of(command, root), printed)
-        yield
-
-
-def chosen(names: list[str], root: Path) -> tuple[list[str], list[str]]:
-    """Return the kinds of runs that are asked for, and pages with commands; all without names.
-
-    Raises UnknownNameError.
-    """
-    known = pages.marked(root)
-    for name in names:
-        if name not in (NAME, TUNED, *known):
-            raise UnknownNameError("page", name, (NAME, TUNED, *known))
-    return ([name for name in (NAME, TUNED) if name in names or not names],
-            [name for name in known if name in names or not names])
-
-
-def _ran(out: Path, quick: bool, workers: int | None) -> Iterator[Rows]:
+def _made(asked: Sequence[str], out: Path, quick: bool, workers: Workers) -> Iterator[Rows | None]:
+    """Make and store rows, fronts with their figure, and outputs; yield after each, rows if any."""
+    root = pages.ROOT
     with bar("runs") as progress:
-        yield from protocol.run(protocol.quick(PROTOCOL) if quick else PROTOCOL, out,
-                                Workers(workers), progress)
-
-
-def outputs(asked: list[str], root: Path, out: Path) -> Iterator[tuple[str, str]]:
-    """Run the commands of pages, one after the other; yield each with what it prints as it ends.
-
-    Those whose output `out` has are not repeated, and those that fail are left out.
-    """
-    found = dict.fromkeys(command for page in asked for command in
-                          pages.commands((root / page).read_text(encoding="utf-8")))
+        for rows in protocol.run(replace(PROTOCOL, seeds=PROTOCOL.seeds[:1]) if quick else PROTOCOL,
+                                 out / NAME, workers, progress) if NAME in asked else ():
+            if not quick:
+                protocol.write(rows, root / ROWS)
+            yield rows
+        if quick:
+            return
+        if TUNED in asked:
+            points = fronts.run(out / TUNED, workers, progress)
+            write_json(root / POINTS, [asdict(one) for one in points])
+            fronts.figure(points).savefig(root / PICTURE, dpi=120)
+            yield None
+    found = dict.fromkeys(command for page in asked if page not in (NAME, TUNED)
+                          for command in pages.commands((root / page).read_text(encoding="utf-8")))
     for count, command in enumerate(found, 1):
         _say(f"command {count} of {len(found)}: {command} ...")
         begun = perf_counter()
         try:
-            printed = pages.run(command, root, out)
+            write_text(pages.file_of(command, root), pages.run(command, root, out / "output"))
         except pages.CommandError as error:
             _say(f"left as it is: {error}")
             continue
-        _say(f"  {minutes(perf_counter() - begun)}")
-        yield command, printed
+        _say(f"  {_minutes(begun)}")
+        yield None
 
 
-def minutes(seconds: float) -> str:
-    """Return a duration as minutes and seconds: "41:07 min"."""
-    return f"{round(seconds) // 60}:{round(seconds) % 60:02} min"
+def _minutes(begun: float) -> str:
+    """Return the time since then as minutes and seconds: "41:07 min"."""
+    seconds = round(perf_counter() - begun)
+    return f"{seconds // 60}:{seconds % 60:02} min"
 
 
 def _lacking(lacking: list[str]) -> int:

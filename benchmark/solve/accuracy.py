@@ -6,7 +6,7 @@ Priority Matrix: a new tool for hierarchical redundancy resolution" (2016).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import nan
 from typing import final
@@ -19,16 +19,15 @@ from benchmark.report import Report, Section
 from benchmark.solve.entrants import ENTRANTS, NUMPY
 from benchmark.solve.interface import Solver
 from benchmark.solve.resolvers import as_problem
-from benchmark.store import Row
-from benchmark.tables import Column, Table, percent, power, whole
+from benchmark.tables import Column, Row, Table, percent, power, whole
 from benchmark.worker import load
 from hierarchy.problem import Array, Hierarchy
 from scenarios.problems.answers import answer
 from solvers import certify
 
-ARMS, CHECKED = 10_000, 300
 DAMPING, THRESHOLD = 0.05, 0.1  # the letter's code
 _TARGETS = 1.0                  # [m/s or rad/s] the largest target of a row
+_SEED = 0
 _REST, _CROSSED, _FULL = ((0, 1), (2, 3), (4, 5)), ((0, 1), (1, 2), (3, 4)), (
     (0, 1), (1, 2), (3, 4), (5, 0))
 _NOTES = """\
@@ -77,16 +76,14 @@ def entrants(damping: float = 0.0) -> list[Entrant]:
                     {"resolver": "reverse", "form": "in-order", **settings})]
 
 
-def run(arms: int = ARMS, checked: int = CHECKED, seed: int = 0,
-        cases: Iterable[Case] = CASES) -> Report:
+def run(arms: int = 10_000, checked: int = 300) -> Report:
     """Resolve `arms` of every case with all resolvers.
 
     `checked` of the arms are also compared with the proved x, and certified.
     """
-    rows: list[Row] = []
-    tables = []
-    for case in cases:
-        problems, least = hierarchies(case, arms, seed)
+    rows, tables = list[Row](), []
+    for case in CASES:
+        problems, least = hierarchies(case, arms)
         right = [damped(h, case.damping, THRESHOLD) if case.damping else answer(h).x
                  for h in problems[:max(1, min(checked, arms))]]
         found = [{"case": case.name, "entrant": one.label, "arms": arms, "checked": len(right),
@@ -102,7 +99,7 @@ def run(arms: int = ARMS, checked: int = CHECKED, seed: int = 0,
     return Report("Errors on random arms", [Section("Errors", tables, _NOTES)], {"errors": rows})
 
 
-def hierarchies(case: Case, count: int, seed: int) -> tuple[list[Hierarchy], Array]:
+def hierarchies(case: Case, count: int) -> tuple[list[Hierarchy], Array]:
     """Return the problems of a case, and the smallest possible violation (count, L) of each task.
 
     Rows of upper tasks are always met, and all other rows can be met, so a repeated row is missed
@@ -110,8 +107,8 @@ def hierarchies(case: Case, count: int, seed: int) -> tuple[list[Hierarchy], Arr
     """
     order = [row for task in case.tasks for row in task]
     sizes = np.array([len(task) for task in case.tasks])
-    A = np.ascontiguousarray(case.jacobians(count, seed)[:, order])
-    b = np.random.default_rng(seed + 1).uniform(-_TARGETS, _TARGETS, (count, len(order)))
+    A = np.ascontiguousarray(case.jacobians(count, _SEED)[:, order])
+    b = np.random.default_rng(_SEED + 1).uniform(-_TARGETS, _TARGETS, (count, len(order)))
     off = b - b[:, [order.index(row) for row in order]]
     least = np.sqrt(np.add.reduceat(off**2, np.cumsum(sizes) - sizes, axis=1))
     return [Hierarchy(A[i], b[i], b[i], sizes) for i in range(count)], least

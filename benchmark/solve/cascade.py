@@ -33,12 +33,17 @@ class Cascade(Solver):
 
     def solve(self, prepared: Problem) -> tuple[Array, bool]:
         """Solve level by level; False from the first program without a solution."""
-        x, n, begin = prepared.reference.copy(), len(prepared.reference), 0
+        x, n, begin = prepared.reference, len(prepared.reference), 0
         lower, upper = prepared.lower.copy(), prepared.upper.copy()
         for end in [int(end) for end in prepared.ends]:
-            own = slice(begin, end)
-            if end > begin:
-                found = self._level(prepared, lower, upper, begin, end)
+            own, m = slice(begin, end), end - begin
+            if m:
+                P = np.diag(np.concatenate([np.full(n, _TINY), np.ones(m)]))
+                q = np.concatenate([-_TINY * prepared.reference, np.zeros(m)])
+                A = np.zeros((end, n + m))
+                A[:, :n] = prepared.A[:end]
+                A[begin:, n:] = -np.eye(m)
+                found = self._solve(P, q, A, lower[:end], upper[:end])
                 if found is None:
                     return x, False
                 x = found[:n]
@@ -50,20 +55,10 @@ class Cascade(Solver):
     def _freeze(self, problem: Problem, lower: Array, upper: Array, own: slice, reached: Array
                 ) -> None:
         """Fix equalities and violated rows at what they have reached; others keep their sides."""
-        fixed = ((problem.lower[own] == problem.upper[own])
-                 | (reached > problem.upper[own]) | (reached < problem.lower[own]))
-        lower[own] = np.where(fixed, reached - self.slack, problem.lower[own])
-        upper[own] = np.where(fixed, reached + self.slack, problem.upper[own])
-
-    def _level(self, problem: Problem, lower: Array, upper: Array, begin: int, end: int
-               ) -> Array | None:
-        n, m = len(problem.reference), end - begin
-        P = np.diag(np.concatenate([np.full(n, _TINY), np.ones(m)]))
-        q = np.concatenate([-_TINY * problem.reference, np.zeros(m)])
-        A = np.zeros((end, n + m))
-        A[:, :n] = problem.A[:end]
-        A[begin:, n:] = -np.eye(m)
-        return self._solve(P, q, A, lower[:end], upper[:end])
+        low, high = problem.lower[own], problem.upper[own]
+        fixed = (low == high) | (reached > high) | (reached < low)
+        lower[own] = np.where(fixed, reached - self.slack, low)
+        upper[own] = np.where(fixed, reached + self.slack, high)
 
     def _solve(self, P: Array, q: Array, A: Array, lower: Array, upper: Array) -> Array | None:
         equal = lower == upper

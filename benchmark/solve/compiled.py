@@ -7,6 +7,7 @@ import hashlib
 import sys
 from pathlib import Path
 from typing import Any, final
+from weakref import finalize
 
 import numba
 import numpy as np
@@ -23,17 +24,14 @@ class _Handle:
     """A prepared problem, released with the object, and what its last solve has said."""
 
     def __init__(self, library: ctypes.CDLL, problem: Problem) -> None:
-        self._library = library
         kept = [np.ascontiguousarray(values) for values in (
             problem.sizes, problem.A, problem.lower, problem.upper, problem.reference)]
         self.x, self.iterations = np.zeros(len(problem.reference)), np.array([-1])
         self.solved = False
         self.address = library.prepare(len(self.x), len(problem.sizes),
                                        *(values.ctypes.data for values in kept))
-
-    def __del__(self) -> None:
         if self.address:
-            self._library.release(self.address)
+            finalize(self, library.release, self.address)
 
 
 @final

@@ -10,8 +10,7 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 from solvers import names
 from solvers.qp.backends import BACKENDS
 
-QUESTIONS = "benchmark.solve.questions:Questions"
-_HERE = "benchmark.solve"
+_HERE, _OURS = "benchmark.solve", "benchmark.solve.ours:Ours"
 NUMPY, HIERARCHICAL = "plain numpy", "DAQP hierarchical"
 _SLACK = 1e-7
 _LIMITS = {
@@ -44,44 +43,32 @@ def _settings(backend: str) -> dict[str, dict[str, float]]:
         for key, value in own.items()}} if own else {})
 
 
-def _ours() -> list[Entrant]:
-    ours = f"{_HERE}.ours:Ours"
-    rows = [Entrant(name, OWN, ours, {"resolver": name}, _LIMITS.get(name, ""))
-            for name in (*names(), "tpm-published") if name != "hqp"]
-    rows += [Entrant(f"hqp {name}", OWN, ours, {"resolver": "hqp", "backend": name},
-                     f"{_QP}, set by hqp.") for name in BACKENDS]
-    return rows + [Entrant(f"hqp {name}, {words}", OWN, f"{_HERE}.ours:Hqp",
-                           {"backend": name, **options}, f"{_QP}: {words}.")
-                   for name in BACKENDS for words, options in _settings(name).items()
-                   if words != "as hqp" and BACKENDS[name].options]
-
-
-def _cascades() -> list[Entrant]:
-    cascade = f"{_HERE}.cascade:Cascade"
-    exact = [Entrant(_labelled(f"cascade {name}", words), OWN, cascade,
-                     {"backend": name, **options},
-                     f"{_CASCADE} are kept exactly; tolerances: {words}.")
-             for name in BACKENDS for words, options in _settings(name).items()]
-    exact.append(Entrant("cascade highs", HIGHS, cascade, {"backend": "highs"},
-                         f"{_CASCADE} are kept exactly; tolerances: defaults."))
-    return exact + [Entrant(f"cascade {name}, slack", OWN, cascade,
-                            {"backend": name, "slack": _SLACK},
-                            f"{_CASCADE} may move by {_SLACK:g}.")
-                    for name in ("quadprog", "daqp")]
-
-
 def _labelled(name: str, words: str) -> str:
     return name if words == "defaults" else f"{name}, {words}"
 
 
+_TUNED = [(name, words, options) for name in BACKENDS for words, options in _settings(name).items()]
 ENTRANTS = (
-    *_ours(),
+    *(Entrant(name, OWN, _OURS, {"resolver": name}, _LIMITS.get(name, ""))
+      for name in (*names(), "tpm-published") if name != "hqp"),
+    *(Entrant(f"hqp {name}", OWN, _OURS, {"resolver": "hqp", "backend": name},
+              f"{_QP}, set by hqp.") for name in BACKENDS),
+    *(Entrant(f"hqp {name}, {words}", OWN, f"{_HERE}.ours:Hqp", {"backend": name, **options},
+              f"{_QP}: {words}.")
+      for name, words, options in _TUNED if words != "as hqp" and BACKENDS[name].options),
     Entrant(NUMPY, OWN, f"{_HERE}.ours:Plain", limits="Equalities only, by np.linalg.pinv."),
     *(Entrant(_labelled(HIERARCHICAL, words), DAQP, f"{_HERE}.with_daqp:Daqp", options,
               "Minimises violations divided by the norms of rows, with a finite weight; rows of "
               f"zeros are infeasible to it; tolerances: {words}.")
       for words, options in _settings("daqp").items()),
-    *_cascades(),
+    *(Entrant(_labelled(f"cascade {name}", words), package, f"{_HERE}.cascade:Cascade",
+              {"backend": name, **options},
+              f"{_CASCADE} are kept exactly; tolerances: {words}.")
+      for package, name, words, options in (*((OWN, *one) for one in _TUNED),
+                                            (HIGHS, "highs", "defaults", {}))),
+    *(Entrant(f"cascade {name}, slack", OWN, f"{_HERE}.cascade:Cascade",
+              {"backend": name, "slack": _SLACK}, f"{_CASCADE} may move by {_SLACK:g}.")
+      for name in ("quadprog", "daqp")),
     Entrant("embodiK", EMBODIK, f"{_HERE}.with_embodik:Embodik", {}, _EMBODIK),
     Entrant("embodiK refined", EMBODIK, f"{_HERE}.with_embodik:Embodik", {"refine": True},
             _EMBODIK),

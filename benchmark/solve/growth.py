@@ -12,13 +12,11 @@ from benchmark import figures
 from benchmark.report import Report, Section
 from benchmark.solve.accuracy import entrants
 from benchmark.solve.interface import Problem
-from benchmark.store import Row
-from benchmark.tables import Column, Table, short, wide
+from benchmark.tables import Column, Row, Table, short, wide
 from benchmark.timing import take_turns
 from benchmark.worker import load
 
 Size = tuple[int, int, int]  # joints, tasks, rows of each
-SECONDS = 40.0
 FIRST_PAPER: dict[str, tuple[Size, ...]] = {
     "tasks": tuple((30, count, 3) for count in range(1, 11)),
     "joints": tuple((n, 5, 3) for n in (20, 30, 45, 70, 100, 150, 200, 300))}
@@ -32,33 +30,30 @@ Times: one call from Python, one core, all resolvers in turns; power: slope of t
 sizes, log over log."""
 
 
-def run(seconds: float = SECONDS, larger: bool = False, seed: int = 0) -> Report:
+def run(seconds: float = 40.0, larger: bool = False) -> Report:
     """Time all resolvers with priorities at every size for `seconds` [s] in total.
 
     The sizes are those of the first paper, or `larger`.
     """
     sizes = LARGER if larger else FIRST_PAPER
     rows = take_turns([one for i, figure in enumerate(sizes)
-                       for one in _field(figure, sizes[figure], seed + i)], seconds)
+                       for one in _field(figure, sizes[figure], i)], seconds)
     panels, tables = {}, []
     for figure, ((joints, tasks, each), *_) in sizes.items():
         words = {"joints": f"{joints} joints", "tasks": f"{tasks} tasks",
                  "rows": f"{each} rows a task"}
         fixed = ", ".join(text for key, text in words.items() if key != figure)
-        tables.append(over(f"Median time of a solve [us], {fixed}, over the number of {figure}",
-                           [row for row in rows if row["figure"] == figure], figure))
+        some = [row for row in rows if row["figure"] == figure]
+        made, columns = wide(some, "entrant", figure, "median_us", short)
+        powers = figures.exponents(some, figure)
+        tables.append(Table(
+            f"Median time of a solve [us], {fixed}, over the number of {figure}",
+            [{**row, "power": powers[row["entrant"]]} for row in made],
+            [*columns, Column("power", "power")]))
         panels[figure] = f"number of {figure}", figure[0], fixed
     return Report("Growth of the time of a solve", [Section(
         "Median times", tables, _NOTES, {"growth": figures.over_sizes(rows, panels)})],
         {"growth": rows})
-
-
-def over(title: str, rows: Sequence[Row], size: str) -> Table:
-    """Return the table of medians over a size, with the power of each entrant."""
-    made, columns = wide(rows, "entrant", size, "median_us", short)
-    powers = figures.exponents(rows, size)
-    return Table(title, [{**row, "power": powers[row["entrant"]]} for row in made],
-                 [*columns, Column("power", "power")])
 
 
 def _field(figure: str, sizes: Sequence[Size], seed: int
@@ -67,18 +62,12 @@ def _field(figure: str, sizes: Sequence[Size], seed: int
                if one.label not in LEVEL_LESS}
     found: list[tuple[Row, Callable[[], Any]]] = []
     for i, (joints, tasks, each) in enumerate(sizes):
-        problem = random_problem((joints, tasks, each), seed + i)
+        rng = np.random.default_rng(seed + i)  # almost surely of full rank, with joints enough
+        b = rng.normal(size=each * tasks)
+        problem = Problem(rng.normal(size=(each * tasks, joints)), b, b, np.full(tasks, each),
+                          np.zeros(joints))
         found += [({"figure": figure, "entrant": label, "joints": joints, "tasks": tasks,
                     "rows": each if figure == "rows" else each * tasks},
                    partial(solver.solve, solver.prepare(problem)))
                   for label, solver in solvers.items()]
     return found
-
-
-def random_problem(size: Size, seed: int) -> Problem:
-    """Return random levels, almost surely of full rank where there are joints enough."""
-    joints, tasks, each = size
-    rng = np.random.default_rng(seed)
-    b = rng.normal(size=each * tasks)
-    return Problem(rng.normal(size=(each * tasks, joints)), b, b, np.full(tasks, each),
-                   np.zeros(joints))

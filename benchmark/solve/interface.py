@@ -5,7 +5,8 @@ A solver is one class in one file: docs/extending/entrant.md shows one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
@@ -49,20 +50,19 @@ class Problem:
         if len(full) < 2:
             return None
         m = int(self.ends[full[-1] - 1])
-        return Problem(self.A[:m].copy(), self.lower[:m].copy(), self.upper[:m].copy(),
-                       self.sizes[:full[-1]].copy(), self.reference)
+        return replace(self, A=self.A[:m].copy(), lower=self.lower[:m].copy(),
+                       upper=self.upper[:m].copy(), sizes=self.sizes[:full[-1]].copy())
 
     def shifted(self) -> Problem:
         """Return the problem of x - reference, for solvers that know no reference."""
         by = self.A @ self.reference
-        return Problem(self.A, self.lower - by, self.upper - by, self.sizes,
-                       np.zeros(len(self.reference)))
+        return replace(self, lower=self.lower - by, upper=self.upper - by,
+                       reference=np.zeros(len(self.reference)))
 
     def moved(self, seed: int) -> Problem:
         """Return the problem with both sides of each row changed by a factor within 1 % of 1."""
         factor = 1.0 + _MOVED * np.random.default_rng(seed).uniform(-1.0, 1.0, len(self.A))
-        return Problem(self.A, self.lower * factor, self.upper * factor, self.sizes,
-                       self.reference)
+        return replace(self, lower=self.lower * factor, upper=self.upper * factor)
 
 
 class Answer(NamedTuple):
@@ -76,14 +76,15 @@ class Answer(NamedTuple):
 class Solver:
     """A solver. Only `solve` and `solve_from` are timed.
 
-    warm : whether `solve_from` starts from an earlier answer.
+    warm : whether `solve_from` starts from an earlier answer. package : whose version it has.
     """
 
     warm = False
+    package = ""
 
     def version(self) -> str:
         """Return name and version of the package."""
-        raise NotImplementedError
+        return f"{self.package} {version(self.package)}"
 
     def refuses(self, problem: Problem) -> str:
         """Return why a problem is not of the class that the solver can be asked, or ""."""
@@ -116,14 +117,16 @@ class Solver:
 def read_problems(file: Path) -> list[Problem]:
     """Return the problems of a file; docs/problem-files.md describes it."""
     with np.load(file, allow_pickle=False) as kept:
-        sizes, A, lower, upper, reference = (kept[name] for name in (
-            "sizes", "A", "lower", "upper", "reference"))
-        found, level, row, entry, column = [], 0, 0, 0, 0
-        for n, count in zip(kept["n"].tolist(), kept["levels"].tolist(), strict=True):
-            own = sizes[level:level + count]
-            m = int(own.sum())
-            found.append(Problem(A[entry:entry + m * n].reshape(m, n).copy(),
-                                 lower[row:row + m].copy(), upper[row:row + m].copy(), own.copy(),
-                                 reference[column:column + n].copy()))
-            level, row, entry, column = level + count, row + m, entry + m * n, column + n
-    return found
+        n = kept["n"]
+        sizes = _parts(kept["sizes"], kept["levels"])
+        m = np.array([own.sum() for own in sizes], dtype=np.int64)
+        return [Problem(A.reshape(len(lower), -1 if len(lower) else len(reference)), lower, upper,
+                        own, reference)
+                for A, lower, upper, own, reference in zip(
+                    _parts(kept["A"], m * n), _parts(kept["lower"], m), _parts(kept["upper"], m),
+                    sizes, _parts(kept["reference"], n), strict=True)]
+
+
+def _parts(values: NDArray[Any], counts: NDArray[np.int64]) -> list[NDArray[Any]]:
+    """Return copies of successive parts of these lengths."""
+    return [part.copy() for part in np.split(values, np.cumsum(counts))[:-1]]

@@ -16,7 +16,8 @@ from benchmark.report import Report
 from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
-from benchmark.store import Row, Store
+from benchmark.store import Store
+from benchmark.tables import Row
 from benchmark.timing import machine
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -19,13 +18,10 @@ class Ours(Solver):
     """A resolver by name, with its settings; warm where its answer has a memory."""
 
     warm = True
+    package = "task-hierarchy"
 
     def __init__(self, resolver: str, **settings: Any) -> None:
         self.resolver = make(resolver, **settings)
-
-    def version(self) -> str:
-        """Return that of this project."""
-        return f"task-hierarchy {version('task-hierarchy')}"
 
     def refuses(self, problem: Problem) -> str:
         """Return what the resolver says of a problem that it cannot handle, or ""."""
@@ -67,9 +63,7 @@ class Hqp(Ours):
 class Plain(Solver):
     """The recursion (5), (6), (14) with np.linalg.pinv, as one writes it in a minute."""
 
-    def version(self) -> str:
-        """Return that of numpy."""
-        return f"numpy {np.__version__}"
+    package = "numpy"
 
     def refuses(self, problem: Problem) -> str:
         """Equalities only."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from time import process_time
 from typing import Any, final
@@ -51,9 +52,15 @@ class Questions:
         if refusal:
             return {"refused": refusal}
         try:
-            said, raw = self._cold(problem)
+            said, raw = self._timed(problem)
+            x, again = said["x"], self._solved(problem)
+            said["same"] = bool(np.array_equal(x, again.x, equal_nan=True))
+            shorter = problem.without_last()
+            if shorter is not None and not self.solver.refuses(shorter):
+                answer = self._solved(shorter)
+                said["without"] = answer.x.tolist() if answer.solved else None
             if self.solver.warm and (start := self._start(p)) is not None:
-                more, raw = self._warm(problem, start)
+                more, raw = self._timed(problem, start)
                 said |= more
             self._answer = p, raw
         except Exception as error:
@@ -82,35 +89,19 @@ class Questions:
         except Exception:  # it is asked again, and what it raises is told
             return
 
-    def _cold(self, problem: Problem) -> tuple[dict[str, Any], Any]:
-        """Solve from a cold start, time it, repeat it, and solve without the last level."""
-        solver = self.solver
-        prepared = solver.prepare(problem)
-        times, raw = timed(lambda: solver.solve(prepared), self.repeats)
-        first = solver.read(raw)
-        said = {**plain(first), "cold_ns": times[1:] or times,
-                "cold_inside_ns": solver.inside(prepared, None, self.repeats)}
-        again = solver.read(solver.solve(solver.prepare(problem)))
-        said["same"] = bool(np.array_equal(first.x, again.x, equal_nan=True))
-        shorter = problem.without_last()
-        if shorter is not None and not solver.refuses(shorter):
-            answer = solver.read(solver.solve(solver.prepare(shorter)))
-            said["without"] = answer.x.tolist() if answer.solved else None
-        return said, raw
+    def _solved(self, problem: Problem) -> Answer:
+        return self.solver.read(self.solver.solve(self.solver.prepare(problem)))
 
-    def _warm(self, problem: Problem, before: Any) -> tuple[dict[str, Any], Any]:
-        """Solve from an earlier answer and time it."""
+    def _timed(self, problem: Problem, before: Any = None) -> tuple[dict[str, Any], Any]:
+        """Solve from a cold start, or an earlier answer; return the row, and the solver's own."""
         solver, prepared = self.solver, self.solver.prepare(problem)
-        times, raw = timed(lambda: solver.solve_from(prepared, before), self.repeats)
-        said = {f"warm_{key}": value for key, value in plain(solver.read(raw)).items()}
-        return {**said, "warm_ns": times[1:] or times,
-                "warm_inside_ns": solver.inside(prepared, before, self.repeats)}, raw
-
-
-def plain(answer: Answer) -> dict[str, Any]:
-    """Return an answer as plain data."""
-    return {"solved": bool(answer.solved), "x": np.asarray(answer.x, dtype=float).tolist(),
-            "iterations": answer.iterations}
+        start, prefix = ("cold", "") if before is None else ("warm", "warm_")
+        times, raw = timed(partial(solver.solve, prepared) if before is None else
+                           partial(solver.solve_from, prepared, before), self.repeats)
+        x, solved, iterations = solver.read(raw)
+        return {f"{prefix}solved": bool(solved), f"{prefix}x": np.asarray(x, dtype=float).tolist(),
+                f"{prefix}iterations": iterations, f"{start}_ns": times[1:] or times,
+                f"{start}_inside_ns": solver.inside(prepared, before, self.repeats)}, raw
 
 
 def resident() -> int:

@@ -20,8 +20,7 @@ from benchmark.solve.interface import Problem
 from benchmark.solve.judge import RIGHT, SOLVED, WRONG, by, judged, summary
 from benchmark.solve.questions import Questions
 from benchmark.solve.views import mark
-from benchmark.store import Row
-from benchmark.tables import TIMES, Column, Table, percent, power, whole
+from benchmark.tables import TIMES, Column, Row, Table, percent, power, whole
 from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
 from hierarchy.errors import UnknownNameError
@@ -33,7 +32,6 @@ from solvers.proof import Proof
 from solvers.qp.backends import installed
 
 KNOWN, FRESH = "known", "fresh"
-COUNT = 200      # fresh problems of a family
 _MOST = 200      # times of one problem
 
 NOTES = f"""\
@@ -73,19 +71,12 @@ def field(wanted: Sequence[str] | None = None) -> tuple[list[Entrant], dict[str,
 
 
 def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int | None = None,
-        count: int = COUNT, resolvers: Sequence[str] | None = None) -> Report:
-    """Time the resolvers on every family on one core, and check every answer.
+        count: int = 200, resolvers: Sequence[str] | None = None) -> Report:
+    """Time resolvers by name, None for all, on every family; check every answer.
 
-    They take turns problem by problem, so that noise of the machine affects all equally.
-
-    seconds : [s] for each resolver in each family, about.
-    seed : seed of the first fresh problem of each family; None for stored problems only.
-    count : number of fresh problems of each family.
-    resolvers : names of those to time, with their variants, beside the yardsticks; None for all.
-
-    Raises
-    ------
-    UnknownNameError : unknown family or resolver.
+    They take turns problem by problem, so that noise of the machine affects all equally, for about
+    `seconds` [s] each in each family. seed, count : of the first fresh problem of a family, None
+    for stored problems only, and their number. Raises UnknownNameError.
     """
     families = families or FAMILIES
     for name in families:
@@ -98,9 +89,8 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
         for name in families:
             problems = (reference.family(name) if seed is None or origin == KNOWN
                         else reference.fresh(name, seed, count))
-            with one_core():
-                some += [{"family": name, "origin": origin, **row}
-                         for row in _measured(name, problems, entrants, seconds)]
+            some += [{"family": name, "origin": origin, **row}
+                     for row in _measured(name, problems, entrants, seconds)]
         sections.append(_section(some, origin))
         rows += some
     return Report(f"Resolvers on reference problems, one core of {machine()['processor']}",
@@ -130,7 +120,7 @@ def _measured(name: str, problems: Sequence[reference.Problem], entrants: Sequen
 
 def asked(name: str, problems: Sequence[reference.Problem], entrants: Sequence[Entrant],
           seconds: float) -> list[Row]:
-    """Ask all entrants that can be asked, in turns, for about `seconds` [s] each; judge the rows.
+    """Ask all that can be asked, in turns on one core for `seconds` [s] each; judge the rows.
 
     name : of the family.
     """
@@ -138,15 +128,16 @@ def asked(name: str, problems: Sequence[reference.Problem], entrants: Sequence[E
     before = [None if one.before is None else as_problem(one.before) for one in problems]
     turn = Repeats(most=_MOST, turn=int(1e9 * seconds / len(plain)))
     running: dict[str, Questions] = {}
-    for one in entrants:
-        own = Questions(load(one.adapter), dict(one.options), turn)
-        if not own.solver.refuses(plain[0]):
-            own.take(plain, before)
-            own.asked(0)  # loads and compiles
-            running[one.label] = own
-    return [judged({"entrant": label, "family": name, "problem": p, **own.asked(p)}, problem.h,
-                   _proof(problem))
-            for p, problem in enumerate(problems) for label, own in running.items()]
+    with one_core():
+        for one in entrants:
+            own = Questions(load(one.adapter), dict(one.options), turn)
+            if not own.solver.refuses(plain[0]):
+                own.take(plain, before)
+                own.asked(0)  # loads and compiles
+                running[one.label] = own
+        return [judged({"entrant": label, "family": name, "problem": p, **own.asked(p)}, problem.h,
+                       _proof(problem))
+                for p, problem in enumerate(problems) for label, own in running.items()]
 
 
 def as_problem(h: Hierarchy) -> Problem:

@@ -19,8 +19,7 @@ from benchmark.solve.judge import (
     steps_of,
     summaries,
 )
-from benchmark.store import Row
-from benchmark.tables import Column, Table, digits, percent, power, text, whole, wide, yes
+from benchmark.tables import Column, Row, Table, digits, percent, power, text, whole, wide, yes
 from hierarchy.words import listed
 from solvers.problems.files import Collection
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from typing import Any
 
 import daqp
@@ -16,12 +15,10 @@ _UNBOUNDED = 1e30  # how it writes a missing side
 class Daqp(Solver):
     """`daqp.solve` with break points and settings; leading rows of the identity as bounds."""
 
+    package = "daqp"
+
     def __init__(self, **settings: float) -> None:
         self.settings = settings
-
-    def version(self) -> str:
-        """Return that of daqp."""
-        return f"daqp {version('daqp')}"
 
     def prepare(self, problem: Problem) -> tuple[Any, ...]:
         """Convert, with a unit Hessian for the distance to the reference."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from importlib.metadata import version
 from typing import Any
 
 import embodik
@@ -17,12 +16,10 @@ _UNBOUNDED = 1e10  # how it writes a missing side
 class Embodik(Solver):
     """`computeMultiObjectiveVelocitySolutionEigen`, with its defaults or with refinement."""
 
+    package = "embodik"
+
     def __init__(self, refine: bool = False) -> None:
         self.refine = refine
-
-    def version(self) -> str:
-        """Return that of embodiK."""
-        return f"embodik {version('embodik')}"
 
     def refuses(self, problem: Problem) -> str:
         """Inequalities belong in the first level."""

@@ -7,7 +7,6 @@ answers are compared with the proved minimum of pink's cost. Prints a table.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import runpy
@@ -23,7 +22,7 @@ from unittest.mock import MagicMock, patch
 
 import numpy as np
 import pink
-import qpsolvers
+import typer
 
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.robots.names import file_of
@@ -101,7 +100,7 @@ class Asked:
                  "ours": lambda: solve_ik(configuration, [tasks], dt, "hcod", *given)}
         order = list(calls)[::1 if len(self.ours) % 2 else -1]
         answers = {}
-        if not self.ours:
+        if not self.ours:  # it compiles
             calls["ours"]()
         for name in order:
             start = perf_counter()
@@ -162,25 +161,15 @@ def _stub() -> None:
     sys.modules.update(stubs)
 
 
-def main() -> None:
-    """Print the table."""
+def main(examples: Path, ticks: int = 300, every: int = 10, only: str = "") -> None:
+    """Print the table; every : ticks between two exact minima; only : part of a path."""
     _stub()
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("examples", type=Path)
-    parser.add_argument("--ticks", type=int, default=300)
-    parser.add_argument("--every", type=int, default=10, help="ticks between two exact minima")
-    parser.add_argument("--only", default="")
-    chosen = parser.parse_args()
     sys.argv[1:] = []
     warnings.simplefilter("ignore")
-    assert qpsolvers.available_solvers
     print("| example | pink [us] | ours [us] | ours off | pink off | rounding of P |")
     print("|---|---|---|---|---|---|")
-    for path in sorted(chosen.examples.rglob("*.py")):
-        if chosen.only not in str(path):
-            continue
-        asked = run(path, chosen.ticks, chosen.every)
-        name = path.relative_to(chosen.examples)
+    for path in sorted(path for path in examples.rglob("*.py") if only in str(path)):
+        asked, name = run(path, ticks, every), path.relative_to(examples)
         if not asked.off:
             print(f"{name}: not run: {asked.failed}", file=sys.stderr)
             continue
@@ -191,4 +180,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

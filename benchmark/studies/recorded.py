@@ -18,21 +18,6 @@ from scenarios.problems.recorded import window
 from solvers import make
 
 
-def recorded(name: str, ticks: int) -> list[Hierarchy]:
-    """Return the problems of the first ticks of a scenario, which all have one shape."""
-    return window(load(name), 0, ticks)
-
-
-def answers(problems: Sequence[Hierarchy]) -> list[Array]:
-    """Return x of each problem, by `hcod`, from the memory of the one before."""
-    resolver, memory, found = make("hcod"), None, []
-    for h in problems:
-        res = resolver.solve(h, memory)
-        memory = res.memory
-        found.append(res.x)
-    return found
-
-
 def record_sequence(file: Path, ticks: Sequence[Hierarchy], xs: Sequence[Array] = ()) -> None:
     """Write problems of one shape, and their answers if given.
 
@@ -47,8 +32,13 @@ def record_sequence(file: Path, ticks: Sequence[Hierarchy], xs: Sequence[Array] 
 
 def main(scenario: str, file: Path, ticks: int = 500) -> None:
     """Write the first ticks of a scenario, such as stand-push, to a file."""
-    problems = recorded(scenario, ticks)
-    record_sequence(file, problems, answers(problems))
+    problems = window(load(scenario), 0, ticks)  # which all have one shape
+    resolver, memory, xs = make("hcod"), None, []
+    for h in problems:
+        res = resolver.solve(h, memory)
+        memory = res.memory
+        xs.append(res.x)
+    record_sequence(file, problems, xs)
     print(f"{len(problems)} problems of {scenario}: {file}")
 
 

@@ -20,9 +20,8 @@ from benchmark.packages import OWN, Entrant
 from benchmark.report import Report, Section
 from benchmark.solve.judge import RIGHT, by, summary
 from benchmark.solve.resolvers import asked
-from benchmark.store import Row
-from benchmark.tables import Column, Table, percent, power, whole
-from benchmark.timing import machine, one_core
+from benchmark.tables import Column, Row, Table, percent, power, whole
+from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
 from scenarios.problems.reference import Problem
 from solvers import certify, make, names
@@ -36,6 +35,9 @@ L k: share of problems in which bounds and levels 1 to k miss no more than the e
 those called solved, relative. off: number that ended with a status. us: a solve from Python in \
 microseconds, cold; warm: with the memory of the same problem with its targets and sides moved by \
 up to 1 %."""
+_COLUMNS = (Column("near", "nearest", percent), Column("miss", "relative", power),
+            Column("off", "off", whole), Column("us", "median_us"), Column("p95", "p95_us"),
+            Column("warm", "warm_median_us"))
 
 
 @final
@@ -57,11 +59,9 @@ class Family:
     def problem(self, seed: int) -> Hierarchy:
         """Return the stack of a seed."""
         rng = np.random.default_rng(seed)
-        if self.hard:
-            free = written(rng, self.joints, self.sizes, _HARD)
-        else:
-            free = Hierarchy.from_levels(
-                [(rng.normal(size=(m, self.joints)), rng.normal(size=m)) for m in self.sizes])
+        free = written(rng, self.joints, self.sizes, _HARD) if self.hard else (
+            Hierarchy.from_levels([(rng.normal(size=(m, self.joints)), rng.normal(size=m))
+                                   for m in self.sizes]))
         largest = np.abs(make("tpm").solve(free).x).max()
         half = self.room * largest * rng.uniform(0.3, 1.0, (2, self.joints))
         reference = 0.1 * self.room * largest * rng.normal(size=self.joints)
@@ -82,31 +82,25 @@ FAMILIES = tuple(
                        ("hard, severe" if hard else "severe", 0.4)))
 
 
-def run(count: int = 400, resolvers: Sequence[str] = (), families: Sequence[Family] = FAMILIES
-        ) -> Report:
-    """Judge and time resolvers by name, or all that take bounds, on `count` stacks of a family."""
-    chosen = resolvers or [name for name in names()
-                           if make(name).handles in ("bounds", "inequalities")]
+def main(count: int = 400, resolver: list[str] | None = None) -> None:
+    """Print the tables; count : problems of a family; resolver : only this, may be repeated."""
+    chosen = resolver or [name for name in names()
+                          if make(name).handles in ("bounds", "inequalities")]
     entrants = [Entrant(make(name).label, OWN, "benchmark.solve.ours:Ours", {"resolver": name})
                 for name in chosen]
-    rows: list[Row] = []
     tables = []
-    for family in families:
-        with one_core():
-            problems = family.problems(count)
-            raw = asked(family.name, problems, entrants, _SECONDS)
-        found = [_row(own, len(family.sizes)) for _, own in by(raw, "entrant")]
+    for family in FAMILIES:
+        problems, levels = family.problems(count), len(family.sizes)
+        raw = asked(family.name, problems, entrants, _SECONDS)
         bound = np.mean([((one.x <= one.h.lower[:one.h.n]) | (one.x >= one.h.upper[:one.h.n])).sum()
                          for one in problems])
-        tables.append(Table(f"{family.name}: {len(problems)} problems, {bound:.1f} joints at a "
-                            "bound", found, [
-            *(Column(f"L {k}", f"optimal_{k}", percent) for k in range(1, len(family.sizes) + 1)),
-            Column("near", "nearest", percent), Column("miss", "relative", power),
-            Column("off", "off", whole), Column("us", "median_us"), Column("p95", "p95_us"),
-            Column("warm", "warm_median_us")]))
-        rows += [{"family": family.name, **row} for row in found]
+        tables.append(Table(
+            f"{family.name}: {len(problems)} problems, {bound:.1f} joints at a bound",
+            [_row(own, levels) for _, own in by(raw, "entrant")],
+            [*(Column(f"L {k}", f"optimal_{k}", percent) for k in range(1, levels + 1)),
+             *_COLUMNS]))
     title = f"Resolvers inside limits, one core of {machine()['processor']}"
-    return Report(title, [Section("", tables, NOTES)], {"saturation": rows})
+    Report(title, [Section("", tables, NOTES)]).say()
 
 
 def _row(rows: Sequence[Row], levels: int) -> Row:
@@ -116,11 +110,6 @@ def _row(rows: Sequence[Row], levels: int) -> Row:
     return {**found, "off": len(rows) - found["answered"],
             "nearest": float((first > levels + 1).mean()), **{
                 f"optimal_{k}": float((first > k).mean()) for k in range(1, levels + 1)}}
-
-
-def main(count: int = 400, resolver: list[str] | None = None) -> None:
-    """Print the tables; count : problems of a family; resolver : only this, may be repeated."""
-    run(count, resolver or ()).say()
 
 
 if __name__ == "__main__":

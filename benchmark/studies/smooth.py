@@ -7,7 +7,6 @@ kept in `out`: the same command continues, and folders of several machines can b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,14 +14,13 @@ import numpy as np
 import typer
 
 from benchmark.report import Report, Section
-from benchmark.store import Row
 from benchmark.tables import Column, Table, power, whole
 from scenarios.config import load
 from scenarios.results.columns import Results
 from scenarios.results.sampled import Workers, compare_starts
 
 SCENARIOS = "reach-torque,stand-push,stand-momentum,stand-g1,stand-talos"
-RESOLVERS = ("hcod", "weighted", "merged")
+RESOLVERS = "hcod,weighted,merged"
 _COLUMNS = (
     Column("stood", "stood", str), Column("step", "step"), Column("largest", "largest"),
     Column("ticks", "above", whole), Column("limits", "limits", power),
@@ -36,29 +34,27 @@ _WORDS = (
     "of the position, medians [mm]; time of a solve over that of weighted.")
 
 
-def run(starts: int = 16, seed: int = 14, scenarios: str = SCENARIOS,
-        resolvers: Sequence[str] = RESOLVERS, out: Path = Path("runs/smooth"),
-        workers: int | None = None, changes: Sequence[str] = ()) -> Report:
-    """Run the scenarios (names with commas between) and return a table for each.
+def main(starts: int = 16, seed: int = 14, scenarios: str = SCENARIOS, resolvers: str = RESOLVERS,
+         out: Path = Path("runs/smooth"), workers: int | None = None,
+         changes: Annotated[list[str] | None, typer.Option("--set")] = None) -> None:
+    """Print a table for each scenario (names with commas between).
 
     changes : KEY=VALUE of all scenarios, as of `hierarchy run --set`.
     """
     tables: list[Table] = []
-    rows: list[Row] = []
     for name in scenarios.split(","):
-        scenario = load(name, changes)
-        done = compare_starts([scenario], resolvers, starts, seed, out / f"{name}-{seed}",
-                              workers=Workers(workers))
+        scenario = load(name, changes or ())
+        done = compare_starts([scenario], resolvers.split(","), starts, seed,
+                              out / f"{name}-{seed}", workers=Workers(workers))
         (results,) = done.found.values()
         found = [_row(results, label, f"{scenario.control.level}_step")
                  for label in results.labels]
         usual = next((one["time"] for one in found if one["entrant"] == "weighted"), np.nan)
         for one in found:
             one["time"] /= usual
-        title = ", ".join([name, *changes, f"{starts} starts", f"seed {seed}"])
+        title = ", ".join([name, *(changes or ()), f"{starts} starts", f"seed {seed}"])
         tables.append(Table(title, found, _COLUMNS))
-        rows += [{"scenario": name, "set": " ".join(changes), **one} for one in found]
-    return Report("Commands from tick to tick", [Section("", tables, _WORDS)], {"smooth": rows})
+    Report("Commands from tick to tick", [Section("", tables, _WORDS)]).say()
 
 
 def _row(results: Results, label: str, step: str) -> dict[str, Any]:
@@ -86,14 +82,6 @@ def _row(results: Results, label: str, step: str) -> dict[str, Any]:
 
 def _median(values: np.ndarray) -> float:
     return float(np.median(values)) if len(values) else float("nan")
-
-
-def main(starts: int = 16, seed: int = 14, scenarios: str = SCENARIOS,
-         resolvers: str = ",".join(RESOLVERS), out: Path = Path("runs/smooth"),
-         workers: int | None = None,
-         changes: Annotated[list[str] | None, typer.Option("--set")] = None) -> None:
-    """Print the tables."""
-    run(starts, seed, scenarios, resolvers.split(","), out, workers, changes or ()).say()
 
 
 if __name__ == "__main__":

@@ -11,8 +11,8 @@ import pytest
 from benchmark.packages import PACKAGES, Entrant, MissingError, Package, python_of
 from benchmark.peers import reaching, standing
 from benchmark.peers.compare import joined
+from benchmark.peers.hierarchy import stand
 from benchmark.peers.moving import ENTRANTS, QUESTIONS, START, make_scenes, run
-from benchmark.peers.ours import stand
 from benchmark.peers.standing import Judge, followed, make_scene
 from benchmark.process import Field
 from benchmark.solve import entrants as solvers_
@@ -190,9 +190,8 @@ def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
 def test_wrong_answers_to_stand_are_found(tmp_path):
     scene = make_scene(tmp_path)
     states = followed(scene, 2)
-    (tick, answer, _), judge = stand(scene, "hcod"), Judge(scene, states)
-    tick(0.0, states["q"][0], states["v"][0], None)
-    a, torques, wrenches = answer()
+    (tick, _), judge = stand(scene, "hcod"), Judge(scene, states)
+    a, torques, wrenches = tick(0.0, states["q"][0], states["v"][0], None)()
     good = judge.residuals(0, a, torques, wrenches)
     assert max(good[key] for key in ("dynamics", "contact", "torque", "friction")) < 1e-6
     for wrong, key, least in (((a, torques + 1.0, wrenches), "dynamics", 0.99),

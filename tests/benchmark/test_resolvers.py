@@ -9,7 +9,7 @@ import pytest
 from benchmark import start
 from benchmark.solve import resolvers
 from benchmark.solve.entrants import NUMPY
-from benchmark.start import Cost, run
+from benchmark.start import Case, Done, run
 from benchmark.tick import PlainTick
 from scenarios.cell.build import build
 from scenarios.config import load
@@ -68,12 +68,25 @@ def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
 
 
 def test_everything_measured_is_told(monkeypatch):
-    monkeypatch.setattr(start, "beginnings", lambda folder: [Cost("help", 0.1, "s", 0.5, 0.09)])
-    monkeypatch.setattr(start, "first_compilation", lambda cache: (
-        [Cost("first", 20.0, "s", None, 19.0)], {"solvers.kernels.a.b": 2.0}))
-    monkeypatch.setattr(start, "library", lambda folder: Cost("library", 9.0, "s", 10.0, 8.0))
-    monkeypatch.setattr(start, "memory", lambda folder: [Cost("a run", 301.0, "MB", 300.0)])
+    events = [[0.0, True, "solvers.kernels.a.b"], [2.0, False, "solvers.kernels.a.b"]]
+    cases = [Case("help", 0.5, ["a"]), Case("first", None, [start._COMPILE]),
+             Case("library", 10.0, ["b"])]
+    said = {"help": Done(0.1, 0.09), "first": Done(20.0, 19.0, events), "library": Done(11.0, 8.0),
+            "memory": Done(1.0, 1.0, [301.0]), "memory of a worker": Done(1.0, 1.0, [250.0] * 20)}
+    monkeypatch.setattr(start, "_cases", lambda folder: cases)
+    monkeypatch.setattr(start, "_measured", lambda case: said[case.what])
     found = run()
-    assert [row["verdict"] for row in found.rows["start"]] == ["met", "", "met", "not met"]
+    assert [row["verdict"] for row in found.rows["start"]] == [
+        "met", "", "", "not met", "not met", "met", ""]
+    assert [row["value"] for row in found.rows["start"]] == [0.1, 20.0, 2.0, 11.0, 301.0, 250.0, 0]
     assert found.rows["compilation"] == [{"kernel": "solvers.kernels.a.b", "seconds": 2.0}]
     assert "a.b 2.0" in found.sections[0].text
+
+
+def test_a_process_is_measured_and_one_that_fails_is_named():
+    done = start._measured(Case("a sum", None, [
+        "-c", "print('noise'); print([sum(range(10**6))])"], repeated=1))
+    assert done.said == [499999500000]
+    assert 0.0 < done.processor
+    with pytest.raises(RuntimeError, match="no such thing"):
+        start._measured(Case("a fault", None, ["-c", "raise SystemExit('no such thing')"]))

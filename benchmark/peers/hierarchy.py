@@ -3,28 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from benchmark.peers.scenes import Answer, Arm, Array, RefusedError, Stand, wrench
-from hierarchy import Robot, Stack, State, Task
+from hierarchy import Robot, Stack, State, Task, tasks
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.paths import Ellipse, Still
-from hierarchy.tasks import (
-    BaseDynamics,
-    CentreOfMass,
-    ContactMotion,
-    Friction,
-    JointLimits,
-    LeastForce,
-    Pose,
-    Position,
-    Posture,
-    Together,
-    TorqueLimits,
-)
-from solvers import Resolution, Resolver, Status, make, solve_ik
+from solvers import Resolution, Status, make, solve_ik
 
 TASKS = ("centre of mass", "left hand", "right hand", "posture")
 _UNLIMITED = 1e9  # [rad/s^2]
@@ -35,8 +23,8 @@ _ANSWERED = {"velocity": (Status.SOLVED,), "torque": (Status.SOLVED, Status.INAC
 class _Solver:
     """Solves the stack at a state, tick after tick, from the memory of the tick before."""
 
-    def __init__(self, state: State, stack: Stack, resolver: Resolver) -> None:
-        self.state, self.stack, self.resolver = state, stack, resolver
+    def __init__(self, state: State, stack: Stack, call: Callable[..., Resolution]) -> None:
+        self.state, self.stack, self.call = state, stack, call
         self.memory: Array | None = None
         self.before: Array | None = None
 
@@ -45,7 +33,7 @@ class _Solver:
         if not self.state.move(t, q, v):
             raise RefusedError("State.move is False")
         self.h = self.stack.hierarchy(self.state)
-        res = self.resolver.solve(self.h, self.memory)
+        res = self.call(self.h, self.memory)
         if res.status not in _ANSWERED[self.stack.level]:
             raise RefusedError(res.status.name)
         self.before, self.memory = self.memory, res.memory
@@ -53,29 +41,26 @@ class _Solver:
 
     def again(self) -> object:
         """Solve the last tick's problem again."""
-        return self.resolver.solve(self.h, self.before)
+        return self.call(self.h, self.before)
 
 
-def arm(scene: Arm, posture: bool, resolver: str | Resolver, **settings: Any) -> tuple[Any, Any]:
+def arm(scene: Arm, posture: bool, resolver: str | Callable[..., Resolution], **settings: Any
+        ) -> tuple[Any, Any]:
     """Velocity limits, position and posture, with any resolver; the path is our own."""
     robot = Robot.from_file(scene.file, scene.frame)
     robot.lower, robot.upper = np.full(robot.n, -np.inf), np.full(robot.n, np.inf)
-    path = _ellipse(scene.centre, scene.cosine, scene.sine, scene.turning)
-    tasks = [JointLimits(robot, _UNLIMITED, scene.period),
-             Position(robot.frame(scene.frame), path, gain=scene.gain),
-             Posture(tuple(scene.posture), gain=scene.posture_gain)]
-    stack = Stack(tasks if posture else tasks[:2], "velocity")
+    path = Ellipse(scene.centre, scene.cosine, scene.sine, scene.turning)
+    asked = [tasks.JointLimits(robot, _UNLIMITED, scene.period),
+             tasks.Position(robot.frame(scene.frame), path, gain=scene.gain),
+             tasks.Posture(tuple(scene.posture), gain=scene.posture_gain)]
+    stack = Stack(asked if posture else asked[:2], "velocity")
     solver = _Solver(State.at(robot, scene.start), stack,
-                     make(resolver, **settings) if isinstance(resolver, str) else resolver)
+                     make(resolver, **settings).solve if isinstance(resolver, str) else resolver)
 
     def velocity(t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         return solver.solve(t, q, v).x
 
     return velocity, solver.again
-
-
-def _ellipse(centre: Any, cosine: Any, sine: Any, rate: float) -> Ellipse:
-    return Ellipse(tuple(centre), tuple(cosine), tuple(sine), rate)
 
 
 def robot_of(scene: Stand) -> Robot:
@@ -89,44 +74,43 @@ def stack_of(scene: Stand, robot: Robot, state: State) -> tuple[Stack, Contacts]
     contacts = Contacts(robot, [Contact.rectangle(robot.frame(sole), (-half[0], half[0]),
                                                   (-half[1], half[1]), mu)
                                 for sole in scene.soles])
-    com, *hands = (_ellipse(*circle) for circle in scene.circles)
-    wanted: list[Task] = [CentreOfMass(robot, com, stiffness=scene.com.stiffness,
-                                       damping=scene.com.damping)]
-    wanted += [Position(robot.frame(frame), path, scene.hand.stiffness, scene.hand.damping,
-                        name=name)
-               for frame, path, name in zip(scene.hands, hands, TASKS[1:3], strict=True)]
-    held = ContactMotion.at(state, contacts, scene.contact.stiffness, scene.contact.damping)
+    com, *hands = (Ellipse(*circle) for circle in scene.circles)
+    stiffness, damping, _ = scene.com
+    wanted: list[Task] = [
+        tasks.CentreOfMass(robot, com, stiffness=stiffness, damping=damping),
+        *(tasks.Position(robot.frame(frame), path, *scene.hand[:2], name=name)
+          for frame, path, name in zip(scene.hands, hands, TASKS[1:3], strict=True))]
+    held = tasks.ContactMotion.at(state, contacts, *scene.contact[:2])
+    torques = tasks.TorqueLimits(robot, contacts=contacts)
     return Stack([
-        Together([BaseDynamics(contacts), held], "physics"),
-        Together([TorqueLimits(robot, contacts=contacts), Friction(contacts)], "limits"),
-        *wanted, Posture(tuple(scene.posture), scene.joint.stiffness, scene.joint.damping),
-        LeastForce(contacts)], "torque", contacts=contacts), contacts
+        tasks.Together([tasks.BaseDynamics(contacts), held], "physics"),
+        tasks.Together([torques, tasks.Friction(contacts)], "limits"),
+        *wanted, tasks.Posture(tuple(scene.posture), *scene.joint[:2]),
+        tasks.LeastForce(contacts)], "torque", contacts=contacts), contacts
 
 
-def stand(scene: Stand, resolver: str) -> tuple[Any, Any, Any]:
+def stand(scene: Stand, resolver: str) -> tuple[Any, Any]:
     """Strict levels, or with `weighted` physics and limits strict and the rest as one level."""
     robot = robot_of(scene)
     state = State.at(robot, scene.rest)
     stack, contacts = stack_of(scene, robot, state)
     weights = {} if resolver != "weighted" else {"strict_levels": _STRICT, "weights": (
-        *(1.0,) * _STRICT, scene.com.weight, scene.hand.weight, scene.hand.weight,
-        scene.joint.weight, scene.force)}
-    solver = _Solver(state, stack, make(resolver, **weights))
-    last: list[Array] = [np.empty(0)] * 2
+        *(1.0,) * _STRICT, scene.com[2], scene.hand[2], scene.hand[2], scene.joint[2],
+        scene.force)}
+    solver = _Solver(state, stack, make(resolver, **weights).solve)
 
-    def tick(t: float, q: Array, v: Array, targets: Array) -> None:
-        last[0] = solver.solve(t, q, v).x
-        last[1] = contacts.torques(state, last[0])
+    def tick(t: float, q: Array, v: Array, targets: Array) -> Callable[[], Answer]:
+        x = solver.solve(t, q, v).x
+        return partial(answer, x, contacts.torques(state, x))
 
-    def answer() -> Answer:
-        wrenches, x = [], last[0]
-        forces = contacts.forces(x).reshape(2, 4, 3)
+    def answer(x: Array, torques: Array) -> Answer:
+        wrenches, forces = [], contacts.forces(x).reshape(2, 4, 3)
         for contact, of in zip(contacts.contacts, forces, strict=True):
             R = state.rotation(contact.frame)
             wrenches.append(wrench(R, np.array(contact.points), of @ R))
-        return Answer(contacts.accelerations(x), last[1], np.array(wrenches))
+        return Answer(contacts.accelerations(x), torques, np.array(wrenches))
 
-    return tick, answer, solver.again
+    return tick, solver.again
 
 
 def reach(file: str, frames: list[str], tolerance: float) -> Callable[..., tuple[Array, bool]]:
@@ -135,9 +119,9 @@ def reach(file: str, frames: list[str], tolerance: float) -> Callable[..., tuple
     placed = [robot.frame(name) for name in frames]
 
     def solve(poses: Array, starts: Array) -> tuple[Array, bool]:
-        hands = [Pose(frame, Still(pose[:3, 3]), pose[:3, :3], name=frame.name)
+        hands = [tasks.Pose(frame, Still(pose[:3, 3]), pose[:3, :3], name=frame.name)
                  for frame, pose in zip(placed, poses, strict=True)]
-        found = solve_ik(robot, starts[0], [Together(hands, "hands")], until=tolerance)
+        found = solve_ik(robot, starts[0], [tasks.Together(hands, "hands")], until=tolerance)
         return found.q, found.met
 
     return solve
