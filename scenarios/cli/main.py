@@ -21,7 +21,7 @@ import scenarios.cli.shown  # both add their commands
 from scenarios.cli import options as opt
 from scenarios.cli.options import app
 from scenarios.cli.problems import problems
-from scenarios.cli.terminal import exit_code, first_line, print_json, print_list, print_lists, shown
+from scenarios.cli.terminal import exit_code, first_line, print_json, print_lists, shown
 
 app.add_typer(problems, name="problems")
 _ROOT = Path(scenarios.__file__).parents[1]  # of a checkout, if `benchmark/` is beside this package
@@ -117,10 +117,11 @@ def library(out: Annotated[Path, opt.output("Folder of the library: new or empty
         difference = differs(out)
         if as_json:
             print_json({"folder": shown(out), "same": not difference, "difference": difference})
-            return int(bool(difference))
-        if not difference:
+        elif difference:
+            return exit_code(f"{shown(out)}: {difference}")
+        else:
             print(f"{shown(out)}: same kernels as installed")
-        return exit_code(f"{shown(out)}: {difference}" if difference else None)
+        return int(bool(difference))
     folder = claim(out)
     with whole(folder) as partial:
         made = write(partial, opt.listed_in(resolvers), target)
@@ -144,17 +145,10 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
     Builds it and, for a scenario, runs the first tick.
     """
     from scenarios.cli import robot_check, scenario_check
-    from scenarios.loop.first_tick import first_tick
 
-    if robot_check.is_robot(file):
-        robot = robot_check.look_at(file, changes or [])
-        data, text = robot_check.as_plain_data(*robot), robot_check.say(*robot)
-    else:
-        scenario = opt.loaded(file, changes)
-        found = first_tick(scenario)
-        data, text = scenario_check.as_plain_data(scenario, found), scenario_check.say(
-            scenario, found)
-    print_json(data) if as_json else print(text)
+    checked = robot_check if robot_check.is_robot(file) else scenario_check
+    found = checked.look_at(file, changes)
+    print_json(checked.as_plain_data(*found)) if as_json else print(checked.say(*found))
 
 
 @app.command("help")
@@ -171,10 +165,11 @@ def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
     assert above is not None, "help is a command of the application"
     commands = getattr(above.command, "commands", {})
     if what is None:
-        print_list("commands, see `hierarchy help COMMAND`",
-                   {name: one.get_short_help_str(60) for name, one in commands.items()})
-        print_list("keys of a scenario file, see `hierarchy help KEY`",
-                   {key.name: key.meaning for key in keys_of(Scenario)})
+        print_lists({
+            "commands, see `hierarchy help COMMAND`":
+                {name: one.get_short_help_str(60) for name, one in commands.items()},
+            "keys of a scenario file, see `hierarchy help KEY`":
+                {key.name: key.meaning for key in keys_of(Scenario)}})
     elif lines := explained(what):
         print(*lines, sep="\n")
     elif what in commands:

@@ -65,7 +65,7 @@ def run(scenario: Annotated[str, typer.Argument(
 
 def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json: bool) -> int:
     from scenarios.cli.progress import bar
-    from scenarios.cli.terminal import certified, levels_given_up, print_table, troubles
+    from scenarios.cli.terminal import certified, print_table, troubles
     from scenarios.config.validation import doubtful_units
     from scenarios.loop.first_tick import contact_warnings
     from scenarios.loop.simulation import simulate
@@ -94,8 +94,7 @@ def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json
         print_table([Run(scenario, scenario.control.resolver, str(resolver.label), recording)])
         if certify:
             print(f"\n{certified(recording, resolver.damping)}")
-        print(*troubles(recording), *levels_given_up(recording), "",
-              f"{recording.ticks} ticks in {shown(folder)}", sep="\n")
+        print(*troubles(recording), "", f"{recording.ticks} ticks in {shown(folder)}", sep="\n")
     return exit_code(recording.fault)
 
 

@@ -21,19 +21,14 @@ _NAMES = 26   # columns of it for the names of metrics
 
 
 def troubles(recording: Any) -> list[str]:
-    """Return one line per kind of problem: action, number of ticks and first tick."""
-    lines = [f"{kind}: {action} in {len(ticks)} ticks, first in tick {ticks[0]} "
-             f"(t = {recording['t'][ticks[0]]:.3f} s)"
-             for (kind, action), ticks in recording.troubles().items()]
-    return ["", *lines] if lines else []
-
-
-def levels_given_up(recording: Any) -> list[str]:
-    """Return one line per level that the run missed: for how long, and what held it back."""
+    """Return one line per kind of problem: its ticks; and per missed level: what held it back."""
     from scenarios.measure.given_up import given_up
 
-    lines = [fill(str(one), _WIDTH, subsequent_indent="  ") for one in given_up(recording)]
-    return ["", *lines] if lines else []
+    faults = [f"{kind}: {action} in {len(ticks)} ticks, first in tick {ticks[0]} "
+              f"(t = {recording['t'][ticks[0]]:.3f} s)"
+              for (kind, action), ticks in recording.troubles().items()]
+    missed = [fill(str(one), _WIDTH, subsequent_indent="  ") for one in given_up(recording)]
+    return [line for lines in (faults, missed) if lines for line in ("", *lines)]
 
 
 def certified(recording: Any, damping: float) -> str:
@@ -116,21 +111,16 @@ def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: 
     console.print(*below, sep="\n", end="\n" if below else "")
 
 
-def print_list(what: str, entries: dict[str, str]) -> None:
-    """Print names with descriptions in 80 columns."""
-    print(f"{what}:")
-    width = max((len(name) for name in entries), default=0)
-    for name, text in entries.items():
-        print(fill(text, _WIDTH, initial_indent=f"  {name:{width}}  ",
-                   subsequent_indent=" " * (width + 4)) or f"  {name}")
-
-
-def print_lists(lists: dict[str, dict[str, str]], as_json: bool) -> None:
-    """Print lists by heading, or all as JSON."""
+def print_lists(lists: dict[str, dict[str, str]], as_json: bool = False) -> None:
+    """Print names with descriptions by heading in 80 columns, or all as JSON."""
     if as_json:
         return print_json(lists)
     for what, entries in lists.items():
-        print_list(what, entries)
+        print(f"{what}:")
+        width = max((len(name) for name in entries), default=0)
+        for name, text in entries.items():
+            print(fill(text, _WIDTH, initial_indent=f"  {name:{width}}  ",
+                       subsequent_indent=" " * (width + 4)) or f"  {name}")
 
 
 def print_files(files: list[Path], as_json: bool) -> None:
