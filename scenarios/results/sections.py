@@ -6,18 +6,20 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from markupsafe import Markup
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from hierarchy import plugins
 from hierarchy.words import counted, listed
 from scenarios.draw.figures import drawing, panels
-from scenarios.draw.figures.drawing import svg
+from scenarios.draw.figures.drawing import ALERT, INK, svg
 from scenarios.draw.figures.palette import Look, task_colours
+from scenarios.draw.figures.panels import Draw, Panel
 from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
 from scenarios.measure.runs import Run, table
 from scenarios.recording.listed import errors
 from scenarios.recording.recording import Recording
-from scenarios.results import curves
 from scenarios.results.columns import flags
 from scenarios.templates import render
 
@@ -106,7 +108,7 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
     recordings = {one.label: one.recording for one in found}
     cards = []
     for panel in plugins.known("figures").values():
-        small = curves.side_by_side(panel, recordings, looks)
+        small = _side_by_side(panel, recordings, looks)
         if any(panel.shows(recordings[label]) for label in small):
             cards.append((panel, _key(panel.name, recordings), [
                 (one, svg(small[one.label], f"{name}, {one.label}: {panel.title}"))
@@ -141,15 +143,88 @@ def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
     moved = {one.label: one.recording for one in found}
     if len(moved) > 1 and all("position_error" in one for one in moved.values()):
         figs.append(("Distance from the path [mm]",
-                     curves.overlay(panels.position_error, moved, looks)))
+                     _overlay(panels.position_error, moved, looks)))
     if len({one.scenario.name for one in recordings.values()}) < len(recordings):
         figs.append((f"Joint difference from {next(iter(recordings))} [rad]",
-                     curves.departure(recordings, looks)))
+                     _departure(recordings, looks)))
     timings = {run.label: run.timing or recordings[run.label] for run in runs
                if run.label in recordings}
     if all("time_tick" in one for one in timings.values()):
         figs.append(("Time per tick: dot: resolve, median; whole tick | median, × 99.9 %",
-                     curves.computing_time(timings, looks)))
+                     _computing_time(timings, looks)))
     return render("results/overlays.html", looks={label: looks[label] for label in recordings},
                   drawn=[(title, svg(fig, f"{name}: {title}")) for title, fig in figs]
                   ) if figs else Markup()
+
+
+def _side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]
+                 ) -> dict[str, Figure]:
+    """Return one small figure of `panel` per run, by label, all with the same limits.
+
+    Values far beyond those of the other runs are cut, and the panel states their range.
+    """
+    drawn, axes = {}, []
+    for label, recording in recordings.items():
+        if panel.fits(recording):
+            drawn[label], (ax,) = drawing.figure()
+            panel.draw(ax, recording, looks[label].colour)
+            axes.append(ax)
+    ranges = [ax.get_ylim() for ax in axes]
+    end = max((float(recordings[label]["t"][-1]) for label in drawn), default=0.0)
+    for ax, (low, high) in zip(axes, ranges, strict=True):
+        limits = drawing.shared_limits(ranges) if ax.get_yscale() != "log" else (
+            min(least for least, _ in ranges), max(most for _, most in ranges))
+        ax.set_ylim(limits)
+        ax.set_xlim(0.0, end)
+        ax.xaxis.set_major_locator(MaxNLocator(4))
+        if high - low > 1.1 * (limits[1] - limits[0]):
+            ax.text(0.98, 0.96, f"cut: {low:.2g} to {high:.2g}", color=ALERT, fontsize=8,
+                    ha="right", va="top", transform=ax.transAxes)
+    return drawn
+
+
+def _overlay(draw: Draw, recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
+    """Return one figure with a curve per run, in the colour and dashes of its label."""
+    fig, (ax,) = drawing.figure(width=4.9, height=2.7)
+    for label, recording in recordings.items():
+        before = len(ax.lines)
+        draw(ax, recording, looks[label].colour)
+        for line in ax.lines[before:]:
+            line.set_linestyle(looks[label].line)
+    ax.set_xlabel("time [s]")
+    return fig
+
+
+def _departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
+    """Return the largest joint difference from the first run over time [rad], logarithmic."""
+    fig, (ax,) = drawing.figure(width=4.9, height=2.7)
+    first, *others = recordings
+    reference = recordings[first]
+    for label in others:
+        ticks = min(reference.ticks, recordings[label].ticks)
+        apart = np.abs(recordings[label]["q"][:ticks] - reference["q"][:ticks]).max(axis=1)
+        drawing.curve(ax, reference["t"][:ticks], np.maximum(apart, 1e-16),
+                      color=looks[label].colour, linestyle=looks[label].line)
+    drawing.make_logarithmic(ax, "y")
+    ax.set_xlabel("time [s]")
+    return fig
+
+
+def _computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
+    """Return the computing times of a tick [us] on a logarithmic axis, one row per run.
+
+    A dot for the median of resolving, then median (|) and 99.9th percentile (x) of whole ticks.
+    """
+    fig, (ax,) = drawing.figure(width=4.9, height=0.7 + 0.4 * len(recordings))
+    for row, (label, recording) in enumerate(recordings.items()):
+        for signal, percent, marker, colour in (("time_resolve", 50.0, "o", looks[label].colour),
+                                                ("time_tick", 50.0, "|", INK),
+                                                ("time_tick", 99.9, "x", INK)):
+            if signal in recording:
+                ax.plot(1e6 * np.percentile(recording[signal], percent), row, marker, color=colour)
+    drawing.make_logarithmic(ax, "x")
+    ax.set_yticks(range(len(recordings)), list(recordings))
+    ax.set_ylim(len(recordings) - 0.5, -0.5)
+    ax.grid(axis="y", visible=False)
+    ax.set_xlabel("µs per tick")
+    return fig

@@ -8,7 +8,7 @@ near-black; tests/scenarios/test_figures.py checks this.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 Dash = tuple[float, ...]
 
@@ -37,6 +37,11 @@ class Look(NamedTuple):
 
     colour: str
     dash: Dash
+
+    @property
+    def line(self) -> Any:
+        """The line style in matplotlib's form."""
+        return (0, self.dash) if self.dash else "-"
 
 
 def colour(label: str) -> str:
