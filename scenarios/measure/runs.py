@@ -16,6 +16,7 @@ from scenarios.measure.metrics import Metric
 from scenarios.recording.facts import ResolverFacts, resolver_facts
 from scenarios.recording.recording import Recording
 
+_TIE, _ROUNDING = 0.01, 1e-12  # relative, and in SI units: values that near are as good
 # How a resolver that is not strict departs from strict priorities, by its name.
 _DEPARTS = {
     "": "not strict",
@@ -72,6 +73,13 @@ class Run:
         timed = metrics.measure(self.timing) if self.timing else {}
         return found | {name: one for name, one in timed.items()
                         if name in found and name.startswith(("time_", "ticks_late"))}
+
+    def as_plain_data(self) -> dict[str, Any]:
+        """Return the run for a JSON file."""
+        return {"scenario": self.scenario.name, "resolver": self.spec, "label": self.label,
+                "folder": self.folder, "fault": self.fault, "settings": self.settings,
+                "ticks": self.recording.ticks if self.recording else 0,
+                "metrics": {name: metrics.plain(one) for name, one in self.metrics.items()}}
 
     @cached_property
     def happened(self) -> tuple[Happening, ...]:
@@ -146,15 +154,11 @@ def caveats(resolvers: Mapping[str, ResolverFacts]) -> dict[str, list[str]]:
             for label, one in resolvers.items()}
 
 
-def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01,
-          rounding: float = 1e-12) -> frozenset[int]:
-    """Return which of the values are as good as the best; empty if all are.
-
-    That is within `tie`, relative, or within what rounding makes of nothing [SI units].
-    """
+def _best(values: Mapping[int, float], lower: bool | None) -> frozenset[int]:
+    """Return which of the values are as good as the best; empty if all are."""
     if lower is None or not values:
         return frozenset()
     winner = min(values.values()) if lower else max(values.values())
     best = frozenset(i for i, value in values.items()
-                     if abs(value - winner) <= max(tie * max(abs(value), abs(winner)), rounding))
+                     if abs(value - winner) <= max(_TIE * max(abs(value), abs(winner)), _ROUNDING))
     return best if len(best) < len(values) else frozenset()
