@@ -137,7 +137,7 @@ def library(out: Annotated[Path, opt.output("Folder of the library: new or empty
 
 @app.command()
 def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file or name.",
-                                              autocompletion=opt.complete_scenarios)],
+                                              autocompletion=opt.names_of("scenarios"))],
           changes: opt.Changes = None, plugin: opt.Plugins = None,
           as_json: opt.AsJson = False) -> None:
     """Validate and summarize a scenario or robot file.

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 @opt.app.command()
 def run(scenario: Annotated[str, typer.Argument(
-            help="Name of a scenario, or a scenario file.", autocompletion=opt.complete_scenarios)],
+            help="Name of a scenario, or a scenario file.",
+            autocompletion=opt.names_of("scenarios"))],
         resolver: Annotated[str | None, typer.Option(
             "--resolver", metavar="SPEC", autocompletion=opt.complete_resolvers,
             help="Use another resolver: name, or name:setting=value:setting=value.")] = None,
@@ -101,7 +102,7 @@ def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json
 @opt.app.command()
 def compare(scenarios: Annotated[list[str], typer.Argument(
                 help="Names of scenarios or groups, or scenario files.",
-                autocompletion=opt.complete_groups)],
+                autocompletion=opt.names_of("scenarios", "groups"))],
             resolvers: Annotated[str | None, typer.Option(
                 "--resolvers", metavar="SPEC,SPEC,...", autocompletion=opt.complete_resolvers,
                 help="Resolvers: name, or name:setting=value; or own, that of each scenario. "
@@ -132,11 +133,11 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
         name = scenarios[0] if grouped else chosen[0].name
         folder = out if out is not None else next_free(Path("runs") / f"compare-{name}")
         return _compare(chosen, specs, folder, as_json, workers)
-    from scenarios.results.sampled import compare_starts
+    from scenarios.results.sampled import Workers, compare_starts
 
     folder = out if out is not None else Path("runs") / f"starts-{chosen[0].name}"
     return _sampled(partial(compare_starts, chosen, specs, starts, seed, folder,
-                            workers=opt.workers_of(workers, scheduler, part)), folder, as_json)
+                            workers=Workers(workers, scheduler, part)), folder, as_json)
 
 
 def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Path,
@@ -171,7 +172,7 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
 
 @opt.app.command()
 def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
-                                              autocompletion=opt.complete_sweeps)],
+                                              autocompletion=opt.names_of("sweeps"))],
           out: Annotated[Path | None, opt.output(
               "Output folder, new or of a sweep to resume. Default: runs/sweep-NAME.")] = None,
           plugin: opt.Plugins = None, workers: opt.Workers = None, scheduler: opt.Scheduler = None,
@@ -180,12 +181,13 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
     Run the same command again to resume an interrupted sweep.
     """
-    asked = opt.workers_of(workers, scheduler, part)
     from scenarios.results.plan import load_sweep
+    from scenarios.results.sampled import Workers
     from scenarios.results.sampled import sweep as make
 
     folder = out if out is not None else Path("runs") / f"sweep-{load_sweep(file).name}"
-    return _sampled(partial(make, file, folder, workers=asked), folder, as_json)
+    return _sampled(partial(make, file, folder, workers=Workers(workers, scheduler, part)), folder,
+                    as_json)
 
 
 def _sampled(make: Callable[..., Finished], folder: Path, as_json: bool) -> int:
