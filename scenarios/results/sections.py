@@ -33,6 +33,7 @@ _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_v
           "acceleration_step_ticks", "stack_changes", "active_set_changes", "ticks_not_solved",
           "ticks_brake", "ticks_stop", "ticks_late", "time_resolve_median", "time_resolve_p999",
           "time_tick_median")
+_USUAL = 4.0  # median widths of the ranges of values: wider ones would flatten all the others
 
 
 def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
@@ -108,7 +109,7 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
     recordings = {one.label: one.recording for one in found}
     cards = []
     for panel in plugins.known("figures").values():
-        small = _side_by_side(panel, recordings, looks)
+        small = side_by_side(panel, recordings, looks)
         if any(panel.shows(recordings[label]) for label in small):
             cards.append((panel, _key(panel.name, recordings), [
                 (one, svg(small[one.label], f"{name}, {one.label}: {panel.title}"))
@@ -157,7 +158,7 @@ def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
                   ) if figs else Markup()
 
 
-def _side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]
+def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]
                  ) -> dict[str, Figure]:
     """Return one small figure of `panel` per run, by label, all with the same limits.
 
@@ -170,14 +171,17 @@ def _side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapp
             panel.draw(ax, recording, looks[label].colour)
             axes.append(ax)
     ranges = [ax.get_ylim() for ax in axes]
+    widths = np.diff(ranges)[:, 0] if ranges else np.zeros(0)
     end = max((float(recordings[label]["t"][-1]) for label in drawn), default=0.0)
     for ax, (low, high) in zip(axes, ranges, strict=True):
-        limits = drawing.shared_limits(ranges) if ax.get_yscale() != "log" else (
-            min(least for least, _ in ranges), max(most for _, most in ranges))
-        ax.set_ylim(limits)
+        linear = ax.get_yscale() != "log"
+        kept = np.array(ranges)[widths <= _USUAL * np.median(widths)] if linear else ranges
+        least, most = np.min(kept), np.max(kept)
+        margin = linear * (0.04 * (most - least) or 1.0)
+        ax.set_ylim(least - margin, most + margin)
         ax.set_xlim(0.0, end)
         ax.xaxis.set_major_locator(MaxNLocator(4))
-        if high - low > 1.1 * (limits[1] - limits[0]):
+        if high - low > 1.1 * (most - least + 2 * margin):
             ax.text(0.98, 0.96, f"cut: {low:.2g} to {high:.2g}", color=ALERT, fontsize=8,
                     ha="right", va="top", transform=ax.transAxes)
     return drawn

@@ -44,11 +44,6 @@ class Look(NamedTuple):
         return (0, self.dash) if self.dash else "-"
 
 
-def colour(label: str) -> str:
-    """Return the colour of a resolver's label: "hqp osqp" has that of "hqp"."""
-    return COLOURS.get(_parts(label)[0], SPARE[0])
-
-
 def looks(labels: Iterable[str]) -> dict[str, Look]:
     """Return how to draw labels side by side, no two alike as long as dashes and colours last.
 
