@@ -122,15 +122,21 @@ def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
     competes = [one_scenario and run.fault is None for run in runs]
     known = {name: metric for run in runs for name, metric in run.metrics.items()
              if details or not metric.detail}
-    groups, rows = list(dict.fromkeys(metric.group for metric in known.values())), []
-    for name, metric in sorted(known.items(), key=lambda one: groups.index(one[1].group)):
+    rows = []
+    for name, metric in known.items():
         found = [run.metrics.get(name) for run in runs]
         best = _best({i: m.value for i, m in enumerate(found)
                       if m and m.value is not None and competes[i]}, metric.lower_is_better)
         rows.append(Row(metric.label, metric.shown_unit, metric.group, name, tuple(
             Cell(m.shown() if m else "–", "best" if i in best else "out" if runs[i].fault else "",
                  m.note if m else "") for i, m in enumerate(found))))
-    return rows
+    return grouped(rows)
+
+
+def grouped(rows: Sequence[Row]) -> list[Row]:
+    """Return rows with those of a group together, groups in the order of their first."""
+    groups = list(dict.fromkeys(row.group for row in rows))
+    return sorted(rows, key=lambda row: groups.index(row.group))
 
 
 def flags(runs: Sequence[Run]) -> list[str]:
