@@ -16,6 +16,8 @@ from typing import NamedTuple
 
 from packaging.requirements import Requirement
 
+from scenarios.cli.terminal import print_json
+
 _PACKAGE = "task-hierarchy"
 _CORE = (None, "robots", "scenarios")  # extras without which there is no command
 _MODULES = {"pin": "pinocchio", "pillow": "PIL"}  # that are not called as their package
@@ -35,8 +37,6 @@ class Finding(NamedTuple):
 
 def doctor_command(as_json: bool) -> int:
     """Print the findings and return the exit code: 0 without problems, otherwise 1."""
-    from scenarios.cli.terminal import print_json
-
     found = list(examine())
     ill = [one.what for one in found if one.well is False]
     if as_json:

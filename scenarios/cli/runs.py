@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scenarios.cli import options as opt
-from scenarios.cli.terminal import exit_code, interruptible, print_json, shown
+from scenarios.cli import terminal
+from scenarios.cli.terminal import bar, exit_code, interruptible, print_json, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,8 +66,6 @@ def run(scenario: Annotated[str, typer.Argument(
 
 
 def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json: bool) -> int:
-    from scenarios.cli.progress import bar
-    from scenarios.cli.terminal import certified, print_table, troubles
     from scenarios.config.validation import doubtful_units
     from scenarios.loop.first_tick import contact_warnings
     from scenarios.loop.simulation import simulate
@@ -92,10 +91,12 @@ def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json
                     **verdict(recording).as_plain_data()})
     else:
         resolver = scenario.make_resolver()
-        print_table([Run(scenario, scenario.control.resolver, str(resolver.label), recording)])
+        made = Run(scenario, scenario.control.resolver, str(resolver.label), recording)
+        terminal.print_table([made])
         if certify:
-            print(f"\n{certified(recording, resolver.damping)}")
-        print(*troubles(recording), "", f"{recording.ticks} ticks in {shown(folder)}", sep="\n")
+            print(f"\n{terminal.certified(recording, resolver.damping)}")
+        print(*terminal.troubles(recording), "", f"{recording.ticks} ticks in {shown(folder)}",
+              sep="\n")
     return exit_code(recording.fault)
 
 
@@ -142,8 +143,6 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
 
 def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Path,
              as_json: bool, workers: int | None) -> int:
-    from scenarios.cli.progress import bar
-    from scenarios.cli.terminal import print_table
     from scenarios.config.resolvers import default_resolvers
     from scenarios.results.comparing import compare
     from scenarios.results.pool import processors
@@ -164,7 +163,7 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
         print_json({"report": report, **comparison.as_plain_data()})
     else:
         for runs in comparison.groups().values():
-            print_table(runs)
+            terminal.print_table(runs)
         print("", *comparison.refused, sep="\n" if comparison.refused else "")
         print(f"\nReport: {report}")
     return max([exit_code(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
@@ -192,8 +191,6 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
 def _sampled(make: Callable[..., Finished], folder: Path, as_json: bool) -> int:
     """Make sampled runs, print their statistics; return 0 if a run finished or a part is made."""
-    from scenarios.cli.progress import bar
-    from scenarios.cli.terminal import print_samples
     from scenarios.results.store import TABLE
 
     begun = perf_counter()
@@ -208,7 +205,7 @@ def _sampled(make: Callable[..., Finished], folder: Path, as_json: bool) -> int:
                     "refused": list(done.plan.refused)})
         return int(done.failed == runs)
     for name, results in done.found.items():
-        print_samples(name, results)
+        terminal.print_samples(name, results)
     if done.plan.refused:
         print("", *done.plan.refused, sep="\n")
     if not done.found:

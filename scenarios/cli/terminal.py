@@ -1,15 +1,16 @@
-"""Output of the command line: tables of metrics, lists, certificates."""
+"""Output of the command line: tables of metrics, lists, certificates, progress."""
 
 from __future__ import annotations
 
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from textwrap import fill
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 _WIDTH = 80   # columns of a terminal
 _NAMES = 26   # columns of it for the names of metrics
+_EVERY = 10.0  # [s] between two lines about progress
 
 
 def troubles(recording: Any) -> list[str]:
@@ -158,3 +160,52 @@ def shown(path: Path) -> str:
         return str(path.resolve().relative_to(Path.cwd()))
     except (OSError, ValueError):  # the current folder has gone, or is elsewhere
         return str(path)
+
+
+@contextmanager
+def bar(what: str = "ticks") -> Iterator[Callable[[str, int, int], None]]:
+    """Yield a function to call with (label, done, total); `what` is the unit of the count.
+
+    It shows a bar on standard error, or prints a line there now and then if that is no terminal.
+    """
+    if not sys.stderr.isatty():
+        yield lines(what)
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(),
+               TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {what}"),
+               TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        tasks: dict[str, int] = {}
+
+        def told(label: str, done: int, total: int) -> None:
+            if label not in tasks:
+                tasks[label] = int(progress.add_task(escape(label), total=total))
+            progress.update(tasks[label], completed=done)  # type: ignore[arg-type]
+
+        yield told
+
+
+def lines(what: str, clock: Callable[[], float] = monotonic) -> Callable[[str, int, int], None]:
+    """Return a function like that of `bar` that prints a line every 10 s, with what is left.
+
+    clock : returns the present time [s].
+    """
+    begun: dict[str, tuple[float, int]] = {}
+    said = clock()
+
+    def told(label: str, done: int, total: int) -> None:
+        nonlocal said
+        now = clock()
+        start, first = begun.setdefault(label, (now, done))
+        if now - said < _EVERY or done >= total:
+            return
+        said = now
+        pace = (now - start) / (done - first) if done > first else None
+        left = "" if pace is None else f", about {(total - done) * pace:.0f} s left"
+        print(f"{label}: {done} of {total} {what}{left}", file=sys.stderr, flush=True)
+
+    return told

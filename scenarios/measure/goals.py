@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.measure.forces import wanted_forces
 from scenarios.measure.metric import passed, shown, true
+from scenarios.measure.safety import wanted_forces
 from scenarios.recording.listed import errors
 from scenarios.recording.recording import Recording
 

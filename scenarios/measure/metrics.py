@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy import plugins
-from scenarios.measure import forces, safety, tracking  # noqa: F401, register metrics
+from scenarios.measure import safety, tracking  # noqa: F401, register metrics
 from scenarios.measure.metric import Criteria, finite, register
 from scenarios.measure.metric import Metric as Metric
 from scenarios.recording.recording import Recording
