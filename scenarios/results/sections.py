@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -18,7 +19,6 @@ from scenarios.draw.figures.panels import Draw, Panel
 from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
 from scenarios.measure.runs import Run, table
-from scenarios.recording.listed import errors
 from scenarios.recording.recording import Recording
 from scenarios.results.columns import flags
 from scenarios.templates import render
@@ -111,7 +111,7 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
     for panel in plugins.known("figures").values():
         small = side_by_side(panel, recordings, looks)
         if any(panel.shows(recordings[label]) for label in small):
-            cards.append((panel, _key(panel.name, recordings), [
+            cards.append((panel, _key(small.values()), [
                 (one, svg(small[one.label], f"{name}, {one.label}: {panel.title}"))
                 for one in found if one.label in small]))
     same = [f"{listed(one.labels)} are the same motion "
@@ -123,16 +123,14 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
                   said=said) if cards else Markup()
 
 
-def _key(panel: str, recordings: Mapping[str, Recording]) -> dict[str, str]:
+def _key(figures: Iterable[Figure]) -> dict[str, str]:
     """Return the legend of a panel's colours, if they mean the same in all runs."""
-    count = max(int(recording["v"].shape[1]) for recording in recordings.values())
-    if panel == "joint-velocities" and count <= len(drawing.JOINTS):
-        return {f"joint {j + 1}": drawing.joint_colour(j) for j in range(count)}
-    first = next(iter(recordings.values()))
-    titles = [section.title for section in first.scenario.tasks]
-    return {section.title: drawing.joint_colour(titles.index(section.title))
-            for section, unit, _ in errors(first)
-            if unit == {"task-errors": "m", "task-angles": "deg"}.get(panel)}
+    keys = []
+    for fig in figures:
+        drawn: Any = fig.axes[0].get_legend_handles_labels()
+        keys.append({label: line.get_color() for line, label in zip(*drawn, strict=True)})
+    clear = len(set(keys[0].values())) == len(keys[0]) and all(one == keys[0] for one in keys)
+    return keys[0] if clear else {}
 
 
 def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
