@@ -108,7 +108,6 @@ def comparison_page(comparison: Comparison, planned: int = 0) -> str:
 
 
 def _about_rows(comparison: Comparison) -> str:
-    """Return what the numbers of the page are not good for."""
     timed = max((run.timing.ticks for run in comparison.runs if run.timing), default=0)
     how = (f"the runs were made side by side, and then the first {timed} ticks of each repeated "
            "alone to take these times" if timed else "one run after the other in one process")

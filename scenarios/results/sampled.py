@@ -87,7 +87,7 @@ def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str]
 
     Parameters
     ----------
-    resolvers : specs as for `compare`; by default those that a comparison takes.
+    resolvers : specs, by default those that `compare` takes.
     starts, seed : number of samples, and the seed from which they are drawn.
     """
     chosen = [load(one) if isinstance(one, str) else one for one in scenarios]

@@ -124,13 +124,14 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
 
 
 def _key(figures: Iterable[Figure]) -> dict[str, str]:
-    """Return the legend of a panel's colours, if they mean the same in all runs."""
+    """Return the legend of a panel's joints or tasks, if colours mean the same in all runs."""
     keys = []
     for fig in figures:
         drawn: Any = fig.axes[0].get_legend_handles_labels()
         keys.append({label: line.get_color() for line, label in zip(*drawn, strict=True)})
-    clear = len(set(keys[0].values())) == len(keys[0]) and all(one == keys[0] for one in keys)
-    return keys[0] if clear else {}
+    colours = list(keys[0].values())
+    clear = set(colours) <= set(drawing.JOINTS) and len(set(colours)) == len(colours)
+    return keys[0] if clear and all(one == keys[0] for one in keys) else {}
 
 
 def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
