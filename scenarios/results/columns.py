@@ -14,12 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.words import listed
-from scenarios.config import Scenario
 from scenarios.measure import statistics
 from scenarios.measure.metrics import Metric
-from scenarios.measure.runs import Cell, Row, caveats, grouped
+from scenarios.measure.runs import Cell, Row, grouped
 from scenarios.measure.statistics import Paired, Spread, paired, wilson
-from scenarios.recording.facts import resolver_facts
 from scenarios.results.plan import Plan
 from scenarios.results.run import Job, Outcome
 
@@ -186,12 +184,6 @@ def verdict(results: Results) -> list[str]:
         said = "; ".join(f"{name}: {listed(who)}" for name, who in best.items() if who)
         lines.append(f"Best beyond chance: {said or 'none'}.")
     return lines
-
-
-def flags(runs: Mapping[str, Scenario]) -> dict[str, str]:
-    """Return the `caveats` of each column in one line."""
-    facts = {label: resolver_facts(scenario) for label, scenario in runs.items()}
-    return {label: ", ".join(said) for label, said in caveats(facts).items()}
 
 
 def valued(metric: Metric, value: float) -> Metric:

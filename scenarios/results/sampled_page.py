@@ -18,7 +18,9 @@ from scenarios.draw.figures.palette import looks
 from scenarios.files import slug
 from scenarios.measure.metrics import Metric
 from scenarios.measure.run_folder import versions
-from scenarios.results.columns import Results, flags, rows, verdict
+from scenarios.measure.runs import caveats
+from scenarios.recording.facts import resolver_facts
+from scenarios.results.columns import Results, rows, verdict
 from scenarios.results.plan import Plan
 from scenarios.results.run import Job
 from scenarios.templates import render, resource
@@ -68,8 +70,8 @@ def name_of(run: Job) -> str:
 def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, Any]:
     """Return the content of the page for one group of runs."""
     failures = results.failures()
-    marked = flags({label: next(run for run in results.runs if run.label == label).load()
-                    for label in results.labels})
+    marked = caveats({run.label: resolver_facts(run.load()) for run in
+                      {run.label: run for run in results.runs}.values()})
     worst: dict[str, list[Metric]] = {}
     for metric, run in results.worst():
         worst.setdefault(run.key, []).append(metric)
@@ -90,7 +92,8 @@ def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, A
         "worst": [(metrics, of_key[key], *_again(of_key[key], folder))
                   for key, metrics in worst.items()],
         "numbers": rows(results), "looks": looks(results.labels),
-        "heads": {label: [("quiet", text)] if text else [] for label, text in marked.items()}}
+        "heads": {label: [("quiet", ", ".join(text))] if text else []
+                  for label, text in marked.items()}}
 
 
 def _again(run: Job, folder: Path) -> tuple[str, str]:

@@ -18,9 +18,9 @@ from scenarios.draw.figures.palette import Look, task_colours
 from scenarios.draw.figures.panels import Draw, Panel
 from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
-from scenarios.measure.runs import Run, table
+from scenarios.measure.runs import Run, caveats, table
+from scenarios.recording.facts import resolver_facts
 from scenarios.recording.recording import Recording
-from scenarios.results.columns import flags
 from scenarios.templates import render
 
 # The most important metrics; the others are folded away.
@@ -41,9 +41,9 @@ def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     rows = table(runs, details=False)
     first = [row for row in rows if row.name in _FIRST or (
         row.name.startswith("task_") and row.name.endswith("_rms"))]
-    marked = flags({run.label: run.scenario for run in runs})
+    marked = caveats({run.label: resolver_facts(run.scenario) for run in runs})
     heads = {run.label: [(kind, text) for kind, text in (
-        ("alert", _stopped(run)), ("quiet", marked[run.label])) if text] for run in runs}
+        ("alert", _stopped(run)), ("quiet", ", ".join(marked[run.label]))) if text] for run in runs}
     return render("results/measured.html", heads=heads, looks=looks, first=first,
                   rest=[row for row in rows if row not in first], said=_marks(runs)
                   ) if rows else Markup()
