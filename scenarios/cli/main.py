@@ -33,17 +33,17 @@ def run_command(arguments: list[str]) -> int:
         code = app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False)
         return int(code or 0) if code != opt.INTERRUPTED else interrupted()
     except typer.TyperException as error:
-        return _wrong(f"{error.format_message()}{_given(error, arguments)}")
+        return exit_code(f"{error.format_message()}{_given(error, arguments)}", wrong=True)
     except (KeyboardInterrupt, typer.Abort):
         return interrupted()
     except Exception as error:
         from hierarchy.errors import HierarchyError
 
         if isinstance(error, HierarchyError):
-            return _wrong(_with_its_file(str(error), arguments))
+            return exit_code(_with_its_file(str(error), arguments), wrong=True)
         if isinstance(error, OSError):
             return exit_code(f"{error.filename}: {error.strerror}" if error.filename else
-                          error.strerror or str(error))
+                             error.strerror or str(error))
         if isinstance(error, RuntimeError) and type(error).__module__.startswith("scenarios."):
             return exit_code(str(error))  # a page that cannot be made, a cluster that is lost
         raise
@@ -207,11 +207,6 @@ def interrupted() -> int:
     """Say that the command was interrupted, and return its exit code."""
     print("hierarchy: interrupted", file=sys.stderr)
     return opt.INTERRUPTED
-
-
-def _wrong(text: str) -> int:
-    print(f"hierarchy: error: {text}", file=sys.stderr)
-    return 2
 
 
 def _add_benchmarks() -> None:

@@ -146,12 +146,12 @@ def interruptible(kept: str) -> Iterator[None]:
         raise
 
 
-def exit_code(fault: str | None) -> int:
-    """Return 0, or print a fault on standard error and return 1."""
+def exit_code(fault: str | None, wrong: bool = False) -> int:
+    """Return 0, or print a fault or what is wrong on standard error and return 1 or 2."""
     if fault is None:
         return 0
-    print(f"hierarchy: fault: {fault}", file=sys.stderr)
-    return 1
+    print(f"hierarchy: {'error' if wrong else 'fault'}: {fault}", file=sys.stderr)
+    return 1 + wrong
 
 
 def shown(path: Path) -> str:

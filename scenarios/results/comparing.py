@@ -44,11 +44,9 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     Parameters
     ----------
     scenarios : names of scenarios or groups, paths or Scenario objects.
-    resolvers : specs `name` or `name:setting=value:setting=value`, or "own", the one that each
-        scenario names; by default those of DEFAULT_RESOLVERS that are installed, with a group
-        "own".
-    progress : called as progress(label, ticks done, total ticks); with several workers as
-        progress(what, runs done, total runs).
+    resolvers : specs `name:setting=value:setting=value`, or "own", the one that each scenario
+        names; by default those of DEFAULT_RESOLVERS that are installed, with a group "own".
+    progress : called as progress(label, done, total) with ticks, of several workers with runs.
     command : the command line shown on the page; derived from the names by default.
     workers : number of processes that make runs side by side; the first TIMED ticks of each run are
         then repeated alone for the computing times. With 1, runs are made here one by one.

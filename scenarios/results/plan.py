@@ -93,9 +93,7 @@ class Plan:
 
 
 def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
-    """Return the runs of a sweep, sample by sample.
-
-    scenarios : in place of those that the sweep names.
+    """Return the runs of a sweep, sample by sample, of `scenarios` or those that it names.
 
     Raises
     ------

@@ -116,15 +116,10 @@ def colours(labels: Iterable[str]) -> dict[str, str]:
     return {label: look.colour for label, look in looks(labels).items()}
 
 
-def joint_colour(joint: int) -> str:
-    """Return the colour of a joint, numbered from 0."""
-    return JOINTS[joint % len(JOINTS)]
-
-
 def joint_line(joint: int) -> dict[str, Any]:
     """Return colour and line style of a joint, numbered from 0, as matplotlib keywords."""
     lines = present().lines
-    return {"color": joint_colour(joint), "linestyle": lines[joint % len(lines)]}
+    return {"color": JOINTS[joint % len(JOINTS)], "linestyle": lines[joint % len(lines)]}
 
 
 def style() -> dict[Any, Any]:
