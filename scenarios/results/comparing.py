@@ -94,10 +94,7 @@ class _Written:
         self._runs[i] = run
         if self._folder is None:
             return
-        write_table(self._folder / TABLE, [
-            (job := _job(one), Outcome(job.key, one.recording.ticks if one.recording else 0,
-                                       one.fault, float("nan"), tuple(one.metrics.values())))
-            for one in self._found().runs])
+        write_table(self._folder / TABLE, [_row(one) for one in self._found().runs])
         if 1 < len(self._runs) < self._count and time.monotonic() >= self._next:
             begun = time.monotonic()
             with suppress(Exception):  # `finish` says what is wrong with it
@@ -125,6 +122,12 @@ class _Written:
 
         write_json(folder / "comparison.json", found.as_plain_data())
         write_text(folder / "index.html", comparison_page(found, self._count))
+
+
+def _row(run: Run) -> tuple[Job, Outcome]:
+    """Return a run as the table has it."""
+    job, ticks = _job(run), run.recording.ticks if run.recording else 0
+    return job, Outcome(job.key, ticks, run.fault, float("nan"), tuple(run.metrics.values()))
 
 
 def _job(run: Run) -> Job:
