@@ -24,7 +24,7 @@ from benchmark.report import Report, Section
 from benchmark.solve.judge import RIGHT, miss_of
 from benchmark.tables import Column, Row, Table, whole
 from hierarchy.problem import Array, Hierarchy
-from scenarios.cli.progress import bar
+from scenarios.cli.terminal import bar
 from scenarios.problems.answers import answer
 from scenarios.results.pool import ended
 from solvers import Resolver, Status, certify, make, problems

@@ -10,6 +10,7 @@ import json
 import os
 import platform
 import re
+import secrets
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -53,14 +54,20 @@ def claim(folder: str | Path) -> Path:
         lock(path)
         for left in path.parent.glob(f"{glob.escape(_hidden(path))}.????????.partial"):
             shutil.rmtree(left)
-        Path(tempfile.mkdtemp(prefix=f"{_hidden(path)}.", suffix=".partial",
-                              dir=path.parent)).rmdir()  # what `whole` will need
+        _partial(path).rmdir()  # what `whole` will need
     return path
 
 
 def _remove_empty(folder: Path) -> None:
     with suppress(OSError):
         folder.rmdir()
+
+
+def _partial(path: Path) -> Path:
+    """Make and return a hidden folder beside a path."""
+    made = path.with_name(f"{_hidden(path)}.{secrets.token_hex(4)}.partial")
+    made.mkdir()
+    return made
 
 
 def lock(path: Path) -> None:
@@ -112,16 +119,13 @@ def _absolute(path: str | Path) -> Path:
 
 def _locked(stream: TextIO) -> bool:
     """Whether the lock of an open file could be had; a file system without locks has none."""
-    try:
+    with suppress(ImportError, OSError):  # Windows has no fcntl
         import fcntl
-    except ImportError:  # Windows
-        return True
-    try:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
+
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
     return True
 
 
@@ -141,12 +145,10 @@ def whole(folder: str | Path) -> Iterator[Path]:
     path = _absolute(folder)
     path.parent.mkdir(parents=True, exist_ok=True)
     with named(path):
-        partial = Path(tempfile.mkdtemp(prefix=f"{_hidden(path)}.", suffix=".partial",
-                                        dir=path.parent))
+        partial = _partial(path)
     try:
         with named(path):
             yield partial
-            partial.chmod(0o777 & ~_umask())
             partial.rename(path)
     except OutputError as error:
         raise OutputError(str(error).replace(str(partial), str(path))) from error
@@ -244,9 +246,3 @@ def slug(text: str) -> str:
     digest, whole = hashlib.sha256(name.encode()).hexdigest(), name.encode()
     return name if len(whole) <= _NAME else (
         f"{whole[:_NAME - 9].decode(errors='ignore')}-{digest[:8]}")
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

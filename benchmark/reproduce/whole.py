@@ -13,8 +13,7 @@ from benchmark.reproduce.blocks import POINTS, ROWS, Stored, every, said
 from benchmark.reproduce.protocol import PROTOCOL, Rows
 from hierarchy.errors import HierarchyError, UnknownNameError
 from scenarios.cli.options import INTERRUPTED
-from scenarios.cli.progress import bar
-from scenarios.cli.terminal import print_json, shown
+from scenarios.cli.terminal import bar, print_json, shown
 from scenarios.files import make_folder, reason, write_json, write_text
 from scenarios.results.sampled import Workers
 

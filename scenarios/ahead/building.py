@@ -2,8 +2,8 @@
 
 With the name of a part it writes that one; `solvers` needs nothing but numba and scipy.
 
-`calls.txt` says what Python calls. `python -m scenarios.ahead record` writes it anew, of what the
-jobs of `jobs.py` call.
+`calls.txt` says what Python calls. `python -m scenarios.ahead record` writes it anew, of what JOBS
+call: each kind of call of the documents, once.
 """
 
 from __future__ import annotations
@@ -11,18 +11,25 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from time import monotonic
+from typing import Any
 
-from scenarios.ahead import jobs
+import numpy as np
+
 from scenarios.results.pool import ended
 
 CALLS = Path(__file__).with_name("calls.txt")
 # The first part of a name of a kernel decides which object file it is in.
 PARTS = {"solvers": ("solvers",), "robots": ("hierarchy", "scenarios")}
+# Together they have every kind of task, sensor and plant of the shipped scenarios.
+_SCENARIOS = ("crawl", "dual-arm", "ellipse", "ellipse-3d", "ellipse-danger-bounds", "ellipse-hqp",
+              "ellipse-mass", "ellipse-nullspace", "ellipse-published", "ellipse-set-based",
+              "human", "humanoid", "reach-torque", "wipe")
 
 
 def main() -> None:
@@ -39,9 +46,9 @@ def main() -> None:
              for part in names or PARTS if not is_current(part)]
     for file, entries in parts:
         _say(f"{file.name}: compiling {len(entries)} entries of kernels, once ...")
-    with _environment(**ENVIRONMENT):
-        for (file, _), size in ended(compile_part, parts):
-            _say(f"{file.name}: {size / 1e6:.2f} MB after {monotonic() - begun:.0f} s")
+    os.environ.update(ENVIRONMENT)  # of the processes that compile
+    for (file, _), size in ended(compile_part, parts):
+        _say(f"{file.name}: {size / 1e6:.2f} MB after {monotonic() - begun:.0f} s")
 
 
 def is_current(part: str) -> bool:
@@ -58,7 +65,7 @@ def record(job: str) -> list[str]:
 
     with (redirect_stdout(StringIO()), redirect_stderr(StringIO()),
           tempfile.TemporaryDirectory() as folder):
-        jobs.JOBS[job](Path(folder))
+        JOBS[job](Path(folder))
     return sorted(asked)
 
 
@@ -75,7 +82,7 @@ def compile_part(part: tuple[Path, Sequence[str]]) -> int:
 def _recorded() -> list[str]:
     """Return all calls of all jobs in one order."""
     calls = set[str]()
-    for job, found in ended(record, list(jobs.JOBS)):
+    for job, found in ended(record, list(JOBS)):
         if found is None:
             raise SystemExit(f"task-hierarchy: the job {job} ended its process")
         calls.update(found)
@@ -88,16 +95,91 @@ def _listed() -> str:
     return digest_of(str(CALLS))
 
 
-@contextmanager
-def _environment(**settings: str) -> Iterator[None]:
-    before = dict(os.environ)
-    os.environ.update(settings)
-    try:
-        yield
-    finally:
-        os.environ.clear()
-        os.environ.update(before)
-
-
 def _say(what: str) -> None:
     print(f"task-hierarchy: {what}", file=sys.stderr, flush=True)
+
+
+def _run(text: str, folder: Path) -> None:
+    """Make a run of a few ticks."""
+    from scenarios.cli.main import run_command
+
+    if run_command(["run", *text.split(), "--duration", "0.01", "--out", str(folder / "out")]) > 1:
+        raise SystemExit(f"hierarchy run {text} failed")
+
+
+def _arrays(_: Path) -> None:
+    """Solve hierarchies of plain arrays with every resolver, once and again from memory."""
+    from solvers import certify, explain, make, names
+
+    for h, handled in _hierarchies():
+        for name in names():
+            for damping in (0.0, 0.05):
+                resolver: Any = make(name, damping=damping)
+                if resolver.handles in handled:
+                    result = resolver.solve(h)
+                    resolver.solve(h, memory=result.memory)
+        result = make("hcod").solve(h)
+        explain(h, result)
+        certify(h, result.x)
+        result.verified(h)
+        make("hcod").solve(h.changed(give=np.append(np.ones(h.m - 1), 0.0)))
+
+
+def _hierarchies() -> Iterator[tuple[Any, tuple[str, ...]]]:
+    """Yield hierarchies, each with what a resolver must be able to handle."""
+    from hierarchy import Hierarchy
+
+    yield Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])]), (
+        "equalities", "bounds", "inequalities", "activations")
+    yield Hierarchy.from_levels([([[1, 0], [0, 1]], [-0.1] * 2, [0.1] * 2), ([[1.0, 0.5]], [0.3])]
+                                ), ("bounds", "inequalities")
+    r = np.random.default_rng(0)
+    for _ in range(20):  # some need the second ways of a resolver
+        A, b = r.normal(size=(3, 3, 6)), r.normal(size=(3, 3))
+        A[1, 2] = 2.0 * A[1, 0]
+        yield Hierarchy.from_levels([(A[0], b[0] - 1.0, b[0]), (A[1], b[1]),
+                                     (A[2], b[2] - 0.1, b[2])]), ("inequalities",)
+
+
+def _robot(_: Path) -> None:
+    """Move a robot of seven joints within its limits, in one call."""
+    from hierarchy import Robot
+    from hierarchy.paths import Still
+    from hierarchy.tasks import Position, Posture
+    from solvers import solve_ik
+
+    robot = Robot.load("kuka_lwr")
+    hand = Position(robot.frame("end_effector"), Still([0.3, 0.5, 0.1]))
+    solve_ik(robot, [0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3], [hand, Posture((0.5,) * 7)],
+             limits=True, dt=0.01)
+
+
+def _batches(_: Path) -> None:
+    """Solve many hierarchies in one call."""
+    from solvers import make
+    from solvers.batch import Batch, solve
+
+    r: Any = np.random.default_rng(0)
+    A, b = r.normal(size=(3, 5, 7)), r.normal(size=(3, 5))
+    for name in ("tpm", "hcod"):
+        solve(Batch(A, b, b, sizes=np.array([3, 1, 1])), make(name))
+
+
+def _kept_factorised(_: Path) -> None:
+    """Change a stack that is kept factorised."""
+    from solvers.factorization import Factorization
+
+    r = np.random.default_rng(0)
+    hand, elbow, gaze = (r.normal(size=(m, 30)) for m in (3, 2, 2))
+    stack = Factorization([hand, elbow, gaze], names=["hand", "elbow", "gaze"])
+    stack.solve({"hand": [0.1, -0.2, 0.3], "elbow": [0.0, 0.1], "gaze": [0.2, 0.0]})
+    stack.swap("hand", "gaze")
+    stack.insert("limit", np.eye(30)[:1], at=0)
+    stack.delete("elbow")
+    stack.solve({"gaze": [0.2, 0.0], "limit": [0.0], "hand": [0.1, -0.2, 0.3]},
+                reference=np.ones(30))
+
+
+JOBS: dict[str, Callable[[Path], None]] = {
+    **{name: partial(_run, name) for name in _SCENARIOS},
+    "arrays": _arrays, "robot": _robot, "batches": _batches, "kept": _kept_factorised}

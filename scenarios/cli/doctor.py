@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, requires, version
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from time import perf_counter
-from typing import final
+from typing import NamedTuple
 
 from packaging.requirements import Requirement
+
+from scenarios.cli.terminal import print_json
 
 _PACKAGE = "task-hierarchy"
 _CORE = (None, "robots", "scenarios")  # extras without which there is no command
@@ -21,9 +25,7 @@ _PROBLEMS = 20      # generated problems for the self-test
 _MET = 1e-6         # largest difference between strict resolvers, relative to 1 + |x|
 
 
-@final
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """The result of one check: `well` is None if it cannot fail, `remedy` says what to do."""
 
     part: str
@@ -35,23 +37,18 @@ class Finding:
 
 def doctor_command(as_json: bool) -> int:
     """Print the findings and return the exit code: 0 without problems, otherwise 1."""
-    from scenarios.cli.terminal import print_json
-
     found = list(examine())
-    ill = [one for one in found if one.well is False]
+    ill = [one.what for one in found if one.well is False]
     if as_json:
-        print_json({"well": not ill, "findings": [asdict(one) for one in found]})
+        print_json({"well": not ill, "findings": [one._asdict() for one in found]})
         return int(bool(ill))
-    part = ""
     width = max(len(one.what) for one in found)
-    for one in found:
-        if one.part != part:
-            part = one.part
-            print(part)
-        mark = {True: "ok  ", False: "BAD ", None: "    "}[one.well]
-        print(f"  {mark}{one.what:{width}}  {one.found}" + f"; {one.remedy}" * bool(one.remedy))
-    problems = ", ".join(one.what for one in ill)
-    print(f"\nProblems: {problems}." if problems else "\nNo problems found.")
+    for part, findings in groupby(found, attrgetter("part")):
+        print(part)
+        for one in findings:
+            mark = {True: "ok  ", False: "BAD ", None: "    "}[one.well]
+            print(f"  {mark}{one.what:{width}}  {one.found}" + f"; {one.remedy}" * bool(one.remedy))
+    print(f"\nProblems: {', '.join(ill)}." if ill else "\nNo problems found.")
     return int(bool(ill))
 
 
@@ -94,11 +91,9 @@ def _extras() -> Iterator[Finding]:
         if extra not in (*_CORE, "dev") and not one.name.startswith(_PACKAGE):
             extras.setdefault(str(extra), []).append(one.name)
     for extra, packages in extras.items():
-        missing = [package for package in packages if _version(package) is None]
-        there = ", ".join(f"{package} {_version(package)}" for package in packages
-                          if package not in missing)
-        yield Finding("extras (optional)", extra, there or "not installed", None,
-                      f"pip install '{_PACKAGE}[{extra}]'" if missing else "")
+        there = [f"{package} {_version(package)}" for package in packages if _version(package)]
+        yield Finding("extras (optional)", extra, ", ".join(there) or "not installed", None, "" if
+                      len(there) == len(packages) else f"pip install '{_PACKAGE}[{extra}]'")
 
 
 def _backends() -> Iterator[Finding]:
@@ -120,21 +115,14 @@ def _kernels() -> Iterator[Finding]:
         yield Finding(part, "cache", "none: no home folder", None,
                       "set NUMBA_CACHE_DIR to a writable folder")
         return
-    size = sum(_size(Path(parent, name)) for parent, _, names in os.walk(folder)
-               for name in names) / 1e6
+    size = 0.0
+    for file in folder.rglob("*"):
+        with suppress(OSError):  # another process has just moved or removed it
+            size += file.stat().st_size / 1e6
     can = os.access(next(path for path in (folder, *folder.parents) if path.exists()), os.W_OK)
-    home = Path.home()
-    said = f"~/{folder.relative_to(home)}" if folder.is_relative_to(home) else str(folder)
+    said = str(folder).replace(f"{Path.home()}/", "~/", 1)
     yield Finding(part, "cache", f"{said}, {size:.0f} MB", can,
                   "" if can else "not writable; set NUMBA_CACHE_DIR to a writable folder")
-
-
-def _size(path: Path) -> int:
-    """Return the bytes of a file: 0 for one that another process has just moved or removed."""
-    try:
-        return path.stat().st_size
-    except OSError:
-        return 0
 
 
 def _tests() -> Iterator[Finding]:

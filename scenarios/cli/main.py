@@ -21,7 +21,7 @@ import scenarios.cli.shown  # both add their commands
 from scenarios.cli import options as opt
 from scenarios.cli.options import app
 from scenarios.cli.problems import problems
-from scenarios.cli.terminal import exit_code, first_line, print_json, print_list, print_lists, shown
+from scenarios.cli.terminal import exit_code, first_line, print_json, print_lists, shown
 
 app.add_typer(problems, name="problems")
 _ROOT = Path(scenarios.__file__).parents[1]  # of a checkout, if `benchmark/` is beside this package
@@ -33,17 +33,17 @@ def run_command(arguments: list[str]) -> int:
         code = app(arguments or ["--help"], prog_name="hierarchy", standalone_mode=False)
         return int(code or 0) if code != opt.INTERRUPTED else interrupted()
     except typer.TyperException as error:
-        return _wrong(f"{error.format_message()}{_given(error, arguments)}")
+        return exit_code(f"{error.format_message()}{_given(error, arguments)}", wrong=True)
     except (KeyboardInterrupt, typer.Abort):
         return interrupted()
     except Exception as error:
         from hierarchy.errors import HierarchyError
 
         if isinstance(error, HierarchyError):
-            return _wrong(_with_its_file(str(error), arguments))
+            return exit_code(_with_its_file(str(error), arguments), wrong=True)
         if isinstance(error, OSError):
             return exit_code(f"{error.filename}: {error.strerror}" if error.filename else
-                          error.strerror or str(error))
+                             error.strerror or str(error))
         if isinstance(error, RuntimeError) and type(error).__module__.startswith("scenarios."):
             return exit_code(str(error))  # a page that cannot be made, a cluster that is lost
         raise
@@ -117,10 +117,11 @@ def library(out: Annotated[Path, opt.output("Folder of the library: new or empty
         difference = differs(out)
         if as_json:
             print_json({"folder": shown(out), "same": not difference, "difference": difference})
-            return int(bool(difference))
-        if not difference:
+        elif difference:
+            return exit_code(f"{shown(out)}: {difference}")
+        else:
             print(f"{shown(out)}: same kernels as installed")
-        return exit_code(f"{shown(out)}: {difference}" if difference else None)
+        return int(bool(difference))
     folder = claim(out)
     with whole(folder) as partial:
         made = write(partial, opt.listed_in(resolvers), target)
@@ -136,7 +137,7 @@ def library(out: Annotated[Path, opt.output("Folder of the library: new or empty
 
 @app.command()
 def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file or name.",
-                                              autocompletion=opt.complete_scenarios)],
+                                              autocompletion=opt.names_of("scenarios"))],
           changes: opt.Changes = None, plugin: opt.Plugins = None,
           as_json: opt.AsJson = False) -> None:
     """Validate and summarize a scenario or robot file.
@@ -144,17 +145,10 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
     Builds it and, for a scenario, runs the first tick.
     """
     from scenarios.cli import robot_check, scenario_check
-    from scenarios.loop.first_tick import first_tick
 
-    if robot_check.is_robot(file):
-        robot = robot_check.look_at(file, changes or [])
-        data, text = robot_check.as_plain_data(*robot), robot_check.say(*robot)
-    else:
-        scenario = opt.loaded(file, changes)
-        found = first_tick(scenario)
-        data, text = scenario_check.as_plain_data(scenario, found), scenario_check.say(
-            scenario, found)
-    print_json(data) if as_json else print(text)
+    checked = robot_check if robot_check.is_robot(file) else scenario_check
+    found = checked.look_at(file, changes)
+    print_json(checked.as_plain_data(*found)) if as_json else print(checked.say(*found))
 
 
 @app.command("help")
@@ -171,10 +165,11 @@ def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
     assert above is not None, "help is a command of the application"
     commands = getattr(above.command, "commands", {})
     if what is None:
-        print_list("commands, see `hierarchy help COMMAND`",
-                   {name: one.get_short_help_str(60) for name, one in commands.items()})
-        print_list("keys of a scenario file, see `hierarchy help KEY`",
-                   {key.name: key.meaning for key in keys_of(Scenario)})
+        print_lists({
+            "commands, see `hierarchy help COMMAND`":
+                {name: one.get_short_help_str(60) for name, one in commands.items()},
+            "keys of a scenario file, see `hierarchy help KEY`":
+                {key.name: key.meaning for key in keys_of(Scenario)}})
     elif lines := explained(what):
         print(*lines, sep="\n")
     elif what in commands:
@@ -212,11 +207,6 @@ def interrupted() -> int:
     """Say that the command was interrupted, and return its exit code."""
     print("hierarchy: interrupted", file=sys.stderr)
     return opt.INTERRUPTED
-
-
-def _wrong(text: str) -> int:
-    print(f"hierarchy: error: {text}", file=sys.stderr)
-    return 2
 
 
 def _add_benchmarks() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,21 +18,17 @@ _LIBRARY = Path(__file__).parents[1] / "library"
 _LONG = 50  # characters of a change in a title
 
 
-def complete_scenarios(incomplete: str) -> list[str]:
-    """Return the matching scenarios; if there are none, the shell completes files."""
-    from scenarios.files import scenarios_in
+def names_of(*kinds: str) -> Callable[[str], list[str]]:
+    """Return what completes names of "scenarios", "groups" or "sweeps"; the shell adds files."""
+    def complete(incomplete: str) -> list[str]:
+        from scenarios.files import scenarios_in
 
-    return [name for name in scenarios_in(_LIBRARY) if name.startswith(incomplete)]
+        return [name for kind in kinds for name in (
+            scenarios_in(_LIBRARY) if kind == "scenarios" else
+            sorted(path.stem for path in (_LIBRARY / kind).glob("*.toml")))
+                if name.startswith(incomplete)]
 
-
-def complete_groups(incomplete: str) -> list[str]:
-    """Return the matching scenarios and groups."""
-    return [*complete_scenarios(incomplete), *_files("groups", incomplete)]
-
-
-def complete_sweeps(incomplete: str) -> list[str]:
-    """Return the matching sweeps."""
-    return _files("sweeps", incomplete)
+    return complete
 
 
 def complete_resolvers(incomplete: str) -> list[str]:
@@ -41,10 +38,6 @@ def complete_resolvers(incomplete: str) -> list[str]:
     before, comma, last = incomplete.rpartition(",")
     return [f"{before}{comma}{name}" for name in (*solvers.names(), *solvers.variants())
             if name.startswith(last)]
-
-
-def _files(folder: str, incomplete: str) -> list[str]:
-    return sorted(path.stem for path in (_LIBRARY / folder).glob(f"{incomplete}*.toml"))
 
 
 def _given(path: str | Path) -> Path:
@@ -57,6 +50,13 @@ def _given(path: str | Path) -> Path:
 def output(help: str, metavar: str = "FOLDER") -> Any:
     """Return the option `--out`."""
     return typer.Option("--out", metavar=metavar, help=help, parser=_given)
+
+
+def _part(text: str) -> tuple[int, int]:
+    i, slash, count = text.partition("/")
+    if not (slash and i.isdigit() and count.isdigit()):
+        raise typer.BadParameter(f"expected I/N such as 1/8, got {text!r}")
+    return int(i), int(count)
 
 
 def _allow(modules: list[str] | None) -> list[str] | None:
@@ -85,9 +85,10 @@ Workers = Annotated[int | None, typer.Option(
 Scheduler = Annotated[str | None, typer.Option(
     "--scheduler", metavar="ADDRESS", help="Use the workers of this Dask scheduler instead; needs "
     "the extra `sweep`.")]
-Part = Annotated[str | None, typer.Option(
-    "--part", metavar="I/N", help="Make only the I-th of N parts of the runs, for job arrays; the "
-    "same command without it then merges all parts.")]
+Part = Annotated[Any, typer.Option(
+    "--part", metavar="I/N", parser=_part,
+    help="Make only the I-th of N parts of the runs, for job arrays; the same command without it "
+         "then merges all parts.")]
 Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
                                    help="Port of the page on 127.0.0.1; 0 for any free port.")]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser",
@@ -95,18 +96,6 @@ Browser = Annotated[bool, typer.Option("--browser/--no-browser",
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder of `hierarchy run`.")]
 Runs = Annotated[list[Path], typer.Argument(
     metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")]
-
-
-def workers_of(processes: int | None, scheduler: str | None, part: str | None) -> Any:
-    """Return where the runs of a sweep are made."""
-    from scenarios.results.sampled import Workers
-
-    if part is None:
-        return Workers(processes, scheduler)
-    i, slash, count = part.partition("/")
-    if not (slash and i.isdigit() and count.isdigit()):
-        raise typer.BadParameter(f"expected I/N such as 1/8, got {part!r}", param_hint="--part")
-    return Workers(processes, scheduler, (int(i), int(count)))
 
 
 def listed_in(specs: str) -> list[str]:

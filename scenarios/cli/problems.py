@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from scenarios.cli.options import AsJson, output
-from scenarios.cli.terminal import print_files, print_json, print_lists, shown
+from scenarios.cli.terminal import bar, print_files, print_json, print_lists, shown
 
 if TYPE_CHECKING:
     from solvers.problems.files import Collection
@@ -69,7 +69,6 @@ def export(family: Annotated[list[str], typer.Argument(
                                        "FAMILY-fresh-S.npz.")] = Path("problems"),
            as_json: AsJson = False) -> None:
     """Write problems as files, with proved answers."""
-    from scenarios.cli.progress import bar
     from scenarios.problems.answers import export as write
     from scenarios.problems.families import available, unavailable
     from scenarios.problems.families import family as named

@@ -53,12 +53,12 @@ def is_robot(text: str) -> bool:
     return True
 
 
-def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robot]:
+def look_at(model: str, changes: Sequence[str] | None) -> tuple[RobotSection, Robot]:
     """Make the robot of a model with changes "robot.key=value"; raises HierarchyError."""
     from scenarios.cell.robot import make_robot
 
     data: dict[str, Any] = {"robot": {"model": model}}
-    for key, value in parse_changes(changes, what="--set").items():
+    for key, value in parse_changes(changes or (), what="--set").items():
         change(data, key, value)
     if unknown := [key for key in data if key != "robot"]:
         raise ScenarioError(f"--set {unknown[0]}: only keys of [robot] can be set for a robot")

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scenarios.cli import options as opt
-from scenarios.cli.terminal import exit_code, interruptible, print_json, shown
+from scenarios.cli import terminal
+from scenarios.cli.terminal import bar, exit_code, interruptible, print_json, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
 
 @opt.app.command()
 def run(scenario: Annotated[str, typer.Argument(
-            help="Name of a scenario, or a scenario file.", autocompletion=opt.complete_scenarios)],
+            help="Name of a scenario, or a scenario file.",
+            autocompletion=opt.names_of("scenarios"))],
         resolver: Annotated[str | None, typer.Option(
             "--resolver", metavar="SPEC", autocompletion=opt.complete_resolvers,
             help="Use another resolver: name, or name:setting=value:setting=value.")] = None,
@@ -64,8 +66,6 @@ def run(scenario: Annotated[str, typer.Argument(
 
 
 def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json: bool) -> int:
-    from scenarios.cli.progress import bar
-    from scenarios.cli.terminal import certified, levels_given_up, print_table, troubles
     from scenarios.config.validation import doubtful_units
     from scenarios.loop.first_tick import contact_warnings
     from scenarios.loop.simulation import simulate
@@ -91,18 +91,19 @@ def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json
                     **verdict(recording).as_plain_data()})
     else:
         resolver = scenario.make_resolver()
-        print_table([Run(scenario, scenario.control.resolver, str(resolver.label), recording)])
+        made = Run(scenario, scenario.control.resolver, str(resolver.label), recording)
+        terminal.print_table([made])
         if certify:
-            print(f"\n{certified(recording, resolver.damping)}")
-        print(*troubles(recording), *levels_given_up(recording), "",
-              f"{recording.ticks} ticks in {shown(folder)}", sep="\n")
+            print(f"\n{terminal.certified(recording, resolver.damping)}")
+        print(*terminal.troubles(recording), "", f"{recording.ticks} ticks in {shown(folder)}",
+              sep="\n")
     return exit_code(recording.fault)
 
 
 @opt.app.command()
 def compare(scenarios: Annotated[list[str], typer.Argument(
                 help="Names of scenarios or groups, or scenario files.",
-                autocompletion=opt.complete_groups)],
+                autocompletion=opt.names_of("scenarios", "groups"))],
             resolvers: Annotated[str | None, typer.Option(
                 "--resolvers", metavar="SPEC,SPEC,...", autocompletion=opt.complete_resolvers,
                 help="Resolvers: name, or name:setting=value; or own, that of each scenario. "
@@ -133,17 +134,15 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
         name = scenarios[0] if grouped else chosen[0].name
         folder = out if out is not None else next_free(Path("runs") / f"compare-{name}")
         return _compare(chosen, specs, folder, as_json, workers)
-    from scenarios.results.sampled import compare_starts
+    from scenarios.results.sampled import Workers, compare_starts
 
     folder = out if out is not None else Path("runs") / f"starts-{chosen[0].name}"
     return _sampled(partial(compare_starts, chosen, specs, starts, seed, folder,
-                            workers=opt.workers_of(workers, scheduler, part)), folder, as_json)
+                            workers=Workers(workers, scheduler, part)), folder, as_json)
 
 
 def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Path,
              as_json: bool, workers: int | None) -> int:
-    from scenarios.cli.progress import bar
-    from scenarios.cli.terminal import print_table
     from scenarios.config.resolvers import default_resolvers
     from scenarios.results.comparing import compare
     from scenarios.results.pool import processors
@@ -164,7 +163,7 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
         print_json({"report": report, **comparison.as_plain_data()})
     else:
         for runs in comparison.groups().values():
-            print_table(runs)
+            terminal.print_table(runs)
         print("", *comparison.refused, sep="\n" if comparison.refused else "")
         print(f"\nReport: {report}")
     return max([exit_code(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
@@ -172,7 +171,7 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
 
 @opt.app.command()
 def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
-                                              autocompletion=opt.complete_sweeps)],
+                                              autocompletion=opt.names_of("sweeps"))],
           out: Annotated[Path | None, opt.output(
               "Output folder, new or of a sweep to resume. Default: runs/sweep-NAME.")] = None,
           plugin: opt.Plugins = None, workers: opt.Workers = None, scheduler: opt.Scheduler = None,
@@ -181,18 +180,17 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
     Run the same command again to resume an interrupted sweep.
     """
-    asked = opt.workers_of(workers, scheduler, part)
     from scenarios.results.plan import load_sweep
+    from scenarios.results.sampled import Workers
     from scenarios.results.sampled import sweep as make
 
     folder = out if out is not None else Path("runs") / f"sweep-{load_sweep(file).name}"
-    return _sampled(partial(make, file, folder, workers=asked), folder, as_json)
+    return _sampled(partial(make, file, folder, workers=Workers(workers, scheduler, part)), folder,
+                    as_json)
 
 
 def _sampled(make: Callable[..., Finished], folder: Path, as_json: bool) -> int:
     """Make sampled runs, print their statistics; return 0 if a run finished or a part is made."""
-    from scenarios.cli.progress import bar
-    from scenarios.cli.terminal import print_samples
     from scenarios.results.store import TABLE
 
     begun = perf_counter()
@@ -207,7 +205,7 @@ def _sampled(make: Callable[..., Finished], folder: Path, as_json: bool) -> int:
                     "refused": list(done.plan.refused)})
         return int(done.failed == runs)
     for name, results in done.found.items():
-        print_samples(name, results)
+        terminal.print_samples(name, results)
     if done.plan.refused:
         print("", *done.plan.refused, sep="\n")
     if not done.found:

@@ -6,11 +6,18 @@ from collections.abc import Iterator
 from textwrap import fill
 from typing import Any
 
+from scenarios.cli.options import loaded
 from scenarios.config import Scenario
-from scenarios.loop.first_tick import FirstTick
+from scenarios.loop.first_tick import FirstTick, first_tick
 from solvers import Status
 
 _WIDTH, _UNDER = 100, " " * 12
+
+
+def look_at(name: str, changes: list[str] | None) -> tuple[Scenario, FirstTick]:
+    """Load a scenario with changes "key=value", and run its first tick."""
+    scenario = loaded(name, changes)
+    return scenario, first_tick(scenario)
 
 
 def as_plain_data(scenario: Scenario, found: FirstTick) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from textwrap import fill
@@ -18,7 +17,6 @@ from scenarios.cli.terminal import print_files, print_json
 if TYPE_CHECKING:
     from scenarios.config import Scenario
     from scenarios.draw.viewer.live import Live
-    from scenarios.recording.recording import Recording
 
 _POLL = 0.5  # [s] between two looks for an interruption
 
@@ -48,23 +46,20 @@ def view(folders: Runs,
 
 
 def _replay(folders: list[Path], rate: float = 30.0, beside: bool = False) -> str:
-    """Return the page that plays the runs of some folders."""
+    """Return the page that plays the runs of some folders, by the labels of their resolvers.
+
+    Labels get the scenarios where those differ, and equal labels the folder.
+    """
     from scenarios.draw.replay.page import html
     from scenarios.measure.run_folder import load_run
 
-    runs = labelled(folders, [load_run(folder) for folder in folders])
-    titles = dict.fromkeys(one.scenario.title or one.scenario.name for one in runs.values())
-    return html(runs, " · ".join(titles), rate=rate, beside=beside)
-
-
-def labelled(folders: Sequence[Path], recordings: Sequence[Recording]) -> dict[str, Recording]:
-    """Return recordings by their resolvers' labels; equal labels get the folder as well."""
-    labels = [one.facts.resolver.label for one in recordings]
-    if len({one.scenario.name for one in recordings}) > 1:
-        labels = [f"{label} {one.scenario.name}"
-                  for label, one in zip(labels, recordings, strict=True)]
-    return {label if labels.count(label) == 1 else f"{label} in {folder}": one
+    recordings = [load_run(folder) for folder in folders]
+    several = len({one.scenario.name for one in recordings}) > 1
+    labels = [one.facts.resolver.label + f" {one.scenario.name}" * several for one in recordings]
+    runs = {label if labels.count(label) == 1 else f"{label} in {folder}": one
             for label, folder, one in zip(labels, folders, recordings, strict=True)}
+    titles = dict.fromkeys(one.scenario.title or one.scenario.name for one in recordings)
+    return html(runs, " · ".join(titles), rate=rate, beside=beside)
 
 
 def show_live(scenario: Scenario, folder: Path, port: int, speed: float, browser: bool,

@@ -15,7 +15,8 @@ def main() -> None:
                if (number := getattr(signal, name, None)) is not None
                and signal.getsignal(number) is not signal.SIG_IGN]
     for number in handled:
-        signal.signal(number, _exit if os.getpid() == 1 else signal.SIG_DFL)
+        signal.signal(number, signal.SIG_DFL if os.getpid() != 1 else
+                      lambda number, _: os._exit(128 + number))
     try:
         from scenarios.cli.main import interrupted, run_command
     except ModuleNotFoundError as error:
@@ -49,10 +50,6 @@ def _open_streams() -> None:
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: PTH123, SIM115
         getattr(sys, name).reconfigure(errors="replace")
-
-
-def _exit(number: int, _: object) -> None:
-    os._exit(128 + number)
 
 
 if __name__ == "__main__":

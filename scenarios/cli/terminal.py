@@ -1,15 +1,16 @@
-"""Output of the command line: tables of metrics, lists, certificates."""
+"""Output of the command line: tables of metrics, lists, certificates, progress."""
 
 from __future__ import annotations
 
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from textwrap import fill
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -18,22 +19,18 @@ if TYPE_CHECKING:
 
 _WIDTH = 80   # columns of a terminal
 _NAMES = 26   # columns of it for the names of metrics
+_EVERY = 10.0  # [s] between two lines about progress
 
 
 def troubles(recording: Any) -> list[str]:
-    """Return one line per kind of problem: action, number of ticks and first tick."""
-    lines = [f"{kind}: {action} in {len(ticks)} ticks, first in tick {ticks[0]} "
-             f"(t = {recording['t'][ticks[0]]:.3f} s)"
-             for (kind, action), ticks in recording.troubles().items()]
-    return ["", *lines] if lines else []
-
-
-def levels_given_up(recording: Any) -> list[str]:
-    """Return one line per level that the run missed: for how long, and what held it back."""
+    """Return one line per kind of problem: its ticks; and per missed level: what held it back."""
     from scenarios.measure.given_up import given_up
 
-    lines = [fill(str(one), _WIDTH, subsequent_indent="  ") for one in given_up(recording)]
-    return ["", *lines] if lines else []
+    faults = [f"{kind}: {action} in {len(ticks)} ticks, first in tick {ticks[0]} "
+              f"(t = {recording['t'][ticks[0]]:.3f} s)"
+              for (kind, action), ticks in recording.troubles().items()]
+    missed = [fill(str(one), _WIDTH, subsequent_indent="  ") for one in given_up(recording)]
+    return [line for lines in (faults, missed) if lines for line in ("", *lines)]
 
 
 def certified(recording: Any, damping: float) -> str:
@@ -116,21 +113,16 @@ def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: 
     console.print(*below, sep="\n", end="\n" if below else "")
 
 
-def print_list(what: str, entries: dict[str, str]) -> None:
-    """Print names with descriptions in 80 columns."""
-    print(f"{what}:")
-    width = max((len(name) for name in entries), default=0)
-    for name, text in entries.items():
-        print(fill(text, _WIDTH, initial_indent=f"  {name:{width}}  ",
-                   subsequent_indent=" " * (width + 4)) or f"  {name}")
-
-
-def print_lists(lists: dict[str, dict[str, str]], as_json: bool) -> None:
-    """Print lists by heading, or all as JSON."""
+def print_lists(lists: dict[str, dict[str, str]], as_json: bool = False) -> None:
+    """Print names with descriptions by heading in 80 columns, or all as JSON."""
     if as_json:
         return print_json(lists)
     for what, entries in lists.items():
-        print_list(what, entries)
+        print(f"{what}:")
+        width = max((len(name) for name in entries), default=0)
+        for name, text in entries.items():
+            print(fill(text, _WIDTH, initial_indent=f"  {name:{width}}  ",
+                       subsequent_indent=" " * (width + 4)) or f"  {name}")
 
 
 def print_files(files: list[Path], as_json: bool) -> None:
@@ -154,12 +146,12 @@ def interruptible(kept: str) -> Iterator[None]:
         raise
 
 
-def exit_code(fault: str | None) -> int:
-    """Return 0, or print a fault on standard error and return 1."""
+def exit_code(fault: str | None, wrong: bool = False) -> int:
+    """Return 0, or print a fault or what is wrong on standard error and return 1 or 2."""
     if fault is None:
         return 0
-    print(f"hierarchy: fault: {fault}", file=sys.stderr)
-    return 1
+    print(f"hierarchy: {'error' if wrong else 'fault'}: {fault}", file=sys.stderr)
+    return 1 + wrong
 
 
 def shown(path: Path) -> str:
@@ -168,3 +160,52 @@ def shown(path: Path) -> str:
         return str(path.resolve().relative_to(Path.cwd()))
     except (OSError, ValueError):  # the current folder has gone, or is elsewhere
         return str(path)
+
+
+@contextmanager
+def bar(what: str = "ticks") -> Iterator[Callable[[str, int, int], None]]:
+    """Yield a function to call with (label, done, total); `what` is the unit of the count.
+
+    It shows a bar on standard error, or prints a line there now and then if that is no terminal.
+    """
+    if not sys.stderr.isatty():
+        yield lines(what)
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(),
+               TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {what}"),
+               TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        tasks: dict[str, int] = {}
+
+        def told(label: str, done: int, total: int) -> None:
+            if label not in tasks:
+                tasks[label] = int(progress.add_task(escape(label), total=total))
+            progress.update(tasks[label], completed=done)  # type: ignore[arg-type]
+
+        yield told
+
+
+def lines(what: str, clock: Callable[[], float] = monotonic) -> Callable[[str, int, int], None]:
+    """Return a function like that of `bar` that prints a line every 10 s, with what is left.
+
+    clock : returns the present time [s].
+    """
+    begun: dict[str, tuple[float, int]] = {}
+    said = clock()
+
+    def told(label: str, done: int, total: int) -> None:
+        nonlocal said
+        now = clock()
+        start, first = begun.setdefault(label, (now, done))
+        if now - said < _EVERY or done >= total:
+            return
+        said = now
+        pace = (now - start) / (done - first) if done > first else None
+        left = "" if pace is None else f", about {(total - done) * pace:.0f} s left"
+        print(f"{label}: {done} of {total} {what}{left}", file=sys.stderr, flush=True)
+
+    return told

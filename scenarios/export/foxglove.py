@@ -25,7 +25,8 @@ _ARM, _OBSTACLE, _TRACE, _ASKED = (dict(zip("rgba", colour, strict=True)) for co
     (0.35, 0.42, 0.5, 1.0), (0.83, 0.23, 0.17, 0.9), (0.0, 0.45, 0.7, 1.0), (0.6, 0.6, 0.6, 1.0)))
 _POINT = 0.01      # [m] radius of a point obstacle as drawn
 _THICK = 2.0       # [px] of lines
-_STRIP, _LIST = 0, 2
+_STRIP = 0         # a type of line
+_WARNING = 3       # a level of a log message
 
 
 def transforms(scene: Scene, frame: int) -> Message:
@@ -41,10 +42,13 @@ def transforms(scene: Scene, frame: int) -> Message:
     placed.append(("end_effector", scene.points[frame, -1], turned))
     if scene.desired is not None:
         placed.append(("desired", scene.desired[frame], np.eye(3)))
-    return {"transforms": [{
-        "timestamp": time(t), "parent_frame_id": WORLD, "child_frame_id": name,
-        "translation": xyz(place), "rotation": xyzw(rotation)}
-        for name, place, rotation in placed]}
+    return {"transforms": [transform(t, *one) for one in placed]}
+
+
+def transform(t: float, name: str, place: Array, rotation: Array) -> Message:
+    """Return the placement of a frame in the world."""
+    return {"timestamp": time(t), "parent_frame_id": WORLD, "child_frame_id": name,
+            "translation": xyz(place), "rotation": xyzw(rotation)}
 
 
 def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
@@ -111,11 +115,19 @@ def _capsule(start: Array, end: Array, radius: float, colour: Message) -> dict[s
 
 def line(t: float, name: str, points: Array, colour: Message) -> Message:
     """Return a line through points (P, 3) [m] in the world, without those that are not finite."""
-    kept = points[np.isfinite(points).all(axis=1)]
-    drawn = {"type": _STRIP, "pose": pose(np.zeros(3), np.eye(3)), "thickness": _THICK,
-             "scale_invariant": True, "points": [xyz(point) for point in kept],
-             "color": colour, "colors": [], "indices": []}
-    return entity(t, name, WORLD, lines=[drawn])
+    return entity(t, name, WORLD, lines=[_strip(points[np.isfinite(points).all(axis=1)], colour)])
+
+
+def _strip(points: Array, colour: Message) -> Message:
+    return {"type": _STRIP, "pose": pose(np.zeros(3), np.eye(3)), "thickness": _THICK,
+            "scale_invariant": True, "points": [xyz(point) for point in points],
+            "color": colour, "colors": [], "indices": []}
+
+
+def log(t: float, message: str, tick: int) -> Message:
+    """Return a warning of the policy in a tick."""
+    return {"timestamp": time(t), "level": _WARNING, "message": message, "name": "policy",
+            "file": "", "line": tick}
 
 
 def entity(t: float, name: str, frame: str, **parts: list[Message]) -> Message:
@@ -157,45 +169,23 @@ def _body(centre: Array, size: float | Array, colour: Message, rotation: Array |
             "size": xyz(np.broadcast_to(size, 3)), "color": colour}
 
 
-NUMBER: dict[str, Any] = {"type": "number"}
-INTEGER: dict[str, Any] = {"type": "integer"}
-TEXT: dict[str, Any] = {"type": "string"}
-TRUTH: dict[str, Any] = {"type": "boolean"}
+def schema(example: Any) -> dict[str, Any]:
+    """Return the JSON schema of all that is like an example; a list is like its first entry."""
+    if isinstance(example, dict):
+        return {"type": "object",
+                "properties": {name: schema(value) for name, value in example.items()}}
+    if isinstance(example, list):
+        return {"type": "array", "items": schema(example[0] if example else {})}
+    return {"type": _KINDS[type(example)]}
 
 
-def an_object(**properties: Any) -> dict[str, Any]:
-    """Return the schema of an object with these properties."""
-    return {"type": "object", "properties": properties}
-
-
-def a_list(items: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of an array."""
-    return {"type": "array", "items": items}
-
-
-_TIME = an_object(sec=INTEGER, nsec=INTEGER)
-_XYZ = an_object(x=NUMBER, y=NUMBER, z=NUMBER)
-_XYZW = an_object(x=NUMBER, y=NUMBER, z=NUMBER, w=NUMBER)
-_POSE = an_object(position=_XYZ, orientation=_XYZW)
-_COLOUR = an_object(r=NUMBER, g=NUMBER, b=NUMBER, a=NUMBER)
-_BODY = an_object(pose=_POSE, size=_XYZ, color=_COLOUR)
-_CYLINDER = an_object(pose=_POSE, size=_XYZ, bottom_scale=NUMBER, top_scale=NUMBER, color=_COLOUR)
-_LINE = an_object(type=INTEGER, pose=_POSE, thickness=NUMBER, scale_invariant=TRUTH,
-                  points=a_list(_XYZ), color=_COLOUR, colors=a_list(_COLOUR),
-                  indices=a_list(INTEGER))
-_ENTITY = an_object(
-    timestamp=_TIME, frame_id=TEXT, id=TEXT, lifetime=_TIME, frame_locked=TRUTH,
-    metadata=a_list(an_object(key=TEXT, value=TEXT)), arrows=a_list(an_object()),
-    cubes=a_list(_BODY), spheres=a_list(_BODY), cylinders=a_list(_CYLINDER), lines=a_list(_LINE),
-    triangles=a_list(an_object()), texts=a_list(an_object()), models=a_list(an_object()))
-_TRANSFORM = an_object(timestamp=_TIME, parent_frame_id=TEXT, child_frame_id=TEXT,
-                       translation=_XYZ, rotation=_XYZW)
-
-FOXGLOVE: dict[str, dict[str, Any]] = {
-    "foxglove.FrameTransforms": an_object(transforms=a_list(_TRANSFORM)),
-    "foxglove.SceneUpdate": an_object(
-        deletions=a_list(an_object(timestamp=_TIME, type=INTEGER, id=TEXT)),
-        entities=a_list(_ENTITY)),
-    "foxglove.Log": an_object(timestamp=_TIME, level=INTEGER, message=TEXT, name=TEXT, file=TEXT,
-                              line=INTEGER),
-}
+_KINDS = {float: "number", int: "integer", str: "string", bool: "boolean"}
+_PARTS = {**_capsule(np.zeros(3), np.ones(3), 1.0, _ARM), "cubes": [_body(np.zeros(3), 1.0, _ARM)],
+          "lines": [{**_strip(np.zeros((1, 3)), _ARM), "colors": [_ARM], "indices": [0]}],
+          "metadata": [{"key": "", "value": ""}]}
+FOXGLOVE = {name: schema(example) for name, example in {
+    "foxglove.FrameTransforms": {"transforms": [transform(0.0, "", np.zeros(3), np.eye(3))]},
+    "foxglove.SceneUpdate": {"deletions": [{"timestamp": time(0.0), "type": 0, "id": ""}],
+                             "entities": [entity(0.0, "", "", **_PARTS)]},
+    "foxglove.Log": log(0.0, "", 0)}.items()}
+"""The schemas of the messages, by the names that Foxglove knows."""

@@ -4,44 +4,59 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.export import foxglove, new_file
-from scenarios.export.foxglove import FOXGLOVE, INTEGER, NUMBER, TEXT, TRUTH, a_list, an_object
+from hierarchy.errors import HierarchyError
+from scenarios.export import foxglove
+from scenarios.files import OutputError, named, write_text, written
 from scenarios.recording.recording import Recording
 from scenarios.recording.signals import OTHER, known
 from scenarios.scene import scene
 
 FRAMES_A_SECOND = 30.0  # of the 3D scene; signals have every tick
-_WARNING = 3            # Foxglove's level of a log message
-
-_KINDS = {"f": NUMBER, "i": INTEGER, "u": INTEGER, "b": TRUTH, "U": TEXT}
 
 Panel = dict[str, Any]
 Entry = tuple[int, str, dict[str, Any]]  # [ns], topic, message
 
 
-def write(recording: Recording, path: Path) -> list[Path]:
-    """Write `path` and `path`.layout.json, times counted from zero.
+def export(recording: Recording, path: str | Path) -> list[Path]:
+    """Write a recording to an MCAP file, and a layout for Foxglove to `path`.layout.json.
 
-    Every signal of every tick has the name and the topic of `scenarios.recording.signals`; numbers
-    that are not finite are null, and an array with several indices is one flat list. `/stack` also
-    has the names of the tasks, `/events` the trouble, `/tf` and `/scene` the 3D scene.
+    Every signal of every tick has the name and the topic of `scenarios.recording.signals`, times
+    are counted from zero, numbers that are not finite are null, and an array with several indices
+    is one flat list. `/stack` also has the names of the tasks, `/events` the trouble, `/tf` and
+    `/scene` the 3D scene. The same recording gives the same bytes. Returns the files written. For
+    tables there is `Recording.to_dataframe`.
+
+    Raises
+    ------
+    OutputError : a file exists or cannot be written.
+    HierarchyError : the suffix is another one, or the package mcap is not installed.
     """
+    path = Path(path)
+    if path.suffix != ".mcap":
+        raise HierarchyError(f"{path} is no .mcap file; for CSV, Parquet and other tables: "
+                             "scenarios.load_run(folder).to_dataframe()")
+    if find_spec("mcap") is None:
+        raise HierarchyError("mcap is not installed; pip install 'task-hierarchy[export]'")
     from mcap.writer import Writer
 
-    groups = grouped(recording)
-    beside = path.with_name(f"{path.name}.layout.json")
-    with new_file(path) as partial, new_file(beside) as panels:
-        with partial.open("wb") as stream:
-            writer = Writer(stream)
-            _write(writer, recording, groups)
-        panels.write_text(json.dumps(layout(recording), indent=1) + "\n", encoding="utf-8")
-    return [path, beside]
+    files = [path, path.with_name(f"{path.name}.layout.json")]
+    for file in files:
+        with named(file):
+            if file.exists():
+                raise OutputError(f"{file} exists; choose another name, or remove it first")
+            file.parent.mkdir(parents=True, exist_ok=True)
+    with named(path), written(path) as partial, partial.open("wb") as stream:
+        _write(Writer(stream), recording, grouped(recording))
+    with named(files[1]):
+        write_text(files[1], json.dumps(layout(recording), indent=1) + "\n")
+    return files
 
 
 def grouped(recording: Recording) -> dict[str, dict[str, NDArray[Any]]]:
@@ -59,13 +74,14 @@ def grouped(recording: Recording) -> dict[str, dict[str, NDArray[Any]]]:
 def _write(writer: Any, recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -> None:
     writer.start(library="task-hierarchy")
     units = recording.units()
-    schemas = {topic: (f"hierarchy.{topic[1:]}", an_object(
-        **{name: {**(a_list(_KINDS[signal.dtype.kind]) if signal.ndim > 1 else
-                     _KINDS[signal.dtype.kind]), "description": " ".join(units.get(name, ()))}
-           for name, signal in group.items()})) for topic, group in groups.items()}
-    for topic, name in (("/tf", "foxglove.FrameTransforms"), ("/scene", "foxglove.SceneUpdate"),
-                        ("/events", "foxglove.Log")):
-        schemas[topic] = (name, FOXGLOVE[name])
+    schemas = {}
+    for topic, group in groups.items():
+        schema = foxglove.schema({name: np.zeros((1,) * (signal.ndim - 1), signal.dtype).tolist()
+                                  for name, signal in group.items()})
+        for name, of in schema["properties"].items():
+            of["description"] = " ".join(units.get(name, ()))
+        schemas[topic] = f"hierarchy.{topic[1:]}", schema
+    schemas |= dict(zip(("/tf", "/scene", "/events"), foxglove.FOXGLOVE.items(), strict=True))
     channels = {}
     for topic, (name, schema) in schemas.items():
         number = writer.register_schema(name, "jsonschema", _bytes(schema))
@@ -89,10 +105,7 @@ def _entries(recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -
         for at, row in zip(times, rows, strict=True):
             yield at, topic, dict(zip(names, row, strict=True))
     for tick, kind, action in recording.events:
-        t = float(recording["t"][tick])
-        yield times[tick], "/events", {
-            "timestamp": foxglove.time(t), "level": _WARNING, "message": f"{kind}: {action}",
-            "name": "policy", "file": "", "line": tick}
+        yield times[tick], "/events", foxglove.log(recording["t"][tick], f"{kind}: {action}", tick)
 
 
 def _plain(values: NDArray[Any]) -> Any:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from hierarchy.notebook import html_table
-from scenarios.measure import metrics
 from scenarios.measure.motions import partings
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import lines, verdicts
@@ -35,7 +33,17 @@ class Comparison:
                 f"{len(self.runs)} runs, {len(self.faults)} faults)")
 
     def _repr_html_(self) -> str:
-        return "".join(_html(name, runs) for name, runs in self.groups().items())
+        """Return a table for each group: a row per metric, the best in bold."""
+        found = ""
+        for name, runs in self.groups().items():
+            rows = table(runs, details=False)
+            best = {(i, j + 1) for i, row in enumerate(rows)
+                    for j, cell in enumerate(row.cells) if cell.kind == "best"}
+            cells = [(row.heading, *(cell.text for cell in row.cells)) for row in rows]
+            faults = [("fault", *(run.fault or "" for run in runs))] if any(
+                run.fault for run in runs) else []
+            found += html_table(name, ("", *(run.label for run in runs)), [*cells, *faults], best)
+        return found
 
     @property
     def _names(self) -> tuple[str, ...]:
@@ -66,29 +74,10 @@ class Comparison:
         return {"command": self.command, "versions": self.versions,
                 "verdicts": {name: list(lines(verdicts(runs)))
                              for name, runs in self.groups().items()},
-                "runs": [_plain(run) for run in self.runs], "refused": list(self.refused),
+                "runs": [run.as_plain_data() | verdicts([run])[0].as_plain_data()
+                         for run in self.runs], "refused": list(self.refused),
                 "partings": {name: [
                     {"label": one.label, "from": one.other, "bound_rad": one.bound,
                      "tick": one.tick, "why": one.why,
                      "largest_rad": one.largest if math.isfinite(one.largest) else None}
                     for one in partings(runs)] for name, runs in self.groups().items()}}
-
-
-def _html(name: str, runs: Sequence[Run]) -> str:
-    """Return the table of runs that stand side by side: a row per metric, the best in bold."""
-    rows = table(runs, details=False)
-    best = {(i, j + 1) for i, row in enumerate(rows)
-            for j, cell in enumerate(row.cells) if cell.kind == "best"}
-    cells = [(row.heading, *(cell.text for cell in row.cells)) for row in rows]
-    faults = [("fault", *(run.fault or "" for run in runs))] if any(
-        run.fault for run in runs) else []
-    return html_table(name, ("", *(run.label for run in runs)), [*cells, *faults], best)
-
-
-def _plain(run: Run) -> dict[str, Any]:
-    return {"scenario": run.scenario.name, "resolver": run.spec, "label": run.label,
-            "folder": run.folder, "fault": run.fault,
-            "settings": run.settings,
-            "ticks": run.recording.ticks if run.recording else 0,
-            "metrics": {name: metrics.plain(metric) for name, metric in run.metrics.items()},
-            **verdicts([run])[0].as_plain_data()}

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.measure.forces import wanted_forces
-from scenarios.measure.metric import norms, passed, shown, true
+from scenarios.measure.metric import passed, shown, true
+from scenarios.measure.safety import wanted_forces
 from scenarios.recording.listed import errors
 from scenarios.recording.recording import Recording
 
@@ -20,6 +20,9 @@ PROMISED = {"m": 1e-4, "deg": 1e-2, "rad": 1e-4, "rad/s": 1e-3, "m/s": 1e-3, "N 
             "contacts in place": 5e-3}  # simulated soles creep
 
 _NOTHING = 1e-9  # SI units, rounding
+
+# What a scenario asks for: name, what, unit, how far off the run was (T,) or NaN, promised or not.
+_Asked = tuple[str, str, str, Array, bool]
 
 
 @dataclass(frozen=True)
@@ -83,34 +86,25 @@ def goals(recording: Recording) -> tuple[Goal, ...]:
     if not recording.ticks:
         return ()
     found = (*_tasks(recording), *_distances(recording), *_limits(recording))
-    return tuple(_goal(*one, recording["t"]) for one in found if np.isfinite(one.off).any())
-
-
-class _Asked(NamedTuple):
-    """One thing that a scenario asks for, and how far off the run was (T,), NaN where unknown."""
-
-    name: str
-    asked: str
-    unit: str
-    off: Array
-    promise: bool = False
+    return tuple(_goal(*one, recording["t"]) for one in found if np.isfinite(one[3]).any())
 
 
 def _tasks(recording: Recording) -> Iterator[_Asked]:
     scenario = recording.scenario
     if scenario.position is not None and "position_error" in recording:
-        off = norms(recording["desired_position"] - true(recording, "ee_position"))
-        yield _Asked("position", _in_words(scenario.position), "m", off)
+        apart = recording["desired_position"] - true(recording, "ee_position")
+        off = np.linalg.norm(apart, axis=1)
+        yield "position", _in_words(scenario.position), "m", off, False
     if scenario.pointing is not None and "pointing_error" in recording:
         for unit, off in scenario.pointing.sizes(recording["pointing_error"][:, None]):
-            yield _Asked("pointing", _in_words(scenario.pointing), unit, off,
-                         scenario.pointing.one_sided)
+            yield ("pointing", _in_words(scenario.pointing), unit, off,
+                   scenario.pointing.one_sided)
     for section, unit, off in errors(recording):
         turned = unit == "deg" and hasattr(section, "rotation")
-        yield _Asked(f"{section.title} turned" if turned else section.title,
-                     "as asked" if turned else _in_words(section), unit, off, section.one_sided)
+        yield (f"{section.title} turned" if turned else section.title,
+               "as asked" if turned else _in_words(section), unit, off, section.one_sided)
     for task, force in wanted_forces(recording):
-        yield _Asked(task.title, f"{task.target[0]:g} N", "N", np.abs(force - task.target[0]))
+        yield task.title, f"{task.target[0]:g} N", "N", np.abs(force - task.target[0]), False
 
 
 def _in_words(section: Any) -> str:
@@ -130,14 +124,14 @@ def _distances(recording: Recording) -> Iterator[_Asked]:
                               ("ee", "ee_distance", "end effector")):
         if avoidance is not None and signal in recording and who in avoidance.promised:
             kept = avoidance.promised[who]
-            yield _Asked(name, f"{shown(kept, 'm')} or more from obstacles", "m",
-                         np.maximum(kept - true(recording, signal), 0.0), promise=True)
+            yield (name, f"{shown(kept, 'm')} or more from obstacles", "m",
+                   np.maximum(kept - true(recording, signal), 0.0), True)
     if "contact_depth" in recording:
-        yield _Asked("no contact with obstacles", "", "m", recording["contact_depth"], True)
+        yield "no contact with obstacles", "", "m", recording["contact_depth"], True
     sticks = [not contact.slides for contact in recording.scenario.contacts]
     if "slip" in recording and any(sticks):
         slip = np.fmax.reduce(recording["slip"][:, sticks], axis=1)
-        yield _Asked("contacts in place", "", "m", slip, promise=True)
+        yield "contacts in place", "", "m", slip, True
 
 
 def _limits(recording: Recording) -> Iterator[_Asked]:
@@ -161,7 +155,7 @@ def _of_units(name: str, units: Sequence[str], beyond: Array) -> Iterator[_Asked
         chosen = has_limits & np.array([one == unit for one in units])
         if chosen.any():  # each joint by itself: another's return forgives nothing
             off = passed(np.maximum(beyond[:, chosen], 0.0), PROMISED.get(unit, 0.0))
-            yield _Asked(name, "", unit, off.max(axis=1), promise=True)
+            yield name, "", unit, off.max(axis=1), True
 
 
 def _goal(name: str, asked: str, unit: str, off: Array, promise: bool, t: Array) -> Goal:

@@ -147,17 +147,16 @@ class Rows:
         return cell.stack.hierarchy(cell.state, order)
 
 
-def depth_view(recording: Recording, t: float | None = None) -> DepthView | None:
-    """Take the image of a run's camera at time t [s]; None without a camera or before its first.
+def depth_view(recording: Recording) -> DepthView | None:
+    """Take an image with a run's camera, without latency; None without one or before its first.
 
-    The default is the tick in which the end effector is nearest to an obstacle, or the last tick if
-    no obstacle was seen. The camera is built from the scenario, with zero latency.
+    That is in the tick in which the end effector is nearest to an obstacle, or the last tick if no
+    obstacle was seen.
     """
     scenario = recording.scenario
     if scenario.sensor.kind != "camera" or not recording.ticks:
         return None
-    off = np.nan_to_num(recording["ee_distance"] if t is None else np.abs(recording["t"] - t),
-                        nan=np.inf, posinf=np.inf)
+    off = np.nan_to_num(recording["ee_distance"], nan=np.inf, posinf=np.inf)
     k = int(np.argmin(off)) if np.isfinite(off).any() else recording.ticks - 1
     sensor = scenario.sensor.model_copy(update={"latency": 0.0})
     cell = build(scenario.model_copy(update={"sensor": sensor, "plant": KinematicSection()}))

@@ -100,11 +100,6 @@ def passed(off: Array, tolerance: float = 0.0) -> Array:
     return np.asarray(np.where(came_back, off - np.fmin.accumulate(off), off))
 
 
-def norms(values: Array) -> Array:
-    """Return the Euclidean norm of each row."""
-    return np.asarray(np.linalg.norm(values, axis=1))
-
-
 def largest(values: Array) -> float | None:
     """Return the largest magnitude; None if there is none, or it is not finite."""
     return finite(np.abs(values).max()) if values.size else None
@@ -124,12 +119,3 @@ def known(values: Array) -> Array:
 def finite(value: Any) -> float | None:
     """Return a number, None if it is not finite."""
     return float(value) if np.isfinite(value) else None
-
-
-def rms_and_max(key: str, label: str, values: Array, unit: str, *, group: str, suffix: str = "",
-                note: str = "") -> Iterator[Metric]:
-    """Yield the root of the mean square and the largest magnitude of values."""
-    rms = finite(np.sqrt(np.mean(values**2))) if values.size else None
-    yield Metric(f"{key}_rms{suffix}", f"{label}, rms", rms, unit, group=group)
-    yield Metric(f"{key}_max{suffix}", f"{label}, max", largest(values), unit, group=group,
-                 note=note)

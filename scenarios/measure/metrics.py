@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy import plugins
-from scenarios.measure import forces, safety, tracking  # noqa: F401, register metrics
+from scenarios.measure import safety, tracking  # noqa: F401, register metrics
 from scenarios.measure.metric import Criteria, finite, register
 from scenarios.measure.metric import Metric as Metric
 from scenarios.recording.recording import Recording
@@ -31,10 +31,9 @@ _metric = partial(Metric, group="Computing")
 def _switching(recording: Recording, by: Criteria) -> Iterator[Metric]:
     metric = partial(Metric, unit="", group="Switching")
     yield metric("stack_changes", "Changes of the stack", float(recording.switches().size))
-    if "active_set" in recording or recording.facts.asks != "equalities":
-        known = recording.get("active_set", np.zeros(0))
-        changes = (float(np.count_nonzero(np.diff(known[known >= 0])))
-                   if "active_set" in recording else None)
+    known = recording.signals.get("active_set")
+    if known is not None or recording.facts.asks != "equalities":
+        changes = None if known is None else float(np.count_nonzero(np.diff(known[known >= 0])))
         yield metric("active_set_changes", "Changes of the active set", changes,
                      lower_is_better=None,
                      note="of the inequality rows that act, where the resolver reports them")

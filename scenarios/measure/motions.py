@@ -43,8 +43,8 @@ class Motion:
         return self.runs[0].recording
 
 
-def motions(runs: Sequence[Run], alike: float = ALIKE,
-            also: Callable[[Recording], Any] = lambda one: None) -> list[Motion]:
+def motions(runs: Sequence[Run], also: Callable[[Recording], Any] = lambda one: None
+            ) -> list[Motion]:
     """Return the motions of the runs that have more than one tick, in the order of their first.
 
     Only runs of one scenario can be alike. `also` gives what they must have in common.
@@ -55,7 +55,7 @@ def motions(runs: Sequence[Run], alike: float = ALIKE,
             continue
         for i, motion in enumerate(found):
             apart = departure(run, motion.runs[0])
-            if apart <= alike and also(run.recording) == also(motion.recording):
+            if apart <= ALIKE and also(run.recording) == also(motion.recording):
                 found[i] = Motion((*motion.runs, run), max(apart, motion.apart))
                 break
         else:
@@ -64,17 +64,11 @@ def motions(runs: Sequence[Run], alike: float = ALIKE,
 
 
 def departure(run: Run, other: Run) -> float:
-    """Return the largest difference of any joint between two runs [rad].
-
-    Infinite if it is not known, or the runs are of two scenarios.
-    """
-    if run.recording is None or other.recording is None or run.scenario.name != other.scenario.name:
+    """Return the largest difference of any joint [rad]; infinite for runs of two scenarios."""
+    q, reference = (one.recording["q"] if one.recording else np.empty(0) for one in (run, other))
+    if run.scenario.name != other.scenario.name or q.shape != reference.shape:
         return math.inf
-    q, reference = run.recording["q"], other.recording["q"]
-    if q.shape != reference.shape:
-        return math.inf
-    largest = float(np.abs(q - reference).max(initial=0.0))
-    return math.inf if math.isnan(largest) else largest
+    return float(np.nan_to_num(np.abs(q - reference), nan=np.inf).max(initial=0.0))
 
 
 @dataclass(frozen=True)

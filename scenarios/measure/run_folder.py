@@ -88,9 +88,12 @@ def load_run(folder: str | Path) -> Recording:
     signals = _arrays(path / "run.npz", "orders", "fault", "events")
     orders, fault, events = (signals.pop(name) for name in ("orders", "fault", "events"))
     signals |= _arrays(path / "timings.npz")
+    depth = None
+    if (path / "depth.npz").exists():
+        seen: dict[str, Any] = _arrays(path / "depth.npz", *DepthView._fields)
+        depth = DepthView(**{**seen, "t": float(seen["t"]), "active": int(seen["active"])})
     return Recording(signals, tuple(map(str, orders)), scenario, _facts(path / "facts.json"),
-                     str(fault) or None, tuple(Event(*event) for event in events.tolist()),
-                     _depth(path / "depth.npz"))
+                     str(fault) or None, tuple(Event(*event) for event in events.tolist()), depth)
 
 
 def _arrays(path: Path, *names: str) -> dict[str, NDArray[Any]]:
@@ -114,13 +117,6 @@ def _facts(path: Path) -> Facts:
         return found
     except (OSError, ValueError, RecursionError) as error:
         raise HierarchyError(f"{path} cannot be read: {error}") from error
-
-
-def _depth(path: Path) -> DepthView | None:
-    if not path.exists():
-        return None
-    arrays: dict[str, Any] = _arrays(path, *DepthView._fields)
-    return DepthView(**{**arrays, "t": float(arrays["t"]), "active": int(arrays["active"])})
 
 
 def versions() -> dict[str, str]:

@@ -16,6 +16,7 @@ from scenarios.measure.metrics import Metric
 from scenarios.recording.facts import ResolverFacts, resolver_facts
 from scenarios.recording.recording import Recording
 
+_TIE, _ROUNDING = 0.01, 1e-12  # relative, and in SI units: values that near are as good
 # How a resolver that is not strict departs from strict priorities, by its name.
 _DEPARTS = {
     "": "not strict",
@@ -73,6 +74,13 @@ class Run:
         return found | {name: one for name, one in timed.items()
                         if name in found and name.startswith(("time_", "ticks_late"))}
 
+    def as_plain_data(self) -> dict[str, Any]:
+        """Return the run for a JSON file."""
+        return {"scenario": self.scenario.name, "resolver": self.spec, "label": self.label,
+                "folder": self.folder, "fault": self.fault, "settings": self.settings,
+                "ticks": self.recording.ticks if self.recording else 0,
+                "metrics": {name: metrics.plain(one) for name, one in self.metrics.items()}}
+
     @cached_property
     def happened(self) -> tuple[Happening, ...]:
         """What happened in it, with the causes of jumps, which take a while to find."""
@@ -114,15 +122,21 @@ def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
     competes = [one_scenario and run.fault is None for run in runs]
     known = {name: metric for run in runs for name, metric in run.metrics.items()
              if details or not metric.detail}
-    groups, rows = list(dict.fromkeys(metric.group for metric in known.values())), []
-    for name, metric in sorted(known.items(), key=lambda one: groups.index(one[1].group)):
+    rows = []
+    for name, metric in known.items():
         found = [run.metrics.get(name) for run in runs]
         best = _best({i: m.value for i, m in enumerate(found)
                       if m and m.value is not None and competes[i]}, metric.lower_is_better)
         rows.append(Row(metric.label, metric.shown_unit, metric.group, name, tuple(
             Cell(m.shown() if m else "–", "best" if i in best else "out" if runs[i].fault else "",
                  m.note if m else "") for i, m in enumerate(found))))
-    return rows
+    return grouped(rows)
+
+
+def grouped(rows: Sequence[Row]) -> list[Row]:
+    """Return rows with those of a group together, groups in the order of their first."""
+    groups = list(dict.fromkeys(row.group for row in rows))
+    return sorted(rows, key=lambda row: groups.index(row.group))
 
 
 def flags(runs: Sequence[Run]) -> list[str]:
@@ -146,15 +160,11 @@ def caveats(resolvers: Mapping[str, ResolverFacts]) -> dict[str, list[str]]:
             for label, one in resolvers.items()}
 
 
-def _best(values: Mapping[int, float], lower: bool | None, tie: float = 0.01,
-          rounding: float = 1e-12) -> frozenset[int]:
-    """Return which of the values are as good as the best; empty if all are.
-
-    That is within `tie`, relative, or within what rounding makes of nothing [SI units].
-    """
+def _best(values: Mapping[int, float], lower: bool | None) -> frozenset[int]:
+    """Return which of the values are as good as the best; empty if all are."""
     if lower is None or not values:
         return frozenset()
     winner = min(values.values()) if lower else max(values.values())
     best = frozenset(i for i, value in values.items()
-                     if abs(value - winner) <= max(tie * max(abs(value), abs(winner)), rounding))
+                     if abs(value - winner) <= max(_TIE * max(abs(value), abs(winner)), _ROUNDING))
     return best if len(best) < len(values) else frozenset()

@@ -79,9 +79,8 @@ def spread(values: Array) -> Spread | None:
     known = values[np.isfinite(values)]
     if not known.size:
         return None
-    lower, median, upper = np.percentile(known, [25.0, 50.0, 75.0])
-    return Spread(known.size, float(median), float(lower), float(upper), float(known.min()),
-                  float(known.max()))
+    least, lower, median, upper, largest = map(float, np.percentile(known, [0, 25, 50, 75, 100]))
+    return Spread(known.size, median, lower, upper, least, largest)
 
 
 def paired(first: Array, second: Array, same: float = SAME) -> Paired:

@@ -6,29 +6,17 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.problem import Array
-from scenarios.measure.metric import (
-    Criteria,
-    Metric,
-    finite,
-    known,
-    largest,
-    norms,
-    register,
-    rms_and_max,
-    true,
-)
+from scenarios.measure.metric import Criteria, Metric, finite, known, largest, register, true
 from scenarios.recording import listed
 from scenarios.recording.recording import Recording
 
-STILL = 0.01     # largest joint speed [rad/s] of a robot that counts as standing still
-FAR = 0.01       # error [m] at which it should not
+_STILL = 0.01    # largest joint speed [rad/s] of a robot that counts as standing still
+_FAR = 0.01      # error [m] at which it should not
 _AFTER = 0.5     # [s] after the return within reach that do not count as error
 _NOTHING = 1e-9  # errors of listed tasks below this are rounding and count as zero [m, deg, rad]
 
-Mask = NDArray[np.bool_]
 Spans = Sequence[tuple[float, float]]
 _metric = partial(Metric, group="Tracking")
 
@@ -37,7 +25,8 @@ _metric = partial(Metric, group="Tracking")
 def _tracking(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "position_error" not in recording:
         return
-    error, metrics = norms(recording["position_error"]), partial(rms_and_max, group="Tracking")
+    error = np.linalg.norm(recording["position_error"], axis=1)
+    metrics = partial(_rms_and_max, group="Tracking")
     after = error[recording["t"] - recording["t"][0] >= by.settle]
     settled = f"Error after {by.settle:g} s"
     yield from metrics("position_error", "Position error", error, "m")
@@ -45,7 +34,8 @@ def _tracking(recording: Recording, by: Criteria) -> Iterator[Metric]:
     yield _metric("position_error_median_settled", f"{settled}, median",
                   finite(np.median(after)) if after.size else None, "m")
     if "true_ee_position" in recording:
-        error = norms(recording["desired_position"] - recording["true_ee_position"])
+        off = recording["desired_position"] - recording["true_ee_position"]
+        error = np.linalg.norm(off, axis=1)
         yield from metrics("true_position_error", "True position error", error, "m")
 
 
@@ -94,14 +84,17 @@ def _returning(recording: Recording, by: Criteria) -> Iterator[Metric]:
     found = _left_path(recording)
     if found is None:
         return
-    spans, error = found
-    t, v, group = recording["t"], true(recording, "v"), "Singularities"
-    yield Metric("ticks_frozen", "Ticks frozen", float(frozen(t, v, error, spans).sum()), "",
-                 group=group, note="still and off a path within reach")
-    yield from rms_and_max("error_returned", "Error after return",
-                           error[returned(t, spans, _AFTER)], "m", group=group,
-                           note=f"from {_AFTER:g} s after the path is within reach")
-    yield from rms_and_max("jerk", "Joint jerk", jerk(t, recording["a"]), "rad/s^3", group=group)
+    (spans, error), t, v, group = found, recording["t"], true(recording, "v"), "Singularities"
+    within, back = (np.all([(t < begin) | (t > end + after) for begin, end in spans], axis=0)
+                    for after in (0.0, _AFTER))
+    still = np.abs(v).max(axis=1, initial=0.0) < _STILL
+    yield Metric("ticks_frozen", "Ticks frozen", float((still & (error > _FAR) & within).sum()),
+                 "", group=group, note="still and off a path within reach")
+    returned = error[back & (t > min(end for _, end in spans) + _AFTER)]
+    yield from _rms_and_max("error_returned", "Error after return", returned, "m", group=group,
+                            note=f"from {_AFTER:g} s after the path is within reach")
+    jerk = np.diff(recording["a"], axis=0) / np.diff(t)[:, None]
+    yield from _rms_and_max("jerk", "Joint jerk", jerk, "rad/s^3", group=group)
     if "velocity_limit" in recording:
         excess = np.maximum(np.abs(v) - recording["velocity_limit"], 0.0)
         yield Metric("speed_limit_excess", "Beyond a speed limit, max", largest(excess), "rad/s",
@@ -113,7 +106,7 @@ def _left_path(recording: Recording) -> tuple[Spans, Array] | None:
     position = recording.scenario.position
     path = position.path if position else None
     if path is not None and path.out_of_reach and "position_error" in recording:
-        return path.out_of_reach, norms(recording["position_error"])
+        return path.out_of_reach, np.linalg.norm(recording["position_error"], axis=1)
     for section, unit, error in listed.errors(recording):
         path = getattr(section, "path", None)
         if unit == "m" and path is not None and path.out_of_reach:
@@ -121,30 +114,10 @@ def _left_path(recording: Recording) -> tuple[Spans, Array] | None:
     return None
 
 
-def within_reach(t: Array, out_of_reach: Spans, after: float = 0.0) -> Mask:
-    """Return which times t (T,) [s] are in no span, nor within `after` [s] of the end of one."""
-    reach = np.ones(len(t), dtype=bool)
-    for begin, end in out_of_reach:
-        reach &= (t < begin) | (t > end + after)
-    return reach
-
-
-def returned(t: Array, out_of_reach: Spans, after: float) -> Mask:
-    """Return which times t (T,) are within reach, `after` [s] or more after a span's end."""
-    first = min((end for _, end in out_of_reach), default=np.inf)
-    return within_reach(t, out_of_reach, after) & (t > first + after)
-
-
-def frozen(t: Array, v: Array, error: Array, out_of_reach: Spans) -> Mask:
-    """Return in which ticks the robot stands still, v (T, n), off a path that is within reach.
-
-    It stands still if no joint is faster than STILL; it is off the path if the error (T,) exceeds
-    FAR.
-    """
-    still = np.abs(v).max(axis=1, initial=0.0) < STILL
-    return np.asarray(still & (error > FAR) & within_reach(t, out_of_reach))
-
-
-def jerk(t: Array, a: Array) -> Array:
-    """Return the differences of a (T, n) over those of t (T,): (T - 1, n) [rad/s^3]."""
-    return np.asarray(np.diff(a, axis=0) / np.diff(t)[:, None])
+def _rms_and_max(key: str, label: str, values: Array, unit: str, *, group: str, suffix: str = "",
+                 note: str = "") -> Iterator[Metric]:
+    """Yield the root of the mean square and the largest magnitude of values."""
+    rms = finite(np.sqrt(np.mean(values**2))) if values.size else None
+    yield Metric(f"{key}_rms{suffix}", f"{label}, rms", rms, unit, group=group)
+    yield Metric(f"{key}_max{suffix}", f"{label}, max", largest(values), unit, group=group,
+                 note=note)

@@ -6,9 +6,9 @@ a fresh one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, final
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -129,24 +129,16 @@ def recorded(name: str, seed: int, count: int) -> list[Hierarchy]:
 
 def window(scenario: Scenario, first: int, count: int) -> list[Hierarchy]:
     """Return the problems of `count` ticks of a run from tick `first` on, fewer if it ends."""
-    kept = _Window(first)
-    ticks = (first + count) * scenario.control.period
-    simulate(scenario.with_changes({"control.duration": ticks}), audits=[kept])
-    return kept.problems[:count]
+    kept: list[Hierarchy] = []
 
+    def keep(tick: int, controller: Controller) -> dict[str, Any]:
+        if tick >= first:
+            kept.append(controller.hierarchy.copy())
+        return {}  # no signals
 
-@final
-class _Window:
-    """Keeps the problems of all ticks from one on; an Audit without signals."""
-
-    def __init__(self, first: int) -> None:
-        self.first = first
-        self.problems: list[Hierarchy] = []
-
-    def __call__(self, tick: int, controller: Controller) -> Mapping[str, Any]:
-        if tick >= self.first:
-            self.problems.append(controller.hierarchy.copy())
-        return {}
+    lasting = {"control.duration": (first + count) * scenario.control.period}
+    simulate(scenario.with_changes(lasting), audits=[keep])
+    return kept[:count]
 
 
 def main(out: Annotated[Path, typer.Option(metavar="FILE")], seed: int = SEED,

@@ -20,11 +20,9 @@ class ClusterError(RuntimeError):
 
 def ended(work: Callable[[Job], Outcome], jobs: Sequence[Job], scheduler: str
           ) -> Iterator[tuple[Job, Outcome | None]]:
-    """Yield each job with its outcome as it ends; None if it killed its workers.
+    """Yield each job with its outcome as it ends on workers of the Dask scheduler at an address.
 
-    Parameters
-    ----------
-    scheduler : address of a Dask scheduler.
+    The outcome is None if a job killed its workers.
 
     Raises
     ------

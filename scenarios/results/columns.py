@@ -8,17 +8,16 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.words import listed
-from scenarios.config import Scenario
 from scenarios.measure import statistics
 from scenarios.measure.metrics import Metric
-from scenarios.measure.runs import Cell, Row, caveats
+from scenarios.measure.runs import Cell, Row, grouped
 from scenarios.measure.statistics import Paired, Spread, paired, wilson
-from scenarios.recording.facts import resolver_facts
 from scenarios.results.plan import Plan
 from scenarios.results.run import Job, Outcome
 
@@ -28,17 +27,16 @@ _WEIGHED = ("position_error_median_settled", "body_distance_min", "ee_distance_m
 _TOLERANCE = 1e-6  # [rad] beyond a joint limit that still counts as within it
 
 
-@dataclass(frozen=True)
-class Share:
-    """A share of runs, with its 95 % Wilson interval."""
+class Share(NamedTuple):
+    """A share of runs."""
 
     met: int
     of: int
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The 95 % interval of the share, between 0 and 1."""
-        return wilson(self.met, self.of)
+        """The 95 % interval of the share after Wilson, between 0 and 1."""
+        return wilson(*self)
 
     def __str__(self) -> str:
         return f"{self.met} of {self.of}"
@@ -154,21 +152,20 @@ class Results:
         for label in self.labels:
             like = (group for group in found if all(
                 self.paired(metric.name, label, group[0]).equal for metric in self.shown()))
-            if group := next(like, None):
-                group.append(label)
-            else:
-                found.append([label])
+            if (group := next(like, [])) == []:
+                found.append(group)
+            group.append(label)
         return found
 
     def failures(self) -> list[Failure]:
         """Return why runs failed; reasons that differ only in numbers are merged by resolver."""
-        found: dict[tuple[str, str], Failure] = {}
+        found: dict[tuple[str, str], list[tuple[str, Job]]] = {}
         for run, reason in zip(self.runs, self.reasons, strict=True):
             if reason is not None:
                 kind = run.label, re.sub(r"\d+(\.\d+)?(e[+-]?\d+)?", "#", reason)
-                first = found.get(kind, Failure(reason, run, 0))
-                found[kind] = dataclasses.replace(first, count=first.count + 1)
-        return sorted(found.values(), key=lambda one: -one.count)
+                found.setdefault(kind, []).append((reason, run))
+        return sorted((Failure(*of[0], len(of)) for of in found.values()),
+                      key=lambda one: -one.count)
 
 
 def verdict(results: Results) -> list[str]:
@@ -189,12 +186,6 @@ def verdict(results: Results) -> list[str]:
     return lines
 
 
-def flags(runs: Mapping[str, Scenario]) -> dict[str, str]:
-    """Return the `caveats` of each column in one line."""
-    facts = {label: resolver_facts(scenario) for label, scenario in runs.items()}
-    return {label: ", ".join(said) for label, said in caveats(facts).items()}
-
-
 def valued(metric: Metric, value: float) -> Metric:
     """Return a metric with a value, None for NaN."""
     return dataclasses.replace(metric, value=float(value) if math.isfinite(value) else None)
@@ -209,8 +200,7 @@ def rows(results: Results) -> list[Row]:
             Cell(_summary(results, metric, label), "best" if label in best else "",
                  more="" if label == results.labels[0] else
                  str(results.paired(metric.name, label))) for label in results.labels)))
-    groups = list(dict.fromkeys(row.group for row in found))
-    return sorted(found, key=lambda row: groups.index(row.group))
+    return grouped(found)
 
 
 def _summary(results: Results, metric: Metric, label: str) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Self, final
+from typing import final
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, brief, expect, file_path
@@ -44,11 +44,9 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     Parameters
     ----------
     scenarios : names of scenarios or groups, paths or Scenario objects.
-    resolvers : specs `name` or `name:setting=value:setting=value`, or "own", the one that each
-        scenario names; by default those of DEFAULT_RESOLVERS that are installed, with a group
-        "own".
-    progress : called as progress(label, ticks done, total ticks); with several workers as
-        progress(what, runs done, total runs).
+    resolvers : specs `name:setting=value:setting=value`, or "own", the one that each scenario
+        names; by default those of DEFAULT_RESOLVERS that are installed, with a group "own".
+    progress : called as progress(label, done, total) with ticks, of several workers with runs.
     command : the command line shown on the page; derived from the names by default.
     workers : number of processes that make runs side by side; the first TIMED ticks of each run are
         then repeated alone for the computing times. With 1, runs are made here one by one.
@@ -63,12 +61,19 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     where = [] if out is None else ["--out", str(out)]
     said = command or Comparison(tuple(planned), "", {}).asked(*where)
     empty = Comparison((), said, versions(), refused, None if out is None else str(out))
-    with _Written(folder, empty, len(planned)) as written:
-        for i, run in (_together(planned, folder, workers, progress)
-                       if min(workers, len(planned)) > 1 else
-                       _one_by_one(planned, folder, progress)):
+    written, told = _Written(folder, empty, len(planned)), progress or (lambda *_: None)
+    make = _together if min(workers, len(planned)) > 1 else _one_by_one
+    try:
+        for i, run in make(planned, folder, workers, told):
             written.add(i, run)
         return written.finish()
+    except KeyboardInterrupt:
+        with suppress(PageError):  # matplotlib cannot be used if its import was interrupted
+            written.finish()
+        raise
+    finally:
+        if folder is not None:
+            unlock(folder)
 
 
 class PageError(RuntimeError):
@@ -83,16 +88,6 @@ class _Written:
         self._folder, self._empty, self._count = folder, empty, count
         self._runs: dict[int, Run] = {}
         self._next = 0.0
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is KeyboardInterrupt:
-            with suppress(PageError):  # matplotlib cannot be used if its import was interrupted
-                self.finish()
-        if self._folder is not None:
-            unlock(self._folder)
 
     def add(self, i: int, run: Run) -> None:
         """Take a run; write the table, and the page of two or more unless it was just written."""
@@ -156,49 +151,47 @@ def _plan(scenarios: Iterable[str | Scenario] | str | Scenario,
     return side_by_side(loaded, resolvers)
 
 
-def _one_by_one(planned: Sequence[Run], folder: Path | None, progress: Progress | None
+def _one_by_one(planned: Sequence[Run], folder: Path | None, _: int, progress: Progress
                 ) -> Iterator[tuple[int, Run]]:
     """Make the runs in this process, up to an interrupted one."""
     for i, run in enumerate(planned):
-        told = partial(progress, f"{run.scenario.name} {run.spec}") if progress else None
-        found, error = recorded(run.scenario, None if folder is None else folder / run.folder, told)
+        found, error = _recorded(run.scenario, folder and folder / run.folder,
+                                 partial(progress, f"{run.scenario.name} {run.spec}"))
         made = dataclasses.replace(run, recording=found, error=error)
         yield i, made
         if str(made.fault).startswith("interrupted"):
             return
 
 
-def _together(planned: Sequence[Run], folder: Path | None, workers: int,
-              progress: Progress | None) -> Iterator[tuple[int, Run]]:
+def _together(planned: Sequence[Run], folder: Path | None, workers: int, progress: Progress
+              ) -> Iterator[tuple[int, Run]]:
     """Make the runs in processes; then repeat the first ticks of each here, to time them alone."""
     made, total = dict[int, Run](), len(planned)
-    asked = [(i, _job(run), None if folder is None else folder / run.folder)
-             for i, run in enumerate(planned)]
+    asked = [(i, _job(run), folder and folder / run.folder) for i, run in enumerate(planned)]
     try:
-        for (i, _, _), answer in pool.ended(_recorded, asked, workers, salvage=True):
+        for (i, _, _), answer in pool.ended(_asked, asked, workers, salvage=True):
             found, error = answer or (None, "the process that made this run died")
             made[i] = dataclasses.replace(planned[i], recording=found, error=error)
             yield i, made[i]
-            if progress is not None:
-                progress("compare", len(made), total)
+            progress("compare", len(made), total)
         for i, run in made.items():
             timed = dataclasses.replace(run, timing=_timed(run))
             if "happened" in vars(run):  # a page has worked it out
                 vars(timed)["happened"] = run.happened
             yield i, timed
     except KeyboardInterrupt:
-        for i in range(total):
-            if i not in made:
-                yield i, dataclasses.replace(planned[i], error="interrupted")
+        for i in set(range(total)) - made.keys():
+            yield i, dataclasses.replace(planned[i], error="interrupted")
 
 
-def _recorded(asked: tuple[int, Job, Path | None]) -> tuple[Recording | None, str | None]:
+def _asked(asked: tuple[int, Job, Path | None]) -> tuple[Recording | None, str | None]:
     _, job, folder = asked
-    return recorded(job.load(), folder, None)
+    return _recorded(job.load(), folder)
 
 
-def recorded(scenario: Scenario, folder: Path | None,
-             progress: Callable[[int, int], None] | None) -> tuple[Recording | None, str | None]:
+def _recorded(scenario: Scenario, folder: Path | None,
+              progress: Callable[[int, int], None] | None = None
+              ) -> tuple[Recording | None, str | None]:
     """Return the recording of a run, which is saved in `folder`, or why there is none."""
     try:
         recording = simulate(scenario, progress=progress)
@@ -209,18 +202,15 @@ def recorded(scenario: Scenario, folder: Path | None,
             write_text(make_folder(folder) / "scenario.toml", scenario.to_toml())
         return None, f"{type(error).__name__}: {error}"
     try:
-        lost = None if folder is None else kept(recording, folder)
+        return recording, None if folder is None else kept(recording, folder)
     except (OSError, OutputError) as error:
         return recording, f"not saved: {error}"
-    return recording, lost
 
 
 def _timed(run: Run) -> Recording | None:
     """Return the first ticks of a run, made while no other run is; None if they cannot be."""
-    if run.recording is None or not run.recording.ticks:
-        return None
-    control = run.scenario.control
-    ticks = min(TIMED, run.recording.ticks)
+    ticks = min(TIMED, run.recording.ticks if run.recording else 0)
     with suppress(Exception):  # a scenario that allows no shorter duration keeps its own times
-        return simulate(run.scenario.with_changes({"control.duration": ticks * control.period}))
+        lasting = {"control.duration": ticks * run.scenario.control.period}
+        return simulate(run.scenario.with_changes(lasting)) if ticks else None
     return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import PurePath
 from typing import Any
 
@@ -66,11 +67,12 @@ def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
     shown, left, rate = found[:MOST], found[MOST:], _FASTEST
     recordings = {one.label: one.recording for one in shown}
     happenings = {one.label: one.runs[0].happened for one in shown}
+    made = partial(html, recordings, name, happenings, embedded=True)
     try:
-        document = html(recordings, name, happenings, rate=rate, embedded=True)
+        document = made(rate=rate)
         if len(document) > most_bytes:
             rate = max(_SLOWEST, float(int(rate * most_bytes / len(document))))
-            document = html(recordings, name, happenings, rate=rate, embedded=True)
+            document = made(rate=rate)
     except HierarchyError as error:
         return render("results/replay.html", problem=str(error), said="")
     said = [f"Shown: {listed(list(recordings))}, {rate:g} frames per second."]
@@ -108,7 +110,6 @@ def comparison_page(comparison: Comparison, planned: int = 0) -> str:
 
 
 def _about_rows(comparison: Comparison) -> str:
-    """Return what the numbers of the page are not good for."""
     timed = max((run.timing.ticks for run in comparison.runs if run.timing), default=0)
     how = (f"the runs were made side by side, and then the first {timed} ticks of each repeated "
            "alone to take these times" if timed else "one run after the other in one process")

@@ -53,10 +53,7 @@ def shipped_sweeps() -> tuple[str, ...]:
 
 
 def find(name_or_path: str | Path) -> Path:
-    """Return the file of a shipped sweep by name, or the given path.
-
-    Raises UnknownNameError for an unknown name.
-    """
+    """Return the file of a shipped sweep by name, or the given path; raises UnknownNameError."""
     if Path(name_or_path).suffix == ".toml":
         return Path(name_or_path)
     if str(name_or_path) not in shipped_sweeps():
@@ -86,8 +83,7 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
 class Plan:
     """All runs of a sweep, without duplicates.
 
-    `scenarios` are unchanged; `refused` has the reason for each resolver that cannot resolve a
-    scenario.
+    `scenarios` are unchanged; `refused` says why a resolver cannot resolve a scenario.
     """
 
     sweep: Sweep
@@ -97,16 +93,14 @@ class Plan:
 
 
 def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
-    """Return the runs of a sweep, sample by sample.
-
-    scenarios : in place of those that the sweep names.
+    """Return the runs of a sweep, sample by sample, of `scenarios` or those that it names.
 
     Raises
     ------
     HierarchyError : an unknown scenario, resolver or setting, a scenario that does not fit its
         robot, a parameter that a scenario does not have, an invalid sampled value.
     """
-    lasting = {} if sweep.duration is None else {"control.duration": sweep.duration}
+    lasting = {"control.duration": sweep.duration} if sweep.duration else {}
     asked = [load(name, lasting) for name in sweep.scenarios] if scenarios is None else scenarios
     columns, refused = side_by_side(asked, sweep.resolvers or None, f"sweep {sweep.name!r}: ")
     alone = len({run.spec for run in columns}) == 1 and len(asked) > 1

@@ -43,8 +43,6 @@ class Job:
 
     def load(self) -> Scenario:
         """Return the scenario under its resolver, after importing the plugins."""
-        from scenarios.config import Scenario
-
         for module in self.plugins:
             plugins.allow(module)
         return Scenario.from_toml(self.text).with_resolver(self.resolver)
@@ -83,13 +81,13 @@ def _of_the_package() -> str:
     from scenarios.measure.run_folder import versions
 
     root = Path(__file__).parents[2]
-    files = (path for package in ("hierarchy", "solvers", "scenarios")
-             for path in sorted((root / package).rglob("*.py")))
     used = {name: version for name, version in versions().items() if name not in _PLACE}
     found = hashlib.sha256(json.dumps(used, sort_keys=True).encode())
-    for name, path in ((path.relative_to(root).as_posix(), path) for path in files):
-        if not name.removeprefix("scenarios/").startswith(_NOT_IN_A_RUN):
-            found.update(name.encode() + path.read_bytes())
+    for package in ("hierarchy", "solvers", "scenarios"):
+        for path in sorted((root / package).rglob("*.py")):
+            name = path.relative_to(root).as_posix()
+            if not name.removeprefix("scenarios/").startswith(_NOT_IN_A_RUN):
+                found.update(name.encode() + path.read_bytes())
     return found.hexdigest()[:16]
 
 

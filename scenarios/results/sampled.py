@@ -6,6 +6,7 @@ import json
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +87,7 @@ def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str]
 
     Parameters
     ----------
-    resolvers : specs as for `compare`; by default those that a comparison takes.
+    resolvers : specs, by default those that `compare` takes.
     starts, seed : number of samples, and the seed from which they are drawn.
     """
     chosen = [load(one) if isinstance(one, str) else one for one in scenarios]
@@ -103,16 +104,12 @@ def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str]
 def _made(planned: Plan, out: Path, source: tuple[str, str], workers: Workers,
           progress: Progress | None) -> Finished:
     """Make the runs of a plan that a folder does not have, and write the results of all."""
-    jobs = list(planned.runs)
-    if workers.part is None:
-        store = Store(out)
-    else:
-        i, count = workers.part
-        if not 1 <= i <= count:
-            raise HierarchyError(f"part {i}/{count}: give 1/{count} to {count}/{count}")
-        jobs, store = jobs[i - 1::count], Store(out, f"part-{i}-of-{count}")
+    i, count = workers.part or (1, 1)
+    if not 1 <= i <= count:
+        raise HierarchyError(f"part {i}/{count}: give 1/{count} to {count}/{count}")
+    store = Store(out, f"part-{i}-of-{count}" if workers.part else "all")
     with store.opened():
-        made = complete(jobs, store, workers, planned.sweep.name, progress)
+        made = complete(planned.runs[i - 1::count], store, workers, planned.sweep.name, progress)
         found = {} if workers.part else _written(planned, store, source)
     return Finished(planned, found, made)
 
@@ -129,17 +126,15 @@ def complete(jobs: Sequence[Job], store: Store, workers: Workers, name: str,
     if not missing:
         return 0
 
-    def told(done: int) -> None:
-        if progress is not None:
-            progress(name, done, len(jobs))
-
-    told(len(jobs) - len(missing))
+    begun = len(jobs) - len(missing)
+    told = partial(progress or (lambda *_: None), name)
+    told(begun, len(jobs))
     ended = (pool.ended(work, missing, workers.processes) if workers.scheduler is None else
              cluster.ended(work, missing, workers.scheduler))
-    for done, (job, found) in enumerate(ended, 1 + len(jobs) - len(missing)):
+    for done, (job, found) in enumerate(ended, begun + 1):
         store.add(job, found or Outcome(job.key, 0, "Killed: every process that started this run "
                                         "died", float("nan")))
-        told(done)
+        told(done, len(jobs))
     return len(missing)
 
 
@@ -150,14 +145,12 @@ def _written(planned: Plan, store: Store, source: tuple[str, str]) -> dict[str, 
     command, file = source
     write_table(store.folder / TABLE, [(run, kept[run.key]) for run in planned.runs])
     texts = {"results.json": json.dumps(_plain(planned, found, command), indent=2) + "\n",
+             "index.html": sampled_page(planned, found, store.folder, command, file),
              **{f"worst/{name_of(run)}": run.load().to_toml() for run in worst_runs(found)}}
     (store.folder / "worst").mkdir(exist_ok=True)
     for name, text in texts.items():
         with writing(store.folder / name):
             write_text(store.folder / name, text)
-    with writing(store.folder / "index.html"):
-        write_text(store.folder / "index.html",
-                   sampled_page(planned, found, store.folder, command, file))
     return found
 
 

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from hierarchy import plugins
 from hierarchy.words import counted, listed
 from scenarios.draw.figures import drawing, panels
-from scenarios.draw.figures.drawing import svg
+from scenarios.draw.figures.drawing import ALERT, INK, svg
 from scenarios.draw.figures.palette import Look, task_colours
+from scenarios.draw.figures.panels import Draw, Panel
 from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
-from scenarios.measure.runs import Run, table
-from scenarios.recording.listed import errors
+from scenarios.measure.runs import Run, caveats, table
+from scenarios.recording.facts import resolver_facts
 from scenarios.recording.recording import Recording
-from scenarios.results import curves
-from scenarios.results.columns import flags
 from scenarios.templates import render
 
 # The most important metrics; the others are folded away.
@@ -31,6 +33,7 @@ _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_v
           "acceleration_step_ticks", "stack_changes", "active_set_changes", "ticks_not_solved",
           "ticks_brake", "ticks_stop", "ticks_late", "time_resolve_median", "time_resolve_p999",
           "time_tick_median")
+_USUAL = 4.0  # median widths of the ranges of values: wider ones would flatten all the others
 
 
 def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
@@ -38,9 +41,9 @@ def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     rows = table(runs, details=False)
     first = [row for row in rows if row.name in _FIRST or (
         row.name.startswith("task_") and row.name.endswith("_rms"))]
-    marked = flags({run.label: run.scenario for run in runs})
+    marked = caveats({run.label: resolver_facts(run.scenario) for run in runs})
     heads = {run.label: [(kind, text) for kind, text in (
-        ("alert", _stopped(run)), ("quiet", marked[run.label])) if text] for run in runs}
+        ("alert", _stopped(run)), ("quiet", ", ".join(marked[run.label]))) if text] for run in runs}
     return render("results/measured.html", heads=heads, looks=looks, first=first,
                   rest=[row for row in rows if row not in first], said=_marks(runs)
                   ) if rows else Markup()
@@ -106,9 +109,9 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
     recordings = {one.label: one.recording for one in found}
     cards = []
     for panel in plugins.known("figures").values():
-        small = curves.side_by_side(panel, recordings, looks)
+        small = side_by_side(panel, recordings, looks)
         if any(panel.shows(recordings[label]) for label in small):
-            cards.append((panel, _key(panel.name, recordings), [
+            cards.append((panel, _key(small.values()), [
                 (one, svg(small[one.label], f"{name}, {one.label}: {panel.title}"))
                 for one in found if one.label in small]))
     same = [f"{listed(one.labels)} are the same motion "
@@ -120,16 +123,15 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
                   said=said) if cards else Markup()
 
 
-def _key(panel: str, recordings: Mapping[str, Recording]) -> dict[str, str]:
-    """Return the legend of a panel's colours, if they mean the same in all runs."""
-    count = max(int(recording["v"].shape[1]) for recording in recordings.values())
-    if panel == "joint-velocities" and count <= len(drawing.JOINTS):
-        return {f"joint {j + 1}": drawing.joint_colour(j) for j in range(count)}
-    first = next(iter(recordings.values()))
-    titles = [section.title for section in first.scenario.tasks]
-    return {section.title: drawing.joint_colour(titles.index(section.title))
-            for section, unit, _ in errors(first)
-            if unit == {"task-errors": "m", "task-angles": "deg"}.get(panel)}
+def _key(figures: Iterable[Figure]) -> dict[str, str]:
+    """Return the legend of a panel's joints or tasks, if colours mean the same in all runs."""
+    keys = []
+    for fig in figures:
+        drawn: Any = fig.axes[0].get_legend_handles_labels()
+        keys.append({label: line.get_color() for line, label in zip(*drawn, strict=True)})
+    colours = list(keys[0].values())
+    clear = set(colours) <= set(drawing.JOINTS) and len(set(colours)) == len(colours)
+    return keys[0] if clear and all(one == keys[0] for one in keys) else {}
 
 
 def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
@@ -141,15 +143,91 @@ def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
     moved = {one.label: one.recording for one in found}
     if len(moved) > 1 and all("position_error" in one for one in moved.values()):
         figs.append(("Distance from the path [mm]",
-                     curves.overlay(panels.position_error, moved, looks)))
+                     _overlay(panels.position_error, moved, looks)))
     if len({one.scenario.name for one in recordings.values()}) < len(recordings):
         figs.append((f"Joint difference from {next(iter(recordings))} [rad]",
-                     curves.departure(recordings, looks)))
+                     _departure(recordings, looks)))
     timings = {run.label: run.timing or recordings[run.label] for run in runs
                if run.label in recordings}
     if all("time_tick" in one for one in timings.values()):
         figs.append(("Time per tick: dot: resolve, median; whole tick | median, × 99.9 %",
-                     curves.computing_time(timings, looks)))
+                     _computing_time(timings, looks)))
     return render("results/overlays.html", looks={label: looks[label] for label in recordings},
                   drawn=[(title, svg(fig, f"{name}: {title}")) for title, fig in figs]
                   ) if figs else Markup()
+
+
+def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]
+                 ) -> dict[str, Figure]:
+    """Return one small figure of `panel` per run, by label, all with the same limits.
+
+    Values far beyond those of the other runs are cut, and the panel states their range.
+    """
+    drawn, axes = {}, []
+    for label, recording in recordings.items():
+        if panel.fits(recording):
+            drawn[label], (ax,) = drawing.figure()
+            panel.draw(ax, recording, looks[label].colour)
+            axes.append(ax)
+    ranges = [ax.get_ylim() for ax in axes]
+    widths = np.diff(ranges)[:, 0] if ranges else np.zeros(0)
+    end = max((float(recordings[label]["t"][-1]) for label in drawn), default=0.0)
+    for ax, (low, high) in zip(axes, ranges, strict=True):
+        linear = ax.get_yscale() != "log"
+        kept = np.array(ranges)[widths <= _USUAL * np.median(widths)] if linear else ranges
+        least, most = np.min(kept), np.max(kept)
+        margin = linear * (0.04 * (most - least) or 1.0)
+        ax.set_ylim(least - margin, most + margin)
+        ax.set_xlim(0.0, end)
+        ax.xaxis.set_major_locator(MaxNLocator(4))
+        if high - low > 1.1 * (most - least + 2 * margin):
+            ax.text(0.98, 0.96, f"cut: {low:.2g} to {high:.2g}", color=ALERT, fontsize=8,
+                    ha="right", va="top", transform=ax.transAxes)
+    return drawn
+
+
+def _overlay(draw: Draw, recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
+    """Return one figure with a curve per run, in the colour and dashes of its label."""
+    fig, (ax,) = drawing.figure(width=4.9, height=2.7)
+    for label, recording in recordings.items():
+        before = len(ax.lines)
+        draw(ax, recording, looks[label].colour)
+        for line in ax.lines[before:]:
+            line.set_linestyle(looks[label].line)
+    ax.set_xlabel("time [s]")
+    return fig
+
+
+def _departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
+    """Return the largest joint difference from the first run over time [rad], logarithmic."""
+    fig, (ax,) = drawing.figure(width=4.9, height=2.7)
+    first, *others = recordings
+    reference = recordings[first]
+    for label in others:
+        ticks = min(reference.ticks, recordings[label].ticks)
+        apart = np.abs(recordings[label]["q"][:ticks] - reference["q"][:ticks]).max(axis=1)
+        drawing.curve(ax, reference["t"][:ticks], np.maximum(apart, 1e-16),
+                      color=looks[label].colour, linestyle=looks[label].line)
+    drawing.make_logarithmic(ax, "y")
+    ax.set_xlabel("time [s]")
+    return fig
+
+
+def _computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
+    """Return the computing times of a tick [us] on a logarithmic axis, one row per run.
+
+    A dot for the median of resolving, then median (|) and 99.9th percentile (x) of whole ticks.
+    """
+    fig, (ax,) = drawing.figure(width=4.9, height=0.7 + 0.4 * len(recordings))
+    for row, (label, recording) in enumerate(recordings.items()):
+        for signal, percent, marker, colour in (("time_resolve", 50.0, "o", looks[label].colour),
+                                                ("time_tick", 50.0, "|", INK),
+                                                ("time_tick", 99.9, "x", INK)):
+            if signal in recording:
+                ax.plot(1e6 * np.percentile(recording[signal], percent), row, marker, color=colour)
+    drawing.make_logarithmic(ax, "x")
+    ax.set_yticks(range(len(recordings)), list(recordings))
+    ax.set_ylim(len(recordings) - 0.5, -0.5)
+    ax.grid(axis="y", visible=False)
+    ax.set_xlabel("µs per tick")
+    return fig

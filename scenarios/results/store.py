@@ -73,8 +73,14 @@ class Store:
             files.unlock(self.file.resolve())
 
     def add(self, job: Job, outcome: Outcome) -> None:
-        """Append the rows of a run; raises FullError."""
-        append(self.file, rows(job, outcome))
+        """Append the rows of a run, which are on the disk on return; raises FullError."""
+        new = not (self.file.exists() and self.file.stat().st_size)
+        text = _as_text([COLUMNS] * new + rows(job, outcome))
+        with writing(self.file), self.file.open("ab") as stream:
+            begun = b"\n" * bool(stream.tell())  # ends a row cut off, as by a full disk
+            stream.write(begun + text.encode())
+            stream.flush()
+            os.fsync(stream.fileno())
 
     def outcomes(self) -> dict[str, Outcome]:
         """Return all finished runs by key; raises StoreError for a damaged file."""
@@ -105,16 +111,6 @@ def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield key, value
 
 
-def append(file: Path, added: Sequence[Sequence[Any]]) -> None:
-    """Append rows to a file in one piece that is on the disk on return; raises FullError."""
-    text = _as_text(added if file.exists() and file.stat().st_size else [COLUMNS, *added])
-    with writing(file), file.open("ab") as stream:
-        begun = b"\n" * bool(stream.tell())  # ends a row cut off by a full disk or a loss of power
-        stream.write(begun + text.encode())
-        stream.flush()
-        os.fsync(stream.fileno())
-
-
 def write_table(file: Path, found: Iterable[tuple[Job, Outcome]]) -> None:
     """Write the rows of runs, whole or not at all; raises FullError."""
     with writing(file):
@@ -137,27 +133,20 @@ def read(file: Path) -> dict[str, Outcome]:
     try:
         with file.open(encoding="utf-8", newline="") as stream:
             for row in csv.DictReader(stream):
-                if None not in row.values():
-                    _take(row, metrics.setdefault(row["key"], {}), found)
+                if None in row.values() or row["group"] == _SAMPLED:
+                    continue
+                key, name, value = row["key"], row["metric"], row["value"]
+                of = metrics.setdefault(key, {})
+                of[name] = Metric(name, row["label"], float(value) if value else None, row["unit"],
+                                  _LOWER[row["better"]], row["group"], row["note"])
+                if name == _END:
+                    measured = tuple(one for one in of.values() if one.group != _RUN)
+                    found[key] = Outcome(key, int(of["ticks"].value or 0), row["note"] or None,
+                                         of["wall_seconds"].value or 0.0, measured)
     except (OSError, ValueError, KeyError, csv.Error) as error:
         raise StoreError(f"{file} cannot be read ({error}); remove it to repeat its "
                          "runs") from error
     return found
-
-
-def _take(row: dict[str, str], metrics: dict[str, Metric], found: dict[str, Outcome]) -> None:
-    """Add a row to the metrics of its run, which is complete with its last row."""
-    name, group = row["metric"], row["group"]
-    if group == _SAMPLED:
-        return
-    value = float(row["value"]) if row["value"] else None
-    metrics[name] = Metric(name, row["label"], value, row["unit"], _LOWER[row["better"]], group,
-                           row["note"])
-    if name == _END:
-        measured = tuple(one for one in metrics.values() if one.group != _RUN)
-        found[row["key"]] = Outcome(row["key"], int(metrics["ticks"].value or 0),
-                                    row["note"] or None, metrics["wall_seconds"].value or 0.0,
-                                    measured)
 
 
 @contextmanager

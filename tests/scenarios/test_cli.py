@@ -107,8 +107,8 @@ def ended(code, folder, *words):
                           text=True, check=False)
 
 
-INTERRUPTED_AT_TICK_500 = """import contextlib, scenarios.cli.progress as progress
-progress.bar = lambda: contextlib.nullcontext(
+INTERRUPTED_AT_TICK_500 = """import contextlib, scenarios.cli.terminal as terminal
+terminal.bar = lambda: contextlib.nullcontext(
     lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGTERM))
 """
 

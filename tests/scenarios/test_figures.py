@@ -12,7 +12,7 @@ from scenarios.draw.figures.timeline import timeline
 from scenarios.loop.simulation import simulate
 from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Event
-from scenarios.results.curves import side_by_side
+from scenarios.results.sections import side_by_side
 
 
 def beside(panel, recordings):

@@ -8,7 +8,7 @@ import pytest
 from hierarchy import Hierarchy, HierarchyError
 from scenarios import load
 from scenarios.cli.main import run_command
-from scenarios.cli.progress import lines
+from scenarios.cli.terminal import lines
 from scenarios.config.validation import doubtful_units
 from scenarios.toml_text import read_toml
 from solvers import Resolution, Resolver, Status

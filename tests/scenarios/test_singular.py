@@ -1,13 +1,15 @@
 """Paths through singularities and out of reach: the jitter, the scenarios, and what is measured."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from hand_made import HandMadeScenario, recording
 
 from hierarchy.paths import Jittered, Still
 from scenarios.config import load
 from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import measure
-from scenarios.measure.tracking import frozen, jerk, returned, within_reach
 
 NAMES = ("singular", "singular-limits", "singular-acceleration", "singular-acceleration-limits")
 
@@ -24,18 +26,21 @@ def test_jitter_is_bounded_moves_in_every_axis_and_depends_on_its_seed_alone():
     assert not np.allclose(jittered()(0.7)[0], jittered(seed=4)(0.7)[0])
 
 
-def test_frozen_returned_and_jerk_are_counted():
-    t = np.arange(6.0)
-    spans = ((1.0, 2.0), (4.0, 4.5))
-    assert within_reach(t, spans).tolist() == [True, False, False, True, False, True]
-    assert returned(t, spans, 0.5).tolist() == [False, False, False, True, False, False]
-    v = np.zeros((6, 2))
-    v[5] = 1.0
-    error = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
-    assert frozen(t, v, error, spans).tolist() == [False, False, False, True, False, False]
-    assert frozen(t, v, error, ()).tolist() == [False, True, True, True, True, False]
-    t = np.array([0.0, 0.1, 0.3])
-    np.testing.assert_allclose(jerk(t, np.array([[0.0], [1.0], [3.0]])), [[10.0], [10.0]])
+@pytest.mark.parametrize(("spans", "frozen", "returned"), [
+    (((1.0, 2.0), (4.0, 4.5)), [3], [3]), (((1.0, 2.0),), [3, 4], [3, 4, 5]),
+    (((4.0, 5.0),), [1, 2, 3], [])])
+def test_frozen_returned_and_jerk_are_counted(spans, frozen, returned):
+    v, a, error = np.zeros((6, 7)), np.zeros((6, 7)), np.array([0.0, 1.0, 1.5, 2.0, 3.0, 4.0])
+    v[5], a[:, 2] = 1.0, [0.0, 1.0, 3.0, 3.0, 3.0, 3.0]
+    path = SimpleNamespace(out_of_reach=spans)
+    found = measure(recording(
+        HandMadeScenario(position=SimpleNamespace(path=path)), t=np.arange(6.0), v=v, a=a,
+        position_error=error[:, None] * [1.0, 0.0, 0.0]))
+    assert found["ticks_frozen"].value == len(frozen)
+    assert found["error_returned_max"].value == (error[returned].max() if returned else None)
+    assert found["error_returned_rms"].value == (
+        pytest.approx(np.sqrt(np.mean(error[returned]**2))) if returned else None)
+    assert found["jerk_max"].value == 2.0
 
 
 @pytest.mark.slow

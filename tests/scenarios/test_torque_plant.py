@@ -12,7 +12,7 @@ from hierarchy.contacts import Contacts
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
 from scenarios.config.plant import PushSection, TorqueSection
-from scenarios.measure.forces import standing
+from scenarios.measure.safety import standing
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("with_mujoco")]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import itertools
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -91,6 +91,7 @@ SCREEN = Style(_SCREEN, None, True, ("svg", "png"))
 PAPER = Style(_PAPER, 3.5, False, ("pdf",), _IN_GREY)
 STYLES = {"screen": SCREEN, "paper": PAPER}
 _LEAST_HEIGHT = 0.75  # of a narrowed figure, relative to its own: the font size stays
+_BUCKETS = 350  # of a thinned curve
 _present: ContextVar[Style] = ContextVar("style", default=SCREEN)
 
 
@@ -115,15 +116,10 @@ def colours(labels: Iterable[str]) -> dict[str, str]:
     return {label: look.colour for label, look in looks(labels).items()}
 
 
-def joint_colour(joint: int) -> str:
-    """Return the colour of a joint, numbered from 0."""
-    return JOINTS[joint % len(JOINTS)]
-
-
 def joint_line(joint: int) -> dict[str, Any]:
     """Return colour and line style of a joint, numbered from 0, as matplotlib keywords."""
     lines = present().lines
-    return {"color": joint_colour(joint), "linestyle": lines[joint % len(lines)]}
+    return {"color": JOINTS[joint % len(JOINTS)], "linestyle": lines[joint % len(lines)]}
 
 
 def style() -> dict[Any, Any]:
@@ -131,25 +127,24 @@ def style() -> dict[Any, Any]:
     return dict(present().settings)
 
 
-def figure(rows: int = 1, width: float = 3.3, height: float = 2.1,
-           heights: Sequence[float] | None = None) -> tuple[Figure, list[Axes]]:
+def figure(rows: int = 1, width: float = 3.3, height: float = 2.1) -> tuple[Figure, list[Axes]]:
     """Return a figure of `rows` axes one below the other, in the present style; sizes in inches."""
     if (fixed := present().width) is not None:
         width, height = fixed, height * min(max(fixed / width, _LEAST_HEIGHT), 1.0)
     with matplotlib.rc_context(style()):
         fig = Figure(figsize=(width, height), layout="constrained")
-        axes = fig.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+        axes = fig.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     return fig, list(axes)
 
 
-def envelope(y: Array, buckets: int = 350) -> NDArray[np.int64]:
+def envelope(y: Array) -> NDArray[np.int64]:
     """Return the indices that keep the shape of a long curve y (T,): extremes of each bucket.
 
     Every bucket's smallest and largest value, and so every peak, is kept. NaN is left out.
     """
-    if len(y) <= 3 * buckets:
+    if len(y) <= 3 * _BUCKETS:
         return np.arange(len(y))
-    edges = np.linspace(0, len(y), buckets + 1).astype(int)
+    edges = np.linspace(0, len(y), _BUCKETS + 1).astype(int)
     kept = {0, len(y) - 1}
     for first, last in itertools.pairwise(edges):
         part = y[first:last]
@@ -178,20 +173,6 @@ def project(points: Array, azimuth: float = 150.0, elevation: float = 30.0) -> A
     right = np.array([-np.sin(a), np.cos(a), 0.0])
     up = np.array([-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)])
     return np.asarray(points @ np.column_stack([right, up]))
-
-
-def shared_limits(ranges: Sequence[tuple[float, float]], factor: float = 4.0
-                  ) -> tuple[float, float]:
-    """Return limits that fit every range except those that would flatten all the others.
-
-    A range more than `factor` times as wide as the median one is cut.
-    """
-    widths = np.array([high - low for low, high in ranges])
-    usual = factor * np.median(widths)
-    kept = [r for r, width in zip(ranges, widths, strict=True) if width <= usual]
-    low, high = min(low for low, _ in kept), max(high for _, high in kept)
-    margin = 0.04 * (high - low) or 1.0
-    return low - margin, high + margin
 
 
 def svg(fig: Figure, title: str) -> Markup:

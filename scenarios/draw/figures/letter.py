@@ -132,7 +132,7 @@ def _others(recording: Recording) -> Iterator[tuple[str, Figure]]:
     """Yield the picture of a run, its stack over time, its depth image and its times of ticks."""
     if recording.ticks > 1:
         if "ee_position" in recording:
-            yield "picture", picture({label_of(recording): recording})
+            yield "picture", picture({recording.facts.resolver.label: recording})
         yield "stack", timeline(recording)
         if "time_tick" in recording:
             yield "tick-times", tick_times(recording)
@@ -175,7 +175,7 @@ def stacked(parts: Sequence[tuple[Recording, Sequence[Panel]]], title: str,
     runs = {id(run): _run_of(run) for run, _ in parts}
     before = -1
     for ax, (i, run, panel) in zip(axes, rows, strict=True):
-        label = label_of(run)
+        label = run.facts.resolver.label
         panel.draw(ax, run, drawing.colours([label])[label])
         letter = f"({'abcdefgh'[i]}) " if lettered and i != before else ""
         which = f", {_run_of(run)}" if drawing.present().titled and letter and len(runs) > 1 else ""
@@ -197,7 +197,7 @@ def stacked(parts: Sequence[tuple[Recording, Sequence[Panel]]], title: str,
 def tick_times(recording: Recording) -> Figure:
     """Return a histogram of the tick times [us], with the period of the loop."""
     fig, (ax,) = drawing.figure(width=6.4, height=2.4)
-    label = label_of(recording)
+    label = recording.facts.resolver.label
     times = 1e6 * recording["time_tick"]
     edges = np.geomspace(max(times.min(), 1.0), max(times.max(), 2.0) * 1.01, 80)
     ax.hist(times, edges.tolist(), color=drawing.colours([label])[label])
@@ -215,10 +215,5 @@ def tick_times(recording: Recording) -> Figure:
     return fig
 
 
-def label_of(recording: Recording) -> str:
-    """Return the label of a run's resolver, such as "tpm-published"."""
-    return recording.facts.resolver.label
-
-
 def _run_of(recording: Recording) -> str:
-    return f"{recording.scenario.name}, {label_of(recording)}"
+    return f"{recording.scenario.name}, {recording.facts.resolver.label}"

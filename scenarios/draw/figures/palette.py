@@ -8,7 +8,7 @@ near-black; tests/scenarios/test_figures.py checks this.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 Dash = tuple[float, ...]
 
@@ -38,10 +38,10 @@ class Look(NamedTuple):
     colour: str
     dash: Dash
 
-
-def colour(label: str) -> str:
-    """Return the colour of a resolver's label: "hqp osqp" has that of "hqp"."""
-    return COLOURS.get(_parts(label)[0], SPARE[0])
+    @property
+    def line(self) -> Any:
+        """The line style in matplotlib's form."""
+        return (0, self.dash) if self.dash else "-"
 
 
 def looks(labels: Iterable[str]) -> dict[str, Look]:

@@ -33,15 +33,19 @@ _OFFSET = "position.offset"
 
 
 class Knob(NamedTuple):
-    """A number in a scenario, by its dotted key, and the range of its slider."""
+    """A number in a scenario, by its dotted key, and the range of its slider.
+
+    level : of control, where only there the number counts.
+    """
 
     key: str
     label: str
     high: float
     step: float
+    level: str = ""
 
 
-_BOTH = (
+_KNOBS = (
     Knob("pointing.alpha_d", "Cone, half angle [deg]", 90.0, 0.5),
     Knob("avoidance.near", "Body, near distance [m]", 0.4, 0.005),
     Knob("avoidance.far", "Body, far distance [m]", 0.4, 0.005),
@@ -50,24 +54,21 @@ _BOTH = (
     Knob("avoidance.influence", "Influence from [m]", 0.8, 0.01),
     Knob("avoidance.rate", "Approach rate [1/s]", 40.0, 0.5),
     Knob("limits.acceleration", "Joint acceleration [rad/s²]", 40.0, 0.5),
-    Knob("damping.value", "Joint damping [1/s]", 20.0, 0.1))
-_ACCELERATION = (
-    Knob("position.stiffness", "Path, stiffness [1/s²]", 200.0, 1.0),
-    Knob("position.damping", "Path, damping [1/s]", 60.0, 0.5),
-    Knob("pointing.stiffness", "Cone, stiffness [1/s²]", 100.0, 0.5),
-    Knob("pointing.damping", "Cone, damping [1/s]", 40.0, 0.5))
-_VELOCITY = (
-    Knob("position.gain", "Path, gain [1/s]", 50.0, 0.5),
-    Knob("pointing.gain", "Cone, gain [1/s]", 50.0, 0.5))
+    Knob("damping.value", "Joint damping [1/s]", 20.0, 0.1),
+    Knob("position.stiffness", "Path, stiffness [1/s²]", 200.0, 1.0, "acceleration"),
+    Knob("position.damping", "Path, damping [1/s]", 60.0, 0.5, "acceleration"),
+    Knob("pointing.stiffness", "Cone, stiffness [1/s²]", 100.0, 0.5, "acceleration"),
+    Knob("pointing.damping", "Cone, damping [1/s]", 40.0, 0.5, "acceleration"),
+    Knob("position.gain", "Path, gain [1/s]", 50.0, 0.5, "velocity"),
+    Knob("pointing.gain", "Cone, gain [1/s]", 50.0, 0.5, "velocity"))
 
 
 def knobs(scenario: Scenario) -> list[tuple[Knob, float]]:
     """Return those of the settings that a scenario has, with their values."""
-    gains = _ACCELERATION if scenario.control.level == "acceleration" else _VELOCITY
     whole: Any = scenario
-    return [(knob, float(value)) for knob in (*_BOTH, *gains)
-            if isinstance(value := reduce(lambda of, name: getattr(of, name, None),
-                                          knob.key.split("."), whole), int | float)]
+    return [(knob, float(value)) for knob in _KNOBS if knob.level in ("", scenario.control.level)
+            and isinstance(value := reduce(lambda of, name: getattr(of, name, None),
+                                           knob.key.split("."), whole), int | float)]
 
 
 class LivePage:

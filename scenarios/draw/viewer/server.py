@@ -7,6 +7,7 @@ import webbrowser
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from email.message import Message
+from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
@@ -42,11 +43,8 @@ def served(port: int, page: Callable[[], str], answer: Answer | None = None) -> 
 
     Raises HierarchyError if the port cannot be used.
     """
-    class Handler(_Handler):
-        pages, answers = staticmethod(page), staticmethod(answer) if answer else None
-
     try:
-        server = ThreadingHTTPServer((HOST, port), Handler)
+        server = ThreadingHTTPServer((HOST, port), partial(_Handler, page, answer))
     except (OSError, OverflowError) as error:
         raise HierarchyError(f"--port {port} cannot be used: {error}") from error
     server.daemon_threads = True
@@ -69,20 +67,22 @@ class _Handler(BaseHTTPRequestHandler):
     """Answers GET with the page, and POST with what is sent back to its script."""
 
     protocol_version = "HTTP/1.1"  # one connection for all requests of a page
-    pages: Callable[[], str]
-    answers: Answer | None
+
+    def __init__(self, page: Callable[[], str], answer: Answer | None, *request: Any) -> None:
+        self.page, self.answer = page, answer
+        super().__init__(*request)
 
     def do_GET(self) -> None:
         if not is_own(self.headers):
             self._send(HTTPStatus.FORBIDDEN, "Only pages of this machine.\n", "text/plain")
         elif self.path.partition("?")[0] == "/":
-            self._send(HTTPStatus.OK, self.pages(), "text/html")
+            self._send(HTTPStatus.OK, self.page(), "text/html")
         else:
             self._send(HTTPStatus.NOT_FOUND, "", "text/plain")
 
     def do_POST(self) -> None:
         size = self.headers.get("Content-Length", "")
-        if not is_own(self.headers) or self.answers is None or not (
+        if not is_own(self.headers) or self.answer is None or not (
                 size.isdigit() and int(size) <= _LONGEST):
             self.close_connection = True
             self._send(HTTPStatus.FORBIDDEN, "", "text/plain")
@@ -91,7 +91,7 @@ class _Handler(BaseHTTPRequestHandler):
         with suppress(ValueError, RecursionError):
             asked = json.loads(self.rfile.read(int(size)))
         if isinstance(asked, dict):
-            self._send(HTTPStatus.OK, self.answers(asked), "application/json")
+            self._send(HTTPStatus.OK, self.answer(asked), "application/json")
         else:
             self._send(HTTPStatus.BAD_REQUEST, "", "text/plain")
 
