@@ -87,7 +87,7 @@ class Scenario(Section):
     faults: tuple[FaultSection, ...] = ()
     """What goes wrong during a run."""
     variation: Parameters = Field(default_factory=dict)
-    """Distributions of dotted keys, in their units, for `hierarchy compare --starts`."""
+    """How dotted keys vary from start to start."""
 
     @field_validator("plugins")
     @classmethod

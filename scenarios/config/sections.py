@@ -97,28 +97,19 @@ class OneOf:
     """
 
     default: str | None = None
-    wants: ClassVar[str] = "expected a table with a kind,"
 
     def sections(self, annotation: Any) -> tuple[type[Section], ...]:
         """Return the sections of all kinds."""
         return get_args(annotation)
 
-    def kinds(self, section: type[Section]) -> tuple[str, ...]:
-        """Return the kinds that a section is for."""
-        return kinds_of(section)
-
     def names(self, annotation: Any) -> tuple[str, ...]:
         """Return the kinds."""
-        return tuple(kind for section in self.sections(annotation) for kind in self.kinds(section))
-
-    def kind_of(self, table: dict[str, Any]) -> Any:
-        """Return the kind of a table."""
-        return table.get("kind", self.default)
+        return tuple(kind for section in self.sections(annotation) for kind in kinds_of(section))
 
     def find(self, annotation: Any, kind: str) -> type[Section] | None:
         """Return the section of a kind, None if there is none."""
         return next((section for section in self.sections(annotation)
-                     if kind in self.kinds(section)), None)
+                     if kind in kinds_of(section)), None)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         kinds = [handler.generate_schema(section) for section in self.sections(source)]
@@ -129,12 +120,12 @@ class OneOf:
     def _section(self, source: Any, table: Any) -> Section:
         if isinstance(table, Section):
             return table
-        kind = self.kind_of(table) if isinstance(table, dict) else table
-        found = self.find(source, kind) if isinstance(kind, str) and kind is not table else None
+        kind = table.get("kind", self.default) if isinstance(table, dict) else None
+        found = self.find(source, kind) if isinstance(kind, str) else None
         if found is None:
             names = self.names(source)
             text = str(UnknownNameError("kind", kind, names)) if isinstance(kind, str) else (
-                f"{self.wants} {listed([repr(name) for name in names], 'or')}")
+                f"expected a table with a kind, {listed([repr(name) for name in names], 'or')}")
             raise PydanticCustomError("kind", "{text}", {"text": text})
         return found.model_validate(table)
 
