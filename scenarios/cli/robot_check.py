@@ -19,7 +19,7 @@ from hierarchy.robots.found import remarks
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.words import some
 from scenarios.config import ScenarioError, is_shipped, shipped, shipped_groups
-from scenarios.config.changes import change, parse_changes
+from scenarios.config.changes import change_all, parse_changes
 from scenarios.config.names import WANTED, no_scenario
 from scenarios.config.robot import RobotSection
 from scenarios.config.sections import Section
@@ -58,8 +58,7 @@ def look_at(model: str, changes: Sequence[str] = ()) -> tuple[RobotSection, Robo
     from scenarios.cell.robot import make_robot
 
     data: dict[str, Any] = {"robot": {"model": model}}
-    for key, value in parse_changes(changes, what="--set").items():
-        change(data, key, value)
+    change_all(data, parse_changes(changes, what="--set"), _OfRobot)
     if unknown := [key for key in data if key != "robot"]:
         raise ScenarioError(f"--set {unknown[0]}: only keys of [robot] can be set for a robot")
     section = validated(_OfRobot, data, repr(model)).robot

@@ -11,7 +11,7 @@ from hierarchy import plugins
 from hierarchy.errors import UnknownNameError, file_path
 from hierarchy.robots.names import in_package, is_file_name
 from scenarios.config.avoidance import as_table
-from scenarios.config.changes import change_all, laid_over, parse_changes
+from scenarios.config.changes import change_all, lay_over, parse_changes
 from scenarios.config.errors import ScenarioError, naming
 from scenarios.config.names import no_scenario
 from scenarios.config.scenario import Scenario
@@ -72,7 +72,7 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     if not isinstance(changes, Mapping):
         changes = parse_changes(changes, what="--set")
     _list_points_as_tables(data)
-    change_all(data, changes, Scenario.tag_at)
+    change_all(data, changes, Scenario)
     _make_files_absolute(data, path.parent.resolve())
     _require_plugins(data, what)
     return validated(Scenario, data, what)
@@ -151,7 +151,8 @@ def _read_extended(source: Source, below: tuple[Source, ...] = ()) -> dict[str, 
     found = _read_extended(under, here)
     if "variation" in data:  # its keys belong together
         found.pop("variation", None)
-    return laid_over(_without(found, replaced or [], path), data, Scenario.tag_at)
+    lay_over(found := _without(found, replaced or [], path), data, Scenario)
+    return found
 
 
 def _extended(base: Any, path: Path) -> Source:

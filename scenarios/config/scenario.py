@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 import tomli_w
@@ -15,7 +15,7 @@ import scenarios.config.kinds  # noqa: F401, registers them
 from hierarchy import plugins
 from hierarchy.errors import expect
 from scenarios.config.avoidance import AvoidanceKind
-from scenarios.config.changes import Tag, change_all, parse_changes, without_none
+from scenarios.config.changes import change_all, parse_changes, without_none
 from scenarios.config.control import ControlSection, FaultSection
 from scenarios.config.distributions import Parameters
 from scenarios.config.plant import KinematicSection, PlantKind
@@ -32,7 +32,7 @@ from scenarios.config.tasks import (
     PositionSection,
     PostureSection,
 )
-from scenarios.config.validation import tag_at, validated
+from scenarios.config.validation import validated
 
 if TYPE_CHECKING:
     from solvers import Resolver
@@ -246,7 +246,7 @@ class Scenario(Section):
         Raises ScenarioError for invalid ones; the message starts with `what`, or the name.
         """
         data = self.model_dump(mode="json")
-        change_all(data, changes, self.tag_at)
+        change_all(data, changes, Scenario)
         return validated(Scenario, data, what or f"scenario {self.name!r}")
 
     def __repr__(self) -> str:
@@ -254,11 +254,6 @@ class Scenario(Section):
                 f"resolver={self.control.resolver!r})")
 
     __str__ = __repr__
-
-    @classmethod
-    def tag_at(cls, path: Sequence[str]) -> Tag | None:
-        """Return which key says the kind of the section at a path, None if there is one kind."""
-        return tag_at(cls, path)
 
     @classmethod
     def from_toml(cls, text: str) -> Self:

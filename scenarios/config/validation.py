@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from math import inf, tau
-from typing import Any, TypeVar, get_args
+from typing import Any, NamedTuple, TypeVar, get_args
 
 from pydantic import ValidationError
 
 from hierarchy.errors import HierarchyError, UnknownNameError, brief
 from hierarchy.words import listed
-from scenarios.config.changes import Tag
 from scenarios.config.errors import ScenarioError
 from scenarios.config.sections import OneOf, Section, Unit, kinds_of
 
@@ -32,6 +31,13 @@ def validated(kind: type[Kind], data: dict[str, Any], what: str) -> Kind:
                             ) from error
     except HierarchyError as error:  # what a resolver says of its settings
         raise ScenarioError(f"{what}: control: {error}") from error
+
+
+class Tag(NamedTuple):
+    """The key that says which kind a section is of, and the kind of one without it."""
+
+    key: str
+    default: str | None
 
 
 def tag_at(root: type[Section], path: Sequence[str]) -> Tag | None:
@@ -115,7 +121,7 @@ def _table(data: Any, path: Sequence[int | str]) -> dict[str, Any]:
 def _annotations(root: type[Section], path: Sequence[str]) -> list[Any]:
     """Return the annotations of the keys at a path, in all sections that it may lead through."""
     parts: list[Any] = [root]
-    for key in (key for key in path if not key.isdigit()):  # a list index is not a key
+    for key in (key for key in path if not key.isdigit() and key != "*"):  # of a list
         parts = [(field.annotation, *field.metadata) for part in parts
                  for section in parts_of(part, Section) for name, field
                  in section.model_fields.items() if key in (name, field.alias)]
