@@ -35,8 +35,14 @@ from hierarchy.tasks import (
 )
 from hierarchy.tasks.geometric import cross
 from hierarchy.tasks.pose import rotation_vector
-from scenarios.config.kinds.frames import ListedFrame, ListedPointing, ListedPose, ListedPosition
-from scenarios.config.kinds.whole import ListedCentreOfMass, ListedPosture
+from scenarios.config.kinds import (
+    ListedCentreOfMass,
+    ListedFrame,
+    ListedPointing,
+    ListedPose,
+    ListedPosition,
+    ListedPosture,
+)
 
 STEP = 1e-6
 STATES = states(11)

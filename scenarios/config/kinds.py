@@ -1,20 +1,27 @@
-"""Kinds of tasks of frames: where one is, where it points, how it is to another."""
+"""The kinds of `[[tasks]]`, which nothing else lists: the keys of each, and the task they make.
+
+Makers import what they make when they are called, so that reading a file loads no robot.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
+from hierarchy.paths import Still
 from hierarchy.plugins import register
 from hierarchy.problem import Array
-from scenarios.config.sections import Flag, Gain, NotNegative, Point, Rows3, Stiffness
+from scenarios.config import sections as keys
+from scenarios.config.avoidance import BarrierSection
 from scenarios.config.tasks import (
     AlongSection,
     Listed,
     PointingTask,
     PositionTask,
+    PostureTask,
     Rows,
     TaskSection,
     of_pose,
@@ -23,6 +30,33 @@ from scenarios.config.tasks import (
 if TYPE_CHECKING:
     from hierarchy import Task
     from scenarios.config.references import References
+
+
+class _OfForces(Listed):
+    """A task with rows over contact forces."""
+
+    unit: ClassVar[str] = "N"
+    of_forces: ClassVar[bool] = True
+
+
+@register("tasks", "contact-force", shipped=True)
+class ListedForce(_OfForces):
+    """A contact's force or wrench at a value, at level "torque"."""
+
+    made_by: ClassVar[str] = "hierarchy.tasks:ContactForce"
+    kind: Literal["contact-force"]
+    contact: str
+    """Name of the contact."""
+    target: tuple[keys.Finite, ...]
+    """Normal force [N], force [N] or wrench [N, N m]: 1, 3 or 6 numbers."""
+
+
+@register("tasks", "least-force", shipped=True)
+class ListedLeastForce(_OfForces):
+    """The smallest contact forces, as last level, at level "torque"."""
+
+    made_by: ClassVar[str] = "hierarchy.tasks:LeastForce"
+    kind: Literal["least-force"]
 
 
 @register("tasks", "position", shipped=True)
@@ -41,7 +75,7 @@ class _AlongPose(Listed, AlongSection):
 
     frame: str
     """Frame of the robot."""
-    rotation: Rows3 | None = None
+    rotation: keys.Rows3 | None = None
     """Rows of the wanted matrix from frame to world, by default the initial one."""
 
     def asked(self, at: References) -> dict[str, Any]:
@@ -92,11 +126,11 @@ class ListedLookAt(Listed, TaskSection):
     kind: Literal["look-at"]
     frame: str
     """Frame of the robot."""
-    target: Point
+    target: keys.Point
     """The point."""
-    stiffness: Stiffness = 20.0
-    damping: Gain = 10.0
-    gain: Gain = 5.0
+    stiffness: keys.Stiffness = 20.0
+    damping: keys.Gain = 10.0
+    gain: keys.Gain = 5.0
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
         """Yield the angle [deg] from the direction to the point."""
@@ -113,11 +147,11 @@ class ListedRelative(Listed, TaskSection):
     """Frame of the robot."""
     to: str
     """The other frame."""
-    position: Point | None = None
+    position: keys.Point | None = None
     """Origin of `frame` in the axes of `to`, by default the initial one."""
-    rotation: Rows3 | None = None
+    rotation: keys.Rows3 | None = None
     """Rows of the matrix from `frame` to `to`, by default the initial one."""
-    orientation: Flag = True
+    orientation: keys.Flag = True
     """Whether the orientation counts too."""
 
     def _wrong(self) -> Iterator[str]:
@@ -147,15 +181,15 @@ class ListedManipulability(Listed, TaskSection):
     kind: Literal["manipulability"]
     frame: str
     """Frame of the robot."""
-    least: NotNegative
+    least: keys.NotNegative
     """The value, in the unit of det(J J^T)^(1/2)."""
     part: Literal["position", "pose"] = "position"
     """"position": of the linear rows of its Jacobian. "pose": of all six."""
     rows: Rows = "inequality"
     """"inequality": at `least` or above. "equality": at `least`."""
-    stiffness: Stiffness = 20.0
-    damping: Gain = 10.0
-    gain: Gain = 5.0
+    stiffness: keys.Stiffness = 20.0
+    damping: keys.Gain = 10.0
+    gain: keys.Gain = 5.0
 
     def make(self, at: References, **more: Any) -> Task:
         """Return the task."""
@@ -166,3 +200,86 @@ class ListedManipulability(Listed, TaskSection):
     def asked(self, at: References) -> dict[str, Any]:
         """Return the kind."""
         return {"kind": self.rows}
+
+
+@register("tasks", "posture", shipped=True)
+class ListedPosture(Listed, PostureTask):
+    """All joints to a posture."""
+
+    kind: Literal["posture"]
+
+
+@register("tasks", "coupling", shipped=True)
+class ListedCoupling(Listed, TaskSection):
+    """A weighted sum of joint positions (1 row)."""
+
+    unit: ClassVar[str] = "rad"
+    made_by: ClassVar[str] = "hierarchy.tasks:JointCoupling"
+    kind: Literal["coupling"]
+    joints: Annotated[dict[str, keys.Finite], Field(min_length=1)]
+    """The factor of each joint, by name."""
+    value: keys.JointPosition = 0.0
+    """The value of the sum."""
+    stiffness: keys.Stiffness = 100.0
+
+
+@register("tasks", "com", shipped=True)
+class ListedCentreOfMass(Listed, AlongSection):
+    """The centre of mass along a path."""
+
+    made_by: ClassVar[str] = "hierarchy.tasks:CentreOfMass"
+    kind: Literal["com"]
+    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
+    """Axes of the world that count."""
+
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return the path and the numbers of the axes."""
+        from hierarchy.tasks import CentreOfMass
+
+        anywhere = CentreOfMass(at.robot, Still((0.0, 0.0, 0.0)))
+        return {"path": self.along(anywhere.position(at.start)),
+                "axes": tuple("xyz".index(axis) for axis in self.axes)}
+
+
+@register("tasks", "momentum", shipped=True)
+class ListedMomentum(Listed):
+    """The momentum of the whole robot to zero."""
+
+    made_by: ClassVar[str] = "hierarchy.tasks:Momentum"
+    kind: Literal["momentum"]
+    part: Literal["linear", "angular"] = "angular"
+    """Which of the two."""
+    damping: keys.Gain = 10.0
+    """Gain of the momentum."""
+
+    @property
+    def unit(self) -> str:  # type: ignore[override]
+        """That of its error."""
+        return "N s" if self.part == "linear" else "N m s"
+
+
+class _Apart(Listed):
+    """A task with one-sided rows between bodies."""
+
+    unit: ClassVar[str] = "m"
+    rows: ClassVar[Rows] = "inequality"
+
+
+@register("tasks", "self-collision", shipped=True)
+class ListedSelfCollision(_Apart, BarrierSection):
+    """Links kept apart, except neighbours."""
+
+    made_by: ClassVar[str] = "hierarchy.tasks:SelfSeparation"
+    kind: Literal["self-collision"]
+
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return the capsules, those of them to keep apart, and how."""
+        return {"capsules": at.robot.capsules, "barrier": self.barrier(self.distance),
+                "pairs": at.pairs(self.distance)}
+
+
+@register("tasks", "collision", shipped=True)
+class ListedCollision(_Apart):
+    """Where the rows of [avoidance] `separation` stand; by default above all tasks."""
+
+    kind: Literal["collision"]
