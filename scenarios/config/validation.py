@@ -15,9 +15,11 @@ from scenarios.config.errors import ScenarioError
 from scenarios.config.sections import OneOf, Section, Unit, kinds_of
 
 Kind = TypeVar("Kind", bound=Section)
-_LARGEST = {  # that is not doubted, by unit
-    "m": (10.0, "lengths are in metres, not in millimetres"),
-    "rad": (tau, "angles are in radians, not in degrees")}
+_USUAL = {  # sizes that are not doubted, by unit
+    "m": (0.0, 10.0, "lengths are in metres, not in millimetres"),
+    "rad": (0.0, tau, "angles are in radians, not in degrees"),
+    "rad or m": (0.0, tau, "joint angles are in radians"),
+    "deg": (1.0, inf, "cones are in degrees; all other angles are in radians")}
 _QUOTED = re.compile(r"'([^']*)'")
 _UNIONS = ("constrained-float", "float", "str")  # what pydantic calls the parts of one in a key
 
@@ -148,14 +150,14 @@ def doubtful_units(section: Section, above: str = "") -> Iterator[str]:
     for name, field in type(section).model_fields.items():
         key, value = f"{above}{field.alias or name}", getattr(section, name)
         units = {unit.name for unit in parts_of((field.annotation, *field.metadata), Unit)}
+        unit = units.pop() if len(units) == 1 else ""
+        least, largest, remark = _USUAL.get(unit, (0.0, inf, ""))
         for where, one in _leaves(value, key):
             if isinstance(one, Section):
                 yield from doubtful_units(one, f"{where}.")
-            elif isinstance(one, float) and len(units) == 1:
-                largest, remark = _LARGEST.get(next(iter(units)), (inf, ""))
-                if largest < abs(one) < inf:
-                    yield f"{where} = {one:g} {units.pop()}: {remark}"
-                    break
+            elif isinstance(one, float) and (0.0 < abs(one) < least or largest < abs(one) < inf):
+                yield f"{where} = {one:g} {unit}: {remark}"
+                break
 
 
 def _leaves(value: Any, key: str) -> Iterator[tuple[str, Any]]:
