@@ -45,8 +45,7 @@ class ListedForce(_OfForces):
 
     made_by: ClassVar[str] = "hierarchy.tasks:ContactForce"
     kind: Literal["contact-force"]
-    contact: str
-    """Name of the contact."""
+    contact: str  #: Name of the contact.
     target: tuple[keys.Finite, ...]
     """Normal force [N], force [N] or wrench [N, N m]: 1, 3 or 6 numbers."""
 
@@ -64,8 +63,7 @@ class ListedPosition(Listed, PositionTask):
     """The origin of a frame along a path."""
 
     kind: Literal["position"]
-    frame: str  # type: ignore[misc]
-    """Frame of the robot."""
+    frame: str  # type: ignore[misc]  #: Frame of the robot.
     axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"  # type: ignore[misc]
     """Axes of the world that count."""
 
@@ -73,8 +71,7 @@ class ListedPosition(Listed, PositionTask):
 class _AlongPose(Listed, AlongSection):
     """The position and the rotation of a frame (6 rows)."""
 
-    frame: str
-    """Frame of the robot."""
+    frame: str  #: Frame of the robot.
     rotation: keys.Rows3 | None = None
     """Rows of the wanted matrix from frame to world, by default the initial one."""
 
@@ -114,8 +111,7 @@ class ListedPointing(PointingTask, Listed):
     """The z axis of a frame on a cone, or within it."""
 
     kind: Literal["pointing"]
-    frame: str  # type: ignore[misc]
-    """Frame of the robot."""
+    frame: str  # type: ignore[misc]  #: Frame of the robot.
 
 
 @register("tasks", "look-at", shipped=True)
@@ -124,10 +120,8 @@ class ListedLookAt(Listed, TaskSection):
 
     made_by: ClassVar[str] = "hierarchy.tasks:LookAt"
     kind: Literal["look-at"]
-    frame: str
-    """Frame of the robot."""
-    target: keys.Point
-    """The point."""
+    frame: str  #: Frame of the robot.
+    target: keys.Point  #: The point.
     stiffness: keys.Stiffness = 20.0
     damping: keys.Gain = 10.0
     gain: keys.Gain = 5.0
@@ -143,16 +137,13 @@ class ListedRelative(Listed, TaskSection):
 
     made_by: ClassVar[str] = "hierarchy.tasks:RelativePose"
     kind: Literal["relative"]
-    frame: str
-    """Frame of the robot."""
-    to: str
-    """The other frame."""
+    frame: str  #: Frame of the robot.
+    to: str  #: The other frame.
     position: keys.Point | None = None
     """Origin of `frame` in the axes of `to`, by default the initial one."""
     rotation: keys.Rows3 | None = None
     """Rows of the matrix from `frame` to `to`, by default the initial one."""
-    orientation: keys.Flag = True
-    """Whether the orientation counts too."""
+    orientation: keys.Flag = True  #: Whether the orientation counts too.
 
     def _wrong(self) -> Iterator[str]:
         if self.rotation is not None and not self.orientation:
@@ -179,14 +170,11 @@ class ListedManipulability(Listed, TaskSection):
     made_by: ClassVar[str] = "hierarchy.tasks:Manipulability"
     unit: ClassVar[str] = ""
     kind: Literal["manipulability"]
-    frame: str
-    """Frame of the robot."""
-    least: keys.NotNegative
-    """The value, in the unit of det(J J^T)^(1/2)."""
+    frame: str  #: Frame of the robot.
+    least: keys.NotNegative  #: The value, in the unit of det(J J^T)^(1/2).
     part: Literal["position", "pose"] = "position"
     """"position": of the linear rows of its Jacobian. "pose": of all six."""
-    rows: Rows = "inequality"
-    """"inequality": at `least` or above. "equality": at `least`."""
+    rows: Rows = "inequality"  #: "inequality": at `least` or above. "equality": at `least`.
     stiffness: keys.Stiffness = 20.0
     damping: keys.Gain = 10.0
     gain: keys.Gain = 5.0
@@ -218,8 +206,7 @@ class ListedCoupling(Listed, TaskSection):
     kind: Literal["coupling"]
     joints: Annotated[dict[str, keys.Finite], Field(min_length=1)]
     """The factor of each joint, by name."""
-    value: keys.JointPosition = 0.0
-    """The value of the sum."""
+    value: keys.JointPosition = 0.0  #: The value of the sum.
     stiffness: keys.Stiffness = 100.0
 
 
@@ -229,8 +216,7 @@ class ListedCentreOfMass(Listed, AlongSection):
 
     made_by: ClassVar[str] = "hierarchy.tasks:CentreOfMass"
     kind: Literal["com"]
-    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"
-    """Axes of the world that count."""
+    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"  #: Axes of the world that count.
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the path and the numbers of the axes."""
@@ -247,10 +233,8 @@ class ListedMomentum(Listed):
 
     made_by: ClassVar[str] = "hierarchy.tasks:Momentum"
     kind: Literal["momentum"]
-    part: Literal["linear", "angular"] = "angular"
-    """Which of the two."""
-    damping: keys.Gain = 10.0
-    """Gain of the momentum."""
+    part: Literal["linear", "angular"] = "angular"  #: Which of the two.
+    damping: keys.Gain = 10.0  #: Gain of the momentum.
 
     @property
     def unit(self) -> str:  # type: ignore[override]

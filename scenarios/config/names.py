@@ -22,10 +22,8 @@ LIBRARY = Path(__file__).parents[1] / "library" / "groups"
 class Group(Section):
     """The scenarios of a group, in the order in which they are compared."""
 
-    title: str
-    """What the scenarios have in common, for lists."""
-    scenarios: Annotated[tuple[str, ...], Field(min_length=1)]
-    """Names of shipped scenarios."""
+    title: str  #: What the scenarios have in common, for lists.
+    scenarios: Annotated[tuple[str, ...], Field(min_length=1)]  #: Names of shipped scenarios.
 
 
 def shipped_groups() -> tuple[str, ...]:

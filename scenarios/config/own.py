@@ -56,8 +56,7 @@ class OwnSection(PartSection):
     model_config = ConfigDict(arbitrary_types_allowed=True)
     group: ClassVar[Group]
     maker: ClassVar[Maker]
-    kind: str
-    """Which kind it is."""
+    kind: str  #: Which kind it is.
 
     @classmethod
     @cache

@@ -48,44 +48,28 @@ class Scenario(Section):
     Absent sections add no task.
     """
 
-    name: Name
-    """Its name, in lists and of run folders."""
-    title: str = ""
-    """One line that says what it shows."""
-    description: str = ""
-    """More about it."""
+    name: Name  #: Its name, in lists and of run folders.
+    title: str = ""  #: One line that says what it shows.
+    description: str = ""  #: More about it.
     plugins: tuple[str, ...] | None = None
     """Modules with kinds, resolvers and robots; a command has to allow them."""
-    robot: RobotSection
-    """Which robot."""
-    start: StartSection = StartSection()
-    """Where a run starts."""
-    control: ControlSection
-    """How the tasks are resolved, and how often."""
-    plant: PlantKind = KinematicSection()
-    """What the commands move."""
-    sensor: SensorKind = ExactSection()
-    """What measures distances to obstacles."""
-    position: PositionSection | None = None
-    """The end effector's position."""
-    pointing: PointingSection | None = None
-    """The end effector's direction."""
-    avoidance: AvoidanceKind | None = None
-    """Obstacles, and how to stay away from them."""
-    limits: LimitsSection | None = None
-    """Joint limits."""
+    robot: RobotSection  #: Which robot.
+    start: StartSection = StartSection()  #: Where a run starts.
+    control: ControlSection  #: How the tasks are resolved, and how often.
+    plant: PlantKind = KinematicSection()  #: What the commands move.
+    sensor: SensorKind = ExactSection()  #: What measures distances to obstacles.
+    position: PositionSection | None = None  #: The end effector's position.
+    pointing: PointingSection | None = None  #: The end effector's direction.
+    avoidance: AvoidanceKind | None = None  #: Obstacles, and how to stay away from them.
+    limits: LimitsSection | None = None  #: Joint limits.
     damping: DampingSection | None = None
     """Null-space term that damps joints; not with the null-space [posture]."""
-    posture: PostureSection | None = None
-    """Null-space term or last task toward a posture."""
+    posture: PostureSection | None = None  #: Null-space term or last task toward a posture.
     tasks: tuple[ListedTask, ...] = ()
     """Tasks in order of priority, below limits, avoidance, position and pointing."""
-    contacts: tuple[ContactSection, ...] = ()
-    """What touches the surroundings, at level "torque"."""
-    forces: ForcesSection = ForcesSection()
-    """Which contact forces the stack allows."""
-    faults: tuple[FaultSection, ...] = ()
-    """What goes wrong during a run."""
+    contacts: tuple[ContactSection, ...] = ()  #: What touches the surroundings, at level "torque".
+    forces: ForcesSection = ForcesSection()  #: Which contact forces the stack allows.
+    faults: tuple[FaultSection, ...] = ()  #: What goes wrong during a run.
     variation: Parameters = Field(default_factory=dict)
     """How dotted keys vary from start to start."""
 

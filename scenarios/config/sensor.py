@@ -27,8 +27,7 @@ class AnySensor(PartSection):
 
     has_frames: ClassVar[bool] = True    # that a fault may leave out
     is_recorded: ClassVar[bool] = False  # whether it shows no obstacle of the scenario
-    kind: str
-    """Which kind it is."""
+    kind: str  #: Which kind it is.
     if TYPE_CHECKING:
         foot: ClassVar[float]
 
@@ -50,12 +49,10 @@ class ImageSection(AnySensor):
     """What sources of depth images have; see scenarios.cell.sensors.depth_sensor."""
 
     made_by: ClassVar[str] = "scenarios.cell.sensors.depth_sensor:depth_sensor"
-    latency: keys.Time = 0.0
-    """Age of a frame when it arrives."""
+    latency: keys.Time = 0.0  #: Age of a frame when it arrives.
     stale_after: keys.Time = 0.2
     """Time without a frame after which `control.policy.stale` applies."""
-    least_readings: keys.Share = 0.1
-    """Least share of valid pixels."""
+    least_readings: keys.Share = 0.1  #: Least share of valid pixels.
     foot: keys.Distance = FOOT  # type: ignore[misc]
     """Height of the column below the base, removed from images."""
     margin: keys.Distance = 0.05
@@ -65,10 +62,8 @@ class ImageSection(AnySensor):
     avoidance acts."""
     thin: keys.Distance | None = None
     """Depth of obstacles behind their surface, by default infinite."""
-    support: Annotated[int, Field(strict=True, ge=1, le=9)] = 3
-    """Pixels of nine that must agree."""
-    band: keys.Distance = 0.05
-    """Difference in depth within which they do."""
+    support: Annotated[int, Field(strict=True, ge=1, le=9)] = 3  #: Pixels of nine that must agree.
+    band: keys.Distance = 0.05  #: Difference in depth within which they do.
 
 
 class DepthErrors(keys.Section):
@@ -76,26 +71,18 @@ class DepthErrors(keys.Section):
 
     noise_floor: keys.Distance = 1.2e-3
     """Standard deviation of the noise of z at `noise_from`, clipped at 3.5 of them."""
-    noise_growth: keys.NotNegative = 1.9e-3
-    """Its growth with (z - noise_from)^2 [1/m]."""
-    noise_from: keys.Distance = 0.4
-    """Depth from which it grows."""
+    noise_growth: keys.NotNegative = 1.9e-3  #: Its growth with (z - noise_from)^2 [1/m].
+    noise_from: keys.Distance = 0.4  #: Depth from which it grows.
     rounding: Literal["disparity", "step"] = "disparity"
     """Rounds z ("step") or 1 / z ("disparity") to multiples of `step`."""
-    step: keys.NotNegative = 2.85e-3
-    """In [m], or [1/m] of a disparity; 0 for none."""
-    near: keys.Distance = 0.5
-    """Depth below which readings are missing."""
+    step: keys.NotNegative = 2.85e-3  #: In [m], or [1/m] of a disparity; 0 for none.
+    near: keys.Distance = 0.5  #: Depth below which readings are missing.
     far: Annotated[float, Field(strict=True, gt=0.0), keys.Unit("m")] = 5.0
     """Depth above which readings are missing."""
-    missing: keys.Share = 0.002
-    """Probability of a missing reading."""
-    missing_at_edges: keys.Share = 0.3
-    """The same beside a step in depth of 5 cm."""
-    outliers: keys.Share = 0.02
-    """Probability of a square with a random, smaller depth in a frame."""
-    outlier_size: keys.Count = 2
-    """Largest half side of that square, in pixels."""
+    missing: keys.Share = 0.002  #: Probability of a missing reading.
+    missing_at_edges: keys.Share = 0.3  #: The same beside a step in depth of 5 cm.
+    outliers: keys.Share = 0.02  #: Probability of a square with a random, smaller depth in a frame.
+    outlier_size: keys.Count = 2  #: Largest half side of that square, in pixels.
 
     def _wrong(self) -> Iterator[str]:
         if self.near >= self.far:
@@ -136,38 +123,25 @@ class CameraSection(DepthErrors, ImageSection):
     """A simulated depth camera; the defaults resemble a Kinect."""
 
     kind: Literal["camera"]
-    width: Pixels = 640
-    """Columns of the image."""
-    height: Pixels = 480
-    """Rows of the image."""
-    fx: Annotated[keys.Positive, keys.Unit("px")] = 525.0
-    """Focal length, horizontally."""
-    fy: Annotated[keys.Positive, keys.Unit("px")] = 525.0
-    """Focal length, vertically."""
+    width: Pixels = 640  #: Columns of the image.
+    height: Pixels = 480  #: Rows of the image.
+    fx: Annotated[keys.Positive, keys.Unit("px")] = 525.0  #: Focal length, horizontally.
+    fy: Annotated[keys.Positive, keys.Unit("px")] = 525.0  #: Focal length, vertically.
     cx: Annotated[keys.Finite, keys.Unit("px")] | None = None
     """Column of the optical axis, by default the middle one."""
     cy: Annotated[keys.Finite, keys.Unit("px")] | None = None
     """Row of the optical axis, by default the middle one."""
-    position: keys.Point = (0.0, 2.0, 0.7)
-    """Where the camera is."""
-    look_at: keys.Point = (0.0, 0.3, 0.1)
-    """Point that it looks at."""
+    position: keys.Point = (0.0, 2.0, 0.7)  #: Where the camera is.
+    look_at: keys.Point = (0.0, 0.3, 0.1)  #: Point that it looks at.
     rotation: keys.Rows3 | None = None
     """In place of `look_at`: rows of the matrix from camera (right, down, forward) to world."""
-    rate: Annotated[keys.Positive, keys.Unit("Hz")] = 30.0
-    """Frames per second."""
-    jitter: keys.Time = 0.0
-    """Largest random shift of a frame; below 1 / rate."""
-    seed: keys.Count = 0
-    """Seed of errors and jitter."""
-    ideal: keys.Flag = False
-    """Whether readings have no errors."""
-    far: keys.Length = 5.0
-    """Depth above which readings are missing."""
-    point_radius: keys.Distance = 0.02
-    """Radius at which obstacles that are points are seen."""
-    backdrop: keys.Distance = 4.0
-    """Depth of a wall behind everything, 0 for none."""
+    rate: Annotated[keys.Positive, keys.Unit("Hz")] = 30.0  #: Frames per second.
+    jitter: keys.Time = 0.0  #: Largest random shift of a frame; below 1 / rate.
+    seed: keys.Count = 0  #: Seed of errors and jitter.
+    ideal: keys.Flag = False  #: Whether readings have no errors.
+    far: keys.Length = 5.0  #: Depth above which readings are missing.
+    point_radius: keys.Distance = 0.02  #: Radius at which obstacles that are points are seen.
+    backdrop: keys.Distance = 4.0  #: Depth of a wall behind everything, 0 for none.
 
 
 @register("sensors", "frames", shipped=True)
@@ -176,8 +150,7 @@ class FramesSection(ImageSection):
 
     is_recorded: ClassVar[bool] = True
     kind: Literal["frames"]
-    folder: str
-    """Their folder, relative to the scenario's file, or a shipped set."""
+    folder: str  #: Their folder, relative to the scenario's file, or a shipped set.
 
 
 class OwnSensor(AnySensor, OwnSection):

@@ -71,23 +71,17 @@ class Made(PartSection):
 class TaskSection(Made):
     """What most tasks have: the gains of their error."""
 
-    stiffness: keys.Stiffness = 40.0
-    """Gain of the error at acceleration level."""
-    damping: keys.Gain = 20.0
-    """Gain of the error's rate at acceleration level."""
-    gain: keys.Gain = 10.0
-    """Gain of the error at velocity level."""
+    stiffness: keys.Stiffness = 40.0  #: Gain of the error at acceleration level.
+    damping: keys.Gain = 20.0  #: Gain of the error's rate at acceleration level.
+    gain: keys.Gain = 10.0  #: Gain of the error at velocity level.
 
 
 class AlongSection(TaskSection):
     """Follow a path, or stay at the initial position without one."""
 
-    path: PathSection | None = None
-    """Path of the point."""
-    offset: keys.Point = (0.0, 0.0, 0.0)
-    """Shift of the path, or of the initial position."""
-    from_start: keys.Flag = False
-    """Whether the path is relative to the initial position."""
+    path: PathSection | None = None  #: Path of the point.
+    offset: keys.Point = (0.0, 0.0, 0.0)  #: Shift of the path, or of the initial position.
+    from_start: keys.Flag = False  #: Whether the path is relative to the initial position.
 
     def _wrong(self) -> Iterator[str]:
         if self.from_start and self.path is None:
@@ -139,12 +133,10 @@ class PositionTask(AlongSection):
 class PointingTask(TaskSection):
     """The z axis of a frame on or in a cone (1 row)."""
 
-    axis: keys.Vector3
-    """Axis of the cone in the world."""
+    axis: keys.Vector3  #: Axis of the cone in the world.
     alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0), keys.Unit("deg")]
     """Half-angle of the cone."""
-    rows: Rows = "inequality"
-    """"equality": on the cone. "inequality": within it."""
+    rows: Rows = "inequality"  #: "equality": on the cone. "inequality": within it.
     buffer: Annotated[keys.Positive, keys.Unit("deg")] | None = None
     """Width inside the cone within which an inequality acts if control.stack is "smooth"."""
     stiffness: keys.Stiffness = 5.0
@@ -174,8 +166,7 @@ class PostureTask(TaskSection):
 
     made_by: ClassVar[str] = "hierarchy.tasks:Posture"
     unit: ClassVar[str] = "rad"
-    target: tuple[keys.JointPosition, ...] | None = None
-    """As `start.q`; by default the start."""
+    target: tuple[keys.JointPosition, ...] | None = None  #: As `start.q`; by default the start.
     joints: dict[str, keys.JointValue] = Field(default_factory=dict)
     """Positions by name, which override `target`."""
     stiffness: keys.Stiffness = 10.0
@@ -245,8 +236,7 @@ class LimitsSection(keys.Section):
 class DampingSection(keys.Section):
     """Null-space term a = -D v, eq. (15); not with the null-space [posture]."""
 
-    value: keys.NotNegative
-    """D [1/s], or with weight = "mass" the factor of M(q)."""
+    value: keys.NotNegative  #: D [1/s], or with weight = "mass" the factor of M(q).
     weight: Literal["identity", "mass"] = "identity"
     """"identity": D = value I. "mass": D = value M(q)."""
 
@@ -254,13 +244,11 @@ class DampingSection(keys.Section):
 class Listed(Made):
     """A task of `[[tasks]]`."""
 
-    name: keys.TaskName | None = None
-    """Its name, by default its kind."""
+    name: keys.TaskName | None = None  #: Its name, by default its kind.
     give: keys.NotNegative = 0.0
     """Violation of each row in favour of the tasks below, in the task's unit per s or s^2, or
     [N]."""
-    kind: str
-    """Which kind it is."""
+    kind: str  #: Which kind it is.
 
     @property
     def title(self) -> str:  # type: ignore[override]
