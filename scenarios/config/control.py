@@ -116,9 +116,8 @@ class FaultSection(keys.Section):
     have no readings."""
     at: keys.Time  #: When it begins.
     duration: keys.Span  #: How long it lasts.
-    joint: Annotated[int, Field(strict=True, ge=1)] | None = None
-    """Number of a joint from 1; by default all."""
-    point: Annotated[int, Field(strict=True, ge=1)] | None = None
+    joint: keys.Number | None = None  #: Number of a joint from 1; by default all.
+    point: keys.Number | None = None
     """Number of a control point from 1, last the end effector; by default all."""
     status: Literal["iteration_limit", "numerical_failure", "backend_failure",
                     "inaccurate"] | None = None  #: What the resolver reports.

@@ -17,7 +17,7 @@ class JitterSection(keys.Section):
     """A smooth random motion."""
 
     amplitude: keys.Distance  #: Largest displacement in each axis.
-    rate: Annotated[keys.Positive, keys.Unit("Hz")]  #: Highest frequency of the motion.
+    rate: keys.Frequency  #: Highest frequency of the motion.
     seed: keys.Count = 0  #: Seed of the motion.
 
 
@@ -63,7 +63,7 @@ class EllipseSection(AnyPath):
     centre: keys.Point  #: Middle of the ellipse.
     cosine: keys.Point  #: Half axis.
     sine: keys.Point  #: The other half axis.
-    rate: Annotated[keys.Finite, keys.Unit("rad/s")] = 1.0  #: How fast s grows.
+    rate: keys.AngularRate = 1.0  #: How fast s grows.
     phase: keys.Angle = 0.0  #: s at the start.
 
     def _steady(self) -> paths.Path:
@@ -108,7 +108,7 @@ class CircleSection(AnyPath):
     centre: keys.Point  #: Middle of the circle.
     radius: keys.Distance  #: Its radius.
     normal: keys.Vector3 = (0.0, 0.0, 1.0)  #: Normal of its plane.
-    rate: Annotated[keys.Finite, keys.Unit("rad/s")] = 1.0  #: How fast the angle grows.
+    rate: keys.AngularRate = 1.0  #: How fast the angle grows.
     phase: keys.Angle = 0.0  #: Angle at the start.
 
 

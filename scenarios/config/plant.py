@@ -24,12 +24,10 @@ _ROUNDING = 1e-9  # [s] of times
 class MeasurementSection(keys.Section):
     """Errors of measured joints."""
 
-    position_noise: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
-    """Standard deviation of the normal noise of positions."""
+    position_noise: keys.Arc = 0.0  #: Standard deviation of the normal noise of positions.
     velocity_noise: Annotated[keys.NotNegative, keys.Unit("rad/s")] = 0.0
     """The same of velocities."""
-    quantisation: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
-    """Step of measured positions."""
+    quantisation: keys.Arc = 0.0  #: Step of measured positions.
     delay: keys.Time = 0.0  #: Age of measurements, a whole number of periods.
     seed: keys.Count = 0  #: Seed of the noise.
     velocity: Literal["measured", "differenced"] = "measured"
@@ -84,8 +82,7 @@ class ServoSection(keys.Section):
     bandwidth: Bandwidth | tuple[Bandwidth, ...] = 80.0  #: How fast joints follow, all or each.
     gravity: keys.NotNegative = 1.0  #: Share of the gravity torque that is compensated.
     feedforward: keys.Flag = True  #: Whether the rate of the reference counts.
-    lead: Annotated[keys.Positive, keys.Unit("rad")] = 0.1
-    """How far the reference may lead its joint."""
+    lead: keys.PositiveAngle = 0.1  #: How far the reference may lead its joint.
 
 
 class JointsSection(keys.Section):
@@ -103,8 +100,7 @@ class PhysicsSection(AnyPlant):
     made_by: ClassVar[str] = "scenarios.cell.plants.physics:PhysicsArm"
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
     kind: Literal["mujoco"]
-    beyond_stop: Annotated[keys.Positive, keys.Unit("rad")] = 0.2
-    """How far a joint may pass its limit before a fault."""
+    beyond_stop: keys.PositiveAngle = 0.2  #: How far a joint may pass its limit before a fault.
     servo: ServoSection = ServoSection()  #: The servo of each joint.
     joints: JointsSection = JointsSection()  #: Friction and inertia of the joints.
 
@@ -142,23 +138,21 @@ class TorqueSection(AnyPlant):
     made_by: ClassVar[str] = "scenarios.cell.plants.torque:TorqueRobot"
     levels: ClassVar[tuple[str, ...]] = ("torque",)
     kind: Literal["torque"]
-    height: Annotated[keys.Finite, keys.Unit("m")] = 0.0  #: Height of the floor.
+    height: keys.Coordinate = 0.0  #: Height of the floor.
     friction: keys.Positive = 0.7  #: Coefficient of friction of the floor.
     softness: keys.Span = 0.005  #: Time constant of a contact.
     joint_friction: Friction = 0.0  #: Coulomb friction of every joint.
     armature: Inertia = 0.0  #: Additional inertia of every joint's drive.
     joint_damping: Damping = 0.0  #: Viscous friction of every joint.
     delay: keys.Time = 0.0  #: Delay of torques, a whole number of periods.
-    bandwidth: Annotated[keys.Positive, keys.Unit("Hz")] | None = None
+    bandwidth: keys.Frequency | None = None
     """Bandwidth of the motors' torques, by default infinite."""
     stops: keys.Flag = True  #: Whether joints have a stop at their position limit.
     self_collision: keys.Flag = False
     """Whether capsules collide, except neighbours and those that overlap initially."""
     fall: keys.Length = 0.2  #: How far the centre of mass may sink before a fault.
-    tilt: Annotated[keys.Positive, keys.Unit("rad")] = 1.0
-    """How far the base may tilt before a fault."""
-    beyond_stop: Annotated[keys.Positive, keys.Unit("rad")] = 0.2
-    """How far a joint may pass its limit before a fault."""
+    tilt: keys.PositiveAngle = 1.0  #: How far the base may tilt before a fault.
+    beyond_stop: keys.PositiveAngle = 0.2  #: How far a joint may pass its limit before a fault.
     pushes: tuple[PushSection, ...] = ()  #: Forces that disturb the robot.
 
 

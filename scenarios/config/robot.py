@@ -10,8 +10,6 @@ from pydantic import Field
 from hierarchy.robots.table import Base
 from scenarios.config import sections as keys
 
-Place = Annotated[keys.Finite, keys.Unit("m")]
-
 
 class ControlPointSection(keys.Section):
     """A point on the body of a joint."""
@@ -89,9 +87,9 @@ class ContactSection(keys.Section):
 
     frame: str  #: Frame of the robot.
     name: keys.TaskName | None = None  #: Its name, by default the frame's.
-    x: tuple[Place, Place] | None = None
+    x: tuple[keys.Coordinate, keys.Coordinate] | None = None
     """Sides of a sole along its x axis, from `offset`; none for a point."""
-    y: tuple[Place, Place] | None = None  #: The same along its y axis.
+    y: tuple[keys.Coordinate, keys.Coordinate] | None = None  #: The same along its y axis.
     offset: keys.Point = (0.0, 0.0, 0.0)  #: The point, or the sole's middle, in the frame.
     friction: keys.Positive = 0.7  #: Coefficient of friction that the controller assumes.
     normal: keys.Vector3 = (0.0, 0.0, 1.0)  #: Normal of the surface in the world.

@@ -20,6 +20,8 @@ from scenarios.config.own import OwnSection, PartSection
 
 FOOT = 0.31  # [m] height of the column that a robot without floor stands on
 Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), keys.Unit("px")]
+Focal = Annotated[keys.Positive, keys.Unit("px")]
+Middle = Annotated[keys.Finite, keys.Unit("px")]
 
 
 class AnySensor(PartSection):
@@ -125,17 +127,15 @@ class CameraSection(DepthErrors, ImageSection):
     kind: Literal["camera"]
     width: Pixels = 640  #: Columns of the image.
     height: Pixels = 480  #: Rows of the image.
-    fx: Annotated[keys.Positive, keys.Unit("px")] = 525.0  #: Focal length, horizontally.
-    fy: Annotated[keys.Positive, keys.Unit("px")] = 525.0  #: Focal length, vertically.
-    cx: Annotated[keys.Finite, keys.Unit("px")] | None = None
-    """Column of the optical axis, by default the middle one."""
-    cy: Annotated[keys.Finite, keys.Unit("px")] | None = None
-    """Row of the optical axis, by default the middle one."""
+    fx: Focal = 525.0  #: Focal length, horizontally.
+    fy: Focal = 525.0  #: Focal length, vertically.
+    cx: Middle | None = None  #: Column of the optical axis, by default the middle one.
+    cy: Middle | None = None  #: Row of the optical axis, by default the middle one.
     position: keys.Point = (0.0, 2.0, 0.7)  #: Where the camera is.
     look_at: keys.Point = (0.0, 0.3, 0.1)  #: Point that it looks at.
     rotation: keys.Rows3 | None = None
     """In place of `look_at`: rows of the matrix from camera (right, down, forward) to world."""
-    rate: Annotated[keys.Positive, keys.Unit("Hz")] = 30.0  #: Frames per second.
+    rate: keys.Frequency = 30.0  #: Frames per second.
     jitter: keys.Time = 0.0  #: Largest random shift of a frame; below 1 / rate.
     seed: keys.Count = 0  #: Seed of errors and jitter.
     ideal: keys.Flag = False  #: Whether readings have no errors.

@@ -213,8 +213,7 @@ class LimitsSection(keys.Section):
     """"stack": the first level. "guard": each command is clamped joint by joint, regardless of the
     tasks, with any resolver. "either": in the stack if the resolver handles bounds, else a guard.
     "bounds": in the stack, but without torque limits and [forces]."""
-    margin: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
-    """Distance kept from the position limits."""
+    margin: keys.Arc = 0.0  #: Distance kept from the position limits.
     horizon: Annotated[keys.NotNegative, keys.Unit("s")] | None = None
     """Time in which a joint comes to rest at a limit, see docs/theory/joint-limits.md; by default
     0.05 s at level "torque", elsewhere one tick, which is the least."""
