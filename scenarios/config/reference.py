@@ -142,7 +142,8 @@ def _texts(section: type[Section]) -> dict[str, str]:
         source = dedent(inspect.getsource(section))
     except (OSError, TypeError):  # a plugin without a source
         return {}
-    lines, body, found = source.splitlines(), getattr(ast.parse(source).body[0], "body", ()), {}
+    lines, body = source.splitlines(), getattr(ast.parse(source).body[0], "body", ())
+    found: dict[str, str] = {}
     for key, below in zip_longest(body, body[1:]):
         if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name):
             text = lines[(key.end_lineno or 0) - 1].partition("  #: ")[2]
