@@ -20,7 +20,7 @@ from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.words import some
 from scenarios.config import ScenarioError, is_shipped, shipped, shipped_groups
 from scenarios.config.changes import change_all, parse_changes
-from scenarios.config.names import WANTED, no_scenario
+from scenarios.config.reading import WANTED, no_scenario
 from scenarios.config.robot import RobotSection
 from scenarios.config.sections import Section
 from scenarios.config.validation import validated
@@ -43,7 +43,7 @@ def is_robot(text: str) -> bool:
     Raises a HierarchyError for what is neither.
     """
     if Path(text).is_dir() or Path(text).suffix == ".py":
-        raise no_scenario(text, shipped())
+        raise no_scenario(text)
     if text.endswith(".toml") or ".toml:" in text or is_shipped(text) or text in shipped_groups():
         return False
     if not (in_package(text) or is_file_name(text) or text in TABLES

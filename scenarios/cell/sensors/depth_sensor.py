@@ -15,8 +15,7 @@ from hierarchy.avoidance.control_points import pack_points
 from hierarchy.avoidance.self_collision import pack_capsules
 from hierarchy.jit import bind
 from hierarchy.problem import Array
-from scenarios.cell.sensors.camera import DepthCamera, Image, Pinhole, looking_at
-from scenarios.cell.sensors.frames import RecordedFrames
+from scenarios.cell.sensors.camera import DepthCamera, Image, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.pixels import (
     ObstacleImage,
     Space,
