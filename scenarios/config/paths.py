@@ -67,8 +67,6 @@ class EllipseSection(AnyPath):
     phase: keys.Angle = 0.0  #: s at the start.
 
     def _steady(self) -> paths.Path:
-        if self.phase == 0.0:
-            return paths.Ellipse(self.centre, self.cosine, self.sine, self.rate)
         cosine, sine = np.array(self.cosine), np.array(self.sine)
         c, s = np.cos(self.phase), np.sin(self.phase)  # the phase by the addition theorems
         turned = tuple((c * cosine + s * sine).tolist()), tuple((c * sine - s * cosine).tolist())

@@ -16,6 +16,7 @@ from hierarchy.problem import Array
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceKind, AvoidanceSection, ObstacleSection
+from scenarios.config.errors import naming
 
 
 class Asked(NamedTuple):
@@ -133,13 +134,9 @@ def sensor_of(scenario: Scenario, start: State,
     exact = ExactDistances(robot, sensor.obstacles if sensor else make_obstacles(section.placed),
                            asked.body, asked.tip, asked.mean_within,
                            pairs=not isinstance(section, AvoidanceSection))
-    try:
+    with naming("sensor"):
         made: Sensor = scenario.sensor.made(robot, exact=exact, asked=asked, body=asked.body,
                                             tip=asked.tip)
-    except ScenarioError:
-        raise
-    except HierarchyError as error:
-        raise ScenarioError(f"sensor: {error}") from error
     if sensor is None:
         made.check_start(start)
     return made
