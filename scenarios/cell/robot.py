@@ -20,10 +20,10 @@ from hierarchy.tasks import Position
 from hierarchy.tasks.mechanism import Mechanism, model_rows
 from scenarios.cell.plants.mjcf import BALL
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.errors import naming
 from scenarios.config.plant import TorqueSection
 from scenarios.config.references import References
 from scenarios.config.robot import ContactSection, RobotPointSection, RobotSection, StartSection
+from scenarios.config.sections import naming
 from solvers import make
 
 _REACHED = 1e-6      # [m]

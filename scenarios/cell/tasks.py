@@ -16,8 +16,8 @@ from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection, SeparationSection
 from scenarios.config.control import ControlSection
-from scenarios.config.errors import naming
 from scenarios.config.references import References
+from scenarios.config.sections import naming
 from scenarios.config.tasks import LimitsSection, Made
 
 

@@ -11,8 +11,7 @@ from typing import Any
 
 from hierarchy.errors import UnknownNameError, brief, expect
 from scenarios.config.distributions import flat
-from scenarios.config.errors import ScenarioError
-from scenarios.config.sections import Section
+from scenarios.config.sections import ScenarioError, Section
 from scenarios.config.validation import Tag, tag_at
 from scenarios.toml_text import parse
 

@@ -21,9 +21,8 @@ from hierarchy import plugins
 from hierarchy.errors import HierarchyError
 from hierarchy.paths import Path
 from hierarchy.plugins import Group
-from scenarios.config.errors import ScenarioError, naming
 from scenarios.config.paths import AnyPath, PathSection
-from scenarios.config.sections import Finite, Flag, Section, Whole
+from scenarios.config.sections import Finite, Flag, ScenarioError, Section, Whole, naming
 
 if TYPE_CHECKING:
     from hierarchy import Robot

@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy import paths
 from scenarios.config import sections as keys
-from scenarios.config.errors import naming
+from scenarios.config.sections import naming
 
 
 class JitterSection(keys.Section):

@@ -12,7 +12,7 @@ from hierarchy.avoidance.self_collision import measure_capsules, pack_capsules, 
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
-from scenarios.config.errors import ScenarioError, naming
+from scenarios.config.sections import ScenarioError, naming
 
 Pairs = list[tuple[int, int]]
 _POSTURES = 200

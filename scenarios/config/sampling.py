@@ -9,8 +9,8 @@ import numpy as np
 
 from scenarios.config.changes import matching, place
 from scenarios.config.distributions import Distribution, Value
-from scenarios.config.errors import ScenarioError
 from scenarios.config.scenario import Scenario
+from scenarios.config.sections import ScenarioError
 
 
 def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int, index: int,

@@ -1,9 +1,10 @@
-"""Common parts of sections: numbers with their bounds and units, and what says their kind."""
+"""Common parts of sections: numbers with bounds and units, what says a kind, and the error."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self, get_args
 
@@ -11,9 +12,22 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from pydantic_core import PydanticCustomError, core_schema
 
 from hierarchy import plugins
-from hierarchy.errors import UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.plugins import Group
 from hierarchy.words import listed
+
+
+class ScenarioError(HierarchyError):
+    """An invalid scenario file or change; the message names the file and the key."""
+
+
+@contextmanager
+def naming(what: str) -> Iterator[None]:
+    """Put a key or a file in front of the errors raised within, which become ScenarioErrors."""
+    try:
+        yield
+    except HierarchyError as error:
+        raise ScenarioError(f"{what}: {error}") from error
 
 
 @dataclass(frozen=True)

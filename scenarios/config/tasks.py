@@ -17,9 +17,9 @@ from hierarchy.paths import Path, Shifted, Still
 from hierarchy.plugins import Group
 from hierarchy.problem import Array
 from scenarios.config import sections as keys
-from scenarios.config.errors import ScenarioError
 from scenarios.config.own import OwnSection, PartSection
 from scenarios.config.paths import PathSection
+from scenarios.config.sections import ScenarioError
 
 if TYPE_CHECKING:
     from hierarchy import Task

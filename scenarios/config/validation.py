@@ -11,8 +11,7 @@ from pydantic import ValidationError
 
 from hierarchy.errors import HierarchyError, UnknownNameError, brief
 from hierarchy.words import listed
-from scenarios.config.errors import ScenarioError
-from scenarios.config.sections import OneOf, Section, Unit, kinds_of
+from scenarios.config.sections import OneOf, ScenarioError, Section, Unit, kinds_of
 
 Kind = TypeVar("Kind", bound=Section)
 _USUAL = {  # sizes that are not doubted, by unit

@@ -16,7 +16,7 @@ from hierarchy.problem import Array
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceKind, AvoidanceSection, ObstacleSection
-from scenarios.config.errors import naming
+from scenarios.config.sections import naming
 
 
 class Asked(NamedTuple):
