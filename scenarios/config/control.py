@@ -123,8 +123,7 @@ class FaultSection(keys.Section):
                     "inaccurate"] | None = None  #: What the resolver reports.
     takes: keys.Span | None = None  #: Time that a tick takes longer.
     centre: keys.Point | None = None  #: Middle of the sphere.
-    place: ControlPointSection | None = None
-    """In place of `centre`: point of the body where it appears."""
+    place: ControlPointSection | None = None  #: Point of the body, in place of `centre`.
     radius: keys.Length | None = None  #: Radius of the sphere.
 
     def _wrong(self) -> Iterator[str]:

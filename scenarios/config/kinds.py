@@ -46,8 +46,7 @@ class ListedForce(_OfForces):
     made_by: ClassVar[str] = "hierarchy.tasks:ContactForce"
     kind: Literal["contact-force"]
     contact: str  #: Name of the contact.
-    target: tuple[keys.Finite, ...]
-    """Normal force [N], force [N] or wrench [N, N m]: 1, 3 or 6 numbers."""
+    target: tuple[keys.Finite, ...]  #: Normal force, force or wrench [N, N m]: 1, 3 or 6 numbers.
 
 
 @register("tasks", "least-force", shipped=True)
@@ -204,8 +203,7 @@ class ListedCoupling(Listed, TaskSection):
     unit: ClassVar[str] = "rad"
     made_by: ClassVar[str] = "hierarchy.tasks:JointCoupling"
     kind: Literal["coupling"]
-    joints: Annotated[dict[str, keys.Finite], Field(min_length=1)]
-    """The factor of each joint, by name."""
+    joints: Annotated[dict[str, keys.Finite], Field(min_length=1)]  #: Factors of joints, by name.
     value: keys.JointPosition = 0.0  #: The value of the sum.
     stiffness: keys.Stiffness = 100.0
 

@@ -25,8 +25,7 @@ class MeasurementSection(keys.Section):
     """Errors of measured joints."""
 
     position_noise: keys.Arc = 0.0  #: Standard deviation of the normal noise of positions.
-    velocity_noise: Annotated[keys.NotNegative, keys.Unit("rad/s")] = 0.0
-    """The same of velocities."""
+    velocity_noise: Annotated[keys.NotNegative, keys.Unit("rad/s")] = 0.0  #: That of velocities.
     quantisation: keys.Arc = 0.0  #: Step of measured positions.
     delay: keys.Time = 0.0  #: Age of measurements, a whole number of periods.
     seed: keys.Count = 0  #: Seed of the noise.
@@ -110,8 +109,7 @@ class PushSection(keys.Section):
 
     joint: str  #: Joint whose body is pushed.
     force: keys.Force  #: Size of the force.
-    direction: Annotated[keys.Finite, keys.Unit("deg")] = 0.0
-    """From the world's x axis toward its y axis."""
+    direction: Annotated[keys.Finite, keys.Unit("deg")] = 0.0  #: From the world's x axis toward y.
     at: keys.Time = 0.0  #: When the push begins.
     duration: keys.Span = 0.1  #: How long it lasts.
 
@@ -145,8 +143,7 @@ class TorqueSection(AnyPlant):
     armature: Inertia = 0.0  #: Additional inertia of every joint's drive.
     joint_damping: Damping = 0.0  #: Viscous friction of every joint.
     delay: keys.Time = 0.0  #: Delay of torques, a whole number of periods.
-    bandwidth: keys.Frequency | None = None
-    """Bandwidth of the motors' torques, by default infinite."""
+    bandwidth: keys.Frequency | None = None  #: Bandwidth of motor torques, by default infinite.
     stops: keys.Flag = True  #: Whether joints have a stop at their position limit.
     self_collision: keys.Flag = False
     """Whether capsules collide, except neighbours and those that overlap initially."""

@@ -44,8 +44,7 @@ class RobotSection(keys.Section):
 
     model: str
     """A name of `hierarchy list`, a URDF or MJCF file, or "package:name" (extra `descriptions`)."""
-    base: Base | None = None
-    """Whether the base is "fixed" or "floating"; by default that of the model."""
+    base: Base | None = None  #: Whether it is "fixed" or "floating"; by default that of the model.
     end_effector: str | None = None  #: Frame of [position] and [pointing].
     control_points: tuple[RobotPointSection, ...] | None = None
     """Points that keep their distance, besides the end effector."""

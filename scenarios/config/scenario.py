@@ -70,8 +70,7 @@ class Scenario(Section):
     contacts: tuple[ContactSection, ...] = ()  #: What touches the surroundings, at level "torque".
     forces: ForcesSection = ForcesSection()  #: Which contact forces the stack allows.
     faults: tuple[FaultSection, ...] = ()  #: What goes wrong during a run.
-    variation: Parameters = Field(default_factory=dict)
-    """How dotted keys vary from start to start."""
+    variation: Parameters = Field(default_factory=dict)  #: How keys vary from start to start.
 
     @field_validator("plugins")
     @classmethod

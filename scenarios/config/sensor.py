@@ -52,18 +52,16 @@ class ImageSection(AnySensor):
 
     made_by: ClassVar[str] = "scenarios.cell.sensors.depth_sensor:depth_sensor"
     latency: keys.Time = 0.0  #: Age of a frame when it arrives.
-    stale_after: keys.Time = 0.2
-    """Time without a frame after which `control.policy.stale` applies."""
+    stale_after: keys.Time = 0.2  #: Time without frames after which `control.policy.stale` applies.
     least_readings: keys.Share = 0.1  #: Least share of valid pixels.
     foot: keys.Distance = FOOT  # type: ignore[misc]
     """Height of the column below the base, removed from images."""
-    margin: keys.Distance = 0.05
-    """Width around the robot's capsules within which pixels are removed."""
+    margin: keys.Distance = 0.05  #: Width around the robot's capsules in which pixels are removed.
     region: keys.Length | None = None
     """Distance from control points within which obstacles are seen; by default that within which
     avoidance acts."""
     thin: keys.Distance | None = None
-    """Depth of obstacles behind their surface, by default infinite."""
+    """Obstacles' depth behind their surface, by default infinite."""
     support: Annotated[int, Field(strict=True, ge=1, le=9)] = 3  #: Pixels of nine that must agree.
     band: keys.Distance = 0.05  #: Difference in depth within which they do.
 

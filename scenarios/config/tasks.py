@@ -136,7 +136,7 @@ class PointingTask(TaskSection):
     axis: keys.Vector3  #: Axis of the cone in the world.
     alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0), keys.Unit("deg")]
     """Half-angle of the cone."""
-    rows: Rows = "inequality"  #: "equality": on the cone. "inequality": within it.
+    rows: Rows = "inequality"  #: "equality": on the cone. "inequality": in it.
     buffer: Annotated[keys.Positive, keys.Unit("deg")] | None = None
     """Width inside the cone within which an inequality acts if control.stack is "smooth"."""
     stiffness: keys.Stiffness = 5.0
@@ -192,8 +192,7 @@ class PointingSection(PointingTask):
 
     title: ClassVar[str] = "pointing"
     frame: ClassVar[str | None] = None
-    rows: Rows = Field("inequality", alias="kind")
-    """"equality": on the cone. "inequality": within it."""
+    rows: Rows = Field("inequality", alias="kind")  #: "equality": on the cone. "inequality": in it.
 
 
 class PostureSection(PostureTask):
@@ -207,8 +206,7 @@ class PostureSection(PostureTask):
 class LimitsSection(keys.Section):
     """The robot's position and velocity limits, and those of acceleration."""
 
-    acceleration: Acceleration | tuple[Acceleration, ...]
-    """Largest acceleration, of all joints or of each."""
+    acceleration: Acceleration | tuple[Acceleration, ...]  #: The largest, of all joints or of each.
     place: Literal["stack", "guard", "either", "bounds"] = "stack"
     """"stack": the first level. "guard": each command is clamped joint by joint, regardless of the
     tasks, with any resolver. "either": in the stack if the resolver handles bounds, else a guard.
@@ -236,8 +234,7 @@ class DampingSection(keys.Section):
     """Null-space term a = -D v, eq. (15); not with the null-space [posture]."""
 
     value: keys.NotNegative  #: D [1/s], or with weight = "mass" the factor of M(q).
-    weight: Literal["identity", "mass"] = "identity"
-    """"identity": D = value I. "mass": D = value M(q)."""
+    weight: Literal["identity", "mass"] = "identity"  #: D = value I, or with "mass" D = value M(q).
 
 
 class Listed(Made):
