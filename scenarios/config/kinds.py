@@ -15,24 +15,15 @@ from hierarchy.paths import Still
 from hierarchy.plugins import register
 from hierarchy.problem import Array
 from scenarios.config import sections as keys
+from scenarios.config import tasks as base
 from scenarios.config.avoidance import BarrierSection
-from scenarios.config.tasks import (
-    AlongSection,
-    Listed,
-    PointingTask,
-    PositionTask,
-    PostureTask,
-    Rows,
-    TaskSection,
-    of_pose,
-)
 
 if TYPE_CHECKING:
     from hierarchy import Task
     from scenarios.config.references import References
 
 
-class _OfForces(Listed):
+class _OfForces(base.Listed):
     """A task with rows over contact forces."""
 
     unit: ClassVar[str] = "N"
@@ -58,7 +49,7 @@ class ListedLeastForce(_OfForces):
 
 
 @register("tasks", "position", shipped=True)
-class ListedPosition(Listed, PositionTask):
+class ListedPosition(base.Listed, base.PositionTask):
     """The origin of a frame along a path."""
 
     kind: Literal["position"]
@@ -67,7 +58,7 @@ class ListedPosition(Listed, PositionTask):
     """Axes of the world that count."""
 
 
-class _AlongPose(Listed, AlongSection):
+class _AlongPose(base.Listed, base.AlongSection):
     """The position and the rotation of a frame (6 rows)."""
 
     frame: str  #: Frame of the robot.
@@ -82,7 +73,7 @@ class _AlongPose(Listed, AlongSection):
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
         """Yield the error of the position and of the rotation."""
-        return of_pose(error)
+        return base.of_pose(error)
 
 
 @register("tasks", "pose", shipped=True)
@@ -106,7 +97,7 @@ class ListedFrame(_AlongPose):
 
 
 @register("tasks", "pointing", shipped=True)
-class ListedPointing(PointingTask, Listed):
+class ListedPointing(base.PointingTask, base.Listed):
     """The z axis of a frame on a cone, or within it."""
 
     kind: Literal["pointing"]
@@ -114,7 +105,7 @@ class ListedPointing(PointingTask, Listed):
 
 
 @register("tasks", "look-at", shipped=True)
-class ListedLookAt(Listed, TaskSection):
+class ListedLookAt(base.Listed, base.TaskSection):
     """The z axis of a frame toward a point (2 rows)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:LookAt"
@@ -131,7 +122,7 @@ class ListedLookAt(Listed, TaskSection):
 
 
 @register("tasks", "relative", shipped=True)
-class ListedRelative(Listed, TaskSection):
+class ListedRelative(base.Listed, base.TaskSection):
     """The pose of a frame in another one (6 rows, or 3)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:RelativePose"
@@ -159,11 +150,11 @@ class ListedRelative(Listed, TaskSection):
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
         """Yield the error of the position and of the rotation."""
-        return of_pose(error) if self.orientation else super().sizes(error)
+        return base.of_pose(error) if self.orientation else super().sizes(error)
 
 
 @register("tasks", "manipulability", shipped=True)
-class ListedManipulability(Listed, TaskSection):
+class ListedManipulability(base.Listed, base.TaskSection):
     """The manipulability of a frame (1 row)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:Manipulability"
@@ -173,7 +164,7 @@ class ListedManipulability(Listed, TaskSection):
     least: keys.NotNegative  #: The value, in the unit of det(J J^T)^(1/2).
     part: Literal["position", "pose"] = "position"
     """"position": of the linear rows of its Jacobian. "pose": of all six."""
-    rows: Rows = "inequality"  #: "inequality": at `least` or above. "equality": at `least`.
+    rows: base.Rows = "inequality"  #: "inequality": at `least` or above. "equality": at `least`.
     stiffness: keys.Stiffness = 20.0
     damping: keys.Gain = 10.0
     gain: keys.Gain = 5.0
@@ -184,20 +175,16 @@ class ListedManipulability(Listed, TaskSection):
         task.jacobian(at.start)  # refuses a robot that it is not for
         return task
 
-    def asked(self, at: References) -> dict[str, Any]:
-        """Return the kind."""
-        return {"kind": self.rows}
-
 
 @register("tasks", "posture", shipped=True)
-class ListedPosture(Listed, PostureTask):
+class ListedPosture(base.Listed, base.PostureTask):
     """All joints to a posture."""
 
     kind: Literal["posture"]
 
 
 @register("tasks", "coupling", shipped=True)
-class ListedCoupling(Listed, TaskSection):
+class ListedCoupling(base.Listed, base.TaskSection):
     """A weighted sum of joint positions (1 row)."""
 
     unit: ClassVar[str] = "rad"
@@ -209,7 +196,7 @@ class ListedCoupling(Listed, TaskSection):
 
 
 @register("tasks", "com", shipped=True)
-class ListedCentreOfMass(Listed, AlongSection):
+class ListedCentreOfMass(base.Listed, base.AlongSection):
     """The centre of mass along a path."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:CentreOfMass"
@@ -226,7 +213,7 @@ class ListedCentreOfMass(Listed, AlongSection):
 
 
 @register("tasks", "momentum", shipped=True)
-class ListedMomentum(Listed):
+class ListedMomentum(base.Listed):
     """The momentum of the whole robot to zero."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:Momentum"
@@ -240,11 +227,11 @@ class ListedMomentum(Listed):
         return "N s" if self.part == "linear" else "N m s"
 
 
-class _Apart(Listed):
+class _Apart(base.Listed):
     """A task with one-sided rows between bodies."""
 
     unit: ClassVar[str] = "m"
-    rows: ClassVar[Rows] = "inequality"
+    rows: ClassVar[base.Rows] = "inequality"
 
 
 @register("tasks", "self-collision", shipped=True)

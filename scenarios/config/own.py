@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from hierarchy import Robot
 
 GIVEN: dict[Group, tuple[str, ...]] = {
-    "tasks": ("robot", "state", "name", "kind"),
+    "tasks": ("robot", "state", "name"),
     "plants": ("robot", "q", "v", "period", "level", "obstacles"),
     "sensors": ("robot", "exact", "body", "tip")}
 Maker = Callable[..., Any]

@@ -47,8 +47,9 @@ class Made(PartSection):
 
     def make(self, at: References, **more: Any) -> Task:
         """Return the task: what `made_by` makes of the keys, of what is `asked`, and of `more`."""
+        kind = "inequality" if self.one_sided else "equality"
         task: Task = self.made(at.robot, state=at.start, contacts=at.contacts, name=self.title,
-                               **{**self.asked(at), **more})
+                               **{"kind": kind, **self.asked(at), **more})
         return task
 
     def asked(self, at: References) -> dict[str, Any]:
@@ -146,9 +147,8 @@ class PointingTask(TaskSection):
     frame: ClassVar[str | None]
 
     def asked(self, at: References) -> dict[str, Any]:
-        """Return frame, half angle and kind."""
-        return {"frame": at.frame(self.frame), "half_angle": radians(self.alpha_d),
-                "kind": self.rows}
+        """Return the frame and the half angle."""
+        return {"frame": at.frame(self.frame), "half_angle": radians(self.alpha_d)}
 
     def angle(self, error: Array) -> Array:
         """Return the angle [deg] from the axis of the cone at errors of the task."""
