@@ -23,39 +23,32 @@ if TYPE_CHECKING:
     from scenarios.config.references import References
 
 
-class _OfForces(base.Listed):
-    """A task with rows over contact forces."""
+@register("tasks", "contact-force", shipped=True)
+class ListedForce(base.Listed):
+    """A contact's force or wrench at a value, at level "torque"."""
 
     unit: ClassVar[str] = "N"
     of_forces: ClassVar[bool] = True
-
-
-@register("tasks", "contact-force", shipped=True)
-class ListedForce(_OfForces):
-    """A contact's force or wrench at a value, at level "torque"."""
-
     made_by: ClassVar[str] = "hierarchy.tasks:ContactForce"
-    kind: Literal["contact-force"]
     contact: str  #: Name of the contact.
     target: tuple[keys.Finite, ...]  #: Normal force, force or wrench [N, N m]: 1, 3 or 6 numbers.
 
 
 @register("tasks", "least-force", shipped=True)
-class ListedLeastForce(_OfForces):
+class ListedLeastForce(base.Listed):
     """The smallest contact forces, as last level, at level "torque"."""
 
+    unit: ClassVar[str] = "N"
+    of_forces: ClassVar[bool] = True
     made_by: ClassVar[str] = "hierarchy.tasks:LeastForce"
-    kind: Literal["least-force"]
 
 
 @register("tasks", "position", shipped=True)
 class ListedPosition(base.Listed, base.PositionTask):
     """The origin of a frame along a path."""
 
-    kind: Literal["position"]
     frame: str  # type: ignore[misc]  #: Frame of the robot.
-    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"  # type: ignore[misc]
-    """Axes of the world that count."""
+    axes: base.Axes = "xyz"  # type: ignore[misc]  #: Axes of the world that count.
 
 
 class _AlongPose(base.Listed, base.AlongSection):
@@ -81,7 +74,6 @@ class ListedPose(_AlongPose):
     """Origin and axes of a frame (6 rows)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:Pose"
-    kind: Literal["pose"]
 
     def wanted(self, position: Array, error: Array) -> Array | None:
         """Return where the task wants the point."""
@@ -93,14 +85,12 @@ class ListedFrame(_AlongPose):
     """As `pose`, with the error log(T^-1 T_d) of SE(3) in the axes of `frame` (6 rows)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:FrameLog"
-    kind: Literal["frame"]
 
 
 @register("tasks", "pointing", shipped=True)
 class ListedPointing(base.PointingTask, base.Listed):
     """The z axis of a frame on a cone, or within it."""
 
-    kind: Literal["pointing"]
     frame: str  # type: ignore[misc]  #: Frame of the robot.
 
 
@@ -109,7 +99,6 @@ class ListedLookAt(base.Listed, base.TaskSection):
     """The z axis of a frame toward a point (2 rows)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:LookAt"
-    kind: Literal["look-at"]
     frame: str  #: Frame of the robot.
     target: keys.Point  #: The point.
     stiffness: keys.Stiffness = 20.0
@@ -126,7 +115,6 @@ class ListedRelative(base.Listed, base.TaskSection):
     """The pose of a frame in another one (6 rows, or 3)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:RelativePose"
-    kind: Literal["relative"]
     frame: str  #: Frame of the robot.
     to: str  #: The other frame.
     position: keys.Point | None = None
@@ -159,7 +147,6 @@ class ListedManipulability(base.Listed, base.TaskSection):
 
     made_by: ClassVar[str] = "hierarchy.tasks:Manipulability"
     unit: ClassVar[str] = ""
-    kind: Literal["manipulability"]
     frame: str  #: Frame of the robot.
     least: keys.NotNegative  #: The value, in the unit of det(J J^T)^(1/2).
     part: Literal["position", "pose"] = "position"
@@ -180,7 +167,6 @@ class ListedManipulability(base.Listed, base.TaskSection):
 class ListedPosture(base.Listed, base.PostureTask):
     """All joints to a posture."""
 
-    kind: Literal["posture"]
 
 
 @register("tasks", "coupling", shipped=True)
@@ -189,7 +175,6 @@ class ListedCoupling(base.Listed, base.TaskSection):
 
     unit: ClassVar[str] = "rad"
     made_by: ClassVar[str] = "hierarchy.tasks:JointCoupling"
-    kind: Literal["coupling"]
     joints: Annotated[dict[str, keys.Finite], Field(min_length=1)]  #: Factors of joints, by name.
     value: keys.JointPosition = 0.0  #: The value of the sum.
     stiffness: keys.Stiffness = 100.0
@@ -200,8 +185,7 @@ class ListedCentreOfMass(base.Listed, base.AlongSection):
     """The centre of mass along a path."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:CentreOfMass"
-    kind: Literal["com"]
-    axes: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = "xyz"  #: Axes of the world that count.
+    axes: base.Axes = "xyz"  #: Axes of the world that count.
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the path and the numbers of the axes."""
@@ -217,7 +201,6 @@ class ListedMomentum(base.Listed):
     """The momentum of the whole robot to zero."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:Momentum"
-    kind: Literal["momentum"]
     part: Literal["linear", "angular"] = "angular"  #: Which of the two.
     damping: keys.Gain = 10.0  #: Gain of the momentum.
 
@@ -227,19 +210,12 @@ class ListedMomentum(base.Listed):
         return "N s" if self.part == "linear" else "N m s"
 
 
-class _Apart(base.Listed):
-    """A task with one-sided rows between bodies."""
-
-    unit: ClassVar[str] = "m"
-    rows: ClassVar[base.Rows] = "inequality"
-
-
 @register("tasks", "self-collision", shipped=True)
-class ListedSelfCollision(_Apart, BarrierSection):
+class ListedSelfCollision(base.Listed, BarrierSection):
     """Links kept apart, except neighbours."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:SelfSeparation"
-    kind: Literal["self-collision"]
+    rows: ClassVar[base.Rows] = "inequality"
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the capsules, those of them to keep apart, and how."""
@@ -248,7 +224,7 @@ class ListedSelfCollision(_Apart, BarrierSection):
 
 
 @register("tasks", "collision", shipped=True)
-class ListedCollision(_Apart):
+class ListedCollision(base.Listed):
     """Where the rows of [avoidance] `separation` stand; by default above all tasks."""
 
-    kind: Literal["collision"]
+    rows: ClassVar[base.Rows] = "inequality"

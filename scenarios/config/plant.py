@@ -64,7 +64,7 @@ class KinematicSection(AnyPlant):
     made_by: ClassVar[str] = "scenarios.cell.plants.plant:KinematicArm"
     follows: ClassVar[bool] = True
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
-    kind: Literal["kinematic"] = "kinematic"
+    kind: str = "kinematic"
 
 
 class ServoSection(keys.Section):
@@ -98,7 +98,6 @@ class PhysicsSection(AnyPlant):
 
     made_by: ClassVar[str] = "scenarios.cell.plants.physics:PhysicsArm"
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
-    kind: Literal["mujoco"]
     beyond_stop: keys.PositiveAngle = 0.2  #: How far a joint may pass its limit before a fault.
     servo: ServoSection = ServoSection()  #: The servo of each joint.
     joints: JointsSection = JointsSection()  #: Friction and inertia of the joints.
@@ -135,7 +134,6 @@ class TorqueSection(AnyPlant):
 
     made_by: ClassVar[str] = "scenarios.cell.plants.torque:TorqueRobot"
     levels: ClassVar[tuple[str, ...]] = ("torque",)
-    kind: Literal["torque"]
     height: keys.Coordinate = 0.0  #: Height of the floor.
     friction: keys.Positive = 0.7  #: Coefficient of friction of the floor.
     softness: keys.Span = 0.005  #: Time constant of a contact.

@@ -43,7 +43,8 @@ def keys_of(section: type[Section]) -> tuple[Key, ...]:
     schema, meanings, found = section.model_json_schema(), _meanings(section), []
     for name, field in section.model_fields.items():
         key, parts = field.alias or name, (field.annotation, *field.metadata)
-        if "const" not in (value := schema["properties"][key]):
+        if key != "kind" or len(kinds_of(section)) != 1:
+            value = schema["properties"][key]
             units = dict.fromkeys(unit.name for unit in parts_of(parts, Unit))
             default = "required" if field.is_required() else _default(value)
             found.append(Key(key, _value(value, schema.get("$defs", {})), " or ".join(units),

@@ -177,6 +177,8 @@ class Registered(OneOf):
 
 
 def kinds_of(section: type[Section]) -> tuple[str, ...]:
-    """Return the values that a section allows for its key "kind"."""
+    """Return the kinds that a section is for: as its key "kind" allows, or as it is registered."""
     field = section.model_fields.get("kind")
-    return get_args(field.annotation) if field else ()
+    return get_args(field.annotation if field else None) or tuple(
+        kind for group in plugins.GROUPS for kind, one in plugins.registered(group).items()
+        if one is section)

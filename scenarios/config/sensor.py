@@ -40,7 +40,7 @@ class ExactSection(AnySensor):
 
     foot: ClassVar[float] = FOOT
     has_frames: ClassVar[bool] = False
-    kind: Literal["exact"] = "exact"
+    kind: str = "exact"
 
     def made(self, robot: Any, **given: Any) -> Any:
         """Return the exact sensor, which is given."""
@@ -122,7 +122,6 @@ class DepthErrors(keys.Section):
 class CameraSection(DepthErrors, ImageSection):
     """A simulated depth camera; the defaults resemble a Kinect."""
 
-    kind: Literal["camera"]
     width: Pixels = 640  #: Columns of the image.
     height: Pixels = 480  #: Rows of the image.
     fx: Focal = 525.0  #: Focal length, horizontally.
@@ -147,7 +146,6 @@ class FramesSection(ImageSection):
     """Recorded depth images, with their camera and times."""
 
     is_recorded: ClassVar[bool] = True
-    kind: Literal["frames"]
     folder: str  #: Their folder, relative to the scenario's file, or a shipped set.
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 Acceleration = Annotated[keys.Positive, keys.Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
+Axes = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
 
 
 class Made(PartSection):
