@@ -6,7 +6,6 @@ All but the exact one see obstacles in depth images: a simulated camera, or reco
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import inf
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -82,34 +81,29 @@ class DepthErrors(keys.Section):
     missing: keys.Share = 0.002  #: Probability of a missing reading.
     missing_at_edges: keys.Share = 0.3  #: The same beside a step in depth of 5 cm.
     outliers: keys.Share = 0.02  #: Probability of a square with a random, smaller depth in a frame.
+    ideal: keys.Flag = False  #: Whether readings have no errors.
     outlier_size: keys.Count = 2  #: Largest half side of that square, in pixels.
 
     def _wrong(self) -> Iterator[str]:
         if self.near >= self.far:
             yield f"near = {self.near} m must be below far = {self.far} m"
 
-    @classmethod
-    def none(cls, near: float = 0.0, far: float = inf) -> DepthErrors:
-        """Return the errors of an ideal camera: exact readings between near and far [m]."""
-        return DepthErrors(noise_floor=0.0, noise_growth=0.0, noise_from=0.0, rounding="step",
-                           step=0.0, near=near, far=far, missing=0.0, missing_at_edges=0.0,
-                           outliers=0.0, outlier_size=0)
-
     @property
     def random(self) -> bool:
         """Whether readings have random errors."""
-        return any((self.noise_floor, self.noise_growth, self.missing, self.missing_at_edges,
-                    self.outliers))
+        return not self.ideal and any((self.noise_floor, self.noise_growth, self.missing,
+                                       self.missing_at_edges, self.outliers))
 
     def packed(self) -> Array:
         """Return the array (9,) for `expose`."""
-        return np.array([self.noise_floor, self.noise_growth, self.noise_from,
-                         self.rounding == "disparity", self.step, self.near, self.far,
-                         self.missing, self.missing_at_edges])
+        errors = np.array([self.noise_floor, self.noise_growth, self.noise_from,
+                           self.rounding == "disparity", self.step, self.missing,
+                           self.missing_at_edges])
+        return np.insert(errors * (not self.ideal), 5, [self.near, self.far])
 
     def add_outliers(self, rng: np.random.Generator, reading: NDArray[np.float32]) -> None:
         """Add this frame's outlier, if it has one, to a reading (h, w)."""
-        if rng.random() >= self.outliers:
+        if self.ideal or rng.random() >= self.outliers:
             return
         v, u = rng.integers(reading.shape[0]), rng.integers(reading.shape[1])
         half = int(rng.integers(self.outlier_size + 1))
@@ -135,7 +129,6 @@ class CameraSection(DepthErrors, ImageSection):
     rate: keys.Frequency = 30.0  #: Frames per second.
     jitter: keys.Time = 0.0  #: Largest random shift of a frame; below 1 / rate.
     seed: keys.Count = 0  #: Seed of errors and jitter.
-    ideal: keys.Flag = False  #: Whether readings have no errors.
     far: keys.Length = 5.0  #: Depth above which readings are missing.
     point_radius: keys.Distance = 0.02  #: Radius at which obstacles that are points are seen.
     backdrop: keys.Distance = 4.0  #: Depth of a wall behind everything, 0 for none.

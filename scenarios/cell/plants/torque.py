@@ -115,15 +115,6 @@ class TorqueRobot:
                     f"(plant.tilt = {self._section.tilt:g}),")
         return self._stops.passed(self.q)
 
-    def accelerations(self, torques: Array) -> Array:
-        """Accelerations (n,) that torques cause at the present state, in the robot's convention."""
-        self.data.ctrl[:] = torques
-        self._mujoco.mj_forward(self.model, self.data)
-        a = np.array(self.data.qacc[self._rates])
-        if self._floating:  # d(R^T p')/dt
-            a[:3] = self._rotation().T @ a[:3] - np.cross(self.v[3:6], self.v[:3])
-        return a
-
     def _body(self, push: PushSection) -> int:
         names = {self.model.body(i).name.removeprefix("body "): i
                  for i in range(1, self.model.nbody)}

@@ -23,7 +23,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.rendering import draw_scene
 from scenarios.config.reading import LIBRARY
-from scenarios.config.sensor import CameraSection, DepthErrors
+from scenarios.config.sensor import CameraSection
 from scenarios.toml_text import read_toml
 
 Image = NDArray[np.float32]
@@ -110,9 +110,8 @@ class DepthCamera:
             raise HierarchyError(f"camera: jitter = {section.jitter} s must be below 1 / rate = "
                                  f"{1.0 / section.rate:.3g} s")
         self.pinhole, self.obstacles, self.latency = pinhole, obstacles, section.latency
-        self.errors = DepthErrors.none(section.near, section.far) if section.ideal else section
         self._section, self._backdrop = section, section.backdrop or inf
-        self._eye, self._packed = pinhole.packed(), self.errors.packed()
+        self._eye, self._packed = pinhole.packed(), section.packed()
         self._joints, self._capsules = pack_capsules(capsules)
         size = (pinhole.height, pinhole.width)
         self.scene, self._reading = np.zeros(size, np.float32), np.zeros(size, np.float32)
@@ -134,11 +133,11 @@ class DepthCamera:
         draw_scene(self.scene, self._eye, self._backdrop, self.obstacles.at(state.t),
                    self._section.point_radius, state.placements, self._joints, self._capsules)
         rng = self._rng(frame, 0)
-        if self.errors.random:
+        if self._section.random:
             rng.standard_normal(out=self._normal, dtype=np.float32)
             rng.random(out=self._uniform, dtype=np.float32)
         expose(self.scene, self._normal, self._uniform, self._packed, self._reading)
-        self.errors.add_outliers(rng, self._reading)
+        self._section.add_outliers(rng, self._reading)
         return self._reading, state.placements
 
     def _rng(self, frame: int, use: int) -> np.random.Generator:
