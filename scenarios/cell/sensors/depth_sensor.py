@@ -103,8 +103,7 @@ class DepthSensor:
     the time the source took to make the image, which is not part of the control loop.
     """
 
-    def __init__(self, section: ImageSection, source: Source, space: DepthSpace,
-                 exact: ExactDistances | None = None) -> None:
+    def __init__(self, section: ImageSection, source: Source, space: DepthSpace) -> None:
         self.source, self.space = source, space
         self.stale_after, self.least_readings = section.stale_after, section.least_readings
         self.points: tuple[ControlPoint, ...] = space.points
@@ -112,7 +111,6 @@ class DepthSensor:
         self.reading: Image | None = None
         self.stopped = self.covered = False
         self.outside = 0.0
-        self._exact = exact
         self._nothing = self._current = self._empty()
         self._spare: list[ObstacleImage] = []
         self._coming: deque[tuple[float, ObstacleImage]] = deque()
@@ -137,11 +135,6 @@ class DepthSensor:
         self.space.measure(self._current, state.placements)
         state.measurement = seen
         return seen
-
-    def check_start(self, state: State) -> None:
-        """Raise a HierarchyError if an obstacle of a simulated scene touches a point."""
-        if self._exact is not None:
-            self._exact.check_start(state)
 
     def _take(self, frame: int, state: State) -> None:
         if self.stopped:
@@ -178,10 +171,7 @@ class DepthSensor:
 
 def depth_sensor(section: CameraSection | FramesSection, robot: Robot, exact: ExactDistances,
                  asked: Asked) -> DepthSensor:
-    """Make the sensor of a simulated camera or of recorded frames, for the points of `exact`.
-
-    Recorded frames cannot be checked for obstacles at the start.
-    """
+    """Make the sensor of a simulated camera or of recorded frames, for the points of `exact`."""
     capsules = _capsules(robot, section.foot)
     source: Source
     if isinstance(section, CameraSection):
@@ -189,12 +179,12 @@ def depth_sensor(section: CameraSection | FramesSection, robot: Robot, exact: Ex
                     else np.array(section.rotation))
         pinhole = Pinhole(section.width, section.height, section.fx, section.fy, section.cx,
                           section.cy, section.position, rotation)
-        source, checked = DepthCamera(section, pinhole, exact.obstacles, capsules), exact
+        source = DepthCamera(section, pinhole, exact.obstacles, capsules)
     else:
-        source, checked = RecordedFrames(section.folder, robot, section.latency), None
+        source = RecordedFrames(section.folder, robot, section.latency)
     space = DepthSpace(section, source.pinhole, exact.points, capsules, asked,
                        exact.measurement.pairs is not None)
-    return DepthSensor(section, source, space, checked)
+    return DepthSensor(section, source, space)
 
 
 def _capsules(robot: Robot, foot: float) -> tuple[Capsule, ...]:
