@@ -157,4 +157,4 @@ class OwnPlant(AnyPlant, OwnSection):
     group: ClassVar[Group] = "plants"
 
 
-PlantKind = Annotated[AnyPlant, keys.Registered("kinematic", "plants", OwnPlant)]
+PlantKind = Annotated[AnyPlant, keys.Registered("kinematic", OwnPlant)]

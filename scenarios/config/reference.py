@@ -79,7 +79,9 @@ def explained(dotted: str) -> list[str]:
                     title_of(owner, _bracketed(path[:-1])))
     lines = [line for text, owners in said.items() for line in (*owners, *text)]
     for section in found:
-        lines += ["", title_of(section, _bracketed(path)), *_paragraphs(section)]
+        lines += ["", title_of(section, _bracketed(path)), *(
+            fill(text, 88, initial_indent="  ", subsequent_indent="  ")
+            for text in about(section).split("\n\n"))]
         for key in keys_of(section):
             lines += _lines(key)
     return lines
@@ -122,11 +124,6 @@ def _lines(key: Key) -> Iterator[str]:
     yield f"  {key.name}: {', '.join(filter(None, (f'{key.value}{unit}', default)))}"
     if key.meaning:
         yield fill(key.meaning, 88, initial_indent="      ", subsequent_indent="      ")
-
-
-def _paragraphs(section: type[Section]) -> Iterator[str]:
-    for text in about(section).split("\n\n"):
-        yield fill(text, 88, initial_indent="  ", subsequent_indent="  ")
 
 
 def _meanings(section: type[Section]) -> dict[str, str]:

@@ -13,7 +13,6 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError
-from hierarchy.plugins import Group
 from hierarchy.words import listed
 
 
@@ -152,22 +151,21 @@ class OneOf:
 
 @dataclass(frozen=True)
 class Registered(OneOf):
-    """The same for the kinds of a group: sections, or what `own.of` makes of something else."""
+    """The same for the kinds of `own.group`: sections, or what `own.of` makes of something else."""
 
-    group: Group = "tasks"
     own: Any = None
 
     def sections(self, annotation: Any) -> tuple[type[Section], ...]:
         """See `OneOf`."""
-        return (*map(self._as_section, plugins.registered(self.group).values()), self.own)
+        return (*map(self._as_section, plugins.registered(self.own.group).values()), self.own)
 
     def names(self, annotation: Any) -> tuple[str, ...]:
         """See `OneOf`."""
-        return tuple(plugins.known(self.group))
+        return tuple(plugins.known(self.own.group))
 
     def find(self, annotation: Any, kind: str) -> type[Section] | None:
         """See `OneOf`; loads the entry point of that name only."""
-        thing = plugins.find(self.group, kind)
+        thing = plugins.find(self.own.group, kind)
         return None if thing is None else self._as_section(thing)
 
     def _as_section(self, thing: Any) -> type[Section]:

@@ -149,4 +149,4 @@ class OwnSensor(AnySensor, OwnSection):
     foot: ClassVar[float] = FOOT
 
 
-SensorKind = Annotated[AnySensor, keys.Registered("exact", "sensors", OwnSensor)]
+SensorKind = Annotated[AnySensor, keys.Registered("exact", OwnSensor)]

@@ -277,4 +277,4 @@ class OwnTask(Listed, OwnSection):
         return task
 
 
-ListedTask = Annotated[Listed, keys.Registered(None, "tasks", OwnTask)]
+ListedTask = Annotated[Listed, keys.Registered(None, OwnTask)]

@@ -31,17 +31,9 @@ class Asked(NamedTuple):
 class Sensor(Protocol):
     """Measures distances of a robot's points to obstacles; see `ExactDistances`, `DepthSensor`."""
 
-    @property
-    def measurement(self) -> Measurement:
-        """The last measurement, always the same object."""
-
-    @property
-    def obstacles(self) -> Obstacles:
-        """The obstacles, as they are now."""
-
-    @property
-    def outside(self) -> float:
-        """Time [s] of the last measurement that the control loop would not spend."""
+    measurement: Measurement  #: The last measurement, always the same object.
+    obstacles: Obstacles  #: The obstacles, as they are now.
+    outside: float  #: Time [s] of the last measurement that the control loop would not spend.
 
     def measure(self, state: State) -> Measurement:
         """Measure at a state and hang the measurement on it; valid until the next call."""
