@@ -7,7 +7,7 @@ while contacts that stand give way by 0.1 mm; until then the robot does not do w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -149,12 +149,11 @@ def contacts_of(scenario: Scenario, robot: Robot) -> Contacts | None:
 def _contact(section: ContactSection, robot: Robot) -> Contact:
     with naming("frame"):
         frame = robot.frame(section.frame)
-    if section.x is None or section.y is None:
-        return Contact(frame, (section.offset,), section.friction, section.normal,
-                       section.name or "", section.open, section.ramp, section.slides)
-    points = np.array(section.offset) + corners(section.x, section.y, section.up)
-    return Contact(frame, points.tolist(), section.friction, section.normal, section.name or "",
-                   section.open, section.ramp, up=section.up)
+    points: Sequence[Sequence[float]] = (section.offset,)
+    if section.x is not None and section.y is not None:
+        points = (np.array(section.offset) + corners(section.x, section.y, section.up)).tolist()
+    return Contact(frame, points, section.friction, section.normal, section.name or "",
+                   section.open, section.ramp, section.slides, section.up)
 
 
 def on_contacts(scenario: Scenario, start: State) -> tuple[State, Contacts | None]:
