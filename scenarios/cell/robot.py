@@ -76,6 +76,13 @@ def sensed_points(robot: Robot) -> tuple[ControlPoint, ...]:
     return (*robot.control_points, ControlPoint(end.name, end.joint, end.offset))
 
 
+def on_column(robot: Robot, links: tuple[Capsule, ...], foot: float) -> tuple[Capsule, ...]:
+    """Return links of a robot; with a fixed base a column of height `foot` [m] is below them."""
+    if foot == 0.0 or robot.base == "floating" or not links:
+        return links
+    return (Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), links[0].radius), *links)
+
+
 def start_of(robot: Robot, section: StartSection) -> tuple[Array, Array]:
     """Return q (nq,) and v (n,) of the start, with the end effector at the requested point.
 

@@ -17,7 +17,7 @@ from hierarchy.avoidance import Capsule
 from hierarchy.problem import Array
 from hierarchy.robots import DHTable
 from hierarchy.robots.table import Base
-from scenarios.cell.robot import contacts_of, sensed_points
+from scenarios.cell.robot import contacts_of, on_column, sensed_points
 from scenarios.config import Scenario
 from scenarios.config.plant import TorqueSection
 from solvers.resolver import Handles
@@ -190,10 +190,7 @@ def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
 
     With `foot` > 0 [m] the first is a column of that height below the base.
     """
-    links = robot.capsules or _sticks(robot)
-    if foot == 0.0 or robot.base == "floating" or not links:
-        return links
-    return (Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), links[0].radius), *links)
+    return on_column(robot, robot.capsules or _sticks(robot), foot)
 
 
 def _sticks(robot: Robot) -> tuple[Capsule, ...]:

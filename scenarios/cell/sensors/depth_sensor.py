@@ -15,6 +15,7 @@ from hierarchy.avoidance.control_points import pack_points
 from hierarchy.avoidance.self_collision import pack_capsules
 from hierarchy.jit import bind
 from hierarchy.problem import Array
+from scenarios.cell.robot import on_column
 from scenarios.cell.sensors.camera import DepthCamera, Image, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.pixels import (
     ObstacleImage,
@@ -172,7 +173,10 @@ class DepthSensor:
 def depth_sensor(section: CameraSection | FramesSection, robot: Robot, exact: ExactDistances,
                  asked: Asked) -> DepthSensor:
     """Make the sensor of a simulated camera or of recorded frames, for the points of `exact`."""
-    capsules = _capsules(robot, section.foot)
+    if not robot.capsules:
+        raise HierarchyError(f"robot {robot.name!r} has no capsules, which are needed to remove "
+                             "it from the image")
+    capsules = on_column(robot, robot.capsules, section.foot)
     source: Source
     if isinstance(section, CameraSection):
         rotation = (looking_at(section.position, section.look_at) if section.rotation is None
@@ -185,13 +189,3 @@ def depth_sensor(section: CameraSection | FramesSection, robot: Robot, exact: Ex
     space = DepthSpace(section, source.pinhole, exact.points, capsules, asked,
                        exact.measurement.pairs is not None)
     return DepthSensor(section, source, space)
-
-
-def _capsules(robot: Robot, foot: float) -> tuple[Capsule, ...]:
-    if not robot.capsules:
-        raise HierarchyError(f"robot {robot.name!r} has no capsules, which are needed to remove "
-                             "it from the image")
-    if foot == 0.0 or robot.base == "floating":
-        return robot.capsules
-    column = Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), robot.capsules[0].radius)
-    return (column, *robot.capsules)
