@@ -14,8 +14,7 @@ import numpy as np
 import tomli_w
 
 from scenarios.cell.build import build
-from scenarios.cell.sensors.camera import DepthCamera
-from scenarios.cell.sensors.frames import ABOUT, INTRINSICS
+from scenarios.cell.sensors.camera import ABOUT, INTRINSICS, DepthCamera
 from scenarios.config import load
 from scenarios.loop.simulation import simulate
 from scenarios.recording.recording import Recording

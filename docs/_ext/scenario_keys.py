@@ -47,15 +47,10 @@ def _single(writer, place, section):
 
 
 def _several(writer, place, group):
-    """Yield what all kinds of a place have, then each kind; sections without a kind at once."""
+    """Yield what all kinds of a place have, then each kind."""
     from scenarios.config.reference import about, keys_of, kinds_of
 
     kinds = {kinds_of(one)[0]: one for one in group if kinds_of(one)}
-    if not kinds:
-        yield from writer.entries((place,), (
-            key._replace(meaning=f"{about(one)} {key.meaning}")
-            for one in group for key in keys_of(one)))
-        return
     yield f"- **kind**: one of these{'' if len(kinds) == len(group) else ', or of a plug-in'}"
     common = set.intersection(*({*map(_same, keys_of(one))} for one in kinds.values()))
     yield from writer.entries((place,), (

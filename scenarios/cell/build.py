@@ -159,27 +159,22 @@ def stack_resolver(scenario: Scenario, stack: Stack, activation: Activation | No
 
     Raises ScenarioError if the stack has activations and the resolver does not take them.
     """
-    resolver = scenario.make_resolver()
+    resolver, control = scenario.make_resolver(), scenario.control
     if isinstance(resolver, Merged):
         scales = {name: stack[name].scale for name in stack.names}
         resolver = replace(resolver, scales=scales | dict(resolver.scales))
-    if scenario.control.stack == "set-based":
+    if control.stack == "set-based":
         return SetBased(inner=resolver)
-    if activation is None:
-        return _settled(resolver, scenario, stack)
+    if activation is None and (control.level != "velocity" or control.damping == 0.0):
+        return resolver
+    if activation is None:  # where x is a velocity, tasks out of reach come to rest
+        curved = frozenset(name for name in stack.names if not stack[name].straight)
+        return Settled(inner=resolver, period=control.period, softness=control.damping,
+                       curved=curved)
     if not isinstance(resolver, Smooth):
         raise ScenarioError('control.stack = "smooth" needs control.resolver = "smooth", got '
                             f'"{resolver.name}"')
     return Activated(inner=resolver, activation=activation)
-
-
-def _settled(resolver: Resolver, scenario: Scenario, stack: Stack) -> Resolver:
-    """Return a resolver that lets tasks out of reach come to rest, where x is a velocity."""
-    control = scenario.control
-    if control.level != "velocity" or control.damping == 0.0:
-        return resolver
-    curved = frozenset(name for name in stack.names if not stack[name].straight)
-    return Settled(inner=resolver, period=control.period, softness=control.damping, curved=curved)
 
 
 def _widened(task: Task, scenario: Scenario) -> tuple[Task, float]:

@@ -7,7 +7,7 @@ while contacts that stand give way by 0.1 mm; until then the robot does not do w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -20,10 +20,10 @@ from hierarchy.tasks import Position
 from hierarchy.tasks.mechanism import Mechanism, model_rows
 from scenarios.cell.plants.mjcf import BALL
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.errors import naming
 from scenarios.config.plant import TorqueSection
 from scenarios.config.references import References
 from scenarios.config.robot import ContactSection, RobotPointSection, RobotSection, StartSection
+from scenarios.config.sections import naming
 from solvers import make
 
 _REACHED = 1e-6      # [m]
@@ -74,6 +74,13 @@ def sensed_points(robot: Robot) -> tuple[ControlPoint, ...]:
     """Return the points that a sensor measures: control points, then the end effector."""
     end = robot.frame(robot.end_effector)
     return (*robot.control_points, ControlPoint(end.name, end.joint, end.offset))
+
+
+def on_column(robot: Robot, links: tuple[Capsule, ...], foot: float) -> tuple[Capsule, ...]:
+    """Return links of a robot; with a fixed base a column of height `foot` [m] is below them."""
+    if foot == 0.0 or robot.base == "floating" or not links:
+        return links
+    return (Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), links[0].radius), *links)
 
 
 def start_of(robot: Robot, section: StartSection) -> tuple[Array, Array]:
@@ -149,12 +156,11 @@ def contacts_of(scenario: Scenario, robot: Robot) -> Contacts | None:
 def _contact(section: ContactSection, robot: Robot) -> Contact:
     with naming("frame"):
         frame = robot.frame(section.frame)
-    if section.x is None or section.y is None:
-        return Contact(frame, (section.offset,), section.friction, section.normal,
-                       section.name or "", section.open, section.ramp, section.slides)
-    points = np.array(section.offset) + corners(section.x, section.y, section.up)
-    return Contact(frame, points.tolist(), section.friction, section.normal, section.name or "",
-                   section.open, section.ramp, up=section.up)
+    points: Sequence[Sequence[float]] = (section.offset,)
+    if section.x is not None and section.y is not None:
+        points = (np.array(section.offset) + corners(section.x, section.y, section.up)).tolist()
+    return Contact(frame, points, section.friction, section.normal, section.name or "",
+                   section.open, section.ramp, section.slides, section.up)
 
 
 def on_contacts(scenario: Scenario, start: State) -> tuple[State, Contacts | None]:

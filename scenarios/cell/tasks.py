@@ -6,34 +6,18 @@ from math import inf
 from typing import Any, NamedTuple
 
 from hierarchy import Robot, Task
+from hierarchy import tasks as kinds
 from hierarchy.avoidance import SurveillanceAreas
 from hierarchy.contacts import Contacts
 from hierarchy.task import check_period
-from hierarchy.tasks import (
-    Avoidance,
-    BaseDynamics,
-    CentreOfPressure,
-    ContactMotion,
-    CumulatedRepulsion,
-    DangerBounds,
-    Friction,
-    JointDamping,
-    JointLimits,
-    Pointing,
-    Position,
-    Separation,
-    Together,
-    TorqueLimits,
-)
 from hierarchy.tasks.mechanism import above, model_rows
-from hierarchy.tasks.separation import SelfSeparation
 from scenarios.cell.published import PublishedAvoidance
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceSection, SeparationSection
 from scenarios.config.control import ControlSection
-from scenarios.config.errors import naming
 from scenarios.config.references import References
+from scenarios.config.sections import naming
 from scenarios.config.tasks import LimitsSection, Made
 
 
@@ -42,9 +26,9 @@ class Tasks(NamedTuple):
 
     all: list[Task]
     always: list[Task]
-    position: Position | None
-    pointing: Pointing | None
-    limits: JointLimits | None
+    position: kinds.Position | None
+    pointing: kinds.Pointing | None
+    limits: kinds.JointLimits | None
     listed: tuple[Task, ...]
     areas: SurveillanceAreas | None
     reference: Task | None
@@ -62,28 +46,31 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
                             "[position], [pointing], [avoidance], [[tasks]]")
     limits, first = _first(scenario, at)
     areas, avoiding = _avoidance(scenario, at)
-    section = scenario.avoidance
-    near: dict[str, Any] = {"repulsion_within": section.end_effector} if isinstance(
-        section, AvoidanceSection) else {}
+    near: dict[str, Any] = {"repulsion_within": scenario.avoidance.end_effector} if isinstance(
+        scenario.avoidance, AvoidanceSection) else {}
     # Algorithm 1 adds the cone's surface to the stack while it is violated: an equality.
     surface: dict[str, Any] = {"kind": "equality"} if scenario.control.stack == "switched" else {}
-    position: Position | None = _made(scenario.position, at, **near)
-    pointing: Pointing | None = _made(scenario.pointing, at, **surface)
+    position: kinds.Position | None = _made(scenario.position, at, **near)
+    pointing: kinds.Pointing | None = _made(scenario.pointing, at, **surface)
     posture = _made(scenario.posture, at)
-    listed = [_made(task, at, f"tasks.{i}") for i, task in enumerate(scenario.tasks)
-              if task.kind != "collision"]
+    # The separation from obstacles stands where the task "collision" is listed.
+    collision = any(task.kind == "collision" for task in scenario.tasks)
+    moved = [task for task in avoiding if collision and isinstance(task, kinds.Separation)]
+    listed = [task for i, section in enumerate(scenario.tasks) for task in (
+        moved if section.kind == "collision" else [_made(section, at, f"tasks.{i}")])]
     last = posture if scenario.posture and scenario.posture.role == "task" else None
-    tasks = _in_order(scenario, [*first, *avoiding, *(
-        task for task in (position, pointing, *listed, last) if task)])
+    tasks = [*first, *(task for task in avoiding if task not in moved),
+             *(task for task in (position, pointing, *listed, last) if task)]
     if scenario.control.level == "velocity":
         for task in tasks:
             check_period(task, scenario.control.period)
     return Tasks(tasks, first if areas else [*first, *avoiding], position, pointing, limits,
-                 tuple(listed), areas, _reference(scenario, at, None if last else posture),
+                 tuple(task for task in listed if task not in moved), areas,
+                 _reference(scenario, at, None if last else posture),
                  {task.title: task.give for task in scenario.tasks if task.give})
 
 
-def _first(scenario: Scenario, at: References) -> tuple[JointLimits | None, list[Task]]:
+def _first(scenario: Scenario, at: References) -> tuple[kinds.JointLimits | None, list[Task]]:
     """Return the joint limits, and all tasks at the top: mechanism, physics, limits."""
     with naming("limits"):
         limits, first = _limits(scenario, at.robot)
@@ -95,22 +82,23 @@ def _first(scenario: Scenario, at: References) -> tuple[JointLimits | None, list
                          not bounded and scenario.make_resolver().can_resolve("inequalities"))
 
 
-def _limits(scenario: Scenario, robot: Robot) -> tuple[JointLimits | None, list[Task]]:
+def _limits(scenario: Scenario, robot: Robot) -> tuple[kinds.JointLimits | None, list[Task]]:
     """Return the joint limits, and the levels that they are in the stack."""
     section = scenario.limits
     if section is None:
         return None, []
     limits = _joint_limits(section, scenario.control, robot)
-    box = limits if section.danger_reach is None else DangerBounds(
+    box = limits if section.danger_reach is None else kinds.DangerBounds(
         limits, sensed_points(robot), section.danger_reach, name=limits.name)
     if not scenario.limits_in_stack:
         return limits, []
     if section.torque is None or section.place == "bounds" or scenario.control.level == "torque":
         return limits, [box]  # with contact forces torques are limited by `_physics`
-    return limits, [box, TorqueLimits(robot, section.torque)]
+    return limits, [box, kinds.TorqueLimits(robot, section.torque)]
 
 
-def _joint_limits(section: LimitsSection, control: ControlSection, robot: Robot) -> JointLimits:
+def _joint_limits(section: LimitsSection, control: ControlSection,
+                  robot: Robot) -> kinds.JointLimits:
     """Return the limits of the joints, and of a floating base unless only forces move it."""
     speed = section.base_speed
     if speed is None and robot.base == "floating" and control.level != "torque":
@@ -118,9 +106,9 @@ def _joint_limits(section: LimitsSection, control: ControlSection, robot: Robot)
     horizon = section.horizon
     if horizon is None:
         horizon = 0.05 if control.level == "torque" else 0.0
-    return JointLimits(robot, section.acceleration, control.period, section.margin,
-                       base_speed=speed, base_acceleration=section.base_acceleration,
-                       horizon=horizon)
+    return kinds.JointLimits(robot, section.acceleration, control.period, section.margin,
+                             base_speed=speed, base_acceleration=section.base_acceleration,
+                             horizon=horizon)
 
 
 def _avoidance(scenario: Scenario,
@@ -131,7 +119,7 @@ def _avoidance(scenario: Scenario,
         return None, _separation(section, at, scenario.sensor.kind == "exact")
     if section is None or section.place == "null-space":
         return None, []
-    kind = PublishedAvoidance if section.jacobian == "published" else Avoidance
+    kind = PublishedAvoidance if section.jacobian == "published" else kinds.Avoidance
     return (SurveillanceAreas(section.near, section.far, section.end_effector),
             [kind(at.robot.control_points, section.dimension)])
 
@@ -140,23 +128,23 @@ def _separation(section: SeparationSection, at: References, exact: bool) -> list
     """Return the tasks that keep clear of obstacles, and of the robot itself."""
     tasks: list[Task] = []
     if section.obstacles or not exact:
-        tasks.append(Separation(sensed_points(at.robot), section.barrier(section.distance),
-                                len(section.obstacles) if exact else None))
+        tasks.append(kinds.Separation(sensed_points(at.robot), section.barrier(section.distance),
+                                      len(section.obstacles) if exact else None))
     if (distance := section.self_collision) is not None:
         with naming("avoidance.self_collision"):
-            tasks.append(SelfSeparation(at.robot.capsules, section.barrier(distance),
-                                        at.pairs(distance)))
+            tasks.append(kinds.SelfSeparation(at.robot.capsules, section.barrier(distance),
+                                              at.pairs(distance)))
     return tasks
 
 
 def _reference(scenario: Scenario, at: References, posture: Task | None) -> Task | None:
     """Return the null-space task: [damping] or a posture, and the body's repulsion if placed so."""
-    base = posture if scenario.damping is None else JointDamping(
+    base = posture if scenario.damping is None else kinds.JointDamping(
         at.robot.n, scenario.damping.value, scenario.damping.weight)
     avoidance, points = scenario.avoidance, at.robot.control_points
     if not isinstance(avoidance, AvoidanceSection) or avoidance.place == "stack" or not points:
         return base
-    return CumulatedRepulsion(at.robot.n, points, avoidance.far, base)
+    return kinds.CumulatedRepulsion(at.robot.n, points, avoidance.far, base)
 
 
 def _made(section: Made | None, at: References, key: str = "", /, **more: Any) -> Any:
@@ -167,19 +155,6 @@ def _made(section: Made | None, at: References, key: str = "", /, **more: Any) -
         return section.make(at, **more)
 
 
-def _in_order(scenario: Scenario, tasks: list[Task]) -> list[Task]:
-    """Move the separation from obstacles to the place of the listed task "collision"."""
-    kinds = [section.kind for section in scenario.tasks]
-    if "collision" not in kinds:
-        return tasks
-    apart = [task for task in tasks if isinstance(task, Separation)]
-    rest = [task for task in tasks if not isinstance(task, Separation)]
-    below = len(kinds) - kinds.index("collision") - 1  # of the list
-    below += scenario.posture is not None and scenario.posture.role == "task"
-    place = len(rest) - below
-    return [*rest[:place], *apart, *rest[place:]]
-
-
 def _physics(scenario: Scenario, contacts: Contacts) -> list[Task]:
     """Return the levels at the top of a stack at level "torque".
 
@@ -187,11 +162,11 @@ def _physics(scenario: Scenario, contacts: Contacts) -> list[Task]:
     torque limits and the forces that contacts can transmit. One that would be empty is left out.
     """
     with naming("forces"):
-        motion = [ContactMotion(contacts, damping=scenario.forces.damping)] \
+        motion = [kinds.ContactMotion(contacts, damping=scenario.forces.damping)] \
             if contacts.contacts else []
-        dynamics = [BaseDynamics(contacts)] if contacts.robot.base == "floating" else []
+        dynamics = [kinds.BaseDynamics(contacts)] if contacts.robot.base == "floating" else []
         limits = _force_limits(scenario, contacts) if scenario.forces_in_stack else []
-    return [Together(tasks, name) for tasks, name in (
+    return [kinds.Together(tasks, name) for tasks, name in (
         ([*dynamics, *motion], "physics"), (limits, "limits")) if tasks]
 
 
@@ -199,10 +174,10 @@ def _force_limits(scenario: Scenario, contacts: Contacts) -> list[Task]:
     limits, forces = scenario.limits, scenario.forces
     found: list[Task] = []
     if limits and (limits.torque or limits.torque_step):
-        found.append(TorqueLimits(contacts.robot, limits.torque or 1.0, contacts=contacts,
+        found.append(kinds.TorqueLimits(contacts.robot, limits.torque or 1.0, contacts=contacts,
                                   step=limits.torque_step or inf))
     if contacts.contacts:
-        found.append(Friction(contacts, forces.faces, forces.least, forces.largest or inf))
+        found.append(kinds.Friction(contacts, forces.faces, forces.least, forces.largest or inf))
     if forces.edge is not None:
-        found.append(CentreOfPressure(contacts, forces.edge))
+        found.append(kinds.CentreOfPressure(contacts, forces.edge))
     return found

@@ -73,7 +73,7 @@ def list_(plugin: opt.Plugins = None, as_json: opt.AsJson = False) -> None:
     from hierarchy.robots.table import in_words
     from hierarchy.tasks import TASKS
     from scenarios.config import load, shipped, shipped_groups
-    from scenarios.config.names import load_group
+    from scenarios.config.reading import load_group
     from scenarios.results.plan import load_sweep, shipped_sweeps
 
     entries = {"scenarios": {name: load(name).title for name in shipped()},

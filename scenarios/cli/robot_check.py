@@ -19,8 +19,8 @@ from hierarchy.robots.found import remarks
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.words import some
 from scenarios.config import ScenarioError, is_shipped, shipped, shipped_groups
-from scenarios.config.changes import change, parse_changes
-from scenarios.config.names import WANTED, no_scenario
+from scenarios.config.changes import change_all, parse_changes
+from scenarios.config.reading import WANTED, no_scenario
 from scenarios.config.robot import RobotSection
 from scenarios.config.sections import Section
 from scenarios.config.validation import validated
@@ -43,7 +43,7 @@ def is_robot(text: str) -> bool:
     Raises a HierarchyError for what is neither.
     """
     if Path(text).is_dir() or Path(text).suffix == ".py":
-        raise no_scenario(text, shipped())
+        raise no_scenario(text)
     if text.endswith(".toml") or ".toml:" in text or is_shipped(text) or text in shipped_groups():
         return False
     if not (in_package(text) or is_file_name(text) or text in TABLES
@@ -58,8 +58,7 @@ def look_at(model: str, changes: Sequence[str] | None) -> tuple[RobotSection, Ro
     from scenarios.cell.robot import make_robot
 
     data: dict[str, Any] = {"robot": {"model": model}}
-    for key, value in parse_changes(changes or (), what="--set").items():
-        change(data, key, value)
+    change_all(data, parse_changes(changes or (), what="--set"), _OfRobot)
     if unknown := [key for key in data if key != "robot"]:
         raise ScenarioError(f"--set {unknown[0]}: only keys of [robot] can be set for a robot")
     section = validated(_OfRobot, data, repr(model)).robot

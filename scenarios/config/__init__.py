@@ -1,9 +1,8 @@
 """Reading and validating scenario files; one module per section."""
 
-from scenarios.config.errors import ScenarioError
-from scenarios.config.names import members, shipped_groups
-from scenarios.config.reading import is_shipped, load, shipped
+from scenarios.config.reading import is_shipped, load, members, shipped, shipped_groups
 from scenarios.config.scenario import Scenario
+from scenarios.config.sections import ScenarioError
 
 __all__ = ["Scenario", "ScenarioError", "is_shipped", "load", "members", "shipped",
            "shipped_groups"]

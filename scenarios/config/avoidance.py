@@ -18,12 +18,9 @@ from scenarios.config.paths import PathSection, WaypointsSection
 class RepulsionSection(keys.Section):
     """Magnitude of the repulsion over the distance, eq. (23)."""
 
-    maximum: keys.Positive
-    """Magnitude at distance zero, in [m/s^2], or [m/s] at velocity level."""
-    reach: keys.Length
-    """rho: distance at which it is nearly zero."""
-    shape: keys.Positive
-    """gamma: its steepness."""
+    maximum: keys.Positive  #: Magnitude at distance zero, in [m/s^2], or [m/s] at velocity level.
+    reach: keys.Length  #: rho: distance at which it is nearly zero.
+    shape: keys.Positive  #: gamma: its steepness.
     scale: keys.Positive = 2.0
     """Factor of the distance: 2 in (23), in the authors' code 3 (body) and 1.5 (end effector)."""
 
@@ -38,18 +35,13 @@ class ObstacleSection(keys.Section):
     tag: ClassVar[str] = "shape"
     shape: Literal["point", "sphere", "capsule", "box"] = "point"
     """A list [x, y, z] in place of the table is a point."""
-    centre: keys.Point | None = None
-    """Its middle, if it does not move."""
-    radius: keys.Length | None = None
-    """Of a sphere or a capsule."""
-    half_length: keys.Length | None = None
-    """Of a capsule: half its segment, along z."""
-    half_lengths: tuple[keys.Length, keys.Length, keys.Length] | None = None
-    """Of a box: half its sides."""
+    centre: keys.Point | None = None  #: Its middle, if it does not move.
+    radius: keys.Length | None = None  #: Of a sphere or a capsule.
+    half_length: keys.Length | None = None  #: Of a capsule: half its segment, along z.
+    half_lengths: tuple[keys.Length, keys.Length, keys.Length] | None = None  #: Half a box's sides.
     rotation: keys.Rows3 = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
     """Rows of the matrix from its axes to the world's."""
-    path: PathSection | None = None
-    """Path of its middle, if it moves."""
+    path: PathSection | None = None  #: Path of its middle, if it moves.
 
     def _wrong(self) -> Iterator[str]:
         needs = {"point": (), "sphere": ("radius",), "capsule": ("radius", "half_length"),
@@ -80,10 +72,8 @@ Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(as_table)], ...]
 class VariationSection(keys.Section):
     """Random variation of the obstacles' waypoints."""
 
-    seed: keys.Count
-    """Seed of the variation."""
-    spread: keys.Distance = 0.05
-    """Largest displacement of a waypoint; equal ones in a row move together."""
+    seed: keys.Count  #: Seed of the variation.
+    spread: keys.Distance = 0.05  #: Largest shift of a waypoint; equal ones in a row move together.
     timing: Annotated[float, Field(strict=True, ge=0.0, lt=1.0)] = 0.1
     """Largest shift of a time but the first, as a share of half the shorter interval beside it."""
 
@@ -115,10 +105,8 @@ def _in_ball(random: np.random.Generator, count: int) -> Array:
 
 
 class _Avoiding(keys.Section):
-    obstacles: Obstacles
-    """Tables, or points [x, y, z]."""
-    variation: VariationSection | None = None
-    """Random variation of the obstacles' paths."""
+    obstacles: Obstacles  #: Tables, or points [x, y, z].
+    variation: VariationSection | None = None  #: Random variation of the obstacles' paths.
 
     @property
     def placed(self) -> Obstacles:
@@ -144,18 +132,12 @@ class AvoidanceSection(_Avoiding):
     direction: Literal["nearest", "mean"] = "nearest"
     """Away from the "nearest" obstacle, or along the "mean" (25)-(26) over those within `far` of a
     control point and `end_effector` of the end effector."""
-    near: keys.Distance
-    """Distance, eps_1, below which the body's avoidance comes before the position."""
-    far: keys.Distance
-    """Distance, eps_2, below which the body avoids at all; at least `near`."""
-    end_effector: keys.Distance
-    """Distance, eps_ee, below which the end effector is repelled."""
-    body: RepulsionSection
-    """Repulsion of the body."""
-    tip: RepulsionSection
-    """Repulsion of the end effector."""
-    jacobian: Literal["exact", "published"] = "exact"
-    """"published": with the error of the published code."""
+    near: keys.Distance  #: eps_1: distance below which the body's avoidance precedes the position.
+    far: keys.Distance  #: Distance, eps_2, below which the body avoids at all; at least `near`.
+    end_effector: keys.Distance  #: Distance, eps_ee, below which the end effector is repelled.
+    body: RepulsionSection  #: Repulsion of the body.
+    tip: RepulsionSection  #: Repulsion of the end effector.
+    jacobian: Literal["exact", "published"] = "exact"  #: "published": with the published error.
     place: Literal["stack", "null-space"] = "stack"
     """"null-space": the repulsion of all control points within `far` is summed in the null-space
     term; `near` has no effect."""
@@ -191,16 +173,11 @@ class AvoidanceSection(_Avoiding):
 class BarrierSection(keys.Section):
     """How one-sided rows keep a distance, see hierarchy.avoidance.Barrier."""
 
-    distance: keys.Distance = 0.03
-    """Clearance to keep."""
-    rate: keys.Rate = 10.0
-    """Fastest approach: speed per distance left."""
-    influence: keys.Length = 0.3
-    """Distance beyond which nothing acts; above `distance`."""
-    recovery: keys.Speed = 0.2
-    """Largest speed of the retreat below it."""
-    limit: Annotated[keys.Positive, keys.Unit("m/s^2")] = 50.0
-    """Largest acceleration of the retreat."""
+    distance: keys.Distance = 0.03  #: Clearance to keep.
+    rate: keys.Rate = 10.0  #: Fastest approach: speed per distance left.
+    influence: keys.Length = 0.3  #: Distance beyond which nothing acts; above `distance`.
+    recovery: keys.Speed = 0.2  #: Largest speed of the retreat below it.
+    limit: Annotated[keys.Positive, keys.Unit("m/s^2")] = 50.0  #: Largest acceleration of retreat.
 
     def barrier(self, distance: float) -> Barrier:
         """Return the barrier of a distance [m] to keep; HierarchyError if it is out of range."""

@@ -6,24 +6,14 @@ every entry: `avoidance.obstacles.*.radius`. `--set`, sweeps and `[variation]` h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from hierarchy.errors import UnknownNameError, brief, expect
 from scenarios.config.distributions import flat
-from scenarios.config.errors import ScenarioError
+from scenarios.config.sections import ScenarioError, Section
+from scenarios.config.validation import Tag, tag_at
 from scenarios.toml_text import parse
-
-
-class Tag(NamedTuple):
-    """The key that says which kind a section is of, and the kind of one without it."""
-
-    key: str
-    default: str | None
-
-
-TagAt = Callable[[Sequence[str]], Tag | None]
-"""Gives the tag of the section at a path, None if there is one kind only."""
 
 
 def parse_changes(changes: Sequence[str], what: str) -> dict[str, Any]:
@@ -50,17 +40,33 @@ def _value(text: str, what: str) -> Any:
         raise
 
 
-def change(data: dict[str, Any], dotted: str, value: Any) -> None:
-    """Set the value at a dotted key of `data` in place; absent tables are added.
+def change_all(data: dict[str, Any], changes: Mapping[str, Any], root: type[Section]) -> None:
+    """Set values at dotted keys of the `data` of a `root` in place; absent tables are added.
 
-    Raises ScenarioError for a key within something that is no table, or outside a list.
+    A section that gets another kind starts anew, wherever that stands. Raises ScenarioError for a
+    key within something that is no table, or outside a list.
     """
-    try:
-        for key in matching(data, dotted):
-            table, last = place(data, key, add=True)
-            table[last] = value
-    except ValueError as error:
-        raise ScenarioError(f"{dotted}: {error}") from None
+    expect("changes", changes, Mapping, "give {\"section.key\": value, ...}")
+    tags = {}
+    for key in changes:
+        expect("changes: a key", key, str, "such as \"control.period\"")
+        *path, last = key.split(".")
+        tag = tag_at(root, path)
+        tags[key] = tag if tag is not None and tag.key == last else None
+    for key in sorted(changes, key=lambda key: tags[key] is None):  # kinds first, else as given
+        try:
+            _change(data, key, changes[key], tags[key])
+        except ValueError as error:
+            raise ScenarioError(f"{key}: {error}") from None
+
+
+def _change(data: dict[str, Any], dotted: str, value: Any, tag: Tag | None) -> None:
+    for key in matching(data, dotted):
+        table, last = place(data, key, add=True)
+        if table and _is_another_kind(table, {last: value}, tag):
+            table.clear()
+            _vary_no_more(data, key.rpartition(".")[0])
+        table[last] = value
 
 
 def matching(data: Any, pattern: str) -> Iterator[str]:
@@ -88,15 +94,14 @@ def place(data: Any, dotted: str, add: bool = False) -> tuple[Any, Any]:
     """
     *path, last = dotted.split(".")
     for i, key in enumerate(path):
-        above = ".".join(path[:i])
-        found = within(data, key, above, add)
+        found = _within(data, key, ".".join(path[:i]), add)
         if add and isinstance(data, dict) and data.get(key) is None:
             data[key] = {}
         data = data[found]
-    return data, within(data, last, ".".join(path), add)
+    return data, _within(data, last, ".".join(path), add)
 
 
-def within(data: Any, key: str, above: str, add: bool = False) -> Any:
+def _within(data: Any, key: str, above: str, add: bool) -> Any:
     """Return the key of a table or the index of a list; raises ValueError if it has none."""
     where = f"[{above}]" if above else "the file"
     if isinstance(data, list):
@@ -110,71 +115,32 @@ def within(data: Any, key: str, above: str, add: bool = False) -> Any:
     return key
 
 
-def change_all(data: dict[str, Any], changes: Mapping[str, Any], tag_at: TagAt) -> None:
-    """Apply changes in place; a section that gets another kind starts anew, wherever that stands.
-
-    Raises ScenarioError like `change`.
-    """
-    expect("changes", changes, Mapping, "give {\"section.key\": value, ...}")
-    for key in changes:
-        expect("changes: a key", key, str, "such as \"control.period\"")
-    kinds = {key for key in changes if _says_kind(key, tag_at)}
-    for key in sorted(changes, key=lambda key: key not in kinds):  # kinds first, else as given
-        if key in kinds:
-            _begin_anew(data, key, changes[key], tag_at)
-        change(data, key, changes[key])
-
-
-def laid_over(below: Mapping[str, Any], above: Mapping[str, Any], tag_at: TagAt) -> dict[str, Any]:
-    """Return a file's tables over those of the file that it extends.
+def lay_over(below: dict[str, Any], above: Mapping[str, Any], root: type[Section]) -> None:
+    """Lay a file's tables over those of the file that it extends, in place.
 
     A section of another kind replaces the one below it, and what varies there goes with it.
     """
-    gone: list[str] = []
-    merged = _merged(below, above, tag_at, (), gone)
-    for section in gone:
-        _vary_no_more(merged, section)
-    return merged
+    for section in list(_lay(below, above, root, ())):
+        _vary_no_more(below, section)
 
 
-def _merged(below: Mapping[str, Any], above: Mapping[str, Any], tag_at: TagAt,
-            at: tuple[str, ...], gone: list[str]) -> dict[str, Any]:
-    merged = dict(below)
+def _lay(below: dict[str, Any], above: Mapping[str, Any], root: type[Section],
+         at: tuple[str, ...]) -> Iterator[str]:
+    """Lay tables over others; yield the sections that have got another kind."""
     for key, value in above.items():
-        under, where = merged.get(key), (*at, key)
+        under, where = below.get(key), (*at, key)
         if not (isinstance(value, dict) and isinstance(under, dict)):
-            merged[key] = value
-        elif _is_another_kind(under, value, tag_at(where)):
-            merged[key] = value
-            gone.append(".".join(where))
+            below[key] = value
+        elif _is_another_kind(under, value, tag_at(root, where)):
+            below[key] = value
+            yield ".".join(where)
         else:
-            merged[key] = _merged(under, value, tag_at, where, gone)
-    return merged
+            yield from _lay(under, value, root, where)
 
 
 def _is_another_kind(below: Mapping[str, Any], above: Mapping[str, Any], tag: Tag | None) -> bool:
     return tag is not None and tag.key in above and (
         above[tag.key] != below.get(tag.key, tag.default))
-
-
-def _says_kind(dotted: str, tag_at: TagAt) -> bool:
-    *path, last = dotted.split(".")
-    tag = tag_at(path)
-    return tag is not None and tag.key == last
-
-
-def _begin_anew(data: dict[str, Any], dotted: str, kind: Any, tag_at: TagAt) -> None:
-    """Empty the sections whose kind a change replaces by another one."""
-    *path, last = dotted.split(".")
-    try:
-        for section in matching(data, ".".join(path)):
-            above, key = place(data, section, add=True)
-            under = above.get(key) if isinstance(above, dict) else above[key]
-            if isinstance(under, dict) and _is_another_kind(under, {last: kind}, tag_at(path)):
-                above[key] = {}
-                _vary_no_more(data, section)
-    except ValueError as error:
-        raise ScenarioError(f"{dotted}: {error}") from None
 
 
 def _vary_no_more(data: dict[str, Any], section: str) -> None:

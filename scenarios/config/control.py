@@ -26,27 +26,19 @@ class PolicySection(keys.Section):
     once.
     """
 
-    iteration_limit: AnswerPolicy = "brake"
-    """Status of the resolver: too many iterations."""
-    numerical_failure: BlindPolicy = "brake"
-    """Status: no usable answer."""
-    backend_failure: AnswerPolicy = "brake"
-    """Status: the solver behind the resolver failed."""
-    inaccurate: AnswerPolicy = "brake"
-    """Status: an answer below the resolver's accuracy."""
+    iteration_limit: AnswerPolicy = "brake"  #: Status of the resolver: too many iterations.
+    numerical_failure: BlindPolicy = "brake"  #: Status: no usable answer.
+    backend_failure: AnswerPolicy = "brake"  #: Status: the solver behind the resolver failed.
+    inaccurate: AnswerPolicy = "brake"  #: Status: an answer below the resolver's accuracy.
     not_finite: BlindPolicy = "brake"
     """A measured state is not finite, its quaternion invalid, or a distance NaN."""
     stale: BlindPolicy = "brake"
     """No measurement for more than `stale_after`; until then the last one is extrapolated from the
     commands."""
-    overrun: AnswerPolicy = "brake"
-    """The command is not ready at the `deadline`."""
-    inside: AnswerPolicy = "brake"
-    """A point of the robot is in an obstacle."""
-    patience: keys.Count = 10
-    """Ticks for which "hold" repeats a command."""
-    stale_after: keys.Time = 0.02
-    """Age from which a measurement is stale."""
+    overrun: AnswerPolicy = "brake"  #: The command is not ready at the `deadline`.
+    inside: AnswerPolicy = "brake"  #: A point of the robot is in an obstacle.
+    patience: keys.Count = 10  #: Ticks for which "hold" repeats a command.
+    stale_after: keys.Time = 0.02  #: Age from which a measurement is stale.
     deadline: keys.Span | None = None
     """Time in a tick until its command must be ready, by default unlimited."""
 
@@ -68,12 +60,10 @@ class ControlSection(keys.Section):
     """Whether to measure, untimed, how far the levels below the position move the end effector."""
     period: Annotated[float, Field(strict=True, gt=0.0, le=1.0), keys.Unit("s")] = 0.001
     """Time from tick to tick."""
-    duration: keys.Span
-    """How long a run lasts."""
+    duration: keys.Span  #: How long a run lasts.
     jacobian_derivative: Literal["exact", "difference"] = "exact"
     """dJ/dt: "exact", or the "difference" of two ticks."""
-    resolver: str
-    """One of `hierarchy list`, or of a plug-in."""
+    resolver: str  #: One of `hierarchy list`, or of a plug-in.
     options: dict[str, Any] = Field(default_factory=dict)
     """Settings of the resolver. A table with a resolver's name, such as `[control.options.tpm]`, is
     for that resolver only; plain settings override it."""
@@ -82,13 +72,11 @@ class ControlSection(keys.Section):
     A resolver's damping is in `options`."""
     metric: Literal["identity", "mass"] = "identity"
     """Metric of the distance to the null-space term: "identity", or "mass", the inertia M(q)."""
-    policy: PolicySection = PolicySection()
-    """The command in a tick with a problem."""
+    policy: PolicySection = PolicySection()  #: The command in a tick with a problem.
     transition: Literal["none", "blend"] = "none"
     """After a change of the stack's order or the active control point the command changes at once
     ("none") or within `transition_time` ("blend")."""
-    transition_time: keys.Span = 0.02
-    """How long "blend" takes."""
+    transition_time: keys.Span = 0.02  #: How long "blend" takes.
 
     def _wrong(self) -> Iterator[str]:
         from solvers import make, names, variants
@@ -126,25 +114,17 @@ class FaultSection(keys.Section):
     "stale": measurements are frozen. "status": the resolver reports `status`. "overrun": a tick
     takes longer. "obstacle": a sphere appears. "no_frames": the camera stops. "dark_frames": images
     have no readings."""
-    at: keys.Time
-    """When it begins."""
-    duration: keys.Span
-    """How long it lasts."""
-    joint: Annotated[int, Field(strict=True, ge=1)] | None = None
-    """Number of a joint from 1; by default all."""
-    point: Annotated[int, Field(strict=True, ge=1)] | None = None
+    at: keys.Time  #: When it begins.
+    duration: keys.Span  #: How long it lasts.
+    joint: keys.Number | None = None  #: Number of a joint from 1; by default all.
+    point: keys.Number | None = None
     """Number of a control point from 1, last the end effector; by default all."""
     status: Literal["iteration_limit", "numerical_failure", "backend_failure",
-                    "inaccurate"] | None = None
-    """What the resolver reports."""
-    takes: keys.Span | None = None
-    """Time that a tick takes longer."""
-    centre: keys.Point | None = None
-    """Middle of the sphere."""
-    place: ControlPointSection | None = None
-    """In place of `centre`: point of the body where it appears."""
-    radius: keys.Length | None = None
-    """Radius of the sphere."""
+                    "inaccurate"] | None = None  #: What the resolver reports.
+    takes: keys.Span | None = None  #: Time that a tick takes longer.
+    centre: keys.Point | None = None  #: Middle of the sphere.
+    place: ControlPointSection | None = None  #: Point of the body, in place of `centre`.
+    radius: keys.Length | None = None  #: Radius of the sphere.
 
     def _wrong(self) -> Iterator[str]:
         of_kind = {"nan_position": {"joint"}, "nan_velocity": {"joint"}, "nan_distance": {"point"},

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from collections.abc import Iterator
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from scenarios.config.sections import Finite, NotNegative, OneOf, Section, Whole
+from scenarios.config.sections import Finite, NotNegative, Section, Whole
 
 Value = bool | int | float | str | list[Any]
 
@@ -18,57 +19,41 @@ def _in_order(bounds: tuple[float, float]) -> tuple[float, float]:
     return bounds
 
 
-class Uniform(Section):
-    """A number from a uniform distribution."""
+class Distribution(Section):
+    """The distribution of a key, in its unit, for `hierarchy compare --starts`: one of these."""
 
-    uniform: Annotated[tuple[Finite, Finite], AfterValidator(_in_order)]
-    """Lower and upper bound."""
+    uniform: Annotated[tuple[Finite, Finite], AfterValidator(_in_order)] | None = None
+    """A number from a uniform distribution: lower and upper bound."""
+    normal: tuple[Finite, NotNegative] | None = None
+    """A number from a normal distribution, not bounded: mean and standard deviation."""
+    choice: Annotated[tuple[Any, ...], Field(min_length=1)] | None = None
+    """One of several values of any type, equally likely."""
+    around: NotNegative | tuple[NotNegative, ...] | None = None
+    """The scenario's value plus a uniform offset in each entry: the largest, of all or of each."""
+    integers: Annotated[tuple[Whole, Whole], AfterValidator(_in_order)] | None = None
+    """An integer, for seeds: first and last one."""
 
-    def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return a number within the bounds."""
-        return float(chance.uniform(*self.uniform))
-
-    def __str__(self) -> str:
-        return f"uniform from {self.uniform[0]:g} to {self.uniform[1]:g}"
-
-
-class Normal(Section):
-    """A number from a normal distribution."""
-
-    normal: tuple[Finite, NotNegative]
-    """Mean and standard deviation."""
-
-    def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return a number; it is not bounded."""
-        return float(chance.normal(*self.normal))
-
-    def __str__(self) -> str:
-        return f"normal, mean {self.normal[0]:g}, standard deviation {self.normal[1]:g}"
-
-
-class Choice(Section):
-    """One of several values of any type."""
-
-    choice: Annotated[tuple[Any, ...], Field(min_length=1)]
-    """They are equally likely."""
+    def _wrong(self) -> Iterator[str]:
+        given = [key for key in _KEYS if getattr(self, key) is not None]
+        if len(given) != 1:
+            yield f"expected a table with one of {', '.join(_KEYS)}, got {given or 'none'}"
 
     def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return one of the values."""
-        value: Value = self.choice[int(chance.integers(len(self.choice)))]
+        """Return a value; raises ValueError if it is to be around an `own` that is no number."""
+        value: Value
+        if self.uniform:
+            value = float(chance.uniform(*self.uniform))
+        elif self.normal:
+            value = float(chance.normal(*self.normal))
+        elif self.choice:
+            value = self.choice[int(chance.integers(len(self.choice)))]
+        elif self.integers:
+            value = int(chance.integers(*self.integers, endpoint=True))
+        else:
+            value = self._around(chance, own)
         return value
 
-    def __str__(self) -> str:
-        return f"one of {', '.join(map(str, self.choice))}"
-
-
-class Around(Section):
-    """The scenario's value plus a uniform offset in each entry."""
-
-    around: NotNegative | tuple[NotNegative, ...]
-    """Largest offset, of all or of each."""
-
-    def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return the own value with offsets; raises ValueError if it is not numeric."""
+    def _around(self, chance: np.random.Generator, own: Value | None) -> Any:
         try:
             centre = np.array(own, dtype=float)
             offset = np.broadcast_to(np.array(self.around), centre.shape)
@@ -77,44 +62,23 @@ class Around(Section):
                              f"{own!r}") from None
         if not np.isfinite(centre).all():
             raise ValueError(f"the scenario's own value is {own!r}, not a number")
-        value: Value = (centre + chance.uniform(-offset, offset)).tolist()
-        return value
+        return (centre + chance.uniform(-offset, offset)).tolist()
 
     def __str__(self) -> str:
-        width = f"{self.around:g}" if isinstance(self.around, float) else str(list(self.around))
+        if self.uniform:
+            return f"uniform from {self.uniform[0]:g} to {self.uniform[1]:g}"
+        if self.normal:
+            return f"normal, mean {self.normal[0]:g}, standard deviation {self.normal[1]:g}"
+        if self.choice:
+            return f"one of {', '.join(map(str, self.choice))}"
+        if self.integers:
+            return f"integers from {self.integers[0]} to {self.integers[1]}"
+        around = self.around
+        width = str(list(around)) if isinstance(around, tuple) else f"{around:g}"
         return f"the scenario's own ± {width}, uniform"
 
 
-class Integers(Section):
-    """An integer, for seeds."""
-
-    integers: Annotated[tuple[Whole, Whole], AfterValidator(_in_order)]
-    """First and last one."""
-
-    def draw(self, chance: np.random.Generator, own: Value | None) -> Value:
-        """Return an integer of the range."""
-        return int(chance.integers(self.integers[0], self.integers[1], endpoint=True))
-
-    def __str__(self) -> str:
-        return f"integers from {self.integers[0]} to {self.integers[1]}"
-
-
-class _ByKey(OneOf):
-    """Selects the distribution by the key of a table."""
-
-    wants: ClassVar[str] = "expected a table with one of"
-
-    def kinds(self, section: type[Section]) -> tuple[str, ...]:
-        """Return the key of a distribution."""
-        return tuple(section.model_fields)
-
-    def kind_of(self, table: dict[str, Any]) -> Any:
-        """Return the first key that is one of a distribution."""
-        return next((key for key in table if key in _KEYS), None)
-
-
-_KEYS = ("uniform", "normal", "choice", "around", "integers")
-Distribution = Annotated[Uniform | Normal | Choice | Around | Integers, _ByKey()]
+_KEYS = tuple(Distribution.model_fields)
 
 
 def flat(table: Any, above: str = "") -> Any:

@@ -21,15 +21,14 @@ from hierarchy import plugins
 from hierarchy.errors import HierarchyError
 from hierarchy.paths import Path
 from hierarchy.plugins import Group
-from scenarios.config.errors import ScenarioError, naming
 from scenarios.config.paths import AnyPath, PathSection
-from scenarios.config.sections import Finite, Flag, Section, Whole
+from scenarios.config.sections import Finite, Flag, ScenarioError, Section, Whole, naming
 
 if TYPE_CHECKING:
     from hierarchy import Robot
 
 GIVEN: dict[Group, tuple[str, ...]] = {
-    "tasks": ("robot", "state", "name", "kind"),
+    "tasks": ("robot", "state", "name"),
     "plants": ("robot", "q", "v", "period", "level", "obstacles"),
     "sensors": ("robot", "exact", "body", "tip")}
 Maker = Callable[..., Any]
@@ -47,7 +46,8 @@ class PartSection(Section):
     def made(self, robot: Robot, **given: Any) -> Any:
         """Call the maker with those of the keys, this `section`, `robot` and `given` it takes."""
         keys = {key: getattr(self, key) for key in type(self).model_fields if key != "kind"}
-        return _called(resolve_name(self.made_by), {"section": self, **keys, **given}, robot)
+        return _called(resolve_name(self.made_by),
+                       {"section": self, "robot": robot, **keys, **given})
 
 
 class OwnSection(PartSection):
@@ -56,8 +56,7 @@ class OwnSection(PartSection):
     model_config = ConfigDict(arbitrary_types_allowed=True)
     group: ClassVar[Group]
     maker: ClassVar[Maker]
-    kind: str
-    """Which kind it is."""
+    kind: str  #: Which kind it is.
 
     @classmethod
     @cache
@@ -90,21 +89,19 @@ class OwnSection(PartSection):
                 if name.startswith(_KEY) and value is not None}
         provided = {name: value for name, value in given.items() if name in GIVEN[self.group]}
         try:
-            return _called(type(self).maker, {**keys, **provided}, robot)
-        except HierarchyError as error:
-            raise ScenarioError(f"{what}: {error}") from error
+            return _called(type(self).maker, {"robot": robot, **keys, **provided})
         except Exception as error:
-            raise ScenarioError(f"{what}: {type(error).__name__}: {error}") from error
+            kind = "" if isinstance(error, HierarchyError) else f"{type(error).__name__}: "
+            raise ScenarioError(f"{what}: {kind}{error}") from error
 
 
 def _again(own: type[OwnSection], kind: str, data: dict[str, Any]) -> OwnSection:
     return own.of(plugins.find(own.group, kind)).model_validate(data)
 
 
-def _called(maker: Maker, given: dict[str, Any], robot: Robot) -> Any:
-    """Call a maker with the robot and those of `given` that it has parameters for."""
-    given = {**given, "robot": robot}
-    return maker(**{name: _made(name, parameter.annotation, given[name], robot)
+def _called(maker: Maker, given: dict[str, Any]) -> Any:
+    """Call a maker with those of `given` that it has parameters for."""
+    return maker(**{name: _made(name, parameter.annotation, given[name], given["robot"])
                     for name, parameter in _parameters(maker).items() if name in given})
 
 

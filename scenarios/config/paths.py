@@ -10,26 +10,22 @@ import numpy as np
 
 from hierarchy import paths
 from scenarios.config import sections as keys
-from scenarios.config.errors import naming
+from scenarios.config.sections import naming
 
 
 class JitterSection(keys.Section):
     """A smooth random motion."""
 
-    amplitude: keys.Distance
-    """Largest displacement in each axis."""
-    rate: Annotated[keys.Positive, keys.Unit("Hz")]
-    """Highest frequency of the motion."""
-    seed: keys.Count = 0
-    """Seed of the motion."""
+    amplitude: keys.Distance  #: Largest displacement in each axis.
+    rate: keys.Frequency  #: Highest frequency of the motion.
+    seed: keys.Count = 0  #: Seed of the motion.
 
 
 class AnyPath(keys.Section):
     """What every path may have."""
 
     of: ClassVar[Callable[..., paths.Path]]
-    jitter: JitterSection | None = None
-    """A random motion added to the path."""
+    jitter: JitterSection | None = None  #: A random motion added to the path.
     out_of_reach: tuple[tuple[keys.Time, keys.Time], ...] | None = None
     """Intervals when the path is out of reach, for metrics of the return."""
 
@@ -57,28 +53,20 @@ class StillSection(AnyPath):
 
     of: ClassVar[Callable[..., paths.Path]] = paths.Still
     kind: Literal["still"]
-    position: keys.Point
-    """Where the point is in the world."""
+    position: keys.Point  #: Where the point is in the world.
 
 
 class EllipseSection(AnyPath):
     """centre + cosine cos(s) + sine sin(s) with s = rate t + phase."""
 
     kind: Literal["ellipse"]
-    centre: keys.Point
-    """Middle of the ellipse."""
-    cosine: keys.Point
-    """Half axis."""
-    sine: keys.Point
-    """The other half axis."""
-    rate: Annotated[keys.Finite, keys.Unit("rad/s")] = 1.0
-    """How fast s grows."""
-    phase: keys.Angle = 0.0
-    """s at the start."""
+    centre: keys.Point  #: Middle of the ellipse.
+    cosine: keys.Point  #: Half axis.
+    sine: keys.Point  #: The other half axis.
+    rate: keys.AngularRate = 1.0  #: How fast s grows.
+    phase: keys.Angle = 0.0  #: s at the start.
 
     def _steady(self) -> paths.Path:
-        if self.phase == 0.0:
-            return paths.Ellipse(self.centre, self.cosine, self.sine, self.rate)
         cosine, sine = np.array(self.cosine), np.array(self.sine)
         c, s = np.cos(self.phase), np.sin(self.phase)  # the phase by the addition theorems
         turned = tuple((c * cosine + s * sine).tolist()), tuple((c * sine - s * cosine).tolist())
@@ -89,10 +77,8 @@ class WaypointsSection(AnyPath):
     """Straight lines, at rest at every point."""
 
     kind: Literal["waypoints"]
-    times: tuple[keys.Time, ...]
-    """A time for each point."""
-    points: tuple[keys.Point, ...]
-    """The points."""
+    times: tuple[keys.Time, ...]  #: A time for each point.
+    points: tuple[keys.Point, ...]  #: The points.
     blend: keys.Span | None = None
     """Rounds each point in a curve of this duration, nearest to it half that time later."""
 
@@ -106,14 +92,10 @@ class LineSection(AnyPath):
 
     of: ClassVar[Callable[..., paths.Path]] = staticmethod(paths.line)
     kind: Literal["line"]
-    start: keys.Point
-    """First point."""
-    end: keys.Point
-    """Last point."""
-    duration: keys.Span
-    """How long the motion takes."""
-    begin: keys.Time = 0.0
-    """When it begins."""
+    start: keys.Point  #: First point.
+    end: keys.Point  #: Last point.
+    duration: keys.Span  #: How long the motion takes.
+    begin: keys.Time = 0.0  #: When it begins.
 
 
 class CircleSection(AnyPath):
@@ -121,16 +103,11 @@ class CircleSection(AnyPath):
 
     of: ClassVar[Callable[..., paths.Path]] = staticmethod(paths.circle)
     kind: Literal["circle"]
-    centre: keys.Point
-    """Middle of the circle."""
-    radius: keys.Distance
-    """Its radius."""
-    normal: keys.Vector3 = (0.0, 0.0, 1.0)
-    """Normal of its plane."""
-    rate: Annotated[keys.Finite, keys.Unit("rad/s")] = 1.0
-    """How fast the angle grows."""
-    phase: keys.Angle = 0.0
-    """Angle at the start."""
+    centre: keys.Point  #: Middle of the circle.
+    radius: keys.Distance  #: Its radius.
+    normal: keys.Vector3 = (0.0, 0.0, 1.0)  #: Normal of its plane.
+    rate: keys.AngularRate = 1.0  #: How fast the angle grows.
+    phase: keys.Angle = 0.0  #: Angle at the start.
 
 
 class RecordedSection(AnyPath):
@@ -138,8 +115,7 @@ class RecordedSection(AnyPath):
 
     of: ClassVar[Callable[..., paths.Path]] = paths.Recorded.from_csv
     kind: Literal["recorded"]
-    file: str
-    """CSV with columns t [s], x, y, z [m], relative to the scenario's file."""
+    file: str  #: CSV with columns t [s], x, y, z [m], relative to the scenario's file.
 
 
 PathSection = Annotated[StillSection | LineSection | CircleSection | EllipseSection

@@ -24,20 +24,14 @@ _ROUNDING = 1e-9  # [s] of times
 class MeasurementSection(keys.Section):
     """Errors of measured joints."""
 
-    position_noise: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
-    """Standard deviation of the normal noise of positions."""
-    velocity_noise: Annotated[keys.NotNegative, keys.Unit("rad/s")] = 0.0
-    """The same of velocities."""
-    quantisation: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
-    """Step of measured positions."""
-    delay: keys.Time = 0.0
-    """Age of measurements, a whole number of periods."""
-    seed: keys.Count = 0
-    """Seed of the noise."""
+    position_noise: keys.Arc = 0.0  #: Standard deviation of the normal noise of positions.
+    velocity_noise: Annotated[keys.NotNegative, keys.Unit("rad/s")] = 0.0  #: That of velocities.
+    quantisation: keys.Arc = 0.0  #: Step of measured positions.
+    delay: keys.Time = 0.0  #: Age of measurements, a whole number of periods.
+    seed: keys.Count = 0  #: Seed of the noise.
     velocity: Literal["measured", "differenced"] = "measured"
     """"differenced": the backward difference of measured positions, after a low-pass filter."""
-    filter_time: keys.Time = 0.0
-    """Time constant of the filter, 0 for none."""
+    filter_time: keys.Time = 0.0  #: Time constant of the filter, 0 for none.
 
     def _wrong(self) -> Iterator[str]:
         key = "velocity_noise" if self.velocity == "differenced" else "filter_time"
@@ -56,13 +50,11 @@ class AnyPlant(PartSection):
 
     follows: ClassVar[bool] = False  # whether its state is what its commands add up to
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration", "torque")
-    kind: str
-    """Which kind it is."""
+    kind: str  #: Which kind it is.
     feedback: Literal["measured", "commanded"] = "measured"
     """The controller receives "measured" joints or its "commanded" ones, integrated, as through
     FRI."""
-    measurement: MeasurementSection = MeasurementSection()
-    """Errors of the measured joints."""
+    measurement: MeasurementSection = MeasurementSection()  #: Errors of the measured joints.
 
 
 @register("plants", "kinematic", shipped=True)
@@ -72,7 +64,7 @@ class KinematicSection(AnyPlant):
     made_by: ClassVar[str] = "scenarios.cell.plants.plant:KinematicArm"
     follows: ClassVar[bool] = True
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
-    kind: Literal["kinematic"] = "kinematic"
+    kind: str = "kinematic"
 
 
 class ServoSection(keys.Section):
@@ -86,25 +78,18 @@ class ServoSection(keys.Section):
     rate: Annotated[float, Field(strict=True, ge=200.0, le=10000.0), keys.Unit("Hz")] = 1000.0
     """Steps per second, rounded up to a whole number per period, on linearly interpolated
     references."""
-    bandwidth: Bandwidth | tuple[Bandwidth, ...] = 80.0
-    """How fast joints follow, all or each."""
-    gravity: keys.NotNegative = 1.0
-    """Share of the gravity torque that is compensated."""
-    feedforward: keys.Flag = True
-    """Whether the rate of the reference counts."""
-    lead: Annotated[keys.Positive, keys.Unit("rad")] = 0.1
-    """How far the reference may lead its joint."""
+    bandwidth: Bandwidth | tuple[Bandwidth, ...] = 80.0  #: How fast joints follow, all or each.
+    gravity: keys.NotNegative = 1.0  #: Share of the gravity torque that is compensated.
+    feedforward: keys.Flag = True  #: Whether the rate of the reference counts.
+    lead: keys.PositiveAngle = 0.1  #: How far the reference may lead its joint.
 
 
 class JointsSection(keys.Section):
     """One value for all joints or one each; plausible, not identified."""
 
-    friction: Friction | tuple[Friction, ...] = 0.5
-    """Dry friction."""
-    damping: Damping | tuple[Damping, ...] = 1.0
-    """Viscous friction."""
-    armature: Inertia | tuple[Inertia, ...] = 0.3
-    """Inertia of motor and gear at the joint."""
+    friction: Friction | tuple[Friction, ...] = 0.5  #: Dry friction.
+    damping: Damping | tuple[Damping, ...] = 1.0  #: Viscous friction.
+    armature: Inertia | tuple[Inertia, ...] = 0.3  #: Inertia of motor and gear at the joint.
 
 
 @register("plants", "mujoco", shipped=True)
@@ -113,28 +98,19 @@ class PhysicsSection(AnyPlant):
 
     made_by: ClassVar[str] = "scenarios.cell.plants.physics:PhysicsArm"
     levels: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
-    kind: Literal["mujoco"]
-    beyond_stop: Annotated[keys.Positive, keys.Unit("rad")] = 0.2
-    """How far a joint may pass its limit before a fault."""
-    servo: ServoSection = ServoSection()
-    """The servo of each joint."""
-    joints: JointsSection = JointsSection()
-    """Friction and inertia of the joints."""
+    beyond_stop: keys.PositiveAngle = 0.2  #: How far a joint may pass its limit before a fault.
+    servo: ServoSection = ServoSection()  #: The servo of each joint.
+    joints: JointsSection = JointsSection()  #: Friction and inertia of the joints.
 
 
 class PushSection(keys.Section):
     """A horizontal force at a body's centre of mass."""
 
-    joint: str
-    """Joint whose body is pushed."""
-    force: keys.Force
-    """Size of the force."""
-    direction: Annotated[keys.Finite, keys.Unit("deg")] = 0.0
-    """From the world's x axis toward its y axis."""
-    at: keys.Time = 0.0
-    """When the push begins."""
-    duration: keys.Span = 0.1
-    """How long it lasts."""
+    joint: str  #: Joint whose body is pushed.
+    force: keys.Force  #: Size of the force.
+    direction: Annotated[keys.Finite, keys.Unit("deg")] = 0.0  #: From the world's x axis toward y.
+    at: keys.Time = 0.0  #: When the push begins.
+    duration: keys.Span = 0.1  #: How long it lasts.
 
     @property
     def vector(self) -> Array:
@@ -158,35 +134,21 @@ class TorqueSection(AnyPlant):
 
     made_by: ClassVar[str] = "scenarios.cell.plants.torque:TorqueRobot"
     levels: ClassVar[tuple[str, ...]] = ("torque",)
-    kind: Literal["torque"]
-    height: Annotated[keys.Finite, keys.Unit("m")] = 0.0
-    """Height of the floor."""
-    friction: keys.Positive = 0.7
-    """Coefficient of friction of the floor."""
-    softness: keys.Span = 0.005
-    """Time constant of a contact."""
-    joint_friction: Friction = 0.0
-    """Coulomb friction of every joint."""
-    armature: Inertia = 0.0
-    """Additional inertia of every joint's drive."""
-    joint_damping: Damping = 0.0
-    """Viscous friction of every joint."""
-    delay: keys.Time = 0.0
-    """Delay of torques, a whole number of periods."""
-    bandwidth: Annotated[keys.Positive, keys.Unit("Hz")] | None = None
-    """Bandwidth of the motors' torques, by default infinite."""
-    stops: keys.Flag = True
-    """Whether joints have a stop at their position limit."""
+    height: keys.Coordinate = 0.0  #: Height of the floor.
+    friction: keys.Positive = 0.7  #: Coefficient of friction of the floor.
+    softness: keys.Span = 0.005  #: Time constant of a contact.
+    joint_friction: Friction = 0.0  #: Coulomb friction of every joint.
+    armature: Inertia = 0.0  #: Additional inertia of every joint's drive.
+    joint_damping: Damping = 0.0  #: Viscous friction of every joint.
+    delay: keys.Time = 0.0  #: Delay of torques, a whole number of periods.
+    bandwidth: keys.Frequency | None = None  #: Bandwidth of motor torques, by default infinite.
+    stops: keys.Flag = True  #: Whether joints have a stop at their position limit.
     self_collision: keys.Flag = False
     """Whether capsules collide, except neighbours and those that overlap initially."""
-    fall: keys.Length = 0.2
-    """How far the centre of mass may sink before a fault."""
-    tilt: Annotated[keys.Positive, keys.Unit("rad")] = 1.0
-    """How far the base may tilt before a fault."""
-    beyond_stop: Annotated[keys.Positive, keys.Unit("rad")] = 0.2
-    """How far a joint may pass its limit before a fault."""
-    pushes: tuple[PushSection, ...] = ()
-    """Forces that disturb the robot."""
+    fall: keys.Length = 0.2  #: How far the centre of mass may sink before a fault.
+    tilt: keys.PositiveAngle = 1.0  #: How far the base may tilt before a fault.
+    beyond_stop: keys.PositiveAngle = 0.2  #: How far a joint may pass its limit before a fault.
+    pushes: tuple[PushSection, ...] = ()  #: Forces that disturb the robot.
 
 
 class OwnPlant(AnyPlant, OwnSection):
@@ -195,4 +157,4 @@ class OwnPlant(AnyPlant, OwnSection):
     group: ClassVar[Group] = "plants"
 
 
-PlantKind = Annotated[AnyPlant, keys.Registered("kinematic", "plants", OwnPlant)]
+PlantKind = Annotated[AnyPlant, keys.Registered("kinematic", OwnPlant)]

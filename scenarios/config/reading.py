@@ -1,25 +1,29 @@
-"""Read a scenario file by name or path, with the file it extends and with changes."""
+"""Read a scenario by name or file, with what it extends and with changes; groups of scenarios."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field
 
 from hierarchy import plugins
-from hierarchy.errors import UnknownNameError, file_path
+from hierarchy.errors import HierarchyError, UnknownNameError, file_path
 from hierarchy.robots.names import in_package, is_file_name
 from scenarios.config.avoidance import as_table
-from scenarios.config.changes import change_all, laid_over, parse_changes
-from scenarios.config.errors import ScenarioError, naming
-from scenarios.config.names import no_scenario
+from scenarios.config.changes import change_all, lay_over, parse_changes
 from scenarios.config.scenario import Scenario
+from scenarios.config.sections import ScenarioError, Section, naming
 from scenarios.config.validation import validated
 from scenarios.files import scenarios_in
 from scenarios.toml_text import read_toml
 
 LIBRARY = Path(__file__).parents[1] / "library"
+GROUPS = LIBRARY / "groups"
+WANTED = "A scenario is a name of `hierarchy list`, or a .toml file."
+_ROBOTS = (".urdf", ".xml", ".mjcf", ".xacro", ".sdf")
 _DEEPEST = 50  # files that may extend each other
 
 
@@ -72,7 +76,7 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     if not isinstance(changes, Mapping):
         changes = parse_changes(changes, what="--set")
     _list_points_as_tables(data)
-    change_all(data, changes, Scenario.tag_at)
+    change_all(data, changes, Scenario)
     _make_files_absolute(data, path.parent.resolve())
     _require_plugins(data, what)
     return validated(Scenario, data, what)
@@ -116,7 +120,7 @@ def _found(path: Path) -> Source:
     name = str(path)
     if is_shipped(name):
         return _library()[name.replace(":", "-", 1)]
-    raise no_scenario(name, shipped())
+    raise no_scenario(name)
 
 
 def _read(source: Source) -> dict[str, Any]:
@@ -151,7 +155,8 @@ def _read_extended(source: Source, below: tuple[Source, ...] = ()) -> dict[str, 
     found = _read_extended(under, here)
     if "variation" in data:  # its keys belong together
         found.pop("variation", None)
-    return laid_over(_without(found, replaced or [], path), data, Scenario.tag_at)
+    lay_over(found := _without(found, replaced or [], path), data, Scenario)
+    return found
 
 
 def _extended(base: Any, path: Path) -> Source:
@@ -161,7 +166,7 @@ def _extended(base: Any, path: Path) -> Source:
     if is_shipped(base):
         return _found(Path(base))
     if Path(base).suffix != ".toml" and ".toml:" not in base:
-        raise ScenarioError(f"{path}: extends: {no_scenario(base, shipped())}")
+        raise ScenarioError(f"{path}: extends: {no_scenario(base)}")
     return _found(path.parent / base)
 
 
@@ -181,3 +186,75 @@ def _list_points_as_tables(data: dict[str, Any]) -> None:
     section = data.get("avoidance")
     if isinstance(section, dict) and isinstance(section.get("obstacles"), list):
         section["obstacles"] = [as_table(obstacle) for obstacle in section["obstacles"]]
+
+
+class Group(Section):
+    """The scenarios of a group, in the order in which they are compared."""
+
+    title: str  #: What the scenarios have in common, for lists.
+    scenarios: Annotated[tuple[str, ...], Field(min_length=1)]  #: Names of shipped scenarios.
+
+
+def shipped_groups() -> tuple[str, ...]:
+    """Return the names of the groups shipped with the package."""
+    return tuple(sorted(path.stem for path in GROUPS.glob("*.toml")))
+
+
+def load_group(name: str) -> Group:
+    """Read a shipped group; raises ScenarioError, naming the file and the key."""
+    path = GROUPS / f"{name}.toml"
+    return validated(Group, read_toml(path, "group file", ScenarioError), f"group {name!r}")
+
+
+def members(asked: Iterable[Any]) -> list[Any]:
+    """Return what was asked for, each name of a group replaced by its scenarios."""
+    return [one for some in asked
+            for one in (load_group(some).scenarios if some in shipped_groups() else (some,))]
+
+
+def no_scenario(text: str) -> HierarchyError:
+    """Return the error of a text that names no scenario: what it names instead, or the nearest."""
+    found = _something_else(Path(text)) or _other_name(text)
+    return ScenarioError(f"{text!r} is {found}") if found else UnknownNameError(
+        "scenario", text, shipped(), WANTED)
+
+
+def _something_else(path: Path) -> str:
+    """Return what a file or folder is, and what to do with it; "" if there is none."""
+    if path.is_dir():
+        return f"a folder{_of_folder(path)}"
+    if path.suffix.lower() in _ROBOTS or in_package(str(path)):
+        return (f"a robot, not a scenario. `hierarchy check {path}` shows it, with its [robot] "
+                f"section for a scenario file. {WANTED}")
+    if path.suffix == ".py":
+        return (f"a program, to be run by `python {path}`; a module of kinds of your own goes "
+                f"with --plugin {path.stem}. {WANTED}")
+    return f"a file of another kind than .toml. {WANTED}" if path.is_file() else ""
+
+
+def _of_folder(path: Path) -> str:
+    if (path / "run.npz").is_file():
+        return (f" of a finished run: `hierarchy view {path}` shows it, and `hierarchy run "
+                f"{path / 'scenario.toml'}` runs it again")
+    if files := sorted(path.glob("*.toml")):
+        return f" with {', '.join(map(str, files[:5]))}: give one of them"
+    return f". {WANTED}"
+
+
+def _other_name(name: str) -> str:
+    """Return what a name of something else than a scenario is for; "" if it is unknown."""
+    from hierarchy.robots import TABLES
+    from solvers import names, variants
+
+    if name in shipped_groups():
+        return (f"a group of scenarios, to be run by `hierarchy compare {name}`; its scenarios are "
+                f"{', '.join(load_group(name).scenarios)}")
+    if (LIBRARY / "sweeps" / f"{name}.toml").is_file():
+        return f"a sweep, to be run by `hierarchy sweep {name}`. {WANTED}"
+    if name in TABLES or name in plugins.registered("robots"):
+        return f"a robot, the `robot.model` of a scenario. {WANTED}"
+    if name in (*names(), *variants()):
+        return f"a resolver, as in `hierarchy run ellipse --resolver {name}`. {WANTED}"
+    if name in plugins.registered("tasks"):
+        return f"a kind of task, for the [[tasks]] of a scenario file. {WANTED}"
+    return ""

@@ -1,7 +1,7 @@
 """What every key of a scenario file means: for `hierarchy help` and the page of keys.
 
 Types, bounds, units and defaults are those that files are checked against; the meaning of a key is
-the text below it in its section.
+the text below it in its section, or behind it after "#:".
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import inspect
 import json
 from collections.abc import Iterator
 from functools import cache
-from itertools import pairwise
+from itertools import zip_longest
 from textwrap import dedent, fill
 from typing import Any, NamedTuple
 
@@ -43,7 +43,8 @@ def keys_of(section: type[Section]) -> tuple[Key, ...]:
     schema, meanings, found = section.model_json_schema(), _meanings(section), []
     for name, field in section.model_fields.items():
         key, parts = field.alias or name, (field.annotation, *field.metadata)
-        if "const" not in (value := schema["properties"][key]):
+        if key != "kind" or len(kinds_of(section)) != 1:
+            value = schema["properties"][key]
             units = dict.fromkeys(unit.name for unit in parts_of(parts, Unit))
             default = "required" if field.is_required() else _default(value)
             found.append(Key(key, _value(value, schema.get("$defs", {})), " or ".join(units),
@@ -78,7 +79,9 @@ def explained(dotted: str) -> list[str]:
                     title_of(owner, _bracketed(path[:-1])))
     lines = [line for text, owners in said.items() for line in (*owners, *text)]
     for section in found:
-        lines += ["", title_of(section, _bracketed(path)), *_paragraphs(section)]
+        lines += ["", title_of(section, _bracketed(path)), *(
+            fill(text, 88, initial_indent="  ", subsequent_indent="  ")
+            for text in about(section).split("\n\n"))]
         for key in keys_of(section):
             lines += _lines(key)
     return lines
@@ -123,13 +126,8 @@ def _lines(key: Key) -> Iterator[str]:
         yield fill(key.meaning, 88, initial_indent="      ", subsequent_indent="      ")
 
 
-def _paragraphs(section: type[Section]) -> Iterator[str]:
-    for text in about(section).split("\n\n"):
-        yield fill(text, 88, initial_indent="  ", subsequent_indent="  ")
-
-
 def _meanings(section: type[Section]) -> dict[str, str]:
-    """Return the text below each key, in the section or in what it derives from."""
+    """Return the text of each key, in the section or in what it derives from."""
     found: dict[str, str] = {}
     for base in reversed(section.__mro__):
         found |= _texts(base) if issubclass(base, Section) else {}
@@ -139,13 +137,18 @@ def _meanings(section: type[Section]) -> dict[str, str]:
 @cache
 def _texts(section: type[Section]) -> dict[str, str]:
     try:
-        (defined,) = ast.parse(dedent(inspect.getsource(section))).body
+        source = dedent(inspect.getsource(section))
     except (OSError, TypeError):  # a plugin without a source
         return {}
-    return {above.target.id: " ".join(str(below.value.value).split())
-            for above, below in pairwise(getattr(defined, "body", ()))
-            if isinstance(above, ast.AnnAssign) and isinstance(above.target, ast.Name)
-            and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)}
+    lines, body = source.splitlines(), getattr(ast.parse(source).body[0], "body", ())
+    found: dict[str, str] = {}
+    for key, below in zip_longest(body, body[1:]):
+        if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name):
+            text = lines[(key.end_lineno or 0) - 1].partition("  #: ")[2]
+            if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
+                text = str(below.value.value)
+            found |= {key.target.id: " ".join(text.split())} if text else {}
+    return found
 
 
 def _default(value: dict[str, Any]) -> str:

@@ -12,7 +12,7 @@ from hierarchy.avoidance.body import measure_capsules, pack_capsules, pairs_of_t
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
-from scenarios.config.errors import ScenarioError, naming
+from scenarios.config.sections import ScenarioError, naming
 
 Pairs = list[tuple[int, int]]
 _POSTURES = 200

@@ -10,27 +10,20 @@ from pydantic import Field
 from hierarchy.robots.table import Base
 from scenarios.config import sections as keys
 
-Place = Annotated[keys.Finite, keys.Unit("m")]
-
 
 class ControlPointSection(keys.Section):
     """A point on the body of a joint."""
 
-    joint: str
-    """Joint that moves the body."""
-    offset: keys.Point
-    """Where the point is in the joint's frame."""
+    joint: str  #: Joint that moves the body.
+    offset: keys.Point  #: Where the point is in the joint's frame.
 
 
 class RobotPointSection(keys.Section):
     """A point of a joint's body or of a frame."""
 
-    joint: str | None = None
-    """Joint that moves the body."""
-    frame: str | None = None
-    """Frame, in place of a joint."""
-    offset: keys.Point = (0.0, 0.0, 0.0)
-    """Where the point is in that frame."""
+    joint: str | None = None  #: Joint that moves the body.
+    frame: str | None = None  #: Frame, in place of a joint.
+    offset: keys.Point = (0.0, 0.0, 0.0)  #: Where the point is in that frame.
 
     def _wrong(self) -> Iterator[str]:
         if (self.joint is None) == (self.frame is None):
@@ -40,14 +33,10 @@ class RobotPointSection(keys.Section):
 class CapsuleSection(keys.Section):
     """All points within a radius of a segment."""
 
-    joint: str | None = None
-    """Joint whose frame it is in, by default the base."""
-    start: keys.Point
-    """First end of the segment."""
-    end: keys.Point
-    """Last end of the segment."""
-    radius: keys.Distance
-    """The radius."""
+    joint: str | None = None  #: Joint whose frame it is in, by default the base.
+    start: keys.Point  #: First end of the segment.
+    end: keys.Point  #: Last end of the segment.
+    radius: keys.Distance  #: The radius.
 
 
 class RobotSection(keys.Section):
@@ -55,10 +44,8 @@ class RobotSection(keys.Section):
 
     model: str
     """A name of `hierarchy list`, a URDF or MJCF file, or "package:name" (extra `descriptions`)."""
-    base: Base | None = None
-    """Whether the base is "fixed" or "floating"; by default that of the model."""
-    end_effector: str | None = None
-    """Frame of [position] and [pointing]."""
+    base: Base | None = None  #: Whether it is "fixed" or "floating"; by default that of the model.
+    end_effector: str | None = None  #: Frame of [position] and [pointing].
     control_points: tuple[RobotPointSection, ...] | None = None
     """Points that keep their distance, besides the end effector."""
     capsules: tuple[CapsuleSection, ...] | None = None
@@ -80,18 +67,14 @@ class StartSection(keys.Section):
     q: tuple[keys.JointPosition, ...] | None = None
     """Positions of all joints but a floating base, or all coordinates; by default the `keyframe`,
     or the robot's rest posture."""
-    keyframe: str | None = None
-    """Keyframe of an MJCF, in place of `q`."""
+    keyframe: str | None = None  #: Keyframe of an MJCF, in place of `q`.
     joints: dict[str, keys.JointValue] = Field(default_factory=dict)
     """Positions by name, which override `q`."""
-    v: tuple[keys.JointVelocity, ...] | None = None
-    """Velocities of all joints, by default zero."""
-    end_effector: keys.Point | None = None
-    """Where the end effector starts; `q` is moved."""
+    v: tuple[keys.JointVelocity, ...] | None = None  #: Velocities of all joints, by default zero.
+    end_effector: keys.Point | None = None  #: Where the end effector starts; `q` is moved.
     on_floor: keys.Flag = False
     """Whether the base moves vertically until the lowest contact touches the floor."""
-    allow_outside_limits: keys.Flag = False
-    """Whether joints may start beyond limits."""
+    allow_outside_limits: keys.Flag = False  #: Whether joints may start beyond limits.
 
     def _wrong(self) -> Iterator[str]:
         if self.q is not None and self.keyframe is not None:
@@ -101,29 +84,21 @@ class StartSection(keys.Section):
 class ContactSection(keys.Section):
     """A point or sole on a rigid surface, at level "torque"."""
 
-    frame: str
-    """Frame of the robot."""
-    name: keys.TaskName | None = None
-    """Its name, by default the frame's."""
-    x: tuple[Place, Place] | None = None
+    frame: str  #: Frame of the robot.
+    name: keys.TaskName | None = None  #: Its name, by default the frame's.
+    x: tuple[keys.Coordinate, keys.Coordinate] | None = None
     """Sides of a sole along its x axis, from `offset`; none for a point."""
-    y: tuple[Place, Place] | None = None
-    """The same along its y axis."""
-    offset: keys.Point = (0.0, 0.0, 0.0)
-    """The point, or the sole's middle, in the frame."""
-    friction: keys.Positive = 0.7
-    """Coefficient of friction that the controller assumes."""
-    normal: keys.Vector3 = (0.0, 0.0, 1.0)
-    """Normal of the surface in the world."""
+    y: tuple[keys.Coordinate, keys.Coordinate] | None = None  #: The same along its y axis.
+    offset: keys.Point = (0.0, 0.0, 0.0)  #: The point, or the sole's middle, in the frame.
+    friction: keys.Positive = 0.7  #: Coefficient of friction that the controller assumes.
+    normal: keys.Vector3 = (0.0, 0.0, 1.0)  #: Normal of the surface in the world.
     up: keys.Vector3 = (0.0, 0.0, 1.0)
     """Normal of the sole in the frame; its x axis is the frame's, projected, or the frame's y axis
     if x is the normal."""
-    open: tuple[tuple[keys.Time, keys.Time], ...] = ()
-    """Intervals in which it is lifted."""
+    open: tuple[tuple[keys.Time, keys.Time], ...] = ()  #: Intervals in which it is lifted.
     ramp: keys.Time = 0.1
     """Time in which the load falls before and rises after them, to at most the robot's weight."""
-    slides: keys.Flag = False
-    """Whether a point may move along its surface."""
+    slides: keys.Flag = False  #: Whether a point may move along its surface.
 
     def _wrong(self) -> Iterator[str]:
         if (self.x is None) != (self.y is None):
@@ -135,13 +110,10 @@ class ContactSection(keys.Section):
 class ForcesSection(keys.Section):
     """Bounds of contact forces, in one level with the torque limits, as `limits.place` says."""
 
-    faces: Literal[4, 8] = 4
-    """Faces of the friction pyramid of each point."""
-    least: keys.Force = 0.0
-    """Smallest normal force of each point."""
+    faces: Literal[4, 8] = 4  #: Faces of the friction pyramid of each point.
+    least: keys.Force = 0.0  #: Smallest normal force of each point.
     largest: Annotated[keys.Positive, keys.Unit("N")] | None = None
     """Largest normal force of each point, by default infinite."""
     edge: Annotated[float, Field(strict=True, gt=0.0), keys.Unit("m")] | None = None
     """How far inside a sole its centre of pressure stays."""
-    damping: keys.Gain = 20.0
-    """Gain that damps the velocity of contacts."""
+    damping: keys.Gain = 20.0  #: Gain that damps the velocity of contacts.

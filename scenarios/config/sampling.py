@@ -9,8 +9,8 @@ import numpy as np
 
 from scenarios.config.changes import matching, place
 from scenarios.config.distributions import Distribution, Value
-from scenarios.config.errors import ScenarioError
 from scenarios.config.scenario import Scenario
+from scenarios.config.sections import ScenarioError
 
 
 def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int, index: int,
@@ -41,13 +41,10 @@ def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int,
 def changed(scenario: Scenario, values: Mapping[str, Value], what: str) -> Scenario:
     """Return the scenario with other values at dotted keys.
 
-    Raises ScenarioError for invalid ones; the message starts with `what`.
+    Raises ScenarioError for invalid ones; the message starts with `what` and has the values.
     """
-    try:
-        return scenario.with_changes(values, what)
-    except ScenarioError as error:
-        drawn_values = ", ".join(f"{key} = {value}" for key, value in values.items())
-        raise ScenarioError(f"{error}, with {drawn_values}") from error
+    drawn_values = ", ".join(f"{key} = {value}" for key, value in values.items())
+    return scenario.with_changes(values, f"{what}, with {drawn_values}")
 
 
 def _chance(seed: int, index: int, key: str) -> np.random.Generator:

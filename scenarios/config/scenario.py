@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 import tomli_w
@@ -15,7 +15,7 @@ import scenarios.config.kinds  # noqa: F401, registers them
 from hierarchy import plugins
 from hierarchy.errors import expect
 from scenarios.config.avoidance import AvoidanceKind
-from scenarios.config.changes import Tag, change_all, parse_changes, without_none
+from scenarios.config.changes import change_all, parse_changes, without_none
 from scenarios.config.control import ControlSection, FaultSection
 from scenarios.config.distributions import Parameters
 from scenarios.config.plant import KinematicSection, PlantKind
@@ -32,7 +32,7 @@ from scenarios.config.tasks import (
     PositionSection,
     PostureSection,
 )
-from scenarios.config.validation import tag_at, validated
+from scenarios.config.validation import validated
 
 if TYPE_CHECKING:
     from solvers import Resolver
@@ -48,46 +48,29 @@ class Scenario(Section):
     Absent sections add no task.
     """
 
-    name: Name
-    """Its name, in lists and of run folders."""
-    title: str = ""
-    """One line that says what it shows."""
-    description: str = ""
-    """More about it."""
+    name: Name  #: Its name, in lists and of run folders.
+    title: str = ""  #: One line that says what it shows.
+    description: str = ""  #: More about it.
     plugins: tuple[str, ...] | None = None
     """Modules with kinds, resolvers and robots; a command has to allow them."""
-    robot: RobotSection
-    """Which robot."""
-    start: StartSection = StartSection()
-    """Where a run starts."""
-    control: ControlSection
-    """How the tasks are resolved, and how often."""
-    plant: PlantKind = KinematicSection()
-    """What the commands move."""
-    sensor: SensorKind = ExactSection()
-    """What measures distances to obstacles."""
-    position: PositionSection | None = None
-    """The end effector's position."""
-    pointing: PointingSection | None = None
-    """The end effector's direction."""
-    avoidance: AvoidanceKind | None = None
-    """Obstacles, and how to stay away from them."""
-    limits: LimitsSection | None = None
-    """Joint limits."""
+    robot: RobotSection  #: Which robot.
+    start: StartSection = StartSection()  #: Where a run starts.
+    control: ControlSection  #: How the tasks are resolved, and how often.
+    plant: PlantKind = KinematicSection()  #: What the commands move.
+    sensor: SensorKind = ExactSection()  #: What measures distances to obstacles.
+    position: PositionSection | None = None  #: The end effector's position.
+    pointing: PointingSection | None = None  #: The end effector's direction.
+    avoidance: AvoidanceKind | None = None  #: Obstacles, and how to stay away from them.
+    limits: LimitsSection | None = None  #: Joint limits.
     damping: DampingSection | None = None
     """Null-space term that damps joints; not with the null-space [posture]."""
-    posture: PostureSection | None = None
-    """Null-space term or last task toward a posture."""
+    posture: PostureSection | None = None  #: Null-space term or last task toward a posture.
     tasks: tuple[ListedTask, ...] = ()
     """Tasks in order of priority, below limits, avoidance, position and pointing."""
-    contacts: tuple[ContactSection, ...] = ()
-    """What touches the surroundings, at level "torque"."""
-    forces: ForcesSection = ForcesSection()
-    """Which contact forces the stack allows."""
-    faults: tuple[FaultSection, ...] = ()
-    """What goes wrong during a run."""
-    variation: Parameters = Field(default_factory=dict)
-    """Distributions of dotted keys, in their units, for `hierarchy compare --starts`."""
+    contacts: tuple[ContactSection, ...] = ()  #: What touches the surroundings, at level "torque".
+    forces: ForcesSection = ForcesSection()  #: Which contact forces the stack allows.
+    faults: tuple[FaultSection, ...] = ()  #: What goes wrong during a run.
+    variation: Parameters = Field(default_factory=dict)  #: How keys vary from start to start.
 
     @field_validator("plugins")
     @classmethod
@@ -246,7 +229,7 @@ class Scenario(Section):
         Raises ScenarioError for invalid ones; the message starts with `what`, or the name.
         """
         data = self.model_dump(mode="json")
-        change_all(data, changes, self.tag_at)
+        change_all(data, changes, Scenario)
         return validated(Scenario, data, what or f"scenario {self.name!r}")
 
     def __repr__(self) -> str:
@@ -254,11 +237,6 @@ class Scenario(Section):
                 f"resolver={self.control.resolver!r})")
 
     __str__ = __repr__
-
-    @classmethod
-    def tag_at(cls, path: Sequence[str]) -> Tag | None:
-        """Return which key says the kind of the section at a path, None if there is one kind."""
-        return tag_at(cls, path)
 
     @classmethod
     def from_toml(cls, text: str) -> Self:

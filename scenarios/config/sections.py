@@ -1,9 +1,10 @@
-"""Common parts of sections: numbers with their bounds and units, and what says their kind."""
+"""Common parts of sections: numbers with bounds and units, what says a kind, and the error."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self, get_args
 
@@ -11,9 +12,21 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from pydantic_core import PydanticCustomError, core_schema
 
 from hierarchy import plugins
-from hierarchy.errors import UnknownNameError
-from hierarchy.plugins import Group
+from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.words import listed
+
+
+class ScenarioError(HierarchyError):
+    """An invalid scenario file or change; the message names the file and the key."""
+
+
+@contextmanager
+def naming(what: str) -> Iterator[None]:
+    """Put a key or a file in front of the errors raised within, which become ScenarioErrors."""
+    try:
+        yield
+    except HierarchyError as error:
+        raise ScenarioError(f"{what}: {error}") from error
 
 
 @dataclass(frozen=True)
@@ -29,6 +42,7 @@ Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(strict=True, ge=0.0, allow_inf_nan=False)]
 Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
 Count = Annotated[int, Field(strict=True, ge=0)]
+Number = Annotated[int, Field(strict=True, ge=1)]  # of a thing, from 1
 Whole = Annotated[int, Field(strict=True)]
 Flag = Annotated[bool, Field(strict=True)]
 JointPosition = Annotated[Finite, Unit("rad or m")]
@@ -36,13 +50,18 @@ JointVelocity = Annotated[Finite, Unit("rad/s or m/s")]
 JointValue = JointPosition | tuple[JointPosition, ...]  # see hierarchy.Robot.configuration
 Vector3 = tuple[Finite, Finite, Finite]
 Rows3 = tuple[Vector3, Vector3, Vector3]
+Coordinate = Annotated[Finite, Unit("m")]
 Length = Annotated[Positive, Unit("m")]
 Distance = Annotated[NotNegative, Unit("m")]
 Span = Annotated[Positive, Unit("s")]
 Time = Annotated[NotNegative, Unit("s")]
 Rate = Annotated[Positive, Unit("1/s")]
 Speed = Annotated[NotNegative, Unit("m/s")]
+Frequency = Annotated[Positive, Unit("Hz")]
 Angle = Annotated[Finite, Unit("rad")]
+Arc = Annotated[NotNegative, Unit("rad")]
+PositiveAngle = Annotated[Positive, Unit("rad")]
+AngularRate = Annotated[Finite, Unit("rad/s")]
 Gain = Annotated[NotNegative, Unit("1/s")]
 Stiffness = Annotated[NotNegative, Unit("1/s^2")]
 Force = Annotated[NotNegative, Unit("N")]
@@ -97,28 +116,19 @@ class OneOf:
     """
 
     default: str | None = None
-    wants: ClassVar[str] = "expected a table with a kind,"
 
     def sections(self, annotation: Any) -> tuple[type[Section], ...]:
         """Return the sections of all kinds."""
         return get_args(annotation)
 
-    def kinds(self, section: type[Section]) -> tuple[str, ...]:
-        """Return the kinds that a section is for."""
-        return kinds_of(section)
-
     def names(self, annotation: Any) -> tuple[str, ...]:
         """Return the kinds."""
-        return tuple(kind for section in self.sections(annotation) for kind in self.kinds(section))
-
-    def kind_of(self, table: dict[str, Any]) -> Any:
-        """Return the kind of a table."""
-        return table.get("kind", self.default)
+        return tuple(kind for section in self.sections(annotation) for kind in kinds_of(section))
 
     def find(self, annotation: Any, kind: str) -> type[Section] | None:
         """Return the section of a kind, None if there is none."""
         return next((section for section in self.sections(annotation)
-                     if kind in self.kinds(section)), None)
+                     if kind in kinds_of(section)), None)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         kinds = [handler.generate_schema(section) for section in self.sections(source)]
@@ -129,34 +139,33 @@ class OneOf:
     def _section(self, source: Any, table: Any) -> Section:
         if isinstance(table, Section):
             return table
-        kind = self.kind_of(table) if isinstance(table, dict) else table
-        found = self.find(source, kind) if isinstance(kind, str) and kind is not table else None
+        kind = table.get("kind", self.default) if isinstance(table, dict) else None
+        found = self.find(source, kind) if isinstance(kind, str) else None
         if found is None:
             names = self.names(source)
             text = str(UnknownNameError("kind", kind, names)) if isinstance(kind, str) else (
-                f"{self.wants} {listed([repr(name) for name in names], 'or')}")
+                f"expected a table with a kind, {listed([repr(name) for name in names], 'or')}")
             raise PydanticCustomError("kind", "{text}", {"text": text})
         return found.model_validate(table)
 
 
 @dataclass(frozen=True)
 class Registered(OneOf):
-    """The same for the kinds of a group: sections, or what `own.of` makes of something else."""
+    """The same for the kinds of `own.group`: sections, or what `own.of` makes of something else."""
 
-    group: Group = "tasks"
     own: Any = None
 
     def sections(self, annotation: Any) -> tuple[type[Section], ...]:
         """See `OneOf`."""
-        return (*map(self._as_section, plugins.registered(self.group).values()), self.own)
+        return (*map(self._as_section, plugins.registered(self.own.group).values()), self.own)
 
     def names(self, annotation: Any) -> tuple[str, ...]:
         """See `OneOf`."""
-        return tuple(plugins.known(self.group))
+        return tuple(plugins.known(self.own.group))
 
     def find(self, annotation: Any, kind: str) -> type[Section] | None:
         """See `OneOf`; loads the entry point of that name only."""
-        thing = plugins.find(self.group, kind)
+        thing = plugins.find(self.own.group, kind)
         return None if thing is None else self._as_section(thing)
 
     def _as_section(self, thing: Any) -> type[Section]:
@@ -166,6 +175,8 @@ class Registered(OneOf):
 
 
 def kinds_of(section: type[Section]) -> tuple[str, ...]:
-    """Return the values that a section allows for its key "kind"."""
+    """Return the kinds that a section is for: as its key "kind" allows, or as it is registered."""
     field = section.model_fields.get("kind")
-    return get_args(field.annotation) if field else ()
+    return get_args(field.annotation if field else None) or tuple(
+        kind for group in plugins.GROUPS for kind, one in plugins.registered(group).items()
+        if one is section)

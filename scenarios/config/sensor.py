@@ -6,7 +6,6 @@ All but the exact one see obstacles in depth images: a simulated camera, or reco
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import inf
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -20,6 +19,8 @@ from scenarios.config.own import OwnSection, PartSection
 
 FOOT = 0.31  # [m] height of the column that a robot without floor stands on
 Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), keys.Unit("px")]
+Focal = Annotated[keys.Positive, keys.Unit("px")]
+Middle = Annotated[keys.Finite, keys.Unit("px")]
 
 
 class AnySensor(PartSection):
@@ -27,8 +28,7 @@ class AnySensor(PartSection):
 
     has_frames: ClassVar[bool] = True    # that a fault may leave out
     is_recorded: ClassVar[bool] = False  # whether it shows no obstacle of the scenario
-    kind: str
-    """Which kind it is."""
+    kind: str  #: Which kind it is.
     if TYPE_CHECKING:
         foot: ClassVar[float]
 
@@ -39,7 +39,7 @@ class ExactSection(AnySensor):
 
     foot: ClassVar[float] = FOOT
     has_frames: ClassVar[bool] = False
-    kind: Literal["exact"] = "exact"
+    kind: str = "exact"
 
     def made(self, robot: Any, **given: Any) -> Any:
         """Return the exact sensor, which is given."""
@@ -50,25 +50,19 @@ class ImageSection(AnySensor):
     """What sources of depth images have; see scenarios.cell.sensors.depth_sensor."""
 
     made_by: ClassVar[str] = "scenarios.cell.sensors.depth_sensor:depth_sensor"
-    latency: keys.Time = 0.0
-    """Age of a frame when it arrives."""
-    stale_after: keys.Time = 0.2
-    """Time without a frame after which `control.policy.stale` applies."""
-    least_readings: keys.Share = 0.1
-    """Least share of valid pixels."""
+    latency: keys.Time = 0.0  #: Age of a frame when it arrives.
+    stale_after: keys.Time = 0.2  #: Time without frames after which `control.policy.stale` applies.
+    least_readings: keys.Share = 0.1  #: Least share of valid pixels.
     foot: keys.Distance = FOOT  # type: ignore[misc]
     """Height of the column below the base, removed from images."""
-    margin: keys.Distance = 0.05
-    """Width around the robot's capsules within which pixels are removed."""
+    margin: keys.Distance = 0.05  #: Width around the robot's capsules in which pixels are removed.
     region: keys.Length | None = None
     """Distance from control points within which obstacles are seen; by default that within which
     avoidance acts."""
     thin: keys.Distance | None = None
-    """Depth of obstacles behind their surface, by default infinite."""
-    support: Annotated[int, Field(strict=True, ge=1, le=9)] = 3
-    """Pixels of nine that must agree."""
-    band: keys.Distance = 0.05
-    """Difference in depth within which they do."""
+    """Obstacles' depth behind their surface, by default infinite."""
+    support: Annotated[int, Field(strict=True, ge=1, le=9)] = 3  #: Pixels of nine that must agree.
+    band: keys.Distance = 0.05  #: Difference in depth within which they do.
 
 
 class DepthErrors(keys.Section):
@@ -76,53 +70,40 @@ class DepthErrors(keys.Section):
 
     noise_floor: keys.Distance = 1.2e-3
     """Standard deviation of the noise of z at `noise_from`, clipped at 3.5 of them."""
-    noise_growth: keys.NotNegative = 1.9e-3
-    """Its growth with (z - noise_from)^2 [1/m]."""
-    noise_from: keys.Distance = 0.4
-    """Depth from which it grows."""
+    noise_growth: keys.NotNegative = 1.9e-3  #: Its growth with (z - noise_from)^2 [1/m].
+    noise_from: keys.Distance = 0.4  #: Depth from which it grows.
     rounding: Literal["disparity", "step"] = "disparity"
     """Rounds z ("step") or 1 / z ("disparity") to multiples of `step`."""
-    step: keys.NotNegative = 2.85e-3
-    """In [m], or [1/m] of a disparity; 0 for none."""
-    near: keys.Distance = 0.5
-    """Depth below which readings are missing."""
+    step: keys.NotNegative = 2.85e-3  #: In [m], or [1/m] of a disparity; 0 for none.
+    near: keys.Distance = 0.5  #: Depth below which readings are missing.
     far: Annotated[float, Field(strict=True, gt=0.0), keys.Unit("m")] = 5.0
     """Depth above which readings are missing."""
-    missing: keys.Share = 0.002
-    """Probability of a missing reading."""
-    missing_at_edges: keys.Share = 0.3
-    """The same beside a step in depth of 5 cm."""
-    outliers: keys.Share = 0.02
-    """Probability of a square with a random, smaller depth in a frame."""
-    outlier_size: keys.Count = 2
-    """Largest half side of that square, in pixels."""
+    missing: keys.Share = 0.002  #: Probability of a missing reading.
+    missing_at_edges: keys.Share = 0.3  #: The same beside a step in depth of 5 cm.
+    outliers: keys.Share = 0.02  #: Probability of a square with a random, smaller depth in a frame.
+    ideal: keys.Flag = False  #: Whether readings have no errors.
+    outlier_size: keys.Count = 2  #: Largest half side of that square, in pixels.
 
     def _wrong(self) -> Iterator[str]:
         if self.near >= self.far:
             yield f"near = {self.near} m must be below far = {self.far} m"
 
-    @classmethod
-    def none(cls, near: float = 0.0, far: float = inf) -> DepthErrors:
-        """Return the errors of an ideal camera: exact readings between near and far [m]."""
-        return DepthErrors(noise_floor=0.0, noise_growth=0.0, noise_from=0.0, rounding="step",
-                           step=0.0, near=near, far=far, missing=0.0, missing_at_edges=0.0,
-                           outliers=0.0, outlier_size=0)
-
     @property
     def random(self) -> bool:
         """Whether readings have random errors."""
-        return any((self.noise_floor, self.noise_growth, self.missing, self.missing_at_edges,
-                    self.outliers))
+        return not self.ideal and any((self.noise_floor, self.noise_growth, self.missing,
+                                       self.missing_at_edges, self.outliers))
 
     def packed(self) -> Array:
         """Return the array (9,) for `expose`."""
-        return np.array([self.noise_floor, self.noise_growth, self.noise_from,
-                         self.rounding == "disparity", self.step, self.near, self.far,
-                         self.missing, self.missing_at_edges])
+        errors = np.array([self.noise_floor, self.noise_growth, self.noise_from,
+                           self.rounding == "disparity", self.step, self.missing,
+                           self.missing_at_edges])
+        return np.insert(errors * (not self.ideal), 5, [self.near, self.far])
 
     def add_outliers(self, rng: np.random.Generator, reading: NDArray[np.float32]) -> None:
         """Add this frame's outlier, if it has one, to a reading (h, w)."""
-        if rng.random() >= self.outliers:
+        if self.ideal or rng.random() >= self.outliers:
             return
         v, u = rng.integers(reading.shape[0]), rng.integers(reading.shape[1])
         half = int(rng.integers(self.outlier_size + 1))
@@ -135,39 +116,22 @@ class DepthErrors(keys.Section):
 class CameraSection(DepthErrors, ImageSection):
     """A simulated depth camera; the defaults resemble a Kinect."""
 
-    kind: Literal["camera"]
-    width: Pixels = 640
-    """Columns of the image."""
-    height: Pixels = 480
-    """Rows of the image."""
-    fx: Annotated[keys.Positive, keys.Unit("px")] = 525.0
-    """Focal length, horizontally."""
-    fy: Annotated[keys.Positive, keys.Unit("px")] = 525.0
-    """Focal length, vertically."""
-    cx: Annotated[keys.Finite, keys.Unit("px")] | None = None
-    """Column of the optical axis, by default the middle one."""
-    cy: Annotated[keys.Finite, keys.Unit("px")] | None = None
-    """Row of the optical axis, by default the middle one."""
-    position: keys.Point = (0.0, 2.0, 0.7)
-    """Where the camera is."""
-    look_at: keys.Point = (0.0, 0.3, 0.1)
-    """Point that it looks at."""
+    width: Pixels = 640  #: Columns of the image.
+    height: Pixels = 480  #: Rows of the image.
+    fx: Focal = 525.0  #: Focal length, horizontally.
+    fy: Focal = 525.0  #: Focal length, vertically.
+    cx: Middle | None = None  #: Column of the optical axis, by default the middle one.
+    cy: Middle | None = None  #: Row of the optical axis, by default the middle one.
+    position: keys.Point = (0.0, 2.0, 0.7)  #: Where the camera is.
+    look_at: keys.Point = (0.0, 0.3, 0.1)  #: Point that it looks at.
     rotation: keys.Rows3 | None = None
     """In place of `look_at`: rows of the matrix from camera (right, down, forward) to world."""
-    rate: Annotated[keys.Positive, keys.Unit("Hz")] = 30.0
-    """Frames per second."""
-    jitter: keys.Time = 0.0
-    """Largest random shift of a frame; below 1 / rate."""
-    seed: keys.Count = 0
-    """Seed of errors and jitter."""
-    ideal: keys.Flag = False
-    """Whether readings have no errors."""
-    far: keys.Length = 5.0
-    """Depth above which readings are missing."""
-    point_radius: keys.Distance = 0.02
-    """Radius at which obstacles that are points are seen."""
-    backdrop: keys.Distance = 4.0
-    """Depth of a wall behind everything, 0 for none."""
+    rate: keys.Frequency = 30.0  #: Frames per second.
+    jitter: keys.Time = 0.0  #: Largest random shift of a frame; below 1 / rate.
+    seed: keys.Count = 0  #: Seed of errors and jitter.
+    far: keys.Length = 5.0  #: Depth above which readings are missing.
+    point_radius: keys.Distance = 0.02  #: Radius at which obstacles that are points are seen.
+    backdrop: keys.Distance = 4.0  #: Depth of a wall behind everything, 0 for none.
 
 
 @register("sensors", "frames", shipped=True)
@@ -175,9 +139,7 @@ class FramesSection(ImageSection):
     """Recorded depth images, with their camera and times."""
 
     is_recorded: ClassVar[bool] = True
-    kind: Literal["frames"]
-    folder: str
-    """Their folder, relative to the scenario's file, or a shipped set."""
+    folder: str  #: Their folder, relative to the scenario's file, or a shipped set.
 
 
 class OwnSensor(AnySensor, OwnSection):
@@ -187,4 +149,4 @@ class OwnSensor(AnySensor, OwnSection):
     foot: ClassVar[float] = FOOT
 
 
-SensorKind = Annotated[AnySensor, keys.Registered("exact", "sensors", OwnSensor)]
+SensorKind = Annotated[AnySensor, keys.Registered("exact", OwnSensor)]

@@ -27,8 +27,13 @@ def unfit(control: ControlSection, limits: LimitsSection | None,
         return
     if control.stack == "set-based":
         yield from _unused(section, pointing)
-    yield from (f'{key} = {value:g} goes with control.stack = "smooth", got "{control.stack}"'
-                for key, value in _buffers(section, pointing).items() if value is not None)
+    buffered: dict[str, PointingTask | SeparationSection] = {**pointing}
+    if section:
+        buffered["avoidance"] = section
+    for key, one in buffered.items():
+        if one.buffer is not None:
+            yield (f'{key}.buffer = {one.buffer:g} goes with control.stack = "smooth", got '
+                   f'"{control.stack}"')
 
 
 def _unfit_control(control: ControlSection, limits: LimitsSection | None) -> Iterator[str]:
@@ -59,25 +64,19 @@ def _unused(section: SeparationSection | None,
 def _unfit_buffers(section: SeparationSection | None,
                    pointing: Mapping[str, PointingTask]) -> Iterator[str]:
     """Yield the buffers that are missing, not used, or too wide."""
+    lacks = 'control.stack = "smooth" needs {}.buffer, in which an inequality comes into effect'
     for where, task in pointing.items():
         if task.rows == "equality" and task.buffer is not None:
             yield f'{where}.buffer = {task.buffer:g} does not go with {where}.kind = "equality"'
-        if task.rows == "inequality" and task.buffer is not None and task.buffer > task.alpha_d:
+        if task.rows == "inequality" and task.buffer is None:
+            yield lacks.format(where)
+        if task.rows == "inequality" and (task.buffer or 0.0) > task.alpha_d:
             yield (f"{where}.buffer = {task.buffer:g} deg is wider than {where}.alpha_d = "
                    f"{task.alpha_d:g} deg")
-    equalities = {f"{where}.buffer" for where, task in pointing.items() if task.rows == "equality"}
-    for key, value in _buffers(section, pointing).items():
-        if value is None and key not in equalities:
-            yield f'control.stack = "smooth" needs {key}, in which an inequality comes into effect'
-    if section and section.buffer is not None:
+    if section and section.buffer is None:
+        yield lacks.format("avoidance")
+    elif section and section.buffer is not None:
         widest = max(section.distance, section.self_collision or 0.0)
         if widest + section.buffer >= section.influence:
             yield (f"avoidance.buffer = {section.buffer:g} m reaches from {widest:g} m beyond "
                    f"avoidance.influence = {section.influence:g} m")
-
-
-def _buffers(section: SeparationSection | None,
-             pointing: Mapping[str, PointingTask]) -> dict[str, float | None]:
-    """Return the width of each buffer that could be given, by its dotted key."""
-    found = {f"{where}.buffer": task.buffer for where, task in pointing.items()}
-    return {**found, "avoidance.buffer": section.buffer} if section else found

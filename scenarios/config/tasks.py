@@ -17,9 +17,9 @@ from hierarchy.paths import Path, Shifted, Still
 from hierarchy.plugins import Group
 from hierarchy.problem import Array
 from scenarios.config import sections as keys
-from scenarios.config.errors import ScenarioError
 from scenarios.config.own import OwnSection, PartSection
 from scenarios.config.paths import PathSection
+from scenarios.config.sections import ScenarioError
 
 if TYPE_CHECKING:
     from hierarchy import Task
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 Acceleration = Annotated[keys.Positive, keys.Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
+Axes = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
 
 
 class Made(PartSection):
@@ -47,8 +48,9 @@ class Made(PartSection):
 
     def make(self, at: References, **more: Any) -> Task:
         """Return the task: what `made_by` makes of the keys, of what is `asked`, and of `more`."""
+        kind = "inequality" if self.one_sided else "equality"
         task: Task = self.made(at.robot, state=at.start, contacts=at.contacts, name=self.title,
-                               **{**self.asked(at), **more})
+                               **{"kind": kind, **self.asked(at), **more})
         return task
 
     def asked(self, at: References) -> dict[str, Any]:
@@ -71,23 +73,17 @@ class Made(PartSection):
 class TaskSection(Made):
     """What most tasks have: the gains of their error."""
 
-    stiffness: keys.Stiffness = 40.0
-    """Gain of the error at acceleration level."""
-    damping: keys.Gain = 20.0
-    """Gain of the error's rate at acceleration level."""
-    gain: keys.Gain = 10.0
-    """Gain of the error at velocity level."""
+    stiffness: keys.Stiffness = 40.0  #: Gain of the error at acceleration level.
+    damping: keys.Gain = 20.0  #: Gain of the error's rate at acceleration level.
+    gain: keys.Gain = 10.0  #: Gain of the error at velocity level.
 
 
 class AlongSection(TaskSection):
     """Follow a path, or stay at the initial position without one."""
 
-    path: PathSection | None = None
-    """Path of the point."""
-    offset: keys.Point = (0.0, 0.0, 0.0)
-    """Shift of the path, or of the initial position."""
-    from_start: keys.Flag = False
-    """Whether the path is relative to the initial position."""
+    path: PathSection | None = None  #: Path of the point.
+    offset: keys.Point = (0.0, 0.0, 0.0)  #: Shift of the path, or of the initial position.
+    from_start: keys.Flag = False  #: Whether the path is relative to the initial position.
 
     def _wrong(self) -> Iterator[str]:
         if self.from_start and self.path is None:
@@ -139,12 +135,10 @@ class PositionTask(AlongSection):
 class PointingTask(TaskSection):
     """The z axis of a frame on or in a cone (1 row)."""
 
-    axis: keys.Vector3
-    """Axis of the cone in the world."""
+    axis: keys.Vector3  #: Axis of the cone in the world.
     alpha_d: Annotated[float, Field(strict=True, ge=0.0, le=180.0), keys.Unit("deg")]
     """Half-angle of the cone."""
-    rows: Rows = "inequality"
-    """"equality": on the cone. "inequality": within it."""
+    rows: Rows = "inequality"  #: "equality": on the cone. "inequality": in it.
     buffer: Annotated[keys.Positive, keys.Unit("deg")] | None = None
     """Width inside the cone within which an inequality acts if control.stack is "smooth"."""
     stiffness: keys.Stiffness = 5.0
@@ -154,9 +148,8 @@ class PointingTask(TaskSection):
     frame: ClassVar[str | None]
 
     def asked(self, at: References) -> dict[str, Any]:
-        """Return frame, half angle and kind."""
-        return {"frame": at.frame(self.frame), "half_angle": radians(self.alpha_d),
-                "kind": self.rows}
+        """Return the frame and the half angle."""
+        return {"frame": at.frame(self.frame), "half_angle": radians(self.alpha_d)}
 
     def angle(self, error: Array) -> Array:
         """Return the angle [deg] from the axis of the cone at errors of the task."""
@@ -174,8 +167,7 @@ class PostureTask(TaskSection):
 
     made_by: ClassVar[str] = "hierarchy.tasks:Posture"
     unit: ClassVar[str] = "rad"
-    target: tuple[keys.JointPosition, ...] | None = None
-    """As `start.q`; by default the start."""
+    target: tuple[keys.JointPosition, ...] | None = None  #: As `start.q`; by default the start.
     joints: dict[str, keys.JointValue] = Field(default_factory=dict)
     """Positions by name, which override `target`."""
     stiffness: keys.Stiffness = 10.0
@@ -201,8 +193,7 @@ class PointingSection(PointingTask):
 
     title: ClassVar[str] = "pointing"
     frame: ClassVar[str | None] = None
-    rows: Rows = Field("inequality", alias="kind")
-    """"equality": on the cone. "inequality": within it."""
+    rows: Rows = Field("inequality", alias="kind")  #: "equality": on the cone. "inequality": in it.
 
 
 class PostureSection(PostureTask):
@@ -216,14 +207,12 @@ class PostureSection(PostureTask):
 class LimitsSection(keys.Section):
     """The robot's position and velocity limits, and those of acceleration."""
 
-    acceleration: Acceleration | tuple[Acceleration, ...]
-    """Largest acceleration, of all joints or of each."""
+    acceleration: Acceleration | tuple[Acceleration, ...]  #: The largest, of all joints or of each.
     place: Literal["stack", "guard", "either", "bounds"] = "stack"
     """"stack": the first level. "guard": each command is clamped joint by joint, regardless of the
     tasks, with any resolver. "either": in the stack if the resolver handles bounds, else a guard.
     "bounds": in the stack, but without torque limits and [forces]."""
-    margin: Annotated[keys.NotNegative, keys.Unit("rad")] = 0.0
-    """Distance kept from the position limits."""
+    margin: keys.Arc = 0.0  #: Distance kept from the position limits.
     horizon: Annotated[keys.NotNegative, keys.Unit("s")] | None = None
     """Time in which a joint comes to rest at a limit, see docs/theory/joint-limits.md; by default
     0.05 s at level "torque", elsewhere one tick, which is the least."""
@@ -245,22 +234,18 @@ class LimitsSection(keys.Section):
 class DampingSection(keys.Section):
     """Null-space term a = -D v, eq. (15); not with the null-space [posture]."""
 
-    value: keys.NotNegative
-    """D [1/s], or with weight = "mass" the factor of M(q)."""
-    weight: Literal["identity", "mass"] = "identity"
-    """"identity": D = value I. "mass": D = value M(q)."""
+    value: keys.NotNegative  #: D [1/s], or with weight = "mass" the factor of M(q).
+    weight: Literal["identity", "mass"] = "identity"  #: D = value I, or with "mass" D = value M(q).
 
 
 class Listed(Made):
     """A task of `[[tasks]]`."""
 
-    name: keys.TaskName | None = None
-    """Its name, by default its kind."""
+    name: keys.TaskName | None = None  #: Its name, by default its kind.
     give: keys.NotNegative = 0.0
     """Violation of each row in favour of the tasks below, in the task's unit per s or s^2, or
     [N]."""
-    kind: str
-    """Which kind it is."""
+    kind: str  #: Which kind it is.
 
     @property
     def title(self) -> str:  # type: ignore[override]
@@ -292,4 +277,4 @@ class OwnTask(Listed, OwnSection):
         return task
 
 
-ListedTask = Annotated[Listed, keys.Registered(None, "tasks", OwnTask)]
+ListedTask = Annotated[Listed, keys.Registered(None, OwnTask)]

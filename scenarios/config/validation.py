@@ -5,20 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from math import inf, tau
-from typing import Any, TypeVar, get_args
+from typing import Any, NamedTuple, TypeVar, get_args
 
 from pydantic import ValidationError
 
 from hierarchy.errors import HierarchyError, UnknownNameError, brief
 from hierarchy.words import listed
-from scenarios.config.changes import Tag
-from scenarios.config.errors import ScenarioError
-from scenarios.config.sections import OneOf, Section, Unit, kinds_of
+from scenarios.config.sections import OneOf, ScenarioError, Section, Unit, kinds_of
 
 Kind = TypeVar("Kind", bound=Section)
-_LARGEST = {  # that is not doubted, by unit
-    "m": (10.0, "lengths are in metres, not in millimetres"),
-    "rad": (tau, "angles are in radians, not in degrees")}
+_USUAL = {  # sizes that are not doubted, by unit
+    "m": (0.0, 10.0, "lengths are in metres, not in millimetres"),
+    "rad": (0.0, tau, "angles are in radians, not in degrees"),
+    "rad or m": (0.0, tau, "joint angles are in radians"),
+    "deg": (1.0, inf, "cones are in degrees; all other angles are in radians")}
 _QUOTED = re.compile(r"'([^']*)'")
 _UNIONS = ("constrained-float", "float", "str")  # what pydantic calls the parts of one in a key
 
@@ -32,6 +32,13 @@ def validated(kind: type[Kind], data: dict[str, Any], what: str) -> Kind:
                             ) from error
     except HierarchyError as error:  # what a resolver says of its settings
         raise ScenarioError(f"{what}: control: {error}") from error
+
+
+class Tag(NamedTuple):
+    """The key that says which kind a section is of, and the kind of one without it."""
+
+    key: str
+    default: str | None
 
 
 def tag_at(root: type[Section], path: Sequence[str]) -> Tag | None:
@@ -115,7 +122,7 @@ def _table(data: Any, path: Sequence[int | str]) -> dict[str, Any]:
 def _annotations(root: type[Section], path: Sequence[str]) -> list[Any]:
     """Return the annotations of the keys at a path, in all sections that it may lead through."""
     parts: list[Any] = [root]
-    for key in (key for key in path if not key.isdigit()):  # a list index is not a key
+    for key in (key for key in path if not key.isdigit() and key != "*"):  # of a list
         parts = [(field.annotation, *field.metadata) for part in parts
                  for section in parts_of(part, Section) for name, field
                  in section.model_fields.items() if key in (name, field.alias)]
@@ -142,14 +149,14 @@ def doubtful_units(section: Section, above: str = "") -> Iterator[str]:
     for name, field in type(section).model_fields.items():
         key, value = f"{above}{field.alias or name}", getattr(section, name)
         units = {unit.name for unit in parts_of((field.annotation, *field.metadata), Unit)}
+        unit = units.pop() if len(units) == 1 else ""
+        least, largest, remark = _USUAL.get(unit, (0.0, inf, ""))
         for where, one in _leaves(value, key):
             if isinstance(one, Section):
                 yield from doubtful_units(one, f"{where}.")
-            elif isinstance(one, float) and len(units) == 1:
-                largest, remark = _LARGEST.get(next(iter(units)), (inf, ""))
-                if largest < abs(one) < inf:
-                    yield f"{where} = {one:g} {units.pop()}: {remark}"
-                    break
+            elif isinstance(one, float) and (0.0 < abs(one) < least or largest < abs(one) < inf):
+                yield f"{where} = {one:g} {unit}: {remark}"
+                break
 
 
 def _leaves(value: Any, key: str) -> Iterator[tuple[str, Any]]:

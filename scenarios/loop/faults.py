@@ -103,10 +103,6 @@ class FaultySensor:
         self._inner, self._faults = sensor, faults
         self.measurement, self.obstacles, self.outside = sensor.measurement, sensor.obstacles, 0.0
 
-    def check_start(self, state: State) -> None:
-        """Raise a HierarchyError if an obstacle touches a point at the start."""
-        self._inner.check_start(state)
-
     def measure(self, state: State) -> Measurement:
         """Measure with the sensor and apply the active faults."""
         self.outside = 0.0

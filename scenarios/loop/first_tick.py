@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import isfinite, tau
+from math import isfinite
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from solvers.explain import is_missed
 
 _NAMED = 3        # pairs of capsules named at most
 _ROUNDING = 1e-6  # [m] below a distance that is not said
-_NARROW = 1.0     # [deg] a cone this narrow may have been meant in radians
 _FAR_BEYOND = 2.0  # times its limit: an acceleration that is said
 _MET = 1e-6       # violation of a level relative to its terms, below which it is met
 
@@ -132,14 +131,4 @@ def _warnings(scenario: Scenario, distances: dict[str, float]) -> Iterator[str]:
             if key in kept and distances.get(name, kept[key]) < kept[key] - _ROUNDING:
                 yield (f"{name}: {1e3 * distances[name]:.0f} mm from the nearest obstacle at the "
                        f"start, less than the {1e3 * kept[key]:.0f} mm to be kept")
-    cones = {"pointing": scenario.pointing} | {
-        f"tasks.{i}": task for i, task in enumerate(scenario.tasks)}
-    for key, task in cones.items():
-        if 0.0 < getattr(task, "alpha_d", 0.0) < _NARROW:
-            yield (f"{key}.alpha_d = {getattr(task, 'alpha_d', 0.0):g} deg: cones are in degrees; "
-                   "all other angles are in radians")
     yield from doubtful_units(scenario)
-    for key, posture in {"posture": scenario.posture, **cones}.items():
-        for i, value in enumerate(getattr(posture, "target", None) or ()):
-            if abs(value) > tau:
-                yield f"{key}.target.{i} = {value:g}: joint angles are in radians"

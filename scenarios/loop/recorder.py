@@ -15,13 +15,11 @@ from hierarchy.allocation import AVOIDANCE
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import place
 from hierarchy.problem import Array
-from hierarchy.robot import Frame, Robot
-from hierarchy.state import State
 from scenarios.config import Scenario
 from scenarios.loop.audit import ActiveSets, Audit, Truth
 from scenarios.loop.controller import Controller
 from scenarios.recording import listed
-from scenarios.recording.facts import facts_of
+from scenarios.recording.facts import facts_of, placed_points
 from scenarios.recording.recording import Event, Recording
 
 FASTEST = 1e3  # [rad/s or m/s] of a joint; a faster motion has diverged
@@ -166,7 +164,9 @@ class Recorder:
             name: values[rows].copy() for name, values in self._extra.items()}
         robot, cell = self._cell.robot, self._cell
         if "true_q" in signals:
-            signals["true_ee_position"] = _positions(robot, self._frame, signals["true_q"])
+            placed = self.facts.robot.placements(signals["true_q"])
+            signals["true_ee_position"] = placed_points(
+                placed, [self._frame.joint], self._frame.offset)[:, 0]
         signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
                     "velocity_limit": cell.velocity_limit}
         if cell.contacts is not None:
@@ -203,16 +203,6 @@ class Recorder:
                         "ee_distance": log.distance[:, -1].copy(), "active_control_point": active,
                         "repulsion_active": repulsion.astype(bool)}
         return signals
-
-
-def _positions(robot: Robot, frame: Frame, q: Array) -> Array:
-    """Positions (T, 3) [m] of a frame's origin at joint positions q (T, nq)."""
-    state, at_rest = State(robot), np.zeros(robot.n)
-    positions = np.full((len(q), 3), np.nan)
-    for k, row in enumerate(q):
-        if state.move(0.0, row, at_rest):
-            positions[k] = state.position(frame)
-    return positions
 
 
 @compiled

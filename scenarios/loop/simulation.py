@@ -42,7 +42,7 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     expect("simulate: audits", audits, Iterable, "give a list of audits")
     rehearsal = rehearsed(scenario)
     faults = Faults(scenario) if scenario.faults else None
-    controller = Controller(with_room(scenario), faults=faults)
+    controller = Controller(with_room(scenario) if faults else scenario, faults=faults)
     ticks = scenario.control.ticks
     fates = Fates(controller.cell.stack.names, ticks, controller.cell.robot.n) \
         if scenario.sensor.kind != "exact" else None  # rows cannot be written again without images

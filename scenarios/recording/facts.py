@@ -17,7 +17,7 @@ from hierarchy.avoidance import Capsule
 from hierarchy.problem import Array
 from hierarchy.robots import DHTable
 from hierarchy.robots.table import Base
-from scenarios.cell.robot import contacts_of, sensed_points
+from scenarios.cell.robot import contacts_of, on_column, sensed_points
 from scenarios.config import Scenario
 from scenarios.config.plant import TorqueSection
 from solvers.resolver import Handles
@@ -190,10 +190,7 @@ def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
 
     With `foot` > 0 [m] the first is a column of that height below the base.
     """
-    links = robot.capsules or _sticks(robot)
-    if foot == 0.0 or robot.base == "floating" or not links:
-        return links
-    return (Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), links[0].radius), *links)
+    return on_column(robot, robot.capsules or _sticks(robot), foot)
 
 
 def _sticks(robot: Robot) -> tuple[Capsule, ...]:
@@ -218,11 +215,11 @@ def ends(links: Sequence[Capsule], placements: Array) -> Array:
     placements (..., J + 1, 12), as in a State.
     """
     joints = np.array([link.joint for link in links], dtype=np.int64)
-    return np.stack([place(placements, joints, [getattr(link, side) for link in links])
+    return np.stack([placed_points(placements, joints, [getattr(link, side) for link in links])
                      for side in ("start", "end")], axis=-2)
 
 
-def place(placements: Array, joints: Any, offsets: Any) -> Array:
+def placed_points(placements: Array, joints: Any, offsets: Any) -> Array:
     """Return the world positions (..., K, 3) [m] of offsets (K, 3) in the frames of joints (K,)."""
     rows = placements[..., np.asarray(joints, dtype=np.int64), :]
     columns = rows[..., :9].reshape(*rows.shape[:-1], 3, 3)

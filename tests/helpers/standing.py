@@ -84,3 +84,15 @@ def written(task, state, level="acceleration", n=ROBOT.n):
     rows = Rows.empty(task.dimension, n)
     task.writer(state, level, rows)()
     return rows
+
+
+def accelerations(plant, torques):
+    """Accelerations (n,) of a TorqueRobot under torques, now, in the robot's convention."""
+    import mujoco
+
+    plant.data.ctrl[:] = torques
+    mujoco.mj_forward(plant.model, plant.data)
+    a = plant.data.qacc[plant._rates]
+    R = plant.data.xmat[1].reshape(3, 3)  # of the base; d(R^T p')/dt
+    a[:3] = R.T @ a[:3] - np.cross(plant.v[3:6], plant.v[:3])
+    return a

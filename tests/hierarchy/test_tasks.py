@@ -35,8 +35,14 @@ from hierarchy.tasks import (
     Separation,
     TorqueLimits,
 )
-from scenarios.config.kinds.frames import ListedFrame, ListedPointing, ListedPose, ListedPosition
-from scenarios.config.kinds.whole import ListedCentreOfMass, ListedPosture
+from scenarios.config.kinds import (
+    ListedCentreOfMass,
+    ListedFrame,
+    ListedPointing,
+    ListedPose,
+    ListedPosition,
+    ListedPosture,
+)
 
 STEP = 1e-6
 STATES = states(11)

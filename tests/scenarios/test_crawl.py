@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from scenarios import load, simulate
-from scenarios.cell.plants.touch import inside
+from scenarios.cell.plants.torque import inside
 from scenarios.measure.metrics import measure
 
 CRAWL = load("crawl")

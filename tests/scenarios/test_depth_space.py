@@ -13,9 +13,8 @@ from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.sensors import DepthSensor
-from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
+from scenarios.cell.sensors.camera import DepthCamera, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage
-from scenarios.cell.sensors.frames import RecordedFrames
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
 from scenarios.config import ScenarioError
 from scenarios.config.sensor import CameraSection, ImageSection

@@ -6,7 +6,7 @@ from hand_made import HandMadeScenario, recording
 
 from hierarchy import HierarchyError
 from scenarios.config import load
-from scenarios.config.kinds.frames import ListedPosition
+from scenarios.config.kinds import ListedPosition
 from scenarios.draw.figures import letter, palette, panels
 from scenarios.draw.figures.timeline import timeline
 from scenarios.loop.simulation import simulate

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hand_made import HandMadeScenario, recording
 
-import scenarios.config.names as groups_of
+import scenarios.config.reading as groups_of
 from hierarchy import HierarchyError
 from scenarios import compare, load
 from scenarios.cli.main import run_command
@@ -44,7 +44,7 @@ def test_a_group_is_not_a_scenario():
     ("title = 'x'\nscenarios = ['ellipse']\nresolver = 'hcod'", r"group 'mine': .*'resolver'"),
     ("title = 'x'\nscenarios = ['elipse']", r"unknown scenario 'elipse'; did you mean 'ellipse'")])
 def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch):
-    monkeypatch.setattr(groups_of, "LIBRARY", tmp_path)
+    monkeypatch.setattr(groups_of, "GROUPS", tmp_path)
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(HierarchyError, match=says):
         compare("mine")

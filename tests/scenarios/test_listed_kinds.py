@@ -1,7 +1,7 @@
 """Every kind of `[[tasks]]` in a scenario: what it reaches, and what is refused."""
 
 import re
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pytest
@@ -152,7 +152,6 @@ def kinds(monkeypatch):
 def test_a_new_task_is_one_section(shipped, kinds, tmp_path):
     @plugins.register("tasks", "elbow", shipped=shipped)
     class Elbow(Listed):
-        kind: Literal["elbow"]
         joint: str
         angle: Annotated[float, Unit("rad")] = 0.5
 
@@ -182,7 +181,6 @@ def test_a_new_plant_is_its_class_and_one_section(kinds, tmp_path):
     @plugins.register("plants", "slow", shipped=True)
     class SlowSection(AnyPlant):
         made_by: ClassVar[str] = f"{__name__}:Slow"
-        kind: Literal["slow"]
         share: float
 
     runs = [simulate(scenario_of(tmp_path, COUPLING, plant=plant,
@@ -196,7 +194,6 @@ def test_a_new_sensor_is_its_class_and_one_section(kinds, tmp_path):
     @plugins.register("sensors", "near", shipped=True)
     class NearSection(AnySensor):
         foot: ClassVar[float] = 0.0
-        kind: Literal["near"]
 
         def made(self, robot, **given):
             return given["exact"]

@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from mechanisms import four_bar
+from standing import accelerations
 from urdf_text import joint, link, urdf
 
 from hierarchy import Robot, State, plugins
@@ -154,7 +155,7 @@ def test_the_torque_plant_has_the_armature_of_the_robots_file(added, tmp_path):
     mujoco.mj_forward(model, data)
     expected = data.qacc.copy()
     expected[:3] = data.xmat[1].reshape(3, 3).T @ expected[:3]
-    np.testing.assert_allclose(plant.accelerations(np.array([3.0, -2.0])), expected, rtol=1e-6)
+    np.testing.assert_allclose(accelerations(plant, np.array([3.0, -2.0])), expected, rtol=1e-6)
 
 
 FALLING = """<mujoco><default><joint armature=".2"/></default><worldbody><body name="trunk">

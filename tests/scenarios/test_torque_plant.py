@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing import ROBOT, feet
+from standing import ROBOT, accelerations, feet
 
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
@@ -36,7 +36,7 @@ def test_without_contact_it_accelerates_as_the_robots_model(seed):
     q, v, torques = in_the_air(seed)
     expected = pin.aba(ROBOT.model, ROBOT.model.createData(), q, v,
                        np.concatenate([np.zeros(6), torques]))
-    found = TorqueRobot(ROBOT, CONTACTS, q, v).accelerations(torques)
+    found = accelerations(TorqueRobot(ROBOT, CONTACTS, q, v), torques)
     assert np.abs(found - expected).max() < 1e-3 * np.abs(expected).max()
 
 

@@ -138,7 +138,7 @@ def checked(capsys, *changes, name="ellipse"):
     ("ellipse", ["pointing.alpha_d=0.6"],
      "Warning: pointing.alpha_d = 0.6 deg: cones are in degrees; all other angles are in radians."),
     ("strictness", ["posture={target=[0, 0, 0, 90, 0, 0, 0], role='task'}"],
-     "posture.target.3 = 90: joint angles are in radians"),
+     "posture.target.3 = 90 rad or m: joint angles are in radians"),
     ("ellipse", ["avoidance.near=0.2", "avoidance.far=0.3"],
      "body: 112 mm from the nearest obstacle at the start, less than the 200 mm")])
 def test_check_warns_of_what_is_missed_or_doubtful(name, changes, said, capsys):

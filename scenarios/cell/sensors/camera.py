@@ -1,30 +1,39 @@
-"""A simulated depth camera that sees obstacles and robot, and the errors of its readings."""
+"""Sources of depth images: a simulated camera with errors of its readings, and recorded images."""
 
 # mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from math import floor, inf
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy import HierarchyError, State
+from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule, Obstacles
 from hierarchy.avoidance.body import pack_capsules
+from hierarchy.errors import UnknownNameError
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.rendering import draw_scene
-from scenarios.config.sensor import CameraSection, DepthErrors
+from scenarios.config.reading import LIBRARY
+from scenarios.config.sensor import CameraSection
+from scenarios.toml_text import read_toml
 
 Image = NDArray[np.float32]
 _WIDEST = 3.5      # [standard deviations] at which noise is clipped, so that it is bounded
 _EDGE = 0.05       # [m] depth difference between two pixels at an edge
 _UPRIGHT = 1e-6    # from 1, of a direction's vertical part: the image then has another x axis
 _ROUNDING = 1e-9   # [s] of times that are compared
+SHIPPED = LIBRARY / "frames"
+ABOUT = "frames.toml"
+INTRINSICS = ("width", "height", "fx", "fy", "cx", "cy", "position", "rotation")
 
 
 @dataclass(frozen=True)
@@ -101,9 +110,8 @@ class DepthCamera:
             raise HierarchyError(f"camera: jitter = {section.jitter} s must be below 1 / rate = "
                                  f"{1.0 / section.rate:.3g} s")
         self.pinhole, self.obstacles, self.latency = pinhole, obstacles, section.latency
-        self.errors = DepthErrors.none(section.near, section.far) if section.ideal else section
         self._section, self._backdrop = section, section.backdrop or inf
-        self._eye, self._packed = pinhole.packed(), self.errors.packed()
+        self._eye, self._packed = pinhole.packed(), section.packed()
         self._joints, self._capsules = pack_capsules(capsules)
         size = (pinhole.height, pinhole.width)
         self.scene, self._reading = np.zeros(size, np.float32), np.zeros(size, np.float32)
@@ -125,15 +133,90 @@ class DepthCamera:
         draw_scene(self.scene, self._eye, self._backdrop, self.obstacles.at(state.t),
                    self._section.point_radius, state.placements, self._joints, self._capsules)
         rng = self._rng(frame, 0)
-        if self.errors.random:
+        if self._section.random:
             rng.standard_normal(out=self._normal, dtype=np.float32)
             rng.random(out=self._uniform, dtype=np.float32)
         expose(self.scene, self._normal, self._uniform, self._packed, self._reading)
-        self.errors.add_outliers(rng, self._reading)
+        self._section.add_outliers(rng, self._reading)
         return self._reading, state.placements
 
     def _rng(self, frame: int, use: int) -> np.random.Generator:
         return np.random.default_rng((self._section.seed, frame, use))
+
+
+class RecordedFrames:
+    """Depth images from a folder, or a shipped set by name, in place of a camera.
+
+    The folder has 16-bit PNG files, in which 0 means no reading, and `frames.toml` with width,
+    height, fx, fy, cx, cy [px], position [m], rotation (rows; its columns are the camera's axes in
+    the world), scale [m] of one step of a pixel, and a table `[[frame]]` for each image: file, time
+    [s], and optionally q [rad or m], the robot's joints when it was taken.
+    `examples/record_frames.py` writes it.
+
+    Image i is taken at its time and available `latency` [s] later. If the folder has no joints for
+    it, the robot is removed in its current state. After the last image there are no more frames.
+    Raises HierarchyError, naming file and key, if the folder is invalid.
+    """
+
+    def __init__(self, folder: str | Path, robot: Robot, latency: float = 0.0) -> None:
+        self.folder, self.latency = _found(folder), latency
+        self.obstacles = Obstacles()
+        about = read_toml(self.folder / ABOUT, "file of frames", HierarchyError)
+        self.pinhole, self._scale = _pinhole(about, self.folder), about.get("scale", 1e-3)
+        frames = about.get("frame") or []
+        try:
+            self.times = [float(frame["time"]) for frame in frames]
+            files = [self.folder / frame["file"] for frame in frames]
+        except (KeyError, TypeError, ValueError) as error:
+            raise HierarchyError(f"{self.folder / ABOUT}: each frame needs a file and a time "
+                                 f"({error!r})") from error
+        if not frames or any(a >= b for a, b in zip(self.times, self.times[1:], strict=False)):
+            raise HierarchyError(f"{self.folder / ABOUT}: needs frames, at increasing times")
+        self._images = [_read_png(file, self.pinhole) for file in files]
+        self._placements = [State.at(robot, frame["q"]).placements.copy() if "q" in frame else None
+                            for frame in frames]
+        self._reading = np.zeros((self.pinhole.height, self.pinhole.width), np.float32)
+
+    def newest(self, t: float) -> int:
+        """Return the number of the last image taken by time t [s], -1 before the first."""
+        return bisect_right(self.times, t + _ROUNDING) - 1
+
+    def image(self, frame: int, state: State) -> tuple[Image, Array]:
+        """Return an image (h, w) [m], valid until the next, and the robot's placements then."""
+        np.multiply(self._images[frame], self._scale, out=self._reading, casting="unsafe")
+        placements = self._placements[frame]
+        return self._reading, state.placements if placements is None else placements
+
+
+def _found(folder: str | Path) -> Path:
+    for place in (SHIPPED / folder, Path(folder)):
+        if (place / ABOUT).is_file():
+            return place
+    if Path(folder).is_dir():
+        raise HierarchyError(f"folder {str(folder)!r} has no {ABOUT}")
+    raise UnknownNameError("folder of frames", str(folder),
+                           sorted(path.name for path in SHIPPED.glob("*")))
+
+
+def _pinhole(about: dict[str, Any], folder: Path) -> Pinhole:
+    for key in INTRINSICS:
+        if key not in about and key not in ("cx", "cy"):
+            raise HierarchyError(f"{folder / ABOUT}: {key} is missing")
+    return Pinhole(**{key: about[key] for key in INTRINSICS if key in about})
+
+
+def _read_png(file: Path, pinhole: Pinhole) -> NDArray[np.uint16]:
+    from PIL import Image as Png
+
+    try:
+        with Png.open(file) as png:
+            values = np.array(png)
+    except OSError as error:
+        raise HierarchyError(f"{file}: {error}") from error
+    if values.shape != (pinhole.height, pinhole.width) or values.dtype.kind not in "ui":
+        raise HierarchyError(f"{file}: an image {values.shape} of {values.dtype}, expected "
+                             f"{(pinhole.height, pinhole.width)} of integers")
+    return values.astype(np.uint16)
 
 
 @compiled

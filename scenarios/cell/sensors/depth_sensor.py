@@ -14,8 +14,8 @@ from hierarchy.avoidance import Capsule, ControlPoint, Measurement, Pairs
 from hierarchy.avoidance.body import pack_capsules, pack_points
 from hierarchy.jit import bind
 from hierarchy.problem import Array
-from scenarios.cell.sensors.camera import DepthCamera, Image, Pinhole, looking_at
-from scenarios.cell.sensors.frames import RecordedFrames
+from scenarios.cell.robot import on_column
+from scenarios.cell.sensors.camera import DepthCamera, Image, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.pixels import (
     ObstacleImage,
     Space,
@@ -103,8 +103,7 @@ class DepthSensor:
     the time the source took to make the image, which is not part of the control loop.
     """
 
-    def __init__(self, section: ImageSection, source: Source, space: DepthSpace,
-                 exact: ExactDistances | None = None) -> None:
+    def __init__(self, section: ImageSection, source: Source, space: DepthSpace) -> None:
         self.source, self.space = source, space
         self.stale_after, self.least_readings = section.stale_after, section.least_readings
         self.points: tuple[ControlPoint, ...] = space.points
@@ -112,7 +111,6 @@ class DepthSensor:
         self.reading: Image | None = None
         self.stopped = self.covered = False
         self.outside = 0.0
-        self._exact = exact
         self._nothing = self._current = self._empty()
         self._spare: list[ObstacleImage] = []
         self._coming: deque[tuple[float, ObstacleImage]] = deque()
@@ -137,11 +135,6 @@ class DepthSensor:
         self.space.measure(self._current, state.placements)
         state.measurement = seen
         return seen
-
-    def check_start(self, state: State) -> None:
-        """Raise a HierarchyError if an obstacle of a simulated scene touches a point."""
-        if self._exact is not None:
-            self._exact.check_start(state)
 
     def _take(self, frame: int, state: State) -> None:
         if self.stopped:
@@ -178,30 +171,20 @@ class DepthSensor:
 
 def depth_sensor(section: CameraSection | FramesSection, robot: Robot, exact: ExactDistances,
                  asked: Asked) -> DepthSensor:
-    """Make the sensor of a simulated camera or of recorded frames, for the points of `exact`.
-
-    Recorded frames cannot be checked for obstacles at the start.
-    """
-    capsules = _capsules(robot, section.foot)
+    """Make the sensor of a simulated camera or of recorded frames, for the points of `exact`."""
+    if not robot.capsules:
+        raise HierarchyError(f"robot {robot.name!r} has no capsules, which are needed to remove "
+                             "it from the image")
+    capsules = on_column(robot, robot.capsules, section.foot)
     source: Source
     if isinstance(section, CameraSection):
         rotation = (looking_at(section.position, section.look_at) if section.rotation is None
                     else np.array(section.rotation))
         pinhole = Pinhole(section.width, section.height, section.fx, section.fy, section.cx,
                           section.cy, section.position, rotation)
-        source, checked = DepthCamera(section, pinhole, exact.obstacles, capsules), exact
+        source = DepthCamera(section, pinhole, exact.obstacles, capsules)
     else:
-        source, checked = RecordedFrames(section.folder, robot, section.latency), None
+        source = RecordedFrames(section.folder, robot, section.latency)
     space = DepthSpace(section, source.pinhole, exact.points, capsules, asked,
                        exact.measurement.pairs is not None)
-    return DepthSensor(section, source, space, checked)
-
-
-def _capsules(robot: Robot, foot: float) -> tuple[Capsule, ...]:
-    if not robot.capsules:
-        raise HierarchyError(f"robot {robot.name!r} has no capsules, which are needed to remove "
-                             "it from the image")
-    if foot == 0.0 or robot.base == "floating":
-        return robot.capsules
-    column = Capsule("foot", 0, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), robot.capsules[0].radius)
-    return (column, *robot.capsules)
+    return DepthSensor(section, source, space)

@@ -16,6 +16,7 @@ from hierarchy.problem import Array
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import AvoidanceKind, AvoidanceSection, ObstacleSection
+from scenarios.config.sections import naming
 
 
 class Asked(NamedTuple):
@@ -30,23 +31,12 @@ class Asked(NamedTuple):
 class Sensor(Protocol):
     """Measures distances of a robot's points to obstacles; see `ExactDistances`, `DepthSensor`."""
 
-    @property
-    def measurement(self) -> Measurement:
-        """The last measurement, always the same object."""
-
-    @property
-    def obstacles(self) -> Obstacles:
-        """The obstacles, as they are now."""
-
-    @property
-    def outside(self) -> float:
-        """Time [s] of the last measurement that the control loop would not spend."""
+    measurement: Measurement  #: The last measurement, always the same object.
+    obstacles: Obstacles  #: The obstacles, as they are now.
+    outside: float  #: Time [s] of the last measurement that the control loop would not spend.
 
     def measure(self, state: State) -> Measurement:
         """Measure at a state and hang the measurement on it; valid until the next call."""
-
-    def check_start(self, state: State) -> None:
-        """Raise a HierarchyError if an obstacle touches a point of the robot at the start."""
 
 
 _TOUCHING = 1e-9  # [m] a control point this close to an obstacle has no direction away from it
@@ -133,15 +123,11 @@ def sensor_of(scenario: Scenario, start: State,
     exact = ExactDistances(robot, sensor.obstacles if sensor else make_obstacles(section.placed),
                            asked.body, asked.tip, asked.mean_within,
                            pairs=not isinstance(section, AvoidanceSection))
-    try:
+    with naming("sensor"):
         made: Sensor = scenario.sensor.made(robot, exact=exact, asked=asked, body=asked.body,
                                             tip=asked.tip)
-    except ScenarioError:
-        raise
-    except HierarchyError as error:
-        raise ScenarioError(f"sensor: {error}") from error
-    if sensor is None:
-        made.check_start(start)
+    if sensor is None and not scenario.sensor.is_recorded:
+        exact.check_start(start)
     return made
 
 
