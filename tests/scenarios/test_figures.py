@@ -2,7 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hand_made import HandMadeScenario, recording
+from hand_made import asked, recording
 
 from hierarchy import HierarchyError
 from scenarios.config import load
@@ -39,9 +39,9 @@ def test_every_panel_draws_a_run_that_has_its_signal(panel):
 
 
 def test_the_errors_of_listed_tasks_are_drawn_with_a_line_for_each():
-    asked = HandMadeScenario(tasks=(ListedPosition(name="left foot", kind="position", frame=""),
-                                    ListedPosition(name="right foot", kind="position", frame="")))
-    run = recording(asked, task_error_left_foot=np.ones((5, 3)),
+    feet = asked(tasks=(ListedPosition(name="left foot", kind="position", frame=""),
+                        ListedPosition(name="right foot", kind="position", frame="")))
+    run = recording(feet, task_error_left_foot=np.ones((5, 3)),
                     task_error_right_foot=np.full((5, 3), 1e-3))
     (ax,) = beside(panels.PANEL["task-errors"], {"hqp": run})["hqp"].axes
     assert [line.get_label() for line in ax.lines] == ["left foot", "right foot"]

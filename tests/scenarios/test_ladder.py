@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from hand_made import HandMadeScenario, recording
+from hand_made import asked, recording
 
 import scenarios.config.names as groups_of
 from hierarchy import HierarchyError
@@ -71,7 +71,7 @@ LETTER = "tpm-published"
 
 
 def run_of(spec, q=None, fault=None, **changed):
-    scenario = HandMadeScenario().with_resolver(spec)
+    scenario = asked(spec)
     q = np.zeros((5, 7)) if q is None else q
     return Run(scenario, spec, spec, recording(scenario, fault, q=q, **changed))
 
@@ -93,7 +93,7 @@ NOT_SOLVED = 3 * np.eye(5, dtype=int)  # at tick 0, 1, ...
 
 
 @pytest.mark.parametrize(("other", "tick", "why"), [
-    ({"q": away_from(3)}, 3, "the motion magnifies the errors of each tick (declared: 1e-09)"),
+    ({"q": away_from(3)}, 3, "the motion magnifies the errors of each tick (declared: 1e-06)"),
     ({"q": away_from(3), "status": NOT_SOLVED[3]}, 3, "tick 3 of hqp was not solved"),
     ({"q": away_from(3), "status": NOT_SOLVED[4]}, 3, "magnifies"),
     ({"q": away_from(3), "order": np.array([0, 1, 0, 0, 0])}, 3, "another one at tick 1"),

@@ -2,8 +2,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hand_made import HandMadeScenario, recording
+from hand_made import asked, recording
 
+from scenarios.config import load
 from scenarios.measure.metrics import Metric, as_plain_data, measure
 from scenarios.recording import listed
 from solvers import Status
@@ -35,7 +36,7 @@ def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch)
     monkeypatch.setattr(listed, "errors", lambda run: [
         (hand, "m", np.array([0.0, 9e-10, 1e-12, 5e-10, 9e-10])),
         (elbow, "m", np.array([0.0, 0.0, 0.0, 0.0, 1e-9]))])
-    found = measure(recording(HandMadeScenario(tasks=(hand, elbow))))
+    found = measure(recording(asked(tasks=(hand, elbow))))
     assert found["task_hand_rms"].label == "Hand: error, rms"
     for key in ("rms", "max_settled", "end"):
         assert found[f"task_hand_{key}"].value == 0.0
@@ -83,7 +84,7 @@ def test_times_are_given_by_median_and_tails_for_each_part():
 
 
 def test_a_scenario_without_a_task_has_no_metric_of_it():
-    full = recording(HandMadeScenario(pointing=None))
+    full = recording(asked(pointing=None))
     for signal in ("minimal_distance", "ee_distance", "position_error"):
         del full.signals[signal]
     assert {"cone_violation_max", "body_distance_min", "ee_distance_min", "position_error_rms",
@@ -98,9 +99,8 @@ def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_
 
 
 def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
-    asked = HandMadeScenario()
-    asked.avoidance.promised = {"body": 0.2, "ee": 0.3}
-    found = measure(recording(asked, minimal_distance=[1, 0.05, 1, 1, 1],
+    far = load("ellipse-hqp", {"avoidance.distance": 0.2, "avoidance.influence": 0.3})
+    found = measure(recording(far, minimal_distance=[1, 0.05, 1, 1, 1],
                               ee_distance=[1, 1, 1, 0.02, 1],
                               true_minimal_distance=[1, 0.4, 0.3, 1, 1],
                               true_ee_distance=[1, 1, 0.35, 1, 1]))
@@ -109,7 +109,7 @@ def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
     measured = found["body_distance_min_measured"], found["ee_distance_min_measured"]
     assert [metric.value for metric in measured] == [0.05, 0.02]
     assert all(metric.detail and metric.lower_is_better is None for metric in measured)
-    found = measure(recording(asked, minimal_distance=np.zeros(5), ee_distance=np.zeros(5),
+    found = measure(recording(far, minimal_distance=np.zeros(5), ee_distance=np.zeros(5),
                               true_minimal_distance=[0.2, 0.19995, 0.1998, 0.1, 1.0],
                               true_ee_distance=[0.3, 0.4, 0.2, 0.4, np.nan]))
     assert found["body_below_share"].value == pytest.approx(2 / 5)  # 0.05 mm is rounding
@@ -124,10 +124,9 @@ def test_steps_of_the_command_and_of_the_joints_are_told_apart():
     assert found["velocity_step_max"].value == pytest.approx(0.3)
     assert found["velocity_step_max_measured"].value == pytest.approx(0.5)
     assert found["command_step_max"].value == pytest.approx(0.04)
-    asked = HandMadeScenario()
-    asked.control.level = "velocity"
+    slow = load("ellipse-velocity")
     command = np.array([[1.0], [1.5], [1.25], [1.25], [1.25]])
-    changed = measure(recording(asked, q=command, command=command))
+    changed = measure(recording(slow, q=command, command=command))
     assert changed["command_step_max"].value == 0.5
     labels = {found[name].label for name in ("velocity_step_max", "command_step_max",
                                              "velocity_step_max_measured")}

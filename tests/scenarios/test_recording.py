@@ -3,25 +3,17 @@ import json
 import os
 import subprocess
 import sys
-from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
 import pytest
-from hand_made import HandMadeScenario, recording
+from hand_made import recording
 
 from hierarchy.errors import HierarchyError
 from scenarios.files import OutputError, claim, next_free, whole
-from scenarios.measure import run_folder
 from scenarios.measure.run_folder import load_run, save
 
 
-@pytest.fixture
-def hand_made_scenarios(monkeypatch):
-    monkeypatch.setattr(run_folder, "load", lambda path, changes=(): HandMadeScenario())
-
-
-@pytest.mark.usefixtures("hand_made_scenarios")
 def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
     saved = recording(q=np.random.default_rng(0).normal(size=(5, 7)), fault="stopped at tick 5")
     loaded = load_run(save(saved, tmp_path / "run"))
@@ -43,16 +35,14 @@ def test_a_run_folder_holds_arrays_metrics_scenario_and_versions(tmp_path):
     assert json.loads((tmp_path / "run" / "metrics.json").read_text())["ticks"] == 5
 
 
-def test_a_save_that_breaks_leaves_nothing_behind(tmp_path):
+def test_a_save_that_breaks_leaves_nothing_behind(tmp_path, monkeypatch):
     broken = mock.Mock(side_effect=KeyboardInterrupt)
-    scenario = SimpleNamespace(pointing=None, to_toml=broken, tasks=(),
-                               control=SimpleNamespace(period=1.0))
+    monkeypatch.setattr("scenarios.config.Scenario.to_toml", broken)
     with pytest.raises(KeyboardInterrupt):
-        save(recording(scenario), tmp_path / "run")
+        save(recording(), tmp_path / "run")
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.usefixtures("hand_made_scenarios")
 def test_a_file_that_is_cut_off_or_has_wrong_bits_is_named(tmp_path):
     with pytest.raises(HierarchyError, match=r"no run\.npz"):
         load_run(tmp_path)

@@ -6,7 +6,7 @@ import shlex
 import numpy as np
 import pytest
 from balanced import Balanced
-from hand_made import HandMadeScenario, recording
+from hand_made import asked, recording
 from headless import chromium
 
 from scenarios.config import load
@@ -23,7 +23,7 @@ SOFTLY = {"contact_depth": np.zeros(5), "contact_force": np.zeros(5)}
 
 
 def made(spec="tpm-published", fault=None, error=None, scenario=None, **signals):
-    scenario = (scenario or HandMadeScenario()).with_resolver(spec)
+    scenario = (scenario or asked()).with_resolver(spec)
     run = None if error else recording(scenario, fault, **signals)
     return Run(scenario, spec, spec, run, error)
 
@@ -63,9 +63,9 @@ def test_the_best_of_each_row_is_marked(runs, label, marked):
     [made(LETTER), made("hqp", error="HierarchyError: cannot")],
     [made("hqp", error="HierarchyError: cannot")],
     [made(LETTER, t=[0.0])],
-    [made(LETTER), made(LETTER, scenario=HandMadeScenario(name="other"))],
-    [made(LETTER, scenario=HandMadeScenario(title="<script>alert(1)</script> & co", pointing=None,
-                                            avoidance=None))],
+    [made(LETTER), made(LETTER, scenario=asked(name="other"))],
+    [made(LETTER, scenario=asked(title="<script>alert(1)</script> & co", pointing=None,
+                                 avoidance=None))],
 ], ids=["one", "three", "a fault", "an error", "only an error", "one tick", "two scenarios",
         "no tasks but position, and markup"])
 def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
@@ -77,9 +77,8 @@ def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
 
 
 def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
-    asked = [HandMadeScenario(name=name) for name in ("slow", "jumpy")]
-    runs = [dataclasses.replace(made(LETTER, scenario=one, v=speed * np.eye(5, 7)), label=one.name)
-            for one, speed in zip(asked, (0.1, 2.0), strict=True)]
+    runs = [dataclasses.replace(made(LETTER, scenario=asked(name=name), v=speed * np.eye(5, 7)),
+                                label=name) for name, speed in (("slow", 0.1), ("jumpy", 2.0))]
     text = page(comparison(*runs))
     assert list(comparison(*runs).groups()) == ["tpm-published"]
     assert not any(best(line) for line in table(runs))

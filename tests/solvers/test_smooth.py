@@ -6,7 +6,6 @@ import pytest
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.activation import activation
 from solvers import Status, make
-from solvers.resolvers.set_based import SetBased
 
 LAMBDA, THRESHOLD, ETA = 1e-4, 1e-2, 10.0
 SMOOTH = make("smooth")
@@ -67,29 +66,6 @@ def test_near_a_singularity_it_is_regularised_as_in_the_paper():
         np.testing.assert_allclose(solved(levels, list(map(np.array, acts))).x, want,
                                    atol=1e-6 * (1 + np.abs(want).max()))
         assert np.abs(want).max() < 1e4
-
-
-def steps(answer, count):
-    """The largest change of the answer between neighbours on a path through the buffer."""
-    answers = np.array([answer(value) for value in np.linspace(1.4, -0.2, count)])
-    return np.abs(np.diff(answers, axis=0)).max()
-
-
-def test_the_command_is_continuous_where_that_of_the_set_based_task_jumps():
-    """A distance falls through its buffer, from 1.4 to below 0; the buffer is 0 .. 1."""
-    J, tip, rate = np.array([[1.0, 0.2, -0.3]]), np.array([[1.0, 0.5, 0.1]]), np.array([-1.0])
-    set_based = SetBased(inner=make("recursive"))
-
-    def smooth(value):
-        a = activation([1.0 - value], 1.0)
-        return solved([(J, [1.0 - value]), (tip, rate)], [a, np.ones(1)]).x
-
-    def switched(value):
-        least = 0.0 if value <= 0.0 else -INF
-        return set_based.solve(Hierarchy.from_levels([(J, [least], [INF]), (tip, rate)])).x
-
-    assert steps(smooth, 801) < 0.15 * steps(smooth, 81), "it falls with the step taken"
-    assert steps(switched, 801) > 0.9 * steps(switched, 81) > 0.1, "a jump stays a jump"
 
 
 def test_the_activation_is_one_at_the_bound_zero_beyond_the_buffer_and_has_no_kink():
