@@ -111,10 +111,10 @@ def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
     assert all(metric.detail and metric.lower_is_better is None for metric in measured)
     found = measure(recording(far, minimal_distance=np.zeros(5), ee_distance=np.zeros(5),
                               true_minimal_distance=[0.2, 0.19995, 0.1998, 0.1, 1.0],
-                              true_ee_distance=[0.3, 0.4, 0.2, 0.4, np.nan]))
+                              true_ee_distance=[0.2, 0.4, 0.1, 0.4, np.nan]))
     assert found["body_below_share"].value == pytest.approx(2 / 5)  # 0.05 mm is rounding
     assert found["ee_below_share"].value == pytest.approx(1 / 4)    # of the ticks in which known
-    assert found["ee_below_share"].note == "nearer than 0.3 m"
+    assert found["ee_below_share"].note == "nearer than 0.2 m"
 
 
 def test_steps_of_the_command_and_of_the_joints_are_told_apart():

@@ -113,6 +113,12 @@ def test_damping_means_the_same_to_every_strict_resolver(resolver, case):
         assert_close(resolver, damped.solve(h).x, oracle.solve(h, 0.05, threshold))
 
 
+def test_resolvers_whose_damping_means_something_else_say_so():
+    assert {r.label for r in RESOLVERS if r.damps != "each level"} == {
+        "tpm-published", "reverse", "reverse in-order", "weighted", "augmented", "merged"}
+    assert make("tpm").damps_with_bounds == make("hcod").damps_with_bounds
+
+
 @every(RESOLVERS)
 def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(resolver):
     for bad in (np.nan, np.inf, -np.inf):
