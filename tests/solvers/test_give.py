@@ -134,15 +134,6 @@ def test_what_cannot_give_refuses_by_name():
         Batch.of([h])
 
 
-@pytest.mark.parametrize(("give", "said"), [
-    ([0.1], "give has 1 entries for 2 levels"),
-    ([0.1, np.inf], "level 2, row 0: give is inf"), ([np.nan, 0.0], "level 1, row 0: give is nan"),
-    ([[0.1, 0.2], 0.0], r"level 1: give has shape \(2,\), expected one number or \(3,\)")])
-def test_a_wrong_give_is_named(give, said):
-    with pytest.raises(HierarchyError, match=said):
-        Hierarchy.from_levels([(np.eye(3), np.ones(3)), (np.eye(3)[:2], np.ones(2))], give=give)
-
-
 def test_a_stack_takes_it_by_the_name_of_a_task_in_any_order():
     robot = Robot.named("kuka_lwr")
     state = State.at(robot, np.full(7, 0.3))

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from rank_cases import family
 
-from hierarchy import Hierarchy
+from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, explain, make
+from solvers.problems import structured
 
 INF = np.inf
 HCOD = make("hcod")
@@ -42,6 +43,26 @@ def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
         k = res.unfinished
         np.testing.assert_allclose(h.violations(res.x)[:k], norms[:k], atol=1e-8)
         assert h.names[k] in explain(h, res)
+
+
+BOX = Hierarchy.from_levels([(np.eye(3), np.full(3, -1.0), np.ones(3)),
+                             ([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]], [5.0, 0.5])])
+
+
+def test_a_solved_answer_is_verified_from_its_active_rows_and_no_other_is():
+    for seed in range(700, 740):
+        h = structured(seed)
+        res = HCOD.solve(h)
+        assert res.verified(h) == (res.status is Status.SOLVED)
+    res = HCOD.solve(BOX)
+    none = res.memory.copy()
+    none[:BOX.m] = 0.0
+    assert res.verified(BOX)
+    assert not res.verified(BOX.changed(upper=BOX.upper + 0.1 * (BOX.upper > BOX.lower)))
+    for x, memory in ((res.x + 1e-6, res.memory), (res.x, none)):
+        assert not type(res)(x, res.status, memory).verified(BOX)
+    with pytest.raises(HierarchyError, match=r"certify\(h, x\)"):
+        make("weighted").solve(BOX).verified(BOX.changed(metric=np.eye(3)))
 
 
 X, Y = ([[1.0, 0.0]], [0.0]), ([[0.0, 1.0]], [0.0])
