@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmark.reproduce import blocks, fronts, protocol, verdicts
-from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, Point, dominated, table
+from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, dominated
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
 from scenarios.config import load
 from scenarios.measure.statistics import holm
@@ -103,27 +103,10 @@ def test_runs_are_resumed_and_noise_is_small(tmp_path):
     assert protocol.read(tmp_path / "rows.json") == first
 
 
-def test_trials_lie_within_the_bounds_evenly_in_the_logarithm():
-    found = Method("weighted", free={"a": (0.1, 1000.0)}).trials(32, seed=1)
-    values = np.array([one["a"] for one in found])
-    assert values.min() >= 0.1
-    assert values.max() <= 1000.0
-    assert 12 <= (values < 10.0).sum() <= 20
-    assert Method("hcod").trials(32, seed=1) == [{}]
-
-
 def test_only_what_nothing_else_improves_is_on_the_front():
     scores = np.array([[1.0, 4.0], [2.0, 2.0], [2.0, 3.0], [np.inf, np.inf]])
     assert [dominated(scores, k) for k in range(4)] == [False, False, True, True]
     assert not dominated(np.full((2, 2), np.inf), 0)
-
-
-def test_a_table_has_the_ends_of_a_front_and_what_lies_evenly_between():
-    tests = [[1e-3 * k, -1e-3 * k, 1.0] for k in range(20)] + [[9.5, 0.0, 1.0]]  # is beaten
-    points = [Point("stand-push", "a", {}, [], test, 6, 6, ["m", "", ""]) for test in tests]
-    lines = table(points, "stand-push")[2:-1]
-    assert [float(line.split()[2]) for line in lines] == [0.0, 9.0, 19.0]
-    assert len(table(points[:2], "stand-push")) == 5
 
 
 def test_every_method_can_take_its_settings():

@@ -23,9 +23,7 @@ from hierarchy.tasks import (
     Posture,
     RelativePose,
 )
-from scenarios.cell.plants import KinematicArm
 from scenarios.cell.sensors import ExactDistances
-from solvers import Status, make
 
 ROBOT = Robot.named("kuka_lwr")
 FRAME = ROBOT.frame("end_effector")
@@ -118,23 +116,6 @@ class FastElbow(Measured):
 
     def measure(self, state):
         return _fast_elbow, (state.q,)
-
-
-def driven(stack, ticks, period, start, resolver=None, differences=False, sensor=None):
-    """Yield (state, hierarchy, resolution) of each tick of an arm that obeys from rest on."""
-    state = State(ROBOT, period if differences else None)
-    plant = KinematicArm(ROBOT, np.array(start), np.zeros(7), period, stack.level)
-    resolver, memory = resolver or make("hcod"), None
-    for k in range(ticks):
-        state.move(k * period, plant.q, plant.v)
-        if sensor is not None:
-            sensor.measure(state)
-        h = stack.hierarchy(state)
-        res = resolver.solve(h, memory)
-        assert res.status is Status.SOLVED
-        yield state, h, res
-        memory = res.memory
-        plant.act(res.x)
 
 
 def compiled_rows(task, state, level, rtol=1e-12):

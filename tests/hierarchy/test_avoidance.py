@@ -56,11 +56,15 @@ def test_distance_is_zero_on_the_surface_with_a_gradient_of_one(shape):
         assert distance(obstacle, point - D * away)[0] == pytest.approx(0, abs=1e-12)
 
 
-def test_moving_obstacles_follow_their_path():
+def test_an_obstacle_follows_its_path_and_keeps_the_offset_that_it_was_shifted_by():
     path = Waypoints((1.0, 2.0), ((0, 0, 0), (1, 0, 0)))
     obstacles = Obstacles([Obstacle("sphere", (9, 9, 9), (0.1,), path=path), SHAPES["box"]])
     np.testing.assert_allclose(obstacles.at(1.5)[:, 4:7], [[0.5, 0, 0], [0.1, -0.2, 0.3]])
-    np.testing.assert_allclose(obstacles.at(3.0)[0, 4:7], [1, 0, 0])
+    for offset in ((0.0, 0.0, 0.5), (0.0, 0.1, 0.0)):  # not one on top of the other
+        for which in (0, 1):
+            obstacles.shift(which, offset)
+    np.testing.assert_allclose(obstacles.at(3.0)[:, 4:7], [[1, 0.1, 0], [0.1, -0.1, 0.3]])
+    np.testing.assert_allclose(obstacles.centres[1], [0.1, -0.1, 0.3])
 
 
 def test_magnitude_reaches_its_maximum_at_contact_and_vanishes_at_the_reach():

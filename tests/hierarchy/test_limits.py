@@ -190,44 +190,7 @@ def test_one_who_always_pushes_up_comes_to_rest_on_the_limit_without_bouncing(le
     assert ride.v.max() == pytest.approx(2.0)
 
 
-def test_a_joint_that_must_turn_back_within_a_tick_keeps_its_limit():
-    """q + v^2 / (2 A) <= U, but too near to be at rest at the end of a tick."""
-    rng = np.random.default_rng(5)
-    _, T = random_limits(rng, JOINTS)
-    A = 10 ** rng.uniform(0, 2, JOINTS)
-    limits = np.array([np.full(JOINTS, -9.0), np.full(JOINTS, 1.0),
-                       np.maximum(10.0, 2 * A * T), A])
-    v = rng.uniform(0, 1, JOINTS) * np.minimum(3.0, 5 * A * T)
-    q = 1.0 - v**2 / (2 * A) - rng.choice([0.0, 1e-6, 1e-4], JOINTS)
-    Ride(q, v, limits, T, "acceleration", adversary(rng, JOINTS, TICKS)).keeps(limits)
-
-
 # ---- with a horizon ------------------------------------------------------------------------------
-
-def calm(rng, ticks):
-    """Joints at rest, with horizons of `ticks` periods; see docs/theory/joint-limits.md."""
-    limits, T = random_limits(rng, JOINTS)
-    H = ticks * T
-    limits[2] = np.minimum(limits[2], limits[3] * (H**2 - T**2 / 4) / (2 * T))
-    q, v = viable_starts(rng, limits, T, "velocity")
-    return limits, T, H, q, 0.0 * v
-
-
-@pytest.mark.slow
-@LEVELS
-@pytest.mark.parametrize("ticks", [2.5, 10, 50])
-def test_from_rest_on_no_side_changes_faster_than_its_constant(level, ticks):
-    rng = np.random.default_rng(0)
-    limits, T, H, q, v = calm(rng, ticks)
-    ride = Ride(q, v, limits, T, level, adversary(rng, JOINTS, TICKS), H)
-    ride.keeps(limits)
-    in_q, in_v = (1 / H**2, 2 / H) if level == "acceleration" else (1 / H, spread(1.0, JOINTS))
-    allowed = (in_q * np.abs(np.diff(ride.q, axis=0)) + in_v * np.abs(np.diff(ride.v, axis=0)))[:-1]
-    rounding = (1e-9 * limits[3] + 1e-15 * (1 + np.abs(ride.q[1:-1])) / T**2) * (
-        1.0 if level == "acceleration" else T)
-    for side in (ride.least, ride.most):  # of box k, from the state after tick k - 1
-        step = np.abs(np.diff(side, axis=0))[1:]
-        assert (step <= allowed + rounding).all()
 
 
 def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():

@@ -6,29 +6,6 @@ from hierarchy import Robot, State
 from hierarchy.errors import RobotError
 from hierarchy.robots import TABLES
 
-ROBOT = Robot.named("kuka_lwr")
-
-D = [0, 0, 0.4, 0, 0.39, 0, 0.078]
-ALPHA = np.deg2rad([90, -90, -90, 90, 90, -90, 0])
-
-
-def from_dh_table(q, joints=7):
-    """Placement after so many joints, by multiplying the letter's Denavit-Hartenberg matrices."""
-    T = np.eye(4)
-    for angle, d, alpha in list(zip(q, D, ALPHA, strict=True))[:joints]:
-        c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
-        T = T @ [[c, -s * ca, s * sa, 0], [s, c * ca, -c * sa, 0], [0, sa, ca, d], [0, 0, 0, 1]]
-    return T
-
-
-@pytest.mark.slow
-def test_kinematics_equal_the_table_multiplied_out():
-    frame = ROBOT.frame("end_effector")
-    for q in np.random.default_rng(0).uniform(-3, 3, (50, 7)):
-        state, T = State.at(ROBOT, q), from_dh_table(q)
-        np.testing.assert_allclose(state.position(frame), T[:3, 3], atol=1e-14)
-        np.testing.assert_allclose(state.rotation(frame), T[:3, :3], atol=1e-14)
-
 
 @pytest.mark.parametrize(("robot", "what", "entry", "name"), [
     ("kuka_lwr", "q", 2, "joint_3"), ("kuka_lwr", "v", 1, "joint_2"),

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
-from scene import BODY, FRAME, ROBOT, TIP, compiled_rows, driven, states
+from scene import BODY, ROBOT, TIP, compiled_rows, states
 
-from hierarchy import HierarchyError, Stack, State
+from hierarchy import HierarchyError, State
 from hierarchy.avoidance import Barrier, Measurement, Obstacle, Obstacles, Pairs
-from hierarchy.paths import Ellipse, Still
-from hierarchy.tasks import JointDamping, Position, Separation
+from hierarchy.paths import Ellipse
+from hierarchy.tasks import Separation
 from scenarios.cell.sensors import ExactDistances
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
@@ -79,25 +79,6 @@ def test_compiled_rows_equal_those_of_the_plain_methods(level, differences, obst
         _, lower, _ = compiled_rows(task, state, level)
         sided += np.isfinite(lower).sum()
     assert 0 < sided < 5 * task.dimension
-
-
-GOAL = tuple(State.at(ROBOT, START).position(FRAME) + np.array([-0.25, 0.05, 0.1]))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("level", "period", "differences"), [
-    ("velocity", 1e-2, False), ("acceleration", 4e-3, False), ("acceleration", 4e-3, True)])
-def test_a_hand_driven_into_an_obstacle_stops_at_the_distance(level, period, differences):
-    obstacles = [Obstacle("sphere", GOAL, (0.05,)),
-                 Obstacle("box", (-0.2, 0.3, 0.2), (0.1, 0.02, 0.03)),
-                 Obstacle("capsule", (-0.1, 0.4, -0.1), (0.02, 0.1))]
-    sensor = sensor_of(obstacles)
-    stack = Stack([Separation(sensor.points, Barrier(0.05), 3), Position(FRAME, Still(GOAL))],
-                  level, JointDamping(7))
-    ticks = driven(stack, round(3.0 / period), period, START, None, differences, sensor)
-    d = np.array([state.measurement.pairs.distance.copy() for state, _, _ in ticks])
-    assert d.min() >= 0.05 - 1e-9
-    assert d[-1, 8, 0] == pytest.approx(0.05, abs=1e-6)
 
 
 @pytest.mark.parametrize(("pairs", "obstacles", "said"), [

@@ -5,13 +5,11 @@ import subprocess
 import sys
 from unittest import mock
 
-import numpy as np
 import pytest
 from hand_made import recording
 
-from scenarios import compare, load, load_run
+from scenarios import compare, load_run
 from scenarios.cli.main import app, run_command
-from scenarios.results import comparing
 
 SHORT = ["--duration", "0.02"]
 pytestmark = pytest.mark.slow
@@ -154,18 +152,6 @@ def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_fo
     assert list((tmp_path / "b").rglob("run.npz"))
     pages = {"index.html", "comparison.json"} if page == "whole" else set()
     assert {"results.csv", *pages} <= {path.name for path in (tmp_path / "b").iterdir()}
-
-
-def test_runs_side_by_side_are_those_made_one_by_one_and_are_timed_alone(tmp_path, monkeypatch):
-    monkeypatch.setattr(comparing, "TIMED", 10)
-    apart, beside = (compare(load("ellipse", ["control.duration=0.02"]), ["tpm", "hcod"],
-                             tmp_path / str(workers), workers=workers) for workers in (1, 2))
-    for one, other in zip(apart.runs, beside.runs, strict=True):
-        assert (one.recording["q"] == other.recording["q"]).all()
-        assert (one.timing, other.timing.ticks) == (None, 10)
-        assert other.metrics["time_tick_median"].value == pytest.approx(
-            float(np.median(other.timing["time_tick"])))
-    assert "first 10 ticks of each repeated" in (tmp_path / "2" / "index.html").read_text()
 
 
 def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsys):

@@ -8,7 +8,7 @@ from scenarios import load, simulate
 from scenarios.measure.given_up import given_up
 from scenarios.measure.goals import goals
 from scenarios.measure.runs import Run
-from scenarios.measure.verdict import lines, table, verdict, verdicts
+from scenarios.measure.verdict import lines, table, verdicts
 
 
 def goal(name, fault=None, **signals):
@@ -34,16 +34,6 @@ def test_median_worst_and_share_count_from_when_the_target_was_first_reached():
     assert (one.reached, one.first) == (1.0, 3.0)
     assert (one.median, one.worst, one.share) == pytest.approx((1.75e-3, 4e-3, 0.5))
     assert (one.flag, one.unit) == ("left", "m")
-
-
-def test_three_sentences_say_the_end_the_promises_and_the_targets():
-    found = [verdict(recording(**at([2, 2, 2, 2, 2])), "a 1/10/100 below 3 strict"),
-             verdict(recording(fault="the robot has fallen by 1 m", **joint([0, 0, 0, 0, 2.5])),
-                     "b")]
-    end, promises, targets = lines(found)
-    assert end.startswith("1 of 2 ran to the end; b fell at ")
-    assert promises == "Broken: joint limits by b, 0.5 rad at worst, for 20 % of the time."
-    assert targets == "Off in the median: position 0 mm (b) to 2 mm (a), 2 mm at worst."
 
 
 @pytest.mark.parametrize(("signals", "name", "flag", "worst", "unit"), [

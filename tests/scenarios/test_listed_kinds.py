@@ -1,7 +1,7 @@
 """Every kind of `[[tasks]]` in a scenario: what it reaches, and what is refused."""
 
 import re
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pytest
@@ -10,11 +10,7 @@ from hierarchy import HierarchyError, plugins
 from hierarchy.tasks import JointCoupling, Separation
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.cell.plants import KinematicArm
-from scenarios.cell.sensors import ExactDistances
-from scenarios.config.plant import AnyPlant
 from scenarios.config.sections import Unit
-from scenarios.config.sensor import AnySensor
 from scenarios.config.tasks import Listed
 from scenarios.measure.metrics import measure
 
@@ -165,42 +161,3 @@ def test_a_new_task_is_one_section(shipped, kinds, tmp_path):
         scenario_of(tmp_path, {"kind": "elbow", "joint": "joint_4", "angle": "wide"})
     with pytest.raises(HierarchyError, match="the kind here is 'elbow'"):
         scenario_of(tmp_path, {"kind": "elbow", "joints": "joint_4"})
-
-
-class Slow(KinematicArm):
-    """Does a share of each command."""
-
-    def __init__(self, robot, q, v, period, level, section):
-        super().__init__(robot, q, v, period, level)
-        self.share = section.share
-
-    def act(self, command):
-        super().act(self.share * command)
-
-
-def test_a_new_plant_is_its_class_and_one_section(kinds, tmp_path):
-    @plugins.register("plants", "slow", shipped=True)
-    class SlowSection(AnyPlant):
-        made_by: ClassVar[str] = f"{__name__}:Slow"
-        kind: Literal["slow"]
-        share: float
-
-    runs = [simulate(scenario_of(tmp_path, COUPLING, plant=plant,
-                                 control={**BASE["control"], "duration": 0.02}))
-            for plant in ({"kind": "kinematic"}, {"kind": "slow", "share": 0.5})]
-    exact, slow = (run["q"][1] - run["q"][0] for run in runs)
-    np.testing.assert_allclose(slow, 0.5 * exact)
-
-
-def test_a_new_sensor_is_its_class_and_one_section(kinds, tmp_path):
-    @plugins.register("sensors", "near", shipped=True)
-    class NearSection(AnySensor):
-        foot: ClassVar[float] = 0.0
-        kind: Literal["near"]
-
-        def made(self, robot, **given):
-            return given["exact"]
-
-    avoidance = {"kind": "separation", "obstacles": [[0.1, 0.5, 0.1]]}
-    cell = build(scenario_of(tmp_path, COUPLING, avoidance=avoidance, sensor={"kind": "near"}))
-    assert isinstance(cell.sensor, ExactDistances)

@@ -207,20 +207,3 @@ def test_a_mobile_base_goes_to_a_posture_by_values(level, measurement, tmp_path)
     data["start"]["joints"]["turn"] = [1.0, 1.0]
     with pytest.raises(ScenarioError, match="start: joint 'turn'"):
         build(Scenario.model_validate(data))
-
-
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-def test_limits_hold_for_a_floating_base(level):
-    data = {"name": "h", "robot": {"model": "humanoid"},
-            "control": {"level": level, "stack": "hierarchical", "resolver": "hcod",
-                        "duration": 0.5, "period": 0.005},
-            "limits": {"acceleration": 50.0, "base_speed": [0.3, 0.5]},
-            "tasks": [{"kind": "position", "frame": "left_hand", "stiffness": 400.0,
-                       "path": {"kind": "still", "position": [5.0, 0.0, 1.0]}}]}
-    run = simulate(Scenario.model_validate(data))
-    fastest = np.abs(run["v"][:, :6]).max(axis=0)
-    assert fastest[:3].max() == pytest.approx(0.3)
-    assert (fastest <= np.repeat([0.3, 0.5], 3) + 1e-9).all()
-    np.testing.assert_array_equal(run["velocity_limit"][:6], np.repeat([0.3, 0.5], 3))
-    with pytest.raises(ScenarioError, match="has a fixed base"):
-        build(scenario(limits={"acceleration": 5.0, "base_speed": [1.0, 1.0]}))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from scenarios.problems import recorded
 from scenarios.problems import reference as families
 from scenarios.problems.families import FAMILIES as FAMILIES_OF_ALL
 from scenarios.problems.postures import posed
@@ -23,6 +24,20 @@ def test_sizes_equalities_norms_of_rows_and_ranks_are_those_of_the_stored_proble
                        for made in (stored, fresh))
     np.testing.assert_allclose(found, expected, atol=0.35 * expected.max())
     assert {ranks(h) for h in fresh} <= {ranks(h) for h in stored}
+
+
+def test_the_stored_answers_are_certified_and_half_of_its_ticks_meet_no_limit():
+    problems = families.family("DYN60")
+    assert len(problems) == recorded.COUNT
+    free = 0
+    for problem in problems:
+        assert problem.h.n == 60
+        assert certify(problem.h, problem.x).certified
+        np.testing.assert_allclose(problem.h.violations(problem.x), problem.norms, atol=1e-9)
+        limits = problem.h.A[18:88] @ problem.x
+        room = np.minimum(limits - problem.h.lower[18:88], problem.h.upper[18:88] - limits)
+        free += bool(room.min() > 1e-6)
+    assert 30 <= free <= 70
 
 
 def ranks(h):

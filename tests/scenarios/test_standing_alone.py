@@ -6,15 +6,12 @@ from dataclasses import asdict
 from unittest import mock
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from urdf_text import INERTIAL, joint, link, placed, shape, urdf
 
-from hierarchy import HierarchyError, Robot, State
-from hierarchy.robots import TABLES
+from hierarchy import HierarchyError
 from scenarios import load, load_run, save, simulate
 from scenarios.draw.replay.page import html
-from scenarios.recording.facts import robot_facts
 from scenarios.scene import scene
 
 pytestmark = pytest.mark.slow
@@ -106,35 +103,3 @@ def test_facts_that_are_missing_or_damaged_are_named(made, tmp_path):
     (tmp_path / "bad" / "facts.json").unlink()
     with pytest.raises(HierarchyError, match="earlier version"):
         load_run(tmp_path / "bad")
-
-
-CART = urdf(
-    *(link(name, "") for name in "abcde"),
-    joint("slide", "prismatic", "a", "b", LIMIT, "1 1 0", placed("0.1 0.2 0.3", "0.1 0.2 0.3")),
-    joint("wheel", "continuous", "b", "c", "", "0 0.6 0.8", placed("0.1 0.2 0.3", "0.1 0.2 0.3")),
-    joint("table", "planar", "c", "d", "", "0 0 1", placed("0.1 0 0.3", "0.3 0 0.3")),
-    joint("hinge", "revolute", "b", "e", LIMIT, "0 -1 0", placed("0 0.2 0.3")))
-DOLL = """<mujoco><worldbody><body name="a" pos="0 0 1"><freejoint/><geom size="0.1"/>
-<body name="b" pos="0 0 0.3" euler="10 20 30"><joint name="h1" axis="1 0 0" pos="0 0 0.1"/>
-<joint name="h2" axis="0 1 0" pos="0 0.1 0.1"/><joint name="s" type="slide" axis="0 1 1"/>
-<geom size="0.1"/><body name="c" pos="0 0 0.3"><joint name="ball" type="ball" pos="0.1 0 0"/>
-<geom size="0.1"/></body></body></body></worldbody></mujoco>"""
-
-
-def robots(folder):
-    (folder / "cart.urdf").write_text(CART)
-    (folder / "doll.xml").write_text(DOLL)
-    yield from (Robot.named(name, base) for name in TABLES for base in ("fixed", "floating"))
-    yield from (Robot.from_file(folder / "cart.urdf", base=base) for base in ("fixed", "floating"))
-    yield Robot.from_file(folder / "doll.xml")
-
-
-def test_the_facts_place_every_joint_as_the_robot_does(tmp_path):
-    for robot in robots(tmp_path):
-        pin.seed(0)
-        q = np.array([pin.randomConfiguration(robot.model, -np.ones(robot.nq), np.ones(robot.nq))
-                      for _ in range(5)])
-        expected = [State.at(robot, one).placements.copy() for one in q]
-        facts = robot_facts(robot)
-        np.testing.assert_allclose(facts.placements(q), expected, atol=1e-14)
-        assert (len(facts.position_units), len(facts.velocity_units)) == (robot.nq, robot.n)

@@ -8,7 +8,6 @@ from hierarchy.paths import Still
 from hierarchy.tasks import Position, Posture
 from solvers import Status, certify, explain, make, names
 from solvers.batch import Batch
-from solvers.give import giving
 from solvers.problems import generate
 
 STRICT = [make("hcod"), *(make("hqp", backend=name) for name in ("proxqp", "daqp"))]
@@ -78,22 +77,6 @@ def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, me
     assert np.array_equal(*cold.witnesses) == met
     for memory in (np.zeros(0), np.full(7, np.nan), hcod.solve(h.changed(give=None)).memory):
         np.testing.assert_allclose(hcod.solve(h, memory).x, cold.x, atol=1e-9)
-
-
-@pytest.mark.parametrize("settings", [{}, {"max_iterations": 1}, {"damping": 0.1}])
-@pytest.mark.parametrize("reach", [0.3, 8.0])
-def test_the_kernel_of_hcod_answers_as_the_solves_of_which_it_is_made(reach, settings):
-    hcod, memories = make("hcod", **settings), [None, None]
-    for shift in np.linspace(0.0, 1.0, 5):
-        h = hand_and_posture(reach + shift)
-        own, other = hcod.solve(h, memories[0]), giving(hcod.solve, h, h.giving, memories[1])
-        assert (own.status, own.iterations) == (other.status, other.iterations)
-        np.testing.assert_array_equal(own.x, other.x)
-        assert (own.memory is None) == (other.memory is None) == (own.witnesses is None)
-        if own.memory is not None:
-            np.testing.assert_array_equal(own.active, other.active)
-            np.testing.assert_array_equal(own.witnesses, other.witnesses)
-        memories = [own.memory, other.memory]
 
 
 def test_generated_hierarchies_that_give_are_certified_by_hcod():
