@@ -89,3 +89,23 @@ def test_every_command_is_certified_in_the_inertia_of_its_tick():
     assert load("ellipse-limits").asks == "bounds"
     assert load("ellipse-limits", ["control.metric=mass"]).asks == "inequalities"
     assert load("ellipse", ["control.metric=mass"]).asks == "equalities"
+
+
+@pytest.mark.slow
+def test_all_levels_above_the_posture_are_met_and_their_errors_recorded():
+    standing = simulate(load("humanoid"))
+    assert standing.fault is None
+    found = measure(standing)
+    for name in ("left_foot", "right_foot", "centre_of_mass"):
+        assert found[f"task_{name}_rms"].value < 1e-5
+    for name in ("right_hand", "left_hand"):
+        assert found[f"task_{name}_max_settled"].value < 1e-4, "what a period of 5 ms leaves"
+        assert found[f"task_{name}_end"].value < 1e-5
+    assert found["task_gaze_max_settled"].value < 0.05
+    assert found["task_left_foot_turned_rms"].unit == "deg"
+    assert found["joint_limit_excess"].value == 0.0
+    cell, k = build(standing.scenario), 700
+    cell.state.move(standing["t"][k], standing["q"][k], standing["v"][k])
+    for task in cell.tasks.listed:
+        np.testing.assert_allclose(standing[f"task_error_{task.name.replace(' ', '_')}"][k],
+                                   task.error(cell.state), atol=1e-15)

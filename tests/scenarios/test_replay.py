@@ -70,55 +70,28 @@ def test_the_data_are_those_of_the_recording(runs, document):
         assert [" > ".join(order) for order in run["orders"]] == list(recording.orders)
 
 
-# In a browser.
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as page:
-        yield page
-
-
-@pytest.fixture(scope="module")
-def opened(browser, document, tmp_path_factory):
-    file = tmp_path_factory.mktemp("page") / "replay.html"
-    file.write_text(document, encoding="utf-8")
-    browser.look_at(file.as_uri(), 1000, 600)  # small, since there is no graphics card
-    return browser
-
-
-@pytest.fixture
-def page(opened):
-    """The page, paused at its begin."""
-    opened.run("""if (player.playing) player.toggle();
-        document.getElementById('speed').value = '1'; player.stage.camera.reset();
-        document.querySelectorAll('#legend [aria-pressed="false"]').forEach(one => one.click());
-        player.arrange(false); player.seek(0)""")
-    opened.painted()
-    yield opened
-    assert opened.complaints == []
-
-
-def test_the_page_shows_the_arm_in_space(page):
-    assert page.run("player.stage !== undefined && document.getElementById('notice').hidden")
-    colours = page.run("""(() => { player.stage.draw(0.5, false);
-        const {gl} = player.stage.painter, seen = new Set();
-        const one = new Uint8Array(4 * 300 * 300);
-        gl.readPixels(150, 150, 300, 300, gl.RGBA, gl.UNSIGNED_BYTE, one);
-        for (let i = 0; i < one.length; i += 4) seen.add(one.slice(i, i + 3).join());
-        return seen.size; })()""")
-    assert colours > 100  # lit solids, not an empty floor
-
-
-def test_play_moves_the_arm_and_pause_stops_it(page):
-    before, at_first = page.screenshot(), page.run("player.t")
-    page.press(" ", "Space")
-    page.wait("player.t > 0.3")
-    page.press(" ", "Space")
-    stopped = page.run("player.t")
-    assert not page.run("player.playing")
-    assert stopped > at_first
-    assert page.screenshot() != before
-    assert page.run("player.t") == stopped
+def test_the_page_shows_the_arm_in_space_and_plays_it_until_it_is_paused(document, tmp_path):
+    (tmp_path / "replay.html").write_text(document, encoding="utf-8")
+    with chromium() as page:  # small, since there is no graphics card
+        page.look_at((tmp_path / "replay.html").as_uri(), 1000, 600)
+        page.run("if (player.playing) player.toggle(); player.seek(0)")
+        assert page.run("player.stage !== undefined && document.getElementById('notice').hidden")
+        colours = page.run("""(() => { player.stage.draw(0.5, false);
+            const {gl} = player.stage.painter, seen = new Set();
+            const one = new Uint8Array(4 * 300 * 300);
+            gl.readPixels(150, 150, 300, 300, gl.RGBA, gl.UNSIGNED_BYTE, one);
+            for (let i = 0; i < one.length; i += 4) seen.add(one.slice(i, i + 3).join());
+            return seen.size; })()""")
+        assert colours > 100  # lit solids, not an empty floor
+        before = page.screenshot()
+        page.press(" ", "Space")
+        page.wait("player.t > 0.3")
+        page.press(" ", "Space")
+        stopped = page.run("player.t")
+        assert not page.run("player.playing")
+        assert page.screenshot() != before
+        assert page.run("player.t") == stopped
+        assert page.complaints == []
 
 
 def test_the_command_takes_several_runs_and_a_name(runs, tmp_path):
