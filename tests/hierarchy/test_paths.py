@@ -1,5 +1,7 @@
 """Paths: position, velocity and acceleration agree, and pass where they should."""
 
+from pathlib import Path as FilePath
+
 import numpy as np
 import pytest
 
@@ -92,21 +94,7 @@ def test_a_wrong_csv_file_is_named_with_its_line(text, said, tmp_path):
 
 # BVH files.
 
-TEXT = """HIERARCHY
-ROOT hips {
-  OFFSET 1 0 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-  JOINT knee {
-    OFFSET 0 -2 0 CHANNELS 1 Xrotation
-    End Site { OFFSET 0 -3 0 }
-  }
-  JOINT hand { OFFSET 4 0 0 CHANNELS 0 }
-}
-MOTION
-Frames: 2
-Frame Time: 0.5
-0 0 0 0 0 0 0
-0 10 0 90 0 90 90
-"""
+TEXT = (FilePath(__file__).parents[1] / "data" / "motion.bvh").read_text()
 
 
 def test_turns_follow_the_order_of_the_channels(tmp_path):

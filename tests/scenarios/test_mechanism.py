@@ -1,5 +1,7 @@
 """Scenarios with joints of every kind, mimic joints, closed chains and floating bases."""
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -140,10 +142,9 @@ def test_an_ankle_with_two_pushrods_stays_closed(level, rod, tmp_path):
 
 
 @pytest.mark.parametrize("added", [0.0, 0.5])
-def test_the_torque_plant_has_the_armature_of_the_robots_file(added, tmp_path):
+def test_the_torque_plant_has_the_armature_of_the_robots_file(added):
     mujoco = pytest.importorskip("mujoco")
-    path = tmp_path / "arm.xml"
-    path.write_text(FALLING)
+    path = Path(__file__).parents[1] / "data" / "robots" / "falling.xml"
     robot, model = Robot.load(path), mujoco.MjModel.from_xml_path(str(path))
     q, v = np.array([0.0, 0.0, 1.0, 0.0, 0.6, 0.0, 0.8, 0.3, 0.1]), np.zeros(8)
     plant = TorqueRobot(robot, Contacts(robot, []), q, v,
@@ -155,13 +156,6 @@ def test_the_torque_plant_has_the_armature_of_the_robots_file(added, tmp_path):
     expected = data.qacc.copy()
     expected[:3] = data.xmat[1].reshape(3, 3).T @ expected[:3]
     np.testing.assert_allclose(plant.accelerations(np.array([3.0, -2.0])), expected, rtol=1e-6)
-
-
-FALLING = """<mujoco><default><joint armature=".2"/></default><worldbody><body name="trunk">
-<joint type="free"/><geom type="box" size=".1 .2 .1" mass="3"/><body pos=".1 0 0"><joint name="arm"
-axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".03"/><body pos=".3 0 0"><joint
-name="slide" type="slide" axis="1 0 0" armature="1"/><geom size=".05"/></body></body></body>
-</worldbody></mujoco>"""
 
 
 def test_the_mechanism_is_the_first_level_and_bounds_of_a_resolver_of_bounds_come_before():

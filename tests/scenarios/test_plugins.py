@@ -5,6 +5,7 @@ import pickle
 import re
 import sys
 from importlib.metadata import distributions
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -76,24 +77,7 @@ class Weak(KinematicArm):
         super().act(self.share * command)
 '''
 
-SCENARIO = '''
-name = "own"
-plugins = ["doors_of_mine"]
-robot = {model = "my_arm"}
-start = {q = [0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]}
-control = {level = "velocity", stack = "hierarchical", period = 0.01, duration = 0.2, \
-resolver = "halved"}
-plant = {kind = "weak", share = 0.5}
-[[tasks]]
-kind = "elbow"
-joint = "joint_4"
-angle = 1.0
-[[tasks]]
-kind = "along"
-name = "hand"
-frame = "end_effector"
-path = {kind = "still", position = [0.1, 0.6, 0.1]}
-'''
+SCENARIO = (Path(__file__).parents[1] / "data" / "own.toml").read_text()
 
 
 @pytest.fixture(autouse=True)

@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import asdict
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -30,23 +31,7 @@ ARM = urdf(
     joint("elbow", "revolute", "two", "three", LIMIT, "0 0.8 0.6", placed("0 0 0.3", "0 0.9 0")),
     joint("wrist", "continuous", "three", "four", LIMIT, "1 0 0", placed("0 0 0.3")),
     joint("end", "fixed", "four", "tip", "", "", placed("0 0 0.12")))
-SCENARIO = """name = "alone"
-robot = {model = "arm.urdf", end_effector = "tip"}
-control = {level = "acceleration", duration = 0.3, stack = "hierarchical", resolver = "hcod"}
-limits = {acceleration = 30.0}
-damping = {value = 5.0}
-[position]
-stiffness = 40.0
-damping = 20.0
-path = {kind = "ellipse", centre = [0.4, 0, 0.4], cosine = [0, 0.1, 0], sine = [0, 0, 0.1]}
-[avoidance]
-kind = "separation"
-distance = 0.02
-influence = 0.3
-rate = 5.0
-obstacles = [{shape = "sphere", radius = 0.05, path = {kind = "ellipse", rate = 2.0, \
-centre = [0.3, 0.2, 0.5], cosine = [0.1, 0.0, 0.0], sine = [0.0, 0.1, 0.0]}}]
-"""
+SCENARIO = (Path(__file__).parents[1] / "data" / "alone.toml").read_text()
 
 
 @pytest.fixture(scope="module")
