@@ -6,8 +6,6 @@ import pytest
 from benchmark.solve import accuracy, growth
 from benchmark.solve.ours import Ours
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def tables():

@@ -169,7 +169,6 @@ def test_every_package_has_an_adapter_that_is_tested():
 
 # -- the scenes and their judges -------------------------------------------------------------------
 
-@pytest.mark.slow
 def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
     found = run([fake("posture"), fake("lost"), fake("ends"), NOBODY], ticks=1100)
     good, lost = found.rows["peers"]

@@ -87,7 +87,6 @@ def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
     assert len(blocks.block("asked-letter", blocks.Stored(None, []), str).splitlines()) > 5
 
 
-@pytest.mark.slow
 def test_runs_are_resumed_and_noise_is_small(tmp_path):
     short = {"lwr": {**PROTOCOL.layouts["lwr"], "control.duration": 0.02}}
     some = replace(PROTOCOL, layouts=short, seeds=(1,), starts=2,

@@ -18,8 +18,6 @@ from scenarios.problems import reference
 from scenarios.problems.reference import family
 from solvers.qp import backends
 
-pytestmark = pytest.mark.slow
-
 FEW = ("EQ7", "INEQ7")
 EQUALITIES = {NUMPY, "augmented", "recursive", "reverse", "sns", "tpm", "tpm-published"}
 
@@ -57,7 +55,6 @@ def test_a_row_for_everybody_in_every_family_asked(few, tmp_path, capsys, monkey
     assert "…" not in out
 
 
-@pytest.mark.slow
 def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
     """Else the benchmark would compare two different jobs."""
     scenario = load("ellipse")

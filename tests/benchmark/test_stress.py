@@ -10,8 +10,6 @@ from benchmark import stress
 from hierarchy import Hierarchy
 from solvers import Resolution, Resolver, Status, certify, make, names, problems
 
-pytestmark = pytest.mark.slow
-
 REGRESSIONS = sorted((Path(__file__).parents[1] / "data" / "regressions").glob("*.npz"))
 JUDGED = [name for name in ("hcod", "tpm", "recursive") if name in names()]
 COUNT = 100 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 400

@@ -47,7 +47,6 @@ def velocity_sides(q, v):
     return -V * (1.0 - backward), V * (1.0 - forward)
 
 
-@pytest.mark.slow
 def test_the_bounds_are_those_of_the_definition_at_velocity_level():
     brought_in = 0
     for q, v in STATES:

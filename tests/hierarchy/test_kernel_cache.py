@@ -24,8 +24,7 @@ def g(x):
 SOLVE = "from user import g; print(g(10.0), sum(g._cache_misses.values()))"
 pytestmark = [
     pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled"),
-    pytest.mark.skipif(sys.platform == "win32", reason="owners and modes of files"),
-    pytest.mark.slow]
+    pytest.mark.skipif(sys.platform == "win32", reason="owners and modes of files")]
 
 
 @pytest.fixture

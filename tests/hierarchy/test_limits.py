@@ -147,7 +147,6 @@ def adversary(rng, joints, ticks):
 
 # ---- from a viable start ----------------------------------------------------------------------
 
-@pytest.mark.slow
 @LEVELS
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("ticks", [0, 1.5, 50])
@@ -158,7 +157,6 @@ def test_no_limit_is_exceeded_whatever_is_chosen_and_however_far_ahead_it_looks(
     Ride(q, v, limits, period, level, adversary(rng, JOINTS, TICKS), ticks * period).keeps(limits)
 
 
-@pytest.mark.slow
 @LEVELS
 def test_beyond_the_box_a_limit_is_exceeded_or_the_joint_cannot_stop_in_time(level):
     rng = np.random.default_rng(3)
@@ -219,7 +217,6 @@ def wide(joints, T, velocity=np.inf):
 PERIODS = pytest.mark.parametrize("period", [0.01, 0.05] if PLAIN else [1e-4, 2e-3, 0.05])
 
 
-@pytest.mark.slow
 @LEVELS
 @pytest.mark.parametrize(("seed", "ticks"), [(6, 0), (7, 0), (6, 10)])
 def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, seed, ticks):
@@ -237,7 +234,6 @@ def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, s
     assert (speed[1:] <= allowed * (1 + SPEED)).all(), "too fast, and not getting slower"
 
 
-@pytest.mark.slow
 @LEVELS
 @PERIODS
 @pytest.mark.parametrize("velocity", [0.3, np.inf])

@@ -54,7 +54,6 @@ def segments():
         yield np.array([shift, shift]), a[[0, 0]]
 
 
-@pytest.mark.slow
 def test_distance_of_segments_is_the_least_there_is():
     for a, b in segments():
         a, b = np.round(a, 12).tolist(), np.round(b, 12).tolist()

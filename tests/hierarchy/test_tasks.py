@@ -49,7 +49,6 @@ def moved(q, v, step, task_state):
     return state
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["position", "pointing", "cone", "posture", "centre of mass",
                                   "centre of mass, x and z", "frame", "relative position",
                                   "coupling", "look-at", "manipulability",
@@ -63,7 +62,6 @@ def test_jacobian_is_the_derivative_of_what_the_error_measures(name):
         np.testing.assert_allclose(np.transpose(columns), task.jacobian(state), atol=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rows", [1, 3])
 def test_avoidance_jacobian_is_that_of_the_active_control_point(rows):
     task = TASKS[f"avoidance {rows}-D"]
@@ -78,7 +76,6 @@ def test_avoidance_jacobian_is_that_of_the_active_control_point(rows):
                                    atol=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in TASKS if name != "damping"])
 def test_jacobian_derivative_agrees_with_central_differences(name):
     task = TASKS[name]

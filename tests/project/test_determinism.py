@@ -7,8 +7,6 @@ import pytest
 
 from scenarios import load, save, simulate
 
-pytestmark = pytest.mark.slow
-
 RUNS = {"ellipse": ["control.duration=0.2"],
         "ellipse-hqp": ["control.duration=0.05"],
         "ellipse-noisy": ["control.duration=0.1", "plant.measurement.position_noise=0.001",

@@ -18,8 +18,6 @@ import solvers
 from hierarchy.tasks import TASKS
 from scenarios.config import shipped
 
-pytestmark = pytest.mark.slow
-
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(str(path.relative_to(DOCS).with_suffix("")) for path in DOCS.rglob("*.md")

@@ -15,8 +15,6 @@ from scenarios.cli.main import app, run_command
 from scenarios.config import load, members
 from scenarios.results.plan import load_sweep
 
-pytestmark = pytest.mark.slow
-
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"(?<!`)`((?:hierarchy |make |python -m |python docs/)[^`]+)`(?!`)")

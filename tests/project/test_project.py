@@ -67,7 +67,6 @@ def test_make_says_what_is_missing_where_python_does_not_serve(interpreter, said
     assert said in done.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("statement", "heavy"), [
     ("import scenarios", {"numpy", "pydantic"}),
     ("import hierarchy", {"pinocchio"}), ("from hierarchy import Hierarchy", {"pinocchio"}),

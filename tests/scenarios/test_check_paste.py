@@ -71,7 +71,6 @@ def expect_the_same(one, other):
     assert [p.joint for p in other.control_points] == [p.joint for p in one.control_points]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_section_to_paste_runs_as_it_is(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -79,7 +78,6 @@ def test_the_section_to_paste_runs_as_it_is(name, tmp_path, monkeypatch, capsys)
     expect_the_same(*pasted(name, tmp_path, capsys))
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("example_robot_data")
 @pytest.mark.parametrize("name", ["pr2", "romeo"])
 def test_the_section_of_a_public_robot_runs_as_it_is(name, tmp_path, capsys):

@@ -12,7 +12,6 @@ from scenarios import compare, load_run
 from scenarios.cli.main import app, run_command
 
 SHORT = ["--duration", "0.02"]
-pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(autouse=True)

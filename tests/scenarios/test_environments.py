@@ -18,7 +18,6 @@ COMMAND = [sys.executable, "-c", "from scenarios.cli.start import main; main()"]
 RUN = [*COMMAND, "run", "ellipse", "--duration", "0.02", "--out", "a"]
 
 
-@pytest.mark.slow
 def test_a_terminal_that_cannot_show_a_character_gets_a_replacement(tmp_path):
     done = subprocess.run(RUN, cwd=tmp_path, capture_output=True, check=False,
                           env={**os.environ, "PYTHONIOENCODING": "ascii"})
@@ -26,7 +25,6 @@ def test_a_terminal_that_cannot_show_a_character_gets_a_replacement(tmp_path):
     assert b"20 ticks in a" in done.stdout
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("closed", ["1>&-", "0<&- 1>&- 2>&-"])
 def test_closed_streams_cost_no_run(closed, tmp_path):
     done = subprocess.run(["sh", "-c", f'"$@" {closed}', "sh", *RUN], cwd=tmp_path, check=False,
@@ -62,7 +60,6 @@ def test_an_interruption_that_breaks_the_compiler_is_still_an_interruption(tmp_p
     assert (done.returncode, done.stderr) == (130, "hierarchy: interrupted\n")
 
 
-@pytest.mark.slow
 def test_the_doctor_finds_all_well_here(capsys):
     assert run_command(["doctor"]) == 0
     out = capsys.readouterr().out
@@ -71,7 +68,6 @@ def test_the_doctor_finds_all_well_here(capsys):
     assert "200 ticks of ellipse" in out
 
 
-@pytest.mark.slow
 def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, capsys):
     def broken():
         raise RuntimeError("no such kernel")

@@ -28,7 +28,6 @@ def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
     assert len(set(looks.values())) == 5
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("panel", panels.PANELS, ids=lambda panel: panel.name)
 def test_every_panel_draws_a_run_that_has_its_signal(panel):
     run = recording()

@@ -88,7 +88,6 @@ def test_what_a_scenario_asks_is_in_its_words(name, asked):
     assert found.items() >= asked.items()
 
 
-@pytest.mark.slow
 def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
     run = simulate(load("strictness", ["control.duration=0.3"]))
     position, posture = given_up(run)
@@ -104,7 +103,6 @@ def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
     assert given_up(simulate(load("ellipse-hqp", ["control.duration=0.05"]))) == ()
 
 
-@pytest.mark.slow
 def test_only_how_long_is_said_where_the_rows_are_not_known():
     changes = ["control.duration=0.05", "avoidance.distance=0.12", "avoidance.influence=0.4"]
     for one in given_up(simulate(load("ellipse-smooth", changes))):

@@ -17,7 +17,6 @@ from scenarios.measure.runs import Run
 from solvers.qp import backends
 
 
-@pytest.mark.slow
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
         tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -50,7 +49,6 @@ def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch
         compare("mine")
 
 
-@pytest.mark.slow
 def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_path):
     limited = load("ellipse", {"name": "limited", "control.duration": 0.01,
                                "control.options": {}, "limits.acceleration": 20.0})

@@ -39,7 +39,6 @@ def at_level(level):
     return {**BASE["control"], "level": level, "period": 0.005, "duration": 3.0}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize(("task", "metric"), [
     (COUPLING, "task_coupling_end"), (FRAME, "task_frame_end"), (LOOK, "task_look-at_end"),
@@ -60,7 +59,6 @@ def test_a_task_is_made_of_its_keys(task, tmp_path):
     assert made.damping == 3.0
 
 
-@pytest.mark.slow
 def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     avoidance = {"kind": "separation", "distance": 0.05, "obstacles": [[0.1, 0.5, 0.1]]}
     hold = {"kind": "position", "frame": "end_effector"}
@@ -72,7 +70,6 @@ def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     assert isinstance(later.stack["separation"], Separation)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", [
     {"kind": "line", "start": [0.0, 0.6, 0.1], "end": [0.1, 0.6, 0.2], "duration": 1.0},
     {"kind": "circle", "centre": [0.05, 0.6, 0.1], "radius": 0.05, "normal": [0.0, 1.0, 0.0]},

@@ -14,8 +14,6 @@ from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
 from scenarios.measure.run_folder import load_run, save
 
-pytestmark = pytest.mark.slow
-
 ROBOT = Robot.named("kuka_lwr")
 START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
 STILL = np.zeros(7)

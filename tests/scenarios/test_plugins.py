@@ -124,7 +124,6 @@ def test_a_file_alone_loads_no_code(command, capsys, folder):
     assert "plugin 'doors_of_mine' cannot be imported: ZeroDivisionError" in text
 
 
-@pytest.mark.slow
 def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():
     plugins.allow("doors_of_mine")
     scenario = load("own.toml")
@@ -138,7 +137,6 @@ def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():
     np.testing.assert_allclose(exact["command"][0], 2.0 * run["command"][0], rtol=1e-9)
 
 
-@pytest.mark.slow
 def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(capsys):
     assert said(["run", "own.toml", "--plugin", "doors_of_mine", "--out", "a"], capsys)[0] == 0
     plugins._loaded.clear()

@@ -13,7 +13,6 @@ from solvers.problems import FAMILIES, family
 SEEDS = range(40)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", FAMILIES)
 def test_sizes_equalities_norms_of_rows_and_ranks_are_those_of_the_stored_problems(name):
     stored, fresh = [p.h for p in families.family(name)], [family(name, s) for s in SEEDS]

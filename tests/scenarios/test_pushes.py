@@ -71,7 +71,6 @@ def test_an_arrow_goes_to_the_middle_of_a_pushed_body_while_it_is_pushed():
     assert shaft[1, 2] > rest[:, 11].mean()  # in the trunk
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["reach-torque", "stand-momentum", "wipe", "step", "crawl"])
 def test_every_shipped_scenario_of_torques_can_be_replayed(name):
     """A level of momentum had no name for its curve; a position in two axes had three."""

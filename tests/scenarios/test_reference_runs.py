@@ -8,7 +8,6 @@ from scenarios.config import load
 from scenarios.loop.simulation import simulate
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_the_authors_runs_are_reproduced_tick_for_tick(name):
     expected = reference(name)
@@ -29,7 +28,6 @@ def test_the_authors_runs_are_reproduced_tick_for_tick(name):
                                rtol=0, atol=1e-8)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", RIGHT)
 def test_exact_derivatives_command_nearly_the_same_from_every_recorded_state(name):
     found = differences(name)

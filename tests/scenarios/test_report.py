@@ -55,7 +55,6 @@ def test_the_best_of_each_row_is_marked(runs, label, marked):
     assert best(row(runs, label)) == marked
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("runs", [
     [made(LETTER)],
     [made(LETTER), made("tpm"), made("recursive")],
@@ -85,7 +84,6 @@ def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
     assert "none is marked as best" in text
 
 
-@pytest.mark.slow
 def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
     run = made(LETTER, contacts=[0, 1, 0, 0, 0], **SOFTLY)
     run = dataclasses.replace(run, recording=dataclasses.replace(
@@ -111,7 +109,6 @@ def test_every_run_has_a_command_that_makes_it_again():
     assert run_command(unchanged, "runs/a") == "hierarchy run ellipse --resolver hcod"
 
 
-@pytest.mark.slow
 def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(tmp_path):
     """Of real runs, two of which are the same motion."""
     short = load("ellipse", ["control.duration=0.3"])

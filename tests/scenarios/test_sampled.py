@@ -140,7 +140,6 @@ def test_a_run_has_every_metric_of_its_scenario_as_sampled(tmp_path):
         m.name: m.value for m in expected.values() if m.group != "Computing"}
 
 
-@pytest.mark.slow
 def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path):
     distributed = pytest.importorskip("distributed", reason="needs the extra sweep")
     command = ["sweep", str(write(tmp_path)), "--out"]
@@ -209,7 +208,6 @@ def done(tmp_path_factory):
     return found, json.loads((folder / "results.json").read_text()), folder
 
 
-@pytest.mark.slow
 def test_strict_resolvers_are_the_same_and_none_is_best_among_them(done):
     found, data, _ = done
     columns = data["groups"]["ellipse"]["columns"]
@@ -220,7 +218,6 @@ def test_strict_resolvers_are_the_same_and_none_is_best_among_them(done):
     assert found.found["ellipse"].alike()[0] == ["recursive", "hcod"]
 
 
-@pytest.mark.slow
 def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_same(done):
     found, data, folder = done
     page = (folder / "index.html").read_text()

@@ -26,7 +26,6 @@ def ellipse(runs):
     return scene(runs["ellipse"])
 
 
-@pytest.mark.slow
 def test_frames_placements_and_distances_are_those_recorded(runs, ellipse):
     assert ellipse.ticks[0] == 0
     assert ellipse.ticks[-1] == runs["ellipse"].ticks - 1
@@ -50,7 +49,6 @@ def test_frames_placements_and_distances_are_those_recorded(runs, ellipse):
     assert np.allclose(away, ellipse.distance)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
     """A second run asks the loop's own hierarchy, tick by tick, what its command violates."""

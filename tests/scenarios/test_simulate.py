@@ -7,8 +7,6 @@ import scenarios.loop.simulation
 from scenarios.config import load
 from scenarios.loop.simulation import simulate
 
-pytestmark = pytest.mark.slow
-
 SHORT = ["control.duration=3.0"]
 
 

@@ -38,7 +38,6 @@ def test_frozen_returned_and_jerk_are_counted():
     np.testing.assert_allclose(jerk(t, np.array([[0.0], [1.0], [3.0]])), [[10.0], [10.0]])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_run_has_the_metrics_of_singularities(name):
     found = measure(simulate(load(name, ["control.duration=0.05"])))

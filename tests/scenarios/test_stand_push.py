@@ -132,7 +132,6 @@ def test_without_an_answer_the_last_torques_are_held_or_damped(action, patience)
 
 # Not of robots of packages: the certificate rejects 13 of 150 answers of stand-g1, and 2 of
 # stand-talos, that are right to 1e-14, as a proof in 120 digits shows.
-@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(
     name for name in shipped() if load(name).control.level == "torque"
     and load(name).make_resolver().strict and ":" not in load(name).robot.model))

@@ -15,7 +15,6 @@ from scenarios import load, load_run, save, simulate
 from scenarios.draw.replay.page import html
 from scenarios.scene import scene
 
-pytestmark = pytest.mark.slow
 
 def tube(name, middle, length):
     return link(name, INERTIAL + shape(f'<cylinder radius="0.04" length="{length}"/>',

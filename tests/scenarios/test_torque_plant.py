@@ -14,7 +14,7 @@ from scenarios.config import ScenarioError
 from scenarios.config.plant import PushSection, TorqueSection
 from scenarios.measure.forces import standing
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("with_mujoco")]
+pytestmark = pytest.mark.usefixtures("with_mujoco")
 
 CONTACTS = feet()
 

@@ -70,7 +70,6 @@ def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
     assert not drawn.levels.known[-1]
 
 
-@pytest.mark.slow
 def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses():
     page = LivePage(Live(LIMITED))
     higher = (page.middle + np.array([0.0, 0.02, 0.0])).tolist()
@@ -107,7 +106,6 @@ def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses():
 _SECONDS = 180.0  # of patience, which only a page that hangs takes
 
 
-@pytest.mark.slow
 def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_motion():
     page = LivePage(Live(load("ellipse-limits", ["control.duration=600.0"])))
     with served(0, page.html, page.answer) as address, chromium() as browser:

@@ -65,7 +65,6 @@ def test_what_cannot_slide_or_is_no_direction_is_refused():
         Along(Position(TIP, Still((0.0, 0.0, 0.0))), ((1.0, 0.0, 0.0), (1.0, 1.0, 0.0)))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("height", [0.111, 0.09])
 def test_it_presses_and_wipes_on_a_table_of_unknown_height(height):
     """Friction known: within 1 N of 20 N most of the time, and a few mm of its circle."""
@@ -87,7 +86,6 @@ def test_it_presses_and_wipes_on_a_table_of_unknown_height(height):
 FIRST, LIFT, TOUCH = 3, 0.75, 1.15  # the first foot of `crawl` that steps, and when [s]
 
 
-@pytest.mark.slow
 def test_a_foot_steps_with_the_weight_over_the_other_three():
     pytest.importorskip("mujoco")
     first_step = simulate(load("crawl").with_changes({

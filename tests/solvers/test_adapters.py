@@ -238,7 +238,6 @@ def arm():
     return model, data
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "kind"), [("tip", "site"), ("lower", "body"), ("pad", "geom")])
 def test_a_jacobian_of_mujoco_is_the_difference_of_its_frames(arm, name, kind):
     import mujoco

@@ -55,7 +55,6 @@ def assert_same(answer, alone):
             assert not answer.memory[p].any()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize(("name", "of"), [*(("tpm", of) for of in EQUALITIES), *(
     ("hcod", of) for of in ("EQ7", "EQ7sing", *INEQUALITIES))])

@@ -21,7 +21,6 @@ OFF = 1e-4
 every_family = pytest.mark.parametrize("name", FAMILIES)
 
 
-@pytest.mark.slow
 @every_family
 def test_the_stored_solutions_are_certified_far_below_the_tolerance(name):
     for h, x, _ in family(name):
@@ -30,7 +29,6 @@ def test_the_stored_solutions_are_certified_far_below_the_tolerance(name):
         assert max([verdict.nearest, *verdict.stationarity]) < 1e-3 * certificate.TOLERANCE
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(25))
 def test_only_the_answer_that_is_proved_is_certified(seed):
     """The least violation of a level is one vector, not only one norm."""
@@ -143,7 +141,6 @@ def test_rows_count_as_parallel_up_to_an_angle_of_1e_8(angle, counts):
 EXTREMES = (0.0, 5e-324, 1e-310, 1e-200, 1e-160, 1e-8, 1.0, 1e8, 1e153, 1e160, 1.6e308)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_no_number_is_too_large_or_too_small_to_be_judged(seed):
     r = rng(seed)

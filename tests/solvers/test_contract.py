@@ -19,8 +19,6 @@ from scenarios.problems.reference import EQUALITIES
 from solvers import Status, certify, make, names
 from solvers.qp.backends import BACKENDS
 
-pytestmark = pytest.mark.slow
-
 HQP = [make("hqp", backend=name, form=form)
        for name in BACKENDS for form in ("null-space", "slack")]
 RESOLVERS = [*(make(name) for name in names() if name != "hqp"), make("tpm-published"),

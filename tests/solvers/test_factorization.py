@@ -75,7 +75,6 @@ def orthogonality(factored):
     return np.abs(Q.T @ Q - np.eye(Q.shape[1])).max(initial=0.0)
 
 
-@pytest.mark.slow
 def test_after_random_edits_the_answers_are_those_of_tpm():
     """The gap between two roundings is far below 1e-12 in nearly all."""
     gaps = []

@@ -28,7 +28,6 @@ def test_an_answer_found_by_hand():
     assert res.multipliers[:2] == pytest.approx([1.5, 0.75])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("limit", [1, 3, 6, 11])
 def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
     resolver = make("hcod", max_iterations=limit)

@@ -13,7 +13,6 @@ ROBOT = Robot.named("kuka_lwr")
 FRAME = ROBOT.frame("end_effector")
 Q = np.array([0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3])
 SLOW = JointLimits(ROBOT, 9.0, 0.01)
-pytestmark = pytest.mark.slow
 
 
 def hand(shift, gain=10.0):

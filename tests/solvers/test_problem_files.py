@@ -44,7 +44,6 @@ def test_a_file_has_what_was_written_to_the_last_bit(collection, file):
         assert one.judged == other.judged
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
 def test_the_reader_in_cpp_finds_the_same_numbers(collection, file, tmp_path):
     program = tmp_path / "reader"

@@ -19,7 +19,6 @@ def test_a_knob_out_of_range_is_named(knob, value):
         Recipe(**{knob: value})
 
 
-@pytest.mark.slow
 @settings(max_examples=50, deadline=None, derandomize=True)
 @given(problems.strategy(Recipe(joints=(1, 8), levels=(1, 4), rows=(0, 6), equalities_only=True)))
 def test_hypothesis_draws_the_same_kind_of_problem(h):
@@ -27,7 +26,6 @@ def test_hypothesis_draws_the_same_kind_of_problem(h):
     assert certify(h, make("tpm").solve(h).x).certified
 
 
-@pytest.mark.slow
 def test_a_seed_means_the_problem_that_it_meant_when_it_was_reported():
     expected = read("problems")
     for kind, sums in problem_sums().items():
@@ -36,7 +34,6 @@ def test_a_seed_means_the_problem_that_it_meant_when_it_was_reported():
     assert not expected
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_is_a_valid_hierarchy_also_of_equalities_alone(kind):
     for seed in range(10):

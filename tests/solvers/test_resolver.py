@@ -105,7 +105,6 @@ for name in ("tpm", "hcod", "recursive"):
 """
 
 
-@pytest.mark.slow
 def test_a_first_hierarchy_is_solved_without_pinocchio_matplotlib_and_qpsolvers():
     assert output_of(FIRST_SOLVE).splitlines() == [
         f"{name} [1.0, 2.0, 0.0] True" for name in ("tpm", "hcod", "recursive")]

@@ -54,7 +54,6 @@ def as_printed(levels, low, up):
     return x, scalings
 
 
-@pytest.mark.slow
 def test_the_basic_form_is_the_algorithm_as_printed():
     judged = 0
     for seed in range(MANY):

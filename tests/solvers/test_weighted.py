@@ -27,7 +27,6 @@ def as_two_levels(h, resolver, hard):
                                  h.reference)
 
 
-@pytest.mark.slow
 @every_case
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3])
 def test_within_limits_it_is_the_minimiser_and_shown_to_be(case, ratio):
