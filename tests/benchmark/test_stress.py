@@ -1,14 +1,27 @@
-"""Generated problems, every answer certified or proved; problems that once failed."""
+"""Generated problems, all resolvers timed and judged, their accuracy."""
 
+import csv
+import json
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmark import stress
+from benchmark import start, stress
+from benchmark.solve import accuracy, growth, resolvers
+from benchmark.solve.entrants import NUMPY
+from benchmark.solve.ours import Ours
+from benchmark.start import Cost, run
+from benchmark.tick import PlainTick
 from hierarchy import Hierarchy
+from scenarios.cell.build import build
+from scenarios.config import load
+from scenarios.loop.simulation import simulate
+from scenarios.problems import reference
+from scenarios.problems.reference import family
 from solvers import Resolution, Resolver, Status, certify, make, names, problems
+from solvers.qp import backends
 
 REGRESSIONS = sorted((Path(__file__).parents[1] / "data" / "regressions").glob("*.npz"))
 JUDGED = [name for name in ("hcod", "tpm", "recursive") if name in names()]
@@ -98,3 +111,88 @@ def test_failing_problems_are_listed_and_saved(tmp_path, monkeypatch):
     assert f"recipe, seed {found.failing[0][0]}, {stress.WRONG}" in told.sections[0].text
     kept = problems.load(next(tmp_path.glob("wrong-*.npz")))
     assert stress.outcome(Wrong(stress.WRONG), kept)[0] == stress.WRONG
+
+
+@pytest.fixture(scope="module")
+def tables():
+    """Errors and times of a small run."""
+    few = pytest.MonkeyPatch()
+    few.setattr(growth, "FIRST_PAPER", {key: sizes[:3] for key, sizes in
+                                        growth.FIRST_PAPER.items()})
+    found = {**accuracy.run(arms=50, checked=10).rows, **growth.run(seconds=0.0).rows}
+    few.undo()
+    return found["errors"], found["growth"]
+
+
+def claims():
+    """Accuracy by label of those that claim to be strict."""
+    made = [(one.label, Ours(**one.options).resolver) for one in accuracy.entrants()
+            if "resolver" in one.options]
+    return {label: resolver.accuracy for label, resolver in made if resolver.strict}
+
+
+def test_strict_resolvers_reach_all_that_the_tasks_can_have(tables):
+    errors, _ = tables
+    for row in errors:
+        if row["entrant"] in claims() and row["case"] in ("regular", "conflict", "crowded"):
+            worst = [row[key] for key in row if key.endswith("_max")]
+            assert max(worst) < claims()[row["entrant"]], row
+            assert row["certified"] == 1.0, row
+
+
+FEW = ("EQ7", "INEQ7")
+EQUALITIES = {NUMPY, "augmented", "recursive", "reverse", "sns", "tpm", "tpm-published"}
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Only one problem a family, since one cascade takes 40 ms for one of them."""
+    monkeypatch.setattr(resolvers.reference, "family", lambda name: family(name)[:1])
+
+
+def test_a_row_for_everybody_in_every_family_asked(few, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    found = resolvers.run(seconds=0.001, families=FEW)
+    rows = found.rows["resolvers"]
+    known = {row["entrant"] for row in rows}
+    assert {NUMPY, "augmented", "hcod", "recursive", "reverse", "sns", "tpm", "tpm-published",
+            "weighted", "hcod warm", "weighted warm", "hqp proxqp", "hqp proxqp warm"} <= known
+    assert {f"hqp {name}" for name in backends.BACKENDS if backends.installed(name)} <= known
+    assert {(row["family"], row["entrant"]) for row in rows} == {
+        (name, label) for name in FEW for label in known
+        if label not in EQUALITIES or name in reference.EQUALITIES}
+    for row in rows:
+        if row["entrant"].startswith(("hqp", "hcod")) or row["entrant"] in ("tpm", "recursive"):
+            assert row["wrong"] == 0, row
+    found.say()
+    found.write(tmp_path)
+    with (tmp_path / "resolvers.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == len(rows)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "resolvers.csv", "machine.json", "missing.json", "time-accuracy.svg", "time-accuracy.png",
+        "index.html"}
+    assert "processor" in json.loads((tmp_path / "machine.json").read_text())
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    assert "…" not in out
+
+
+def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
+    """Else the benchmark would compare two different jobs."""
+    scenario = load("ellipse")
+    plain, path = PlainTick(scenario, build(scenario)), simulate(scenario)
+    for k in range(0, path.ticks, 100):
+        found = plain.step(path["t"][k], path["q"][k], path["v"][k])
+        np.testing.assert_allclose(found, path["a"][k], atol=1e-8)
+
+
+def test_everything_measured_is_told(monkeypatch):
+    monkeypatch.setattr(start, "beginnings", lambda folder: [Cost("help", 0.1, "s", 0.5, 0.09)])
+    monkeypatch.setattr(start, "first_compilation", lambda cache: (
+        [Cost("first", 20.0, "s", None, 19.0)], {"solvers.kernels.a.b": 2.0}))
+    monkeypatch.setattr(start, "library", lambda folder: Cost("library", 9.0, "s", 10.0, 8.0))
+    monkeypatch.setattr(start, "memory", lambda folder: [Cost("a run", 301.0, "MB", 300.0)])
+    found = run()
+    assert [row["verdict"] for row in found.rows["start"]] == ["met", "", "met", "not met"]
+    assert found.rows["compilation"] == [{"kernel": "solvers.kernels.a.b", "seconds": 2.0}]
+    assert "a.b 2.0" in found.sections[0].text

@@ -1,12 +1,14 @@
-"""Joints with more coordinates than velocities: continuous, balls, planar and free ones."""
+"""Joints with more coordinates than velocities, shipped robots, entries that are not finite."""
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from pinned import leaves, read, robot_facts
 from urdf_text import LIMIT, joint, link, placed, urdf
 
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.robots import TABLES
 from hierarchy.tasks import JointCoupling, JointLimits, Posture
 from solvers import solve_ik
 
@@ -167,3 +169,24 @@ def test_joint_limits_cover_a_floating_base_where_it_has_limits():
     np.testing.assert_allclose(sent[[0, 1, 20]], [0.0, 1e6, 5.0])
     with pytest.raises(HierarchyError, match="has a fixed base"):
         JointLimits(ROBOT, 5.0, T, base_acceleration=(1.0, 1.0))
+
+
+@pytest.mark.parametrize(("robot", "what", "entry", "name"), [
+    ("kuka_lwr", "q", 2, "joint_3"), ("kuka_lwr", "v", 1, "joint_2"),
+    ("humanoid", "q", 0, "root_joint 1"), ("humanoid", "q", 6, "root_joint 7"),
+    ("humanoid", "q", 7, "left_hip_yaw"), ("humanoid", "q", 36, "neck_pitch"),
+    ("humanoid", "v", 5, "root_joint 6"), ("humanoid", "v", 10, "left_ankle_pitch")])
+def test_an_entry_that_is_not_finite_is_named_by_its_own_joint(robot, what, entry, name):
+    robot = Robot.named(robot)
+    given = {"q": robot.rest.copy(), "v": np.zeros(robot.n)}
+    for value in (np.nan, np.inf):
+        given[what][entry] = value
+        with pytest.raises(RobotError) as error:
+            State.at(robot, **given)
+        assert f"{what}[{entry}] ({name}) is {value}" in str(error.value)
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_shipped_robot_is_the_one_that_recorded_runs_were_made_with(name):
+    found, expected = leaves(robot_facts(name)), leaves(read("robots")[name])
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)

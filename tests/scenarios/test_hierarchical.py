@@ -1,4 +1,4 @@
-"""Scenarios whose rows are inequalities: limits, separation and cone in the stack at all times."""
+"""Limits, separation, cones and listed tasks in one stack at all times."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""`hcod`: answers by hand, words for what holds back, how it ends, levels and rows of any size."""
+"""`hcod`: answers by hand, words for what holds back, its own check, rows of any size."""
 
 import numpy as np
 import pytest
