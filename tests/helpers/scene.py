@@ -6,7 +6,6 @@ import numpy as np
 
 from hierarchy import Robot, State, Task
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion
-from hierarchy.measured import Measured, measured
 from hierarchy.paths import Ellipse, Still
 from hierarchy.tasks import (
     Along,
@@ -95,27 +94,6 @@ class Elbow(Task):
 
     def jacobian_derivative(self, state):
         return np.zeros((1, 7))
-
-
-@measured
-def _fast_elbow(kinematics, reads, goal, J, motion):
-    [q] = reads
-    J[0, 3] = 1.0
-    motion.error[0], motion.rate[0] = 1.0 - q[3], kinematics.v[3]
-
-
-@dataclass(frozen=True)
-class FastElbow(Measured):
-    """The same, compiled."""
-
-    name: str = "elbow"
-    gain: float = 2.0
-    stiffness: float = 10.0
-    damping: float = 0.0
-    dimension = 1
-
-    def measure(self, state):
-        return _fast_elbow, (state.q,)
 
 
 def compiled_rows(task, state, level, rtol=1e-12):

@@ -43,13 +43,6 @@ def test_velocity_and_acceleration_are_the_derivatives(name):
         np.testing.assert_allclose(rates, now[1:], atol=2e-8, rtol=1e-6)
 
 
-@pytest.mark.parametrize("name", [name for name in PATHS if name != "recorded"])
-def test_position_velocity_and_acceleration_do_not_jump(name):
-    path = PATHS[name]
-    for t in (*TIMES, *(t + 0.3 for t in TIMES), *(t + 0.7 for t in TIMES), 0.4, 1.9):
-        np.testing.assert_allclose(path(t - 1e-9), path(t + 1e-9), atol=1e-6)
-
-
 def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
     path = PATHS["blended"]
     for i in (1, 2):

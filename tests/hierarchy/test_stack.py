@@ -2,10 +2,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scene import FRAME, PATH, ROBOT, TASKS, state_at, states
+from scene import FRAME, ROBOT, TASKS, state_at, states
 
 from hierarchy import HierarchyError, Stack, State
-from hierarchy.tasks import JointDamping, JointLimits, LookAt, Position
+from hierarchy.tasks import JointDamping, JointLimits, LookAt
 
 Q, V = states(1)[0]
 
@@ -42,17 +42,6 @@ def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_bu
     state.move(0.0, Q + 0.1, V)
     assert s.hierarchy(state) is first
     assert not np.array_equal(first.A, A)
-
-
-def test_a_task_that_takes_the_place_of_one_removed_is_the_one_that_is_written():
-    s, state = Stack([TASKS["position"]]), state_at(Q, V)
-    before = s.hierarchy(state).lower.copy()
-    s.remove("position")
-    s.insert(Position(FRAME, PATH, stiffness=7.0))
-    after = s.hierarchy(state)
-    np.testing.assert_array_equal(
-        after.lower, Stack([Position(FRAME, PATH, stiffness=7.0)]).hierarchy(state).lower)
-    assert not np.array_equal(after.lower, before)
 
 
 @pytest.mark.parametrize("name", TASKS)

@@ -9,7 +9,6 @@ from scene import (
     TASKS,
     TIP,
     Elbow,
-    FastElbow,
     compiled_rows,
     place_of,
     state_at,
@@ -97,18 +96,6 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
         state = state_at(q, v, differences=differences)
         state.move(0.8, q + 1e-3 * v, v)
         compiled_rows(task, state, level)
-
-
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-def test_a_fast_task_of_a_user_writes_the_rows_of_the_plain_one(level):
-    state, rows = state_at(*STATES[1]), []
-    for task in (Elbow(), FastElbow()):
-        rows.append((np.zeros((1, 7)), np.zeros(1), np.zeros(1)))
-        task.writer(state, level, *rows[-1], 0)()
-        np.testing.assert_array_equal(task.jacobian(state), Elbow().jacobian(state))
-        np.testing.assert_array_equal(task.jacobian_derivative(state), np.zeros((1, 7)))
-    for plain, fast in zip(*rows, strict=True):
-        np.testing.assert_array_equal(plain, fast)
 
 
 def test_references_of_position_and_damping_are_those_of_the_letter():

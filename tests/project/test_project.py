@@ -71,6 +71,8 @@ def test_make_says_what_is_missing_where_python_does_not_serve(interpreter, said
     ("import scenarios", {"numpy", "pydantic"}),
     ("import hierarchy", {"pinocchio"}), ("from hierarchy import Hierarchy", {"pinocchio"}),
     ("import solvers, solvers.qp.backends", {"pinocchio", "qpsolvers", "proxsuite", "osqp"}),
+    ("import solvers, hierarchy as h; solvers.make('hcod').solve(h.Hierarchy.from_levels("
+     "[([[1.0]], [1.0])]))", {"pinocchio", "matplotlib", "qpsolvers"}),
     ("import scenarios.cli.main", {"numpy", "numba", "pinocchio", "scipy", "matplotlib"}),
     ("import scenarios.cell.build", {"scipy.spatial", "matplotlib"}),
     ("from scenarios.cli.main import run_command; run_command(['--help'])",

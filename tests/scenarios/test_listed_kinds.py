@@ -1,17 +1,14 @@
 """Every kind of `[[tasks]]` in a scenario: what it reaches, and what is refused."""
 
 import re
-from typing import Annotated, Literal
 
 import numpy as np
 import pytest
 
 from hierarchy import HierarchyError, plugins
-from hierarchy.tasks import JointCoupling, Separation
+from hierarchy.tasks import Separation
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.config.sections import Unit
-from scenarios.config.tasks import Listed
 from scenarios.measure.metrics import measure
 
 BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
@@ -125,36 +122,7 @@ def test_what_does_not_fit_the_robot_is_named(task, said, tmp_path):
 
 def test_every_kind_has_a_test_here(request):
     text = request.path.read_text(encoding="utf-8")
-    tested = {"pose", "com", "pointing", "posture",  # in test_humanoid.py, test_mechanism.py
+    tested = {"pose", "com", "pointing", "posture",  # in scenarios that are run elsewhere
               "momentum", "contact-force", "least-force"}  # in shipped scenarios of torques
     assert [kind for kind in plugins.registered("tasks")
             if f'"{kind}"' not in text and kind not in tested] == []
-
-
-# A new kind is one section that nothing else lists, in the product and in a user's module.
-
-@pytest.fixture
-def kinds(monkeypatch):
-    """The registers, which forget at the end what a test adds."""
-    for register in ("_shipped", "_registered"):
-        monkeypatch.setattr(plugins, register, {
-            group: dict(kinds) for group, kinds in getattr(plugins, register).items()})
-
-
-@pytest.mark.parametrize("shipped", [True, False])
-def test_a_new_task_is_one_section(shipped, kinds, tmp_path):
-    @plugins.register("tasks", "elbow", shipped=shipped)
-    class Elbow(Listed):
-        kind: Literal["elbow"]
-        joint: str
-        angle: Annotated[float, Unit("rad")] = 0.5
-
-        def make(self, at):
-            return JointCoupling(at.robot, {self.joint: 1.0}, self.angle, name=self.title)
-
-    cell = build(scenario_of(tmp_path, {"kind": "elbow", "joint": "joint_4"}))
-    assert cell.stack.names == ("elbow",)
-    with pytest.raises(HierarchyError, match=r"tasks\.0\.angle: .*, got 'wide' rad"):
-        scenario_of(tmp_path, {"kind": "elbow", "joint": "joint_4", "angle": "wide"})
-    with pytest.raises(HierarchyError, match="the kind here is 'elbow'"):
-        scenario_of(tmp_path, {"kind": "elbow", "joints": "joint_4"})

@@ -77,15 +77,6 @@ def test_braking_ends_at_rest_and_never_swings_through_it(period):
     assert np.abs(v).max() < 1e-9
 
 
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-def test_a_stop_is_at_rest_after_one_tick_and_says_why_the_run_ends(level):
-    p = policy(level, not_finite="stop")
-    x = p.choose(0.25, ["not_finite"], X, V)
-    np.testing.assert_allclose(x if level == "velocity" else V + x * PERIOD, 0.0, atol=1e-12)
-    assert p.stopped
-    assert "0.250 s: not_finite" in p.fault
-
-
 class Saying:
     """A resolver that says what it is told of a right answer."""
 
@@ -101,16 +92,6 @@ def controller(*changes, name="ellipse"):
     made = Controller(scenario)
     made.resolver = Saying(scenario)
     return made, made.cell.plant.q.copy(), made.cell.plant.v.copy()
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_what_is_measured_may_be_nan_at_the_first_tick_already(bad):
-    c, q, v = controller()
-    v[2] = bad
-    np.testing.assert_array_equal(c.command(0.0, q, v), np.zeros(7))
-    assert list(c.policy.events) == [("not_finite", "brake")]
-    np.testing.assert_array_equal(c.cell.state.q, q)
-    assert not c.answered
 
 
 @pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity"])

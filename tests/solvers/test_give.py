@@ -43,18 +43,6 @@ def test_a_level_gives_up_to_what_it_may_and_those_below_gain(resolver, seed):
     assert lower[first] < were[first] - 1e-3
 
 
-def test_a_give_of_zero_is_no_give_and_a_boundless_one_drops_the_level():
-    hcod, strict = make("hcod"), problem(1, 0.0)
-    plain = Hierarchy(strict.A, strict.lower, strict.upper, strict.sizes, strict.reference,
-                      strict.names)
-    np.testing.assert_array_equal(hcod.solve(strict).x, hcod.solve(plain).x)
-    soft = problem(1, 1e6)
-    kept = np.r_[0:2, 5:soft.m]
-    without = Hierarchy(soft.A[kept], soft.lower[kept], soft.upper[kept],
-                        np.delete(soft.sizes, 1), soft.reference, ("a", "b", "c"))
-    np.testing.assert_allclose(hcod.solve(soft).x, hcod.solve(without).x, atol=1e-9)
-
-
 def hand_and_posture(reach):
     """Two tasks that give, of which the second is met while the first leaves it room."""
     rng = np.random.default_rng(4)

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from standing import ROBOT as HUMANOID
-from standing import WEIGHT, external_forces, feet, standing_stack
+from standing import WEIGHT, feet, standing_stack
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.paths import Still
@@ -164,18 +164,6 @@ def assert_physical(h, x, state, contacts, fraction=1.0, friction=0.7):
     tau = contacts.torques(state, x)
     assert (np.abs(tau) <= fraction * HUMANOID.effort_limit[6:] + 1e-7).all()
     assert (np.linalg.norm(forces[:, :2], axis=1) <= friction * forces[:, 2] + 1e-7).all()
-
-
-def test_standing_still_is_gravity_compensation():
-    h, res = solved(standing_stack(STANDING, CONTACTS), STANDING)
-    assert np.abs(CONTACTS.accelerations(res.x)).max() < 1e-9
-    wrenches = external_forces(STANDING, CONTACTS, CONTACTS.forces(res.x))
-    efforts = pin.rnea(HUMANOID.model, HUMANOID.model.createData(), STANDING.q, STANDING.v,
-                       np.zeros(HUMANOID.n), wrenches)
-    np.testing.assert_allclose(efforts[:6], 0.0, atol=1e-9)
-    np.testing.assert_allclose(CONTACTS.torques(STANDING, res.x), efforts[6:], atol=1e-9)
-    np.testing.assert_allclose(CONTACTS.forces(res.x).sum(axis=0), [0.0, 0.0, WEIGHT], atol=1e-9)
-    assert_physical(h, res.x, STANDING, CONTACTS)
 
 
 @pytest.mark.parametrize("faces", [4, 8])

@@ -3,8 +3,6 @@
 import dataclasses
 import pickle
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -90,29 +88,6 @@ def test_settings_of_parts_are_named():
         with pytest.raises(HierarchyError, match=next(iter(wrong))):
             Settled(inner=make("tpm"), **{"period": 0.1, **wrong})
     assert Settled(inner=make("tpm"), period=0.1, softness=0.0).softness == 0.0
-
-
-FIRST_SOLVE = """
-import sys
-for name in ("pinocchio", "matplotlib", "qpsolvers"):
-    sys.modules[name] = None
-from hierarchy import Hierarchy
-from solvers import certify, make
-h = Hierarchy.from_levels([([[1.0, 0.0, 0.0]], [1.0]), ([[1.0, 1.0, 0.0]], [3.0])])
-for name in ("tpm", "hcod", "recursive"):
-    x = make(name).solve(h).x
-    print(name, x.round(12).tolist(), certify(h, x).certified)
-"""
-
-
-def test_a_first_hierarchy_is_solved_without_pinocchio_matplotlib_and_qpsolvers():
-    assert output_of(FIRST_SOLVE).splitlines() == [
-        f"{name} [1.0, 2.0, 0.0] True" for name in ("tpm", "hcod", "recursive")]
-
-
-def output_of(code):
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return run.stdout.strip()
 
 
 # The work space of these: its content never matters.
