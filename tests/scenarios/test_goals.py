@@ -43,7 +43,7 @@ def test_median_worst_and_share_count_from_when_the_target_was_first_reached():
 
 @pytest.mark.parametrize(("signals", "name", "flag", "worst", "unit"), [
     (at([0.25, 0.5, 0.25, 0.25, 1.0]), "position", "met", 1e-3, "m"),
-    (at([90, 0.5, 0.5, 0.25, 0.5]), "position", "met", 0.5e-3, "m"),
+    (at([90, 1.0, 0.5, 0.25, 0.5]), "position", "met", 1e-3, "m"),
     (at([437] * 5), "position", "never met", 0.437, "m"),
     (joint([0.0] * 5), "joint limits", "kept", 0.0, "rad"),
     (joint([2.5, 2.2, 1.9, 1.9, 1.9]), "joint limits", "kept", 0.0, "rad"),        # came back

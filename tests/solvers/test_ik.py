@@ -116,6 +116,7 @@ def test_poses_of_random_configurations_are_found_within_the_limits():
         found = solve_ik(ROBOT, Q, [pose], until=1e-6)
         assert found.met
         assert found.verdict == "reached"
+        assert found.iterations > 0
         assert ((found.q >= ROBOT.lower - 1e-9) & (found.q <= ROBOT.upper + 1e-9)).all()
         here = State.at(ROBOT, found.q)
         np.testing.assert_allclose(here.position(FRAME), goal.position(FRAME), atol=1e-6)
