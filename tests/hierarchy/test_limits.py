@@ -24,61 +24,34 @@ POSITION, SPEED, ACCELERATION = 1e-12, 1e-12, 1e-9
 
 # ---- a plant that remembers what it has seen --------------------------------------------------
 
-@compiled
-def drive(q, v, limits, acceleration, picks, low, up, seen, log):
-    """Move each joint through picks (ticks, joints), 0 for the lower end of its box, 1 the upper.
-
-    seen (6, joints): highest and lowest position, also between ticks, greatest speed and
-    acceleration, greatest lower - upper of the box, whether it was finite. log (ticks, 4, joints)
-    keeps q and v after every tick, and the sides of the box before it.
-    """
-    for k in range(len(picks)):
-        for j in range(len(q)):
-            T = limits[4, j]
-            write_box(q[j:j + 1], v[j:j + 1], limits[:, j:j + 1], acceleration, low, up, j)
-            x = low[j] * (1.0 - picks[k, j]) + up[j] * picks[k, j]
-            a = x if acceleration else (x - v[j]) / T
-            high, deep = q[j], q[j]
-            if acceleration:
-                if v[j] * (v[j] + a * T) < 0.0:  # turns between ticks
-                    turn = q[j] - v[j] * v[j] / (2 * a)
-                    high, deep = max(high, turn), min(deep, turn)
-                q[j] += v[j] * T + a * T * T / 2
-                v[j] += a * T
-            else:
-                q[j] += x * T
-                v[j] = x
-            seen[0, j] = max(seen[0, j], high, q[j])
-            seen[1, j] = min(seen[1, j], deep, q[j])
-            seen[2, j] = max(seen[2, j], abs(v[j]))
-            seen[3, j] = max(seen[3, j], abs(a))
-            seen[4, j] = max(seen[4, j], low[j] - up[j])
-            if not np.isfinite(low[j]) or not np.isfinite(up[j]):
-                seen[5, j] = 0.0
-            log[k, 0, j], log[k, 1, j], log[k, 2, j], log[k, 3, j] = q[j], v[j], low[j], up[j]
-
-
 def spread(values, *shape):
     """An array of its own of this shape: kernels are compiled once for all that are alike."""
     return np.array(np.broadcast_to(values, shape), dtype=float, order="C")
 
 
 class Ride:
-    """What happened to joints driven through `picks`."""
+    """What happened to joints driven through picks (ticks, joints): 0 is the lower end of the box.
+
+    high, low : extreme positions, also between ticks. q, v (ticks, joints) : after each tick.
+    """
 
     def __init__(self, q, v, limits, period, level, picks, horizon=0.0):
-        joints = len(q)
-        picks = spread(picks, len(picks), joints)
-        packed = np.vstack([limits, spread(period, joints), spread(horizon, joints)])
-        seen = np.full((6, joints), -np.inf)
-        seen[1], seen[5] = np.inf, 1.0
-        log = np.empty((len(picks), 4, joints))
-        drive(q.copy(), v.copy(), packed, level == "acceleration", picks, np.empty(joints),
-              np.empty(joints), seen, log)
-        self.high, self.low, self.speed, self.acceleration, empty, finite = seen
-        self.q, self.v, self.least, self.most = log.transpose(1, 0, 2)
-        assert finite.all(), "a box was not finite"
-        assert (empty <= 0.0).all(), "a box was empty"
+        T, accelerates = spread(period, len(q)), level == "acceleration"
+        packed = np.vstack([limits, T, spread(horizon, len(q))])
+        box, seen, a = np.empty((2, len(q))), [], [0.0]
+        self.high, self.low = q, q
+        for pick in picks:
+            write_box(q, v, packed, accelerates, *box, 0)
+            assert np.isfinite(box).all(), "a box was not finite"
+            assert (box[0] <= box[1]).all(), "a box was empty"
+            x = box[0] * (1.0 - pick) + box[1] * pick
+            a.append(np.abs(x if accelerates else (x - v) / T))
+            q, v, turn = moved(q, v, x, T) if accelerates else (q + x * T, x, q)
+            self.high = np.maximum(self.high, np.maximum(q, turn))
+            self.low = np.minimum(self.low, np.minimum(q, turn))
+            seen.append((q, v))
+        self.q, self.v = np.array(seen).transpose(1, 0, 2)
+        self.speed, self.acceleration = np.abs(self.v).max(axis=0), np.max(a[1:], axis=0)
 
     def keeps_acceleration(self, limits):
         assert (self.acceleration <= limits[3] * (1 + ACCELERATION)).all()
@@ -89,6 +62,14 @@ class Ride:
         assert (lower - self.low <= POSITION * (1 + np.abs(self.low))).all()
         assert (self.speed <= velocity * (1 + SPEED)).all()
         self.keeps_acceleration(limits)
+
+
+def moved(q, v, a, T):
+    """Return q and v after a tick, and where a joint turns between ticks, or q."""
+    after = v + a * T
+    turns = v * after < 0.0
+    return (q + v * T + a * T * T / 2, after,
+            np.where(turns, q - v * v / np.where(turns, 2 * a, 1.0), q))
 
 
 def braking_way(v, A, T, level):
