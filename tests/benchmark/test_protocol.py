@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from benchmark.reproduce import blocks, fronts, protocol, verdicts
-from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, dominated
+from benchmark.reproduce.fronts import Method, dominated
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
-from scenarios.config import load
 from scenarios.measure.statistics import holm
 from scenarios.results.sampled import Workers
 
@@ -45,17 +44,6 @@ def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters(chan
     assert verdict(rows(x=x, y=y), above="y", percent=True, matters=5.0
                    ).decided == "contradicted"
     assert verdicts.shown(found.claim, rows(x=x, y=y), found.effect).startswith("-19.8 [")
-
-
-def test_layouts_that_disagree_and_noise_that_changes_a_verdict_are_said(chance):
-    y = np.ones(SIZE)
-    x = y + np.repeat([-0.5, 0.1], SIZE // 2) + 0.01 * chance.standard_normal(SIZE)
-    mostly = np.where(np.arange(SIZE) < 60, -0.5, 0.02) + y
-    assert verdict(rows(x=x, y=y), below="y").decided in ("differs between layouts", "undecided")
-    assert verdict(rows(x=mostly, y=y), below="y").layouts[1].estimate < 0.0
-    low = y - 0.5
-    assert verdict(rows({"x": y + 0.5}, x=low, y=y), below="y").decided == (
-        "undecided: with noise contradicted")
 
 
 def test_a_run_that_ends_in_a_fault_has_the_worst_value():
@@ -106,16 +94,6 @@ def test_only_what_nothing_else_improves_is_on_the_front():
     scores = np.array([[1.0, 4.0], [2.0, 2.0], [2.0, 3.0], [np.inf, np.inf]])
     assert [dominated(scores, k) for k in range(4)] == [False, False, True, True]
     assert not dominated(np.full((2, 2), np.inf), 0)
-
-
-def test_every_method_can_take_its_settings():
-    for front in FRONTS.values():
-        for given in front.method.values():
-            method = Method(**given)
-            scenario = load(front.scenario, GIVEN["plant"].get(front.plant, {}))
-            for settings in method.trials(2, seed=1):
-                scenario.with_resolver(method.resolver).with_changes(
-                    {**method.set, **settings}).make_resolver()
 
 
 def test_trials_that_are_left_out_of_the_second_scene_are_not_on_the_front(monkeypatch):
