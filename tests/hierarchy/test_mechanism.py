@@ -6,7 +6,6 @@ import pytest
 from mechanisms import four_bar
 
 from hierarchy import Robot, Stack, State
-from hierarchy.contacts import Contacts
 from hierarchy.robots.found import Loop
 from hierarchy.tasks import Posture
 from hierarchy.tasks.mechanism import Mechanism, model_rows
@@ -22,16 +21,6 @@ def bar(rigid=False):
 
 
 ROBOT = bar()
-GOAL = {"crank": -0.4, "finger": 0.5}
-
-
-def distance(robot, q):
-    """How far the pin is open [m] and the thumb from its polynomial [rad], by pinocchio alone."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    end, tip = (data.oMf[robot.model.getFrameId(name)].translation for name in ("end", "tip"))
-    finger, thumb = (q[robot.coordinate(name)] for name in ("finger", "thumb"))
-    return max(np.linalg.norm(end - tip), abs(thumb - (0.1 - finger + 0.5 * finger**2)))
 
 
 def start(robot=ROBOT):
@@ -57,29 +46,6 @@ def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
     np.testing.assert_allclose(
         task.jacobian_derivative(at(0 * v)),
         (task.jacobian(at(h * v)) - task.jacobian(at(-h * v))) / (2 * h), atol=1e-8)
-
-
-@pytest.mark.parametrize(("level", "resolver"), [
-    ("velocity", "hcod"), ("acceleration", "tpm"), ("torque", "recursive")])
-def test_a_four_bar_closes_from_a_millimetre_off_and_goes_to_its_posture(level, resolver):
-    """The torque is that of the answer, and the motion is what pinocchio says that it causes."""
-    crank = Posture({**ROBOT.values(start()), **GOAL}, 100.0, 20.0, 10.0)
-    contacts = Contacts(ROBOT) if level == "torque" else None
-    stack = Stack([*model_rows(ROBOT, PERIOD), crank], level, contacts=contacts)
-    off = np.zeros(ROBOT.n)
-    off[1], off[3] = 3e-3, 1e-3
-    q, v, state, solver = ROBOT.integrate(start(), off), np.zeros(ROBOT.n), State(ROBOT), make(
-        resolver)
-    assert 1e-3 < distance(ROBOT, q) < 2e-3
-    for _ in range(2000):
-        assert state.move(0.0, q, v)
-        x = solver.solve(stack.hierarchy(state)).x
-        if level == "torque":
-            x = pin.aba(ROBOT.model, ROBOT.model.createData(), q, v, contacts.torques(state, x))
-        step = x * PERIOD if level == "velocity" else v * PERIOD + x * PERIOD**2 / 2
-        q, v = ROBOT.integrate(q, step), v if level == "velocity" else v + x * PERIOD
-    assert distance(ROBOT, q) < 1e-9
-    assert np.abs(ROBOT.values(q)["finger"] - ROBOT.values(start())["finger"]) > 0.05, "it moved"
 
 
 def planar_bar(rigid, rounding):

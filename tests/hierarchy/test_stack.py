@@ -44,19 +44,6 @@ def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_bu
     assert not np.array_equal(first.A, A)
 
 
-@pytest.mark.parametrize("name", TASKS)
-def test_stacks_that_share_a_task_change_nothing_in_it(name):
-    """The target of a path stood in the task, where each stack overwrote that of the other."""
-    task = TASKS[name]
-    before = {key: value.copy() for key, value in vars(task).items()
-              if isinstance(value, np.ndarray)}
-    one, other = state_at(Q, V, 0.2), state_at(Q + 0.1, V, 0.9)
-    rows = [Stack([task]).hierarchy(state).lower.copy() for state in (one, other, one)]
-    np.testing.assert_array_equal(rows[0], rows[2])
-    for key, value in before.items():
-        np.testing.assert_array_equal(getattr(task, key), value)
-
-
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("task", [JointDamping(7, 5.0), JointDamping(7, 2.0, "mass"),
                                   TASKS["posture"]], ids=["identity", "mass", "posture"])

@@ -43,15 +43,6 @@ def test_a_variant_has_two_names_and_those_of_a_file_extend_it(tmp_path):
         load(f"{tmp_path}/mine.toml:wid")
 
 
-def test_changes_are_toml_values_at_dotted_keys():
-    s = load("ellipse", ["pointing.alpha_d=35", "pointing.kind=equality",
-                         "avoidance.obstacles=[[1, 2, 3]]", "control.options.damping = 0.02"])
-    assert (s.pointing.alpha_d, s.pointing.rows) == (35.0, "equality")
-    assert s.avoidance.obstacles[0].centre == (1, 2, 3)
-    assert s.control.settings() == {"damping": 0.02, "threshold": 0.1}
-    assert load("ellipse", {"pointing.alpha_d": 35}).pointing.alpha_d == 35
-
-
 def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
     s = load("ellipse").with_resolver("recursive")
     assert s.control.resolver == "recursive"

@@ -108,13 +108,6 @@ def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
     assert given_up(simulate(load("ellipse-hqp", ["control.duration=0.05"]))) == ()
 
 
-def test_only_how_long_is_said_where_the_rows_are_not_known():
-    changes = ["control.duration=0.05", "avoidance.distance=0.12", "avoidance.influence=0.4"]
-    for one in given_up(simulate(load("ellipse-smooth", changes))):
-        assert one.held_by == ()
-        assert 0.0 < one.share <= 1.0
-
-
 def enumerated(apart):
     """The two-sided p-value of the signed-rank test, by trying all signs."""
     ranks = rankdata(np.abs(apart))

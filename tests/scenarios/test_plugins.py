@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-import re
 import sys
 from importlib.metadata import distributions
 from pathlib import Path
@@ -153,19 +152,6 @@ def test_a_scenario_with_own_kinds_is_copied_and_pickled():
     scenario = load("own.toml")
     assert pickle.loads(pickle.dumps(scenario)) == copy.deepcopy(scenario) == scenario
     assert Scenario.from_toml(scenario.to_toml()) == scenario
-
-
-@pytest.mark.parametrize(("change", "said"), [
-    ("tasks.0.angel=1.0", "unknown key 'tasks.0.angel'; did you mean 'tasks.0.angle'?"),
-    ("tasks.0.angle=true", "tasks.0.angle: Input should be a valid number, got True"),
-    ("tasks.1.path.kind=spiral", "tasks.1.path: unknown kind 'spiral'. Known: circle"),
-    ("tasks.0.kind=elbwo", "tasks.0: unknown kind 'elbwo'; did you mean 'elbow'?"),
-    ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
-    ("control.options.shar=0.1", "unknown setting of halved 'shar'; did you mean 'share'?")])
-def test_wrong_keys_of_own_kinds_are_named(change, said):
-    plugins.allow("doors_of_mine")
-    with pytest.raises(HierarchyError, match=re.escape(said)):
-        simulate(load("own.toml", [change]))
 
 
 @pytest.mark.parametrize(("group", "line", "use"), [

@@ -19,8 +19,6 @@ pytest.importorskip("mujoco")
 STANDING = load("stand-push")
 SHORT = STANDING.with_changes({"control.duration": 0.02, "plant.pushes.0.at": 0.005,
                                "plant.pushes.0.duration": 0.01})
-LEVELS = ("physics", "limits", "joint limits", "centre of mass", "left hand", "right hand",
-          "posture", "least force")
 
 
 @pytest.mark.parametrize(("keys", "said"), [
@@ -33,19 +31,6 @@ LEVELS = ("physics", "limits", "joint limits", "centre of mass", "left hand", "r
 def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
     with pytest.raises(ScenarioError, match=said):
         STANDING.with_changes(keys)
-
-
-def test_a_resolver_with_bounds_alone_keeps_those_of_single_joints_above_all_else():
-    """Without torque limits and friction, which are no bounds."""
-    scenario = SHORT.with_changes({"limits.place": "bounds"}).with_resolver("tpm")
-    assert scenario.asks == "bounds"
-    cell = build(scenario)
-    assert cell.stack.names == (LEVELS[2], LEVELS[0], *LEVELS[3:])
-    h = cell.stack.hierarchy(cell.state)
-    assert (np.count_nonzero(h.A[:h.sizes[0]], axis=1) == 1).all()
-    run = simulate(scenario)
-    assert run.fault is None
-    assert (run["status"] == Status.SOLVED).all()
 
 
 @pytest.mark.parametrize(("keys", "said"), [
