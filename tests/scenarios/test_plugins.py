@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 import sys
 from importlib.metadata import distributions
 from pathlib import Path
@@ -19,34 +20,17 @@ MODULE = '''
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from hierarchy import Robot, Task
+from hierarchy import Robot
 from hierarchy.paths import Path
 from hierarchy.plugins import register
 from hierarchy.robot import Frame
-from hierarchy.tasks import Position
+from hierarchy.tasks import JointCoupling, Position
 from scenarios.cell.plants import KinematicArm
 from solvers import Resolution, Resolver, make
 
 @register("tasks", "elbow")
-@dataclass(frozen=True)
-class Elbow(Task):
-    robot: Robot
-    joint: str
-    angle: float
-    gain: float = 2.0
-    name: str = "elbow"
-    dimension = 1
-
-    def error(self, state):
-        return np.array([self.angle - state.q[self.robot.coordinate(self.joint)]])
-
-    def jacobian(self, state):
-        return np.eye(state.n)[self.robot.joint(self.joint) - 1][None]
-
-    def jacobian_derivative(self, state):
-        return np.zeros((1, state.n))
+def elbow(robot: Robot, joint: str, angle: float, name: str = "elbow"):
+    return JointCoupling(robot, {joint: 1.0}, angle, gain=2.0, name=name)
 
 @register("tasks", "along")
 def along(frame: Frame, path: Path, name: str):
@@ -152,6 +136,19 @@ def test_a_scenario_with_own_kinds_is_copied_and_pickled():
     scenario = load("own.toml")
     assert pickle.loads(pickle.dumps(scenario)) == copy.deepcopy(scenario) == scenario
     assert Scenario.from_toml(scenario.to_toml()) == scenario
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ("tasks.0.angel=1.0", "unknown key 'tasks.0.angel'; did you mean 'tasks.0.angle'?"),
+    ("tasks.0.angle=true", "tasks.0.angle: Input should be a valid number, got True"),
+    ("tasks.1.path.kind=spiral", "tasks.1.path: unknown kind 'spiral'. Known: circle"),
+    ("tasks.0.kind=elbwo", "tasks.0: unknown kind 'elbwo'; did you mean 'elbow'?"),
+    ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
+    ("control.options.shar=0.1", "unknown setting of halved 'shar'; did you mean 'share'?")])
+def test_wrong_keys_of_own_kinds_are_named(change, said):
+    plugins.allow("doors_of_mine")
+    with pytest.raises(HierarchyError, match=re.escape(said)):
+        simulate(load("own.toml", [change]))
 
 
 @pytest.mark.parametrize(("group", "line", "use"), [
