@@ -7,7 +7,6 @@ from scene import (
     PATH,
     ROBOT,
     TASKS,
-    TIP,
     Elbow,
     compiled_rows,
     place_of,
@@ -24,7 +23,6 @@ from hierarchy.robots import link_capsules
 from hierarchy.tasks import (
     DangerBounds,
     FrameLog,
-    JointDamping,
     JointLimits,
     Pose,
     Position,
@@ -96,31 +94,6 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
         state = state_at(q, v, differences=differences)
         state.move(0.8, q + 1e-3 * v, v)
         compiled_rows(task, state, level)
-
-
-def test_references_of_position_and_damping_are_those_of_the_letter():
-    task = Position(FRAME, PATH, stiffness=40.0, damping=20.0, gain=3.0)
-    q, v = STATES[2]
-    state = State.at(ROBOT, q, v, 0.7)
-    p, dp, ddp = PATH(0.7)
-    error, rate = p - state.position(FRAME), dp - task.jacobian(state) @ v
-    np.testing.assert_allclose(task.reference_acceleration(state), ddp + 20 * rate + 40 * error)
-    np.testing.assert_allclose(task.reference_velocity(state), dp + 3 * error)
-    q, v = STATES[3]
-    state = state_at(q, v)
-    near = state.measurement.end_effector_distance
-    plain = Position(FRAME, PATH).reference_acceleration(state)
-    inside = Position(FRAME, PATH, repulsion_within=near * 1.01)
-    outside = Position(FRAME, PATH, repulsion_within=near * 0.99)
-    added = TIP(near) * state.measurement.direction[-1]
-    np.testing.assert_allclose(inside.reference_acceleration(state), plain + added)
-    np.testing.assert_allclose(outside.reference_acceleration(state), plain)
-    q, v = STATES[7]
-    state = State.at(ROBOT, q, v)
-    np.testing.assert_allclose(JointDamping(7, 5.0).reference_acceleration(state), -5 * v)
-    np.testing.assert_allclose(JointDamping(7, 2.0, "mass").reference_acceleration(state),
-                               -2 * state.mass_matrix() @ v)
-    np.testing.assert_allclose(JointDamping(7).reference_velocity(state), 0)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.5, 3.0, np.pi - 1e-9, np.pi])

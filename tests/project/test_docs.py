@@ -27,8 +27,6 @@ from scenarios.results.plan import load_sweep
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-PAGES = sorted(str(path.relative_to(DOCS).with_suffix("")) for path in DOCS.rglob("*.md")
-               if "_build" not in path.parts)
 LARGEST = 60_000  # bytes of a picture of the gallery
 
 
@@ -72,20 +70,6 @@ def leads_to(path, link):
 
 def root_of(site):
     return min((path.parent for path in site), key=lambda folder: len(folder.parts))
-
-
-def test_every_page_can_be_reached_from_the_index(site):
-    root = root_of(site)
-    waiting, reached = [root / "index.html"], set()
-    while waiting:
-        path = waiting.pop()
-        if path in reached or path not in site:
-            continue
-        reached.add(path)
-        found = (leads_to(path, link) for link in site[path].links)
-        waiting += [place[0] for place in found if place]
-    unreached = [page for page in PAGES if root / f"{page}.html" not in reached]
-    assert unreached == [], "list them in docs/index.md"
 
 
 def test_no_link_inside_the_site_is_broken(site):
