@@ -7,8 +7,7 @@ import pytest
 from hand_made import asked, recording
 
 from hierarchy.paths import Jittered, Still
-from scenarios.config import load
-from scenarios.loop.simulation import simulate
+from scenarios import load, simulate
 from scenarios.measure.metrics import Metric, as_plain_data, measure
 from scenarios.measure.tracking import frozen, jerk, returned, within_reach
 from scenarios.recording import listed
