@@ -123,6 +123,12 @@ def test_an_older_pinocchio_that_comes_first_is_named_in_one_line(tmp_path):
     assert f"pinocchio 3.9.0 in {tmp_path / 'pinocchio.py'} is older" in done.stderr
 
 
+def test_every_test_in_the_list_of_slow_ones_exists():
+    for line in (ROOT / "tests" / "slow.txt").read_text(encoding="utf-8").split():
+        file, _, name = line.partition("::")
+        assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8"), line
+
+
 @pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])
 def test_the_map_names_every_part_of_a_package_in_the_order_of_the_layers(package):
     told = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
