@@ -16,19 +16,11 @@ SET_BASED = SetBased(inner=make("recursive"))
 INF = np.inf
 
 
-def tip(q):
-    """Position (2,) of the tip of a planar arm of links of length 1, and its Jacobian (2, n)."""
+def jacobian(q):
+    """Jacobian (2, n) of the tip of a planar arm of links of length 1."""
     angles = np.cumsum(q)
-    J = np.array([[-np.sin(angles[j:]).sum() for j in range(len(q))],
-                  [np.cos(angles[j:]).sum() for j in range(len(q))]])
-    return np.array([np.cos(angles).sum(), np.sin(angles).sum()]), J
-
-
-def in_tangent_cone(rate, value, least, most):
-    """in_T_RC of the paper: whether a rate is in the extended tangent cone."""
-    if least < value < most:
-        return True
-    return rate >= -1e-9 if value <= least else rate <= 1e-9
+    return np.array([[-np.sin(angles[j:]).sum() for j in range(len(q))],
+                     [np.cos(angles[j:]).sum() for j in range(len(q))]])
 
 
 def pseudoinverse(M):
@@ -38,8 +30,9 @@ def pseudoinverse(M):
 
 
 def by_the_paper(sets, tasks, n):
-    """Resolve with set-based tasks (J, value, least, most) above equality tasks (J, rate).
+    """Resolve with set-based tasks (J, sign) at bounds above equality tasks (J, rate).
 
+    The rate of a set-based task may have its sign: the extended tangent cone of the paper.
     All modes in the paper's order, from none frozen to all; each by null-space projections.
     """
     for count in range(len(sets) + 1):
@@ -49,7 +42,7 @@ def by_the_paper(sets, tasks, n):
                 inverse = pseudoinverse(J @ N)
                 x = x + inverse @ (rate - J @ x)
                 N = N - inverse @ J @ N
-            if all(in_tangent_cone(float(J[0] @ x), *bounds) for k, (J, *bounds) in enumerate(sets)
+            if all(sign * (J[0] @ x) >= -1e-9 for k, (J, sign) in enumerate(sets)
                    if k not in frozen):
                 return x, frozen
     raise AssertionError("the last mode has no condition")
@@ -57,22 +50,19 @@ def by_the_paper(sets, tasks, n):
 
 def as_rows(sets, tasks):
     """The same problem as a Hierarchy: one level of tangent cones, then the equalities."""
-    sides = [(0.0, INF) if value <= least else (-INF, 0.0) if value >= most else (-INF, INF)
-             for _, value, least, most in sets]
-    rows = np.vstack([J for J, *_ in sets])
+    sides = [(0.0, INF) if sign > 0.0 else (-INF, 0.0) for _, sign in sets]
+    rows = np.vstack([J for J, _ in sets])
     return Hierarchy.from_levels([(rows, *np.array(sides).T), *tasks])
 
 
-def problems(count, inside=0.0):
+def problems(count):
     """Random arms with joint limits, a wall for the tip, and a rate asked of the tip."""
     rng = np.random.default_rng(7)
     for _ in range(count):
         n = int(rng.integers(4, 7))
-        q = rng.uniform(-2.0, 2.0, n)
-        J = tip(q)[1]
+        J = jacobian(rng.uniform(-2.0, 2.0, n))
         rows = [np.eye(n)[[j]] for j in rng.permutation(n)[:2]] + [J[:1]]
-        values = np.where(rng.random(3) < inside, 0.5, rng.choice([0.0, 1.0], 3))
-        sets = [(row, float(value), 0.0, 1.0) for row, value in zip(rows, values, strict=True)]
+        sets = list(zip(rows, rng.choice([-1.0, 1.0], 3), strict=True))
         yield sets, [(J, rng.normal(size=2)), (np.eye(n)[-1:], rng.normal(size=1))], n
 
 
