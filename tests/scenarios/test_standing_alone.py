@@ -114,7 +114,7 @@ def tree(*joints):
 
 
 FOLLOWING = [("f1", "revolute", "palm", "finger1", NARROW),
-             *((f"f{i}", "revolute", "palm", f"finger{i}", f'{LIMIT}<mimic joint="f1"/>')
+             *((f"f{i}", "revolute", "palm", f"finger{i}", f'{NARROW}<mimic joint="f1"/>')
                for i in (2, 3, 4))]
 ROBOTS = {
     "gripper.urdf": tree(("wrist", "revolute", "arm", "palm", NARROW), *FOLLOWING),
