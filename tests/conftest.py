@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from importlib.metadata import distributions
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -16,6 +17,17 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 settings.register_profile("any machine", deadline=None,
                           suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
+
+
+SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text().split())
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark the tests of a second or more, as `pytest --durations=0` finds them."""
+    for item in items:
+        if item.nodeid.partition("[")[0] in SLOW:
+            item.add_marker("slow")
 
 
 def pytest_collection_finish():

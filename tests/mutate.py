@@ -56,24 +56,17 @@ OF_KERNELS = ("solvers/kernels/", "solvers/status.py")
 
 # Loaded by every Python that is started: takes the code of one module from a file.
 HOOK = '''
-import marshal, os, sys
+import marshal, os
 from importlib.machinery import SourceFileLoader
-from importlib.util import spec_from_file_location
-from pathlib import Path
+usual = SourceFileLoader.get_code
 
-class Loader(SourceFileLoader):
-    def get_code(self, fullname):
-        return marshal.loads(Path(os.environ["MUTANT_CODE"]).read_bytes())
+def get_code(loader, name):
+    if name != os.environ.get("MUTANT_NAME"):
+        return usual(loader, name)
+    with open(os.environ["MUTANT_CODE"], "rb") as file:
+        return marshal.load(file)
 
-class Finder:
-    @staticmethod
-    def find_spec(name, path=None, target=None):
-        if name == os.environ["MUTANT_NAME"]:
-            file = os.environ["MUTANT_FILE"]
-            return spec_from_file_location(name, file, loader=Loader(name, file))
-
-if "MUTANT_NAME" in os.environ:
-    sys.meta_path.insert(0, Finder)
+SourceFileLoader.get_code = get_code
 '''
 
 SWAPS = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq,
@@ -232,27 +225,27 @@ def write_map(tests: list[str]) -> None:
 
 
 @cache
-def footprints() -> Counter[str]:
-    """Return how many lines each test runs."""
+def known() -> dict[str, dict[int, list[str]]]:
+    """Return the tests of each line of each file, as the map has them."""
     from coverage import CoverageData
 
-    data, found = CoverageData(str(MAP)), Counter[str]()
+    data = CoverageData(str(MAP))
     data.read()
-    for file in data.measured_files():
-        for tests in data.contexts_by_lineno(file).values():
-            found.update(tests)
-    return found
+    return {file: data.contexts_by_lineno(file) for file in data.measured_files()}
+
+
+@cache
+def footprints() -> Counter[str]:
+    """Return how many lines each test runs."""
+    return Counter(test for lines in known().values() for tests in lines.values()
+                   for test in tests)
 
 
 @cache
 def lines_of(module: str) -> dict[int, tuple[str, ...]]:
     """Return the tests of each line of a module; of line 0 those that run any line of it."""
-    from coverage import CoverageData
-
-    data = CoverageData(str(MAP))
-    data.read()
     lines = {line: tuple(test for test in tests if test)
-             for line, tests in data.contexts_by_lineno(str(ROOT / module)).items()}
+             for line, tests in known().get(str(ROOT / module), {}).items()}
     return lines | {0: tuple(sorted({test for tests in lines.values() for test in tests}))}
 
 
@@ -264,10 +257,10 @@ def tests_of(mutant: Mutant) -> tuple[str, ...]:
     keys = ("tests/scenarios/test_config.py",)
     if "frozen=" in line:
         return records
-    known = lines_of(mutant.module)
-    default = mutant.module.startswith("scenarios/config/") and not known.get(mutant.line)
+    lines = lines_of(mutant.module)
+    default = mutant.module.startswith("scenarios/config/") and not lines.get(mutant.line)
     seen, order = Counter[str](), dict[str, tuple[int, int]]()
-    for test in sorted(known.get(mutant.line) or known[0]):
+    for test in sorted(lines.get(mutant.line) or lines[0]):
         function = test.partition("[")[0]
         order[test] = seen[function], footprints()[test]
         seen[function] += 1
@@ -303,7 +296,7 @@ class Runner:
         """Whether the tests pass with this code of a module."""
         (self.folder / "sitecustomize.py").write_text(HOOK)
         (self.folder / "mutant").write_bytes(marshal.dumps(code))
-        return self.passes(tests, MUTANT_NAME=name_of(module), MUTANT_FILE=str(ROOT / module),
+        return self.passes(tests, MUTANT_NAME=name_of(module),
                            MUTANT_CODE=str(self.folder / "mutant"))
 
 

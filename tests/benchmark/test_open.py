@@ -63,7 +63,6 @@ def fake(name, **options):
     return Entrant(name, OWN, f"{HELPERS / 'fake_entrants.py'}:{name}", options)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "limit", "most", "expected"), [
     ("Crashing", 10.0, 5, [None, None, CRASHED, None, None]),
     ("Hanging", 1.0, 5, [None, None, HUNG, None, None]),
@@ -92,7 +91,6 @@ def shared(source, out, *flags):
     return out
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(CC is None, reason="no compiler of C")
 @pytest.mark.skipif(sys.platform != "linux", reason="the C library is made on Linux")
 def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path):
@@ -173,7 +171,6 @@ def test_an_entrant_that_is_not_there_is_refused(call, said):
         call()
 
 
-@pytest.mark.slow
 def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     out = tmp_path / "open"
@@ -203,7 +200,6 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     assert not re.search(r'(src|href)="http', page)
 
 
-@pytest.mark.slow
 def test_the_check_accepts_the_example_of_the_documents_and_not_what_ends(tmp_path, capsys):
     page = (Path(__file__).parents[2] / "docs" / "extending" / "entrant.md").read_text()
     (tmp_path / "mine.py").write_text(re.search(r"```python\n(.*?)```", page, re.DOTALL)[1])

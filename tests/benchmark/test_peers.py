@@ -54,27 +54,6 @@ def answered(entrant, questions, *calls):
         return [field.running[entrant.label].ask(call, 120.0) for call in calls]
 
 
-# -- the robots ------------------------------------------------------------------------------------
-
-def test_the_arm_read_from_its_urdf_moves_and_weighs_as_ours(tmp_path):
-    ours, file = Robot.named("kuka_lwr"), tmp_path / "arm.urdf"
-    file.write_text(urdf(ours))
-    read = Robot.from_file(file, ours.end_effector)
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        q, v = rng.uniform(ours.lower, ours.upper), rng.uniform(-1.0, 1.0, ours.n)
-        a, b = State.at(ours, q, v), State.at(read, q, v)
-        for of in ("lower", "upper", "velocity_limit", "effort_limit"):
-            np.testing.assert_array_equal(getattr(read, of), getattr(ours, of))
-        for of in ("J", "dJ"):
-            np.testing.assert_allclose(getattr(b, of), getattr(a, of), rtol=0.0, atol=1e-12)
-        end, same = ours.frame("end_effector"), read.frame("end_effector")
-        np.testing.assert_allclose(b.position(same), a.position(end), rtol=0.0, atol=1e-12)
-        np.testing.assert_allclose(b.rotation(same), a.rotation(end), rtol=0.0, atol=1e-12)
-        np.testing.assert_allclose(b.mass_matrix(), a.mass_matrix(), rtol=0.0, atol=1e-12)
-        np.testing.assert_allclose(b.bias_effort(), a.bias_effort(), rtol=0.0, atol=1e-12)
-
-
 # -- known answers ---------------------------------------------------------------------------------
 
 def each(entrants):
@@ -169,7 +148,6 @@ def test_every_package_has_an_adapter_that_is_tested():
 
 # -- the scenes and their judges -------------------------------------------------------------------
 
-@pytest.mark.slow
 def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
     found = run([fake("posture"), fake("lost"), fake("ends"), NOBODY], ticks=1100)
     good, lost = found.rows["peers"]

@@ -1,14 +1,18 @@
-"""The protocol of the studies in closed loop: its rules on rows whose answer is known."""
+"""The protocol of studies in closed loop, and the pages that have what came of runs."""
 
+import re
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmark.reproduce import blocks, fronts, protocol, verdicts
-from benchmark.reproduce.fronts import FRONTS, GIVEN, Method, Point, dominated, table
+from benchmark.reproduce import blocks, fronts, pages, protocol, verdicts
+from benchmark.reproduce.blocks import Stored
+from benchmark.reproduce.fronts import Method, dominated
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
-from scenarios.config import load
+from hierarchy.errors import HierarchyError
 from scenarios.measure.statistics import holm
 from scenarios.results.sampled import Workers
 
@@ -47,17 +51,6 @@ def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters(chan
     assert verdicts.shown(found.claim, rows(x=x, y=y), found.effect).startswith("-19.8 [")
 
 
-def test_layouts_that_disagree_and_noise_that_changes_a_verdict_are_said(chance):
-    y = np.ones(SIZE)
-    x = y + np.repeat([-0.5, 0.1], SIZE // 2) + 0.01 * chance.standard_normal(SIZE)
-    mostly = np.where(np.arange(SIZE) < 60, -0.5, 0.02) + y
-    assert verdict(rows(x=x, y=y), below="y").decided in ("differs between layouts", "undecided")
-    assert verdict(rows(x=mostly, y=y), below="y").layouts[1].estimate < 0.0
-    low = y - 0.5
-    assert verdict(rows({"x": y + 0.5}, x=low, y=y), below="y").decided == (
-        "undecided: with noise contradicted")
-
-
 def test_a_run_that_ends_in_a_fault_has_the_worst_value():
     y, x = np.ones(SIZE), np.full(SIZE, np.inf)
     assert verdict(rows(x=x, y=y), above="y", matters=0.1).decided == "supported"
@@ -87,7 +80,6 @@ def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
     assert len(blocks.block("asked-letter", blocks.Stored(None, []), str).splitlines()) > 5
 
 
-@pytest.mark.slow
 def test_runs_are_resumed_and_noise_is_small(tmp_path):
     short = {"lwr": {**PROTOCOL.layouts["lwr"], "control.duration": 0.02}}
     some = replace(PROTOCOL, layouts=short, seeds=(1,), starts=2,
@@ -103,37 +95,10 @@ def test_runs_are_resumed_and_noise_is_small(tmp_path):
     assert protocol.read(tmp_path / "rows.json") == first
 
 
-def test_trials_lie_within_the_bounds_evenly_in_the_logarithm():
-    found = Method("weighted", free={"a": (0.1, 1000.0)}).trials(32, seed=1)
-    values = np.array([one["a"] for one in found])
-    assert values.min() >= 0.1
-    assert values.max() <= 1000.0
-    assert 12 <= (values < 10.0).sum() <= 20
-    assert Method("hcod").trials(32, seed=1) == [{}]
-
-
 def test_only_what_nothing_else_improves_is_on_the_front():
     scores = np.array([[1.0, 4.0], [2.0, 2.0], [2.0, 3.0], [np.inf, np.inf]])
     assert [dominated(scores, k) for k in range(4)] == [False, False, True, True]
     assert not dominated(np.full((2, 2), np.inf), 0)
-
-
-def test_a_table_has_the_ends_of_a_front_and_what_lies_evenly_between():
-    tests = [[1e-3 * k, -1e-3 * k, 1.0] for k in range(20)] + [[9.5, 0.0, 1.0]]  # is beaten
-    points = [Point("stand-push", "a", {}, [], test, 6, 6, ["m", "", ""]) for test in tests]
-    lines = table(points, "stand-push")[2:-1]
-    assert [float(line.split()[2]) for line in lines] == [0.0, 9.0, 19.0]
-    assert len(table(points[:2], "stand-push")) == 5
-
-
-def test_every_method_can_take_its_settings():
-    for front in FRONTS.values():
-        for given in front.method.values():
-            method = Method(**given)
-            scenario = load(front.scenario, GIVEN["plant"].get(front.plant, {}))
-            for settings in method.trials(2, seed=1):
-                scenario.with_resolver(method.resolver).with_changes(
-                    {**method.set, **settings}).make_resolver()
 
 
 def test_trials_that_are_left_out_of_the_second_scene_are_not_on_the_front(monkeypatch):
@@ -151,3 +116,62 @@ def test_trials_that_are_left_out_of_the_second_scene_are_not_on_the_front(monke
     assert ([k for k in range(40) if not dominated(found, k)]
             == [k for k in range(40) if not dominated(whole, k)])
     assert sum(ran[1:]) < 30
+
+
+ROOT = Path(__file__).parents[2]
+PAGES = pages.marked(ROOT)
+STORED = Stored.read(ROOT)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_has_what_its_rows_and_commands_say(name):
+    text = (ROOT / name).read_text(encoding="utf-8")
+    assert pages.filled(text, ROOT, name, STORED) == text
+
+
+def test_every_output_that_is_stored_stands_in_a_page_or_is_linked():
+    texts = [path.read_text("utf-8") for path in (ROOT / "README.md", *ROOT.glob("docs/**/*.md"))]
+    shown = {pages.file_of(found["name"], ROOT).name for text in texts
+             for found in pages._MARK.finditer(text) if found["kind"] != "reproduce"}
+    linked = {name for text in texts for name in re.findall(r"output/([\w.-]+\.txt)\)", text)}
+    assert {"README.md", "docs/results/problems.md", "docs/results/loops.md"} <= set(PAGES)
+    assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == shown | linked
+
+
+def test_an_unknown_block_is_named(tmp_path):
+    with pytest.raises(HierarchyError, match=r"page\.md: block 'other'"):
+        pages.filled("<!-- reproduce: other -->\n<!-- end -->", tmp_path, "page.md",
+                     STORED)
+
+
+BENCH = """\
+EQ7
+            median  p95
+plain numpy   55.3 83.4
+hcod warm     1.85 2.43
+
+INEQ7
+            median  p95
+hqp proxqp    1443 1945
+Times of one call
+"""
+
+
+def page(mark, inside=""):
+    return f"before\n<!-- measured: {mark} -->\n{inside}<!-- end -->\nafter\n"
+
+
+def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
+    pages.file_of("python a.py", tmp_path).write_text(BENCH)
+    fill = partial(pages.filled, root=tmp_path, page="page.md", stored=STORED)
+    assert fill(page("python a.py")) == page("python a.py", f"```\n{BENCH}```\n")
+    mark = "python a.py | INEQ7 .. Times of"
+    assert fill(page(mark, "old\n")) == page(
+        mark, "```\nINEQ7\n            median  p95\nhqp proxqp    1443 1945\n```\n")
+    mark += " | EQ7 .. hcod | without ^hqp|[A-Z]7"
+    head = "            median  p95"
+    assert fill(page(mark)) == page(mark, f"```\n{head}\n\n{head}\nplain numpy   55.3 83.4\n```\n")
+    for text, says in ((page("python b.py"), r"page\.md: no output of 'python b\.py' is stored"),
+                       (page("python a.py | EQ8 .. EQ9"), "has no line that starts with 'EQ8'")):
+        with pytest.raises(HierarchyError, match=says):
+            fill(text)

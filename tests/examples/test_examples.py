@@ -20,7 +20,6 @@ PROMISES = {
     "so101": (1.6, 0.1, 10.0), "teleop": (1.5, 15.001, 100.0), "wall": (1.6, 0.01, 100.0)}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", PROMISES)
 def test_an_example_keeps_what_it_promises_where_the_other_way_does_not(name, capsys):
     duration, most, least = PROMISES[name]
@@ -33,7 +32,6 @@ def test_an_example_keeps_what_it_promises_where_the_other_way_does_not(name, ca
 EQUAL = ["control.resolver=weighted", "control.options.ratio=1", "control.damping=0"]
 
 
-@pytest.mark.slow
 def test_the_ur5_keeps_clear_of_the_ball_and_of_itself_and_with_equal_weights_does_not():
     strict, equal = (simulate(load(EXAMPLES / "ur5.toml", changes))
                      for changes in ([], EQUAL))
@@ -45,7 +43,6 @@ def test_the_ur5_keeps_clear_of_the_ball_and_of_itself_and_with_equal_weights_do
     assert equal["ee_distance"].min() < -0.05
 
 
-@pytest.mark.slow
 def test_two_hands_hold_their_tray_and_with_equal_weights_do_not():
     strict, equal = (simulate(load(EXAMPLES / "tray.toml", ["control.duration=2", *changes]))
                      for changes in ([], EQUAL))

@@ -130,6 +130,14 @@ class Library:
         solve = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 5, ctypes.c_int64)
         return solve(self.address(f"th_solve_{name}"))(*given.values(), len(memory.work) - 1)
 
+    def verify(self, h, memory):
+        """Status of th_verify on the x and the record in a memory."""
+        call = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 5, ctypes.c_int64)
+        problem = problem_of(h)
+        return call(self.address("th_verify"))(
+            ctypes.addressof(problem), None, ctypes.addressof(memory.record),
+            memory.x.ctypes.data, memory.work.ctypes.data, len(memory.work) - 1)
+
     def violations(self, problem, x, count):
         """Status and norms of th_violations; a canary behind the norms stays."""
         norms = np.full(count + 1, CANARY)

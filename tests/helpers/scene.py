@@ -6,7 +6,6 @@ import numpy as np
 
 from hierarchy import Robot, State, Task
 from hierarchy.avoidance import Obstacle, Obstacles, Pairs, Repulsion, measure_pairs
-from hierarchy.measured import Measured, measured
 from hierarchy.paths import Ellipse, Still
 from hierarchy.task import Rows
 from hierarchy.tasks import (
@@ -24,9 +23,7 @@ from hierarchy.tasks import (
     Posture,
     RelativePose,
 )
-from scenarios.cell.plants import KinematicArm
 from scenarios.cell.sensors import ExactDistances
-from solvers import Status, make
 
 ROBOT = Robot.named("kuka_lwr")
 FRAME = ROBOT.frame("end_effector")
@@ -100,51 +97,6 @@ class Elbow(Task):
         return np.zeros((1, 7))
 
 
-@measured
-def _fast_elbow(kinematics, reads, goal, J, motion):
-    [q] = reads
-    J[0, 3] = 1.0
-    motion.error[0], motion.rate[0] = 1.0 - q[3], kinematics.v[3]
-
-
-@dataclass(frozen=True)
-class FastElbow(Measured):
-    """The same, compiled."""
-
-    name: str = "elbow"
-    gain: float = 2.0
-    stiffness: float = 10.0
-    damping: float = 0.0
-    dimension = 1
-
-    def measure(self, state):
-        return _fast_elbow, (state.q,)
-
-
-def driven(stack, ticks, period, start, resolver=None, differences=False, sensor=None):
-    """Yield (state, hierarchy, resolution) of each tick of an arm that obeys from rest on."""
-    state = State(ROBOT, period if differences else None)
-    plant = KinematicArm(ROBOT, np.array(start), np.zeros(7), period, stack.level)
-    resolver, memory = resolver or make("hcod"), None
-    for k in range(ticks):
-        state.move(k * period, plant.q, plant.v)
-        if sensor is not None:
-            sensor.measure(state)
-        h = stack.hierarchy(state)
-        res = resolver.solve(h, memory)
-        assert res.status is Status.SOLVED
-        yield state, h, res
-        memory = res.memory
-        plant.act(res.x)
-
-
-def distance(obstacle, point):
-    """Signed distance of a point to an obstacle, and the direction away from it (3,)."""
-    pairs = Pairs(1, 1)
-    measure_pairs(pairs, np.array([point]), Obstacles([obstacle]))
-    return pairs.distance[0, 0], pairs.direction[0, 0]
-
-
 def compiled_rows(task, state, level, rtol=1e-12):
     """The rows that a task writes (A, lower, upper), checked against those of its plain methods."""
     count = task.dimension + 2
@@ -156,3 +108,10 @@ def compiled_rows(task, state, level, rtol=1e-12):
         np.testing.assert_allclose(a, b, rtol=rtol, atol=1e-9)  # dJ by differences
         assert (a[[0, -1]] == 5.0).all(), "rows of others are left alone"
     return [a[1:-1] for a in written]
+
+
+def distance(obstacle, point):
+    """Signed distance of a point to an obstacle, and the direction away from it (3,)."""
+    pairs = Pairs(1, 1)
+    measure_pairs(pairs, np.array([point]), Obstacles([obstacle]))
+    return pairs.distance[0, 0], pairs.direction[0, 0]

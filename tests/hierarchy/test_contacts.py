@@ -17,7 +17,6 @@ from hierarchy.tasks import (
     ContactMotion,
     Friction,
     Momentum,
-    Posture,
     Together,
     TorqueLimits,
 )
@@ -227,20 +226,6 @@ def test_momentum_rows_are_the_rate_of_the_momentum(part):
     target = np.arange(1.0, task.dimension + 1.0)
     np.testing.assert_allclose(Momentum(part, tuple(target), 5.0).reference_acceleration(state),
                                5.0 * (target - task.jacobian(state) @ state.v))
-
-
-def test_together_has_the_rows_of_its_tasks_in_order():
-    state = moving_state(19)
-    tasks = [BaseDynamics(CONTACTS), ContactMotion(CONTACTS), Friction(CONTACTS)]
-    one = Stack([Together(tasks, "physics")], "torque", contacts=CONTACTS).hierarchy(state)
-    apart = Stack(tasks, "torque", contacts=CONTACTS).hierarchy(state)
-    assert one.sizes.tolist() == [sum(apart.sizes)]
-    for now in (one.A, Together(tasks).jacobian(state)):
-        np.testing.assert_array_equal(now, apart.A)
-    np.testing.assert_array_equal(one.lower, apart.lower)
-    assert Together(tasks).jacobian_derivative(state).shape == apart.A.shape
-    assert Together(tasks).row_names[0] == "base dynamics force x"
-    assert Together([Posture((0.0,) * 30)]).of_forces is False
 
 
 FRAME = ROBOT.frame("left_foot")

@@ -13,8 +13,6 @@ from hierarchy.loop import Loop, Watchdog
 from hierarchy.tasks import Posture
 from solvers import Resolution, Status
 
-pytestmark = pytest.mark.slow
-
 PERIOD = 0.25  # with steps of eighths every time is exact
 
 

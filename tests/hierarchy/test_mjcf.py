@@ -92,7 +92,6 @@ def test_a_robot_is_what_mujoco_has(kind, written):
 PACKAGES = public_robots.MJCF + public_robots.URDF
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("package", PACKAGES)
 def test_robots_of_public_packages_are_what_mujoco_and_pinocchio_have(package):
     judged = [(str(file), verdict, why) for file, verdict, why in public_robots.tried(package)]

@@ -2,6 +2,7 @@
 
 import sys
 from itertools import combinations
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -14,25 +15,8 @@ from scenarios.cell.robot import make_robot
 from scenarios.config.references import separable_pairs
 from scenarios.config.robot import RobotSection
 
-ARM = """<robot name="arm">
-  <link name="base"><collision><geometry><box size="0.2 0.2 0.1"/></geometry></collision></link>
-  <link name="upper"><inertial><mass value="2"/><origin xyz="0 0 0.2"/>
-    <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.05" length="0.4"/></geometry>
-    </collision></link>
-  <link name="fore"><collision><origin xyz="0 0 0.15"/>
-    <geometry>{shape}</geometry></collision></link>
-  <link name="wrist"/><link name="tool0"/><link name="sensor"/>
-  <joint name="shoulder" type="{kind}"><parent link="base"/><child link="upper"/>
-    <origin xyz="0 0 0.1"/><axis xyz="0 1 0"/>{limit}</joint>
-  <joint name="elbow" type="{kind}"><parent link="upper"/><child link="fore"/>
-    <origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>{limit}</joint>
-  <joint name="turn" type="{kind}"><parent link="fore"/><child link="wrist"/>
-    <origin xyz="0 0 0.3"/><axis xyz="0 0 1"/>{limit}</joint>
-  <joint name="flange" type="fixed"><parent link="wrist"/><child link="tool0"/>
-    <origin xyz="0 0 0.1"/></joint>
-  <joint name="mount" type="fixed"><parent link="base"/><child link="sensor"/></joint>
-</robot>"""
+ROBOTS = Path(__file__).parents[1] / "data" / "robots"
+ARM = (ROBOTS / "arm.urdf.txt").read_text()
 LIMIT = '<limit lower="0.5" upper="2" velocity="3" effort="10"/>'
 SPHERE = '<sphere radius="0.04"/>'
 
@@ -169,13 +153,7 @@ def test_arms_of_example_robot_data_are_read_with_their_meshes(name, joints, end
 # What is wrong in a file is named before pinocchio reads it, which would end the process or say
 # "not a valid URDF model".
 
-TWO_JOINTS = """<robot name="arm">
-<link name="base"/><link name="upper">{link}</link><link name="fore"/>
-<joint name="shoulder" type="{kind}"><parent link="{parent}"/><child link="upper"/>
-<axis xyz="{axis}"/>{limit}</joint>
-<joint name="elbow" type="prismatic"><parent link="upper"/><child link="fore"/>
-<axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="1" effort="10"/>{mimic}</joint>{more}
-</robot>"""
+TWO_JOINTS = (ROBOTS / "two_joints.urdf.txt").read_text()
 PLAIN = {"link": "", "kind": "revolute", "parent": "base", "axis": "0 0 1", "mimic": "", "more": "",
          "limit": '<limit lower="-2" upper="2" velocity="1" effort="10"/>'}
 LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"/></joint>'

@@ -1,12 +1,19 @@
+"""Distances to obstacles and between capsules, and the rows that keep them."""
+
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scene import BODY, FRAME, ROBOT, TIP, compiled_rows, driven, states
+from scene import BODY, ROBOT, TIP, compiled_rows, states
+from scipy.optimize import lsq_linear
 
-from hierarchy import HierarchyError, Stack, State
-from hierarchy.avoidance import Barrier, Measurement, Obstacle, Obstacles, Pairs
-from hierarchy.paths import Ellipse, Still
+from hierarchy import HierarchyError, State
+from hierarchy.avoidance import Barrier, Capsule, Measurement, Obstacle, Obstacles, Pairs
+from hierarchy.avoidance.body import measure_capsules, pack_capsules
+from hierarchy.paths import Ellipse
+from hierarchy.robots import TABLES, link_capsules
 from hierarchy.task import Rows
-from hierarchy.tasks import JointDamping, Position, Separation
+from hierarchy.tasks import SelfSeparation, Separation
 from scenarios.cell.sensors import ExactDistances
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
@@ -63,40 +70,6 @@ def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
     assert checked >= 54 * len(STATES) - 2
 
 
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("differences", [None, 1e-3])
-@pytest.mark.parametrize("obstacles", [len(SHAPES), None])
-def test_compiled_rows_equal_those_of_the_plain_methods(level, differences, obstacles):
-    task = Separation(SENSOR.points, Barrier(0.05, influence=0.6), obstacles)
-    sided = 0
-    for q, v in STATES[:5]:
-        state = State.at(ROBOT, q, v, 0.7, differences)
-        state.move(0.701, q + 1e-3 * v, v)
-        SENSOR.measure(state)
-        _, lower, _ = compiled_rows(task, state, level)
-        sided += np.isfinite(lower).sum()
-    assert 0 < sided < 5 * task.dimension
-
-
-GOAL = tuple(State.at(ROBOT, START).position(FRAME) + np.array([-0.25, 0.05, 0.1]))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("level", "period", "differences"), [
-    ("velocity", 1e-2, False), ("acceleration", 4e-3, False), ("acceleration", 4e-3, True)])
-def test_a_hand_driven_into_an_obstacle_stops_at_the_distance(level, period, differences):
-    obstacles = [Obstacle("sphere", GOAL, (0.05,)),
-                 Obstacle("box", (-0.2, 0.3, 0.2), (0.1, 0.02, 0.03)),
-                 Obstacle("capsule", (-0.1, 0.4, -0.1), (0.02, 0.1))]
-    sensor = sensor_of(obstacles)
-    stack = Stack([Separation(sensor.points, Barrier(0.05), 3), Position(FRAME, Still(GOAL))],
-                  level, JointDamping(7))
-    ticks = driven(stack, round(3.0 / period), period, START, None, differences, sensor)
-    d = np.array([state.measurement.pairs.distance.copy() for state, _, _ in ticks])
-    assert d.min() >= 0.05 - 1e-9
-    assert d[-1, 8, 0] == pytest.approx(0.05, abs=1e-6)
-
-
 @pytest.mark.parametrize(("pairs", "obstacles", "said"), [
     (None, 1, "'separation': the state carries no measurement of pairs"),
     (Pairs(9, 2), 1, "9 points are measured against 2 obstacles, expected 9 against 1"),
@@ -111,3 +84,99 @@ def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
     state.measurement.pairs = pairs
     with pytest.raises(HierarchyError, match=said):
         task.writer(state, "velocity", Rows.empty(18, 7))()
+
+
+ARM = link_capsules(TABLES["kuka_lwr"], foot=0.3105)
+# Capsules at odds with the links' own axes, so that every kind of nearest points comes up.
+ODD = (Capsule("ball", 1, (0.1, 0.1, 0.1), (0.1, 0.1, 0.1), 0.05),
+       Capsule("bar", 3, (-0.3, 0.1, 0.2), (0.3, 0.0, 0.3), 0.02),
+       Capsule("rod", 5, (0.1, -0.3, 0.1), (0.0, 0.4, 0.3), 0.03),
+       Capsule("hand", 7, (0.0, -0.2, 0.1), (0.0, 0.2, 0.0), 0.0))
+ALL_PAIRS = Barrier(0.02, influence=5.0)
+TASKS = {"arm": SelfSeparation(ARM, ALL_PAIRS),
+         "odd": SelfSeparation(ODD, ALL_PAIRS, ((0, 1), (0, 2), (3, 1), (1, 2), (2, 3)))}
+POSTURES = states(40, seed=3)
+IDENTITY = np.r_[np.eye(3).ravel(), np.zeros(3)][None]
+
+
+def measured(a, b):
+    """Distance, direction and shares of two capsules given by start, end and radius, at rest."""
+    joints, table = pack_capsules([Capsule("a", 0, *a), Capsule("b", 0, *b)])
+    return measure_capsules(IDENTITY, joints, table, np.array([[0, 1]]))[0]
+
+
+def by_least_squares(a, b):
+    """Least distance of two segments: that of the best shares of both, between 0 and 1."""
+    (p, q), (r, s) = np.array(a, dtype=float), np.array(b, dtype=float)
+    found = lsq_linear(np.c_[q - p, r - s], r - p, (0.0, 1.0), "bvls", tol=1e-15)
+    return np.sqrt(2.0 * found.cost)
+
+
+def segments():
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        yield rng.normal(size=(2, 3)), rng.normal(size=(2, 3))
+    for _ in range(100):  # parallel, nearly parallel, on one line, short, of no length
+        a = rng.normal(size=(2, 3))
+        shift, stretch = rng.normal(size=3), rng.normal()
+        yield a, a + shift
+        yield a, a[::-1] * stretch + shift
+        yield a, a + shift + 1e-7 * rng.normal(size=(2, 3))
+        yield a, a + stretch * (a[1] - a[0])
+        yield a, shift + 1e-9 * a
+        yield a, np.array([shift, shift])
+        yield np.array([shift, shift]), a[[0, 0]]
+
+
+def test_distance_of_segments_is_the_least_there_is():
+    for a, b in segments():
+        a, b = np.round(a, 12).tolist(), np.round(b, 12).tolist()
+        seen = measured((*a, 0.0), (*b, 0.0))
+        assert seen[0] == pytest.approx(by_least_squares(a, b), abs=2e-8)
+        assert 0.0 <= seen[4:].min() <= seen[4:].max() <= 1.0
+        on_a, on_b = [np.add(p, share * np.subtract(q, p))
+                      for (p, q), share in zip((a, b), seen[4:], strict=True)]
+        assert np.linalg.norm(seen[1:4]) == pytest.approx(1)
+        if seen[0] > 1e-6:
+            np.testing.assert_allclose(seen[0] * seen[1:4], on_a - on_b, atol=1e-9)
+
+
+def test_rows_give_the_second_derivative_with_nearest_points_that_slide():
+    rate, kept, slow = 10.0, 0.02, 0.2
+    task = replace(TASKS["odd"], barrier=Barrier(kept, rate, 5.0, slow, limit=1e9))
+    h, rng, kinds = 5e-5, np.random.default_rng(0), set()
+    for q, v in POSTURES:
+        a, d, free = rng.normal(size=7), [], []
+        for t in (-h, 0.0, h):
+            state = State.at(ROBOT, q + v * t + a * t * t / 2)
+            d.append(task.distances(state))
+            seen = measure_capsules(state.placements, *pack_capsules(task.capsules), task.indices)
+            free.append((seen[:, 4:] > 0) & (seen[:, 4:] < 1))
+        state = State.at(ROBOT, q, v)
+        A, lower, _ = task.rows(state, "acceleration")
+        second, speed = (d[2] - 2 * d[1] + d[0]) / h**2, (d[2] - d[0]) / (2 * h)
+        toward = np.minimum(-0.5 * rate * (d[1] - kept), slow)
+        same = (free[0] == free[2]).all(axis=1)  # no nearest point came to an end in between
+        calm = same & (np.abs(second) < 100.0)
+        np.testing.assert_allclose((A @ a - lower + 2.0 * rate * (toward - speed))[calm],
+                                   second[calm], atol=2e-3)
+        assert calm.sum() >= 4
+        kinds |= {tuple(pair) for pair in free[1][calm].tolist()}
+    assert len(kinds) == 4
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("differences", [None, 1e-3])
+@pytest.mark.parametrize("task", [
+    *(Separation(SENSOR.points, Barrier(0.05, influence=0.6), of) for of in (len(SHAPES), None)),
+    *(SelfSeparation(kind.capsules, Barrier(0.02, influence=0.4), kind.pairs)
+      for kind in TASKS.values())], ids=["6 shapes", "any", *TASKS])
+def test_compiled_rows_equal_those_of_the_plain_methods(task, level, differences):
+    sided = 0
+    for q, v in STATES[:8]:
+        state = State.at(ROBOT, q, v, 0.7, differences)
+        state.move(0.701, q + 1e-3 * v, v)
+        SENSOR.measure(state)
+        _, lower, _ = compiled_rows(task, state, level, rtol=1e-11)
+        sided += np.isfinite(lower).sum()
+    assert 0 < sided < 8 * task.dimension

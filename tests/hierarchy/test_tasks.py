@@ -1,4 +1,6 @@
-from dataclasses import fields, replace
+"""Tasks: rows, errors and their derivatives, by differences; stacks of them."""
+
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
@@ -7,9 +9,7 @@ from scene import (
     PATH,
     ROBOT,
     TASKS,
-    TIP,
     Elbow,
-    FastElbow,
     compiled_rows,
     place_of,
     state_at,
@@ -17,7 +17,7 @@ from scene import (
 )
 from scipy.linalg import expm
 
-from hierarchy import HierarchyError, State
+from hierarchy import HierarchyError, Stack, State
 from hierarchy.avoidance import Barrier
 from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
@@ -29,6 +29,7 @@ from hierarchy.tasks import (
     FrameLog,
     JointDamping,
     JointLimits,
+    LookAt,
     Pose,
     Position,
     SelfSeparation,
@@ -55,7 +56,6 @@ def moved(q, v, step, task_state):
     return state
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["position", "pointing", "cone", "posture", "centre of mass",
                                   "centre of mass, x and z", "frame", "relative position",
                                   "coupling", "look-at", "manipulability",
@@ -69,7 +69,6 @@ def test_jacobian_is_the_derivative_of_what_the_error_measures(name):
         np.testing.assert_allclose(np.transpose(columns), task.jacobian(state), atol=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rows", [1, 3])
 def test_avoidance_jacobian_is_that_of_the_active_control_point(rows):
     task = TASKS[f"avoidance {rows}-D"]
@@ -84,7 +83,6 @@ def test_avoidance_jacobian_is_that_of_the_active_control_point(rows):
                                    atol=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in TASKS if name != "damping"])
 def test_jacobian_derivative_agrees_with_central_differences(name):
     task = TASKS[name]
@@ -106,43 +104,6 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
         state = state_at(q, v, differences=differences)
         state.move(0.8, q + 1e-3 * v, v)
         compiled_rows(task, state, level)
-
-
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-def test_a_fast_task_of_a_user_writes_the_rows_of_the_plain_one(level):
-    state, rows = state_at(*STATES[1]), []
-    for task in (Elbow(), FastElbow()):
-        rows.append(Rows.empty(1, 7))
-        task.writer(state, level, rows[-1])()
-        np.testing.assert_array_equal(task.jacobian(state), Elbow().jacobian(state))
-        np.testing.assert_array_equal(task.jacobian_derivative(state), np.zeros((1, 7)))
-    for plain, fast in zip(*rows, strict=True):
-        np.testing.assert_array_equal(plain, fast)
-
-
-def test_references_of_position_and_damping_are_those_of_the_letter():
-    task = Position(FRAME, PATH, stiffness=40.0, damping=20.0, gain=3.0)
-    q, v = STATES[2]
-    state = State.at(ROBOT, q, v, 0.7)
-    p, dp, ddp = PATH(0.7)
-    error, rate = p - state.position(FRAME), dp - task.jacobian(state) @ v
-    np.testing.assert_allclose(task.reference_acceleration(state), ddp + 20 * rate + 40 * error)
-    np.testing.assert_allclose(task.reference_velocity(state), dp + 3 * error)
-    q, v = STATES[3]
-    state = state_at(q, v)
-    near = state.measurement.end_effector_distance
-    plain = Position(FRAME, PATH).reference_acceleration(state)
-    inside = Position(FRAME, PATH, repulsion_within=near * 1.01)
-    outside = Position(FRAME, PATH, repulsion_within=near * 0.99)
-    added = TIP(near) * state.measurement.direction[-1]
-    np.testing.assert_allclose(inside.reference_acceleration(state), plain + added)
-    np.testing.assert_allclose(outside.reference_acceleration(state), plain)
-    q, v = STATES[7]
-    state = State.at(ROBOT, q, v)
-    np.testing.assert_allclose(JointDamping(7, 5.0).reference_acceleration(state), -5 * v)
-    np.testing.assert_allclose(JointDamping(7, 2.0, "mass").reference_acceleration(state),
-                               -2 * state.mass_matrix() @ v)
-    np.testing.assert_allclose(JointDamping(7).reference_velocity(state), 0)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.5, 3.0, np.pi - 1e-9, np.pi])
@@ -247,3 +208,98 @@ def test_manipulability_is_yoshikawas_and_has_no_row_at_a_singular_posture():
     assert task.value(straight) < 1e-12
     assert not task.jacobian(straight).any()
     assert not task.jacobian_derivative(straight).any()
+
+
+Q, V = states(1)[0]
+
+
+def stack(level="acceleration", **kwargs):
+    return Stack([TASKS["position"], TASKS["pointing"], TASKS["avoidance 3-D"]], level, **kwargs)
+
+
+def test_insert_remove_swap_and_reorder_by_name():
+    s = stack()
+    s.insert(TASKS["posture"], 1)
+    assert s.names == ("position", "posture", "pointing", "avoidance")
+    s.swap("position", "avoidance")
+    assert s.names == ("avoidance", "posture", "pointing", "position")
+    assert s.remove("posture") is TASKS["posture"]
+    s.reorder(["pointing", "position", "avoidance"])
+    assert s.names == ("pointing", "position", "avoidance")
+    assert len(s) == 3
+
+
+def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_buffers():
+    s = Stack([TASKS["position"], LookAt(FRAME, (0.3, 0.3, 0.6))])
+    assert s.row_names() == ("x", "y", "z", "x", "y")
+    assert s.row_names(("look-at",)) == ("x", "y")
+    state = state_at(Q, V)
+    h = stack().hierarchy(state, ("avoidance", "position"))
+    assert (h.names, h.sizes.tolist()) == (("avoidance", "position"), [3, 3])
+    np.testing.assert_array_equal(h.A[:3], TASKS["avoidance 3-D"].jacobian(state))
+    np.testing.assert_array_equal(h.A[3:], TASKS["position"].jacobian(state))
+    assert h.is_equality
+    s, state = stack(), state_at(Q, V)
+    first = s.hierarchy(state)
+    A = first.A.copy()
+    state.move(0.0, Q + 0.1, V)
+    assert s.hierarchy(state) is first
+    assert not np.array_equal(first.A, A)
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+@pytest.mark.parametrize("task", [JointDamping(7, 5.0), JointDamping(7, 2.0, "mass"),
+                                  TASKS["posture"]], ids=["identity", "mass", "posture"])
+def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
+    state = state_at(Q, V)
+    h = Stack([task], level, reference=task).hierarchy(state)
+    expected = (task.reference_velocity(state) if level == "velocity"
+                else task.reference_acceleration(state))
+    np.testing.assert_allclose(h.reference, expected, rtol=1e-14)
+    np.testing.assert_array_equal(h.lower, h.reference)
+    np.testing.assert_array_equal(h.upper, h.reference)
+    np.testing.assert_array_equal(h.A, np.eye(7))
+    assert not Stack([task], level).hierarchy(state).reference.any()
+
+
+@pytest.mark.parametrize(("edit", "said"), [
+    (lambda s: s.remove("pose"), "unknown task 'pose'"),
+    (lambda s: s.swap("position", "pointin"), "did you mean 'pointing'"),
+    (lambda s: s.insert(TASKS["position"]), "already has a task 'position'"),
+    (lambda s: s.insert(TASKS["pose"], 9), "index 9"),
+    (lambda s: s.reorder(["position"]), "each of"),
+    (lambda s: s.reorder(["position", "position", "pointing"]), "each of"),
+    (lambda s: s.hierarchy(state_at(Q, V), ("posture",)), "unknown task 'posture'"),
+    (lambda s: Stack(level="effort"), "level must be"),
+    (lambda s: Stack([JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot has 7")])
+def test_bad_edits_are_named(edit, said):
+    with pytest.raises(HierarchyError) as error:
+        edit(stack())
+    assert said in str(error.value)
+
+
+def test_an_empty_stack_is_an_error_and_an_empty_order_is_not():
+    with pytest.raises(HierarchyError, match="stack is empty"):
+        Stack().hierarchy(State.at(ROBOT, Q))
+    assert stack().hierarchy(state_at(Q, V), ()).m == 0
+
+
+@dataclass(frozen=True)
+class Crossed(JointLimits):
+    """Limits whose kernel writes sides that cross in the third row."""
+
+    def writer(self, state, level, rows):
+        write = super().writer(state, level, rows)
+
+        def crossed():
+            write()
+            rows.lower[2], rows.upper[2] = 3.0, 2.0
+
+        return crossed
+
+
+def test_a_task_whose_sides_cross_is_named_with_its_row():
+    stack = Stack([TASKS["position"], Crossed(ROBOT, 5.0, 0.01)], "velocity")
+    third = ROBOT.velocity_names[2]
+    with pytest.raises(HierarchyError, match=f"task 'joint limits', {third}: no value lies betw"):
+        stack.hierarchy(state_at(Q, V))

@@ -12,8 +12,6 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-pytestmark = pytest.mark.slow
-
 ROOT = Path(__file__).parents[2]
 OUTSIDE = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 UNCOMPILED = {**OUTSIDE, "NUMBA_DISABLE_JIT": "1"}  # kernels run as plain Python

@@ -1,29 +1,32 @@
-"""The documentation builds without a warning, is whole, and needs no network to be read."""
+"""The documentation is whole, and what documents show works as printed."""
 
 import importlib
+import importlib.util
 import pkgutil
 import re
+import shlex
 import subprocess
 import sys
+import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
+import typer
 from sphinx.util.inventory import InventoryFile
 
 import hierarchy
 import scenarios
 import solvers
+from hierarchy.robots import TABLES
 from hierarchy.tasks import TASKS
-from scenarios.config import shipped
-
-pytestmark = pytest.mark.slow
+from scenarios.cli.main import app, run_command
+from scenarios.config import load, members, shipped
+from scenarios.results.plan import load_sweep
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-PAGES = sorted(str(path.relative_to(DOCS).with_suffix("")) for path in DOCS.rglob("*.md")
-               if "_build" not in path.parts)
 LARGEST = 60_000  # bytes of a picture of the gallery
 
 
@@ -56,51 +59,25 @@ def site(tmp_path_factory):
     return {path.resolve(): Page(path) for path in out.rglob("*.html")}
 
 
-def leads_to(path, link):
-    """The file and the place in it that a link of a page leads to; None for one elsewhere."""
-    parts = urlsplit(link)
-    if parts.scheme or parts.netloc:
-        return None
-    return ((path.parent / unquote(parts.path)).resolve() if parts.path else path,
-            unquote(parts.fragment))
+def test_no_link_inside_the_site_is_broken_and_nothing_is_loaded_from_a_network(site):
+    broken = []
+    for path, page in site.items():
+        for link in [*page.links, *page.loads]:
+            parts = urlsplit(link)
+            file = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            fragment = unquote(parts.fragment)
+            if parts.scheme or parts.netloc:
+                broken += [link] if link in page.loads else []
+            elif not file.exists() or (
+                    fragment and file in site and fragment not in site[file].ids):
+                broken.append((path.name, link))
+    assert broken == []
+    for style in root_of(site).rglob("*.css"):
+        assert not re.search(r"(url\(|@import)\s*['\"]?(https?:)?//", style.read_text()), style
 
 
 def root_of(site):
     return min((path.parent for path in site), key=lambda folder: len(folder.parts))
-
-
-def test_every_page_can_be_reached_from_the_index(site):
-    root = root_of(site)
-    waiting, reached = [root / "index.html"], set()
-    while waiting:
-        path = waiting.pop()
-        if path in reached or path not in site:
-            continue
-        reached.add(path)
-        found = (leads_to(path, link) for link in site[path].links)
-        waiting += [place[0] for place in found if place]
-    unreached = [page for page in PAGES if root / f"{page}.html" not in reached]
-    assert unreached == [], "list them in docs/index.md"
-
-
-def test_no_link_inside_the_site_is_broken(site):
-    broken = []
-    for path, page in site.items():
-        for link in [*page.links, *page.loads]:
-            place = leads_to(path, link)
-            if place is None or link == "#":
-                continue
-            file, fragment = place
-            if not file.exists() or (fragment and file in site and fragment not in site[file].ids):
-                broken.append((path.name, link))
-    assert broken == []
-
-
-def test_nothing_is_loaded_from_a_network(site):
-    loaded = {link for page in site.values() for link in page.loads}
-    assert [link for link in loaded if urlsplit(link).netloc] == []
-    for style in root_of(site).rglob("*.css"):
-        assert not re.search(r"(url\(|@import)\s*['\"]?(https?:)?//", style.read_text()), style
 
 
 def test_every_public_name_is_in_the_reference(site):
@@ -149,3 +126,142 @@ def test_every_scenario_is_in_the_gallery_with_a_picture(name):
     assert shown, (f"run `python -m benchmark.studies.gallery {name}` and give it a section in "
                    "docs/gallery.md, as the others have it")
     assert picture.stat().st_size < LARGEST
+
+
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+INLINE = re.compile(r"(?<!`)`((?:hierarchy |make |python -m |python docs/)[^`]+)`(?!`)")
+TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+         for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md",
+                      *sorted(path for path in (ROOT / "docs").rglob("*.md")
+                              if "_build" not in path.parts)]}
+FENCE = re.compile(r"^(\s*)```(.*)$", re.MULTILINE)
+CHECKED = {"", "python", "toml", "sh", "console", "bash", "c"}  # c: test_library_programs.py
+OF_THE_SITE = {"{toctree}", "{eval-rst}"}
+FOLLOWED = "docs/tutorial.md", "docs/urdf-to-standing.md"  # whose commands are run, not only read
+COMMANDS = typer.main.get_command(app).commands
+
+
+def blocks(name, *languages):
+    """The blocks of a document in these languages, in order."""
+    return [text for language, text in BLOCK.findall(TEXTS[name]) if language in languages]
+
+
+def commands(name):
+    """The command lines of a document: of its shell blocks and of its running text."""
+    shell = "\n".join(blocks(name, "", "sh", "console", "bash")).replace("\\\n", " ")
+    lines = [line.strip().removeprefix("$ ") for line in shell.splitlines()]
+    prose = [" ".join(text.split()) for text in INLINE.findall(BLOCK.sub("", TEXTS[name]))]
+    return [re.split(r"\s{2,}| #", line)[0] for line in [*lines, *prose]
+            if re.match(r"((hierarchy|make|python -m|pip install) [a-z'\".-]|python docs/)", line)]
+
+
+def having(found):
+    return [name for name in TEXTS if found(name)]
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path, monkeypatch, no_plugins):
+    """What a document writes or registers is gone after it."""
+    monkeypatch.chdir(tmp_path)
+    kept = [(registry, dict(registry)) for registry in (TABLES, TASKS)]
+    yield
+    for registry, before in kept:
+        registry.clear()
+        registry.update(before)
+
+
+def test_no_block_of_a_document_escapes_these_tests():
+    assert [(name, indent, language) for name, text in TEXTS.items()
+            for indent, language in FENCE.findall(text)
+            if indent.strip("\n") or language not in CHECKED | OF_THE_SITE] == []
+
+
+@pytest.mark.parametrize("name", having(
+    lambda name: name not in FOLLOWED and blocks(name, "python")))
+def test_the_code_of_a_document_runs(name):
+    """Later blocks go on from earlier ones."""
+    exec(compile("\n".join(blocks(name, "python")), name, "exec"), {"__name__": "document"})
+
+
+@pytest.mark.parametrize("name", having(
+    lambda name: name not in FOLLOWED and blocks(name, "toml")))
+def test_the_files_that_a_document_shows_can_be_read(name, tmp_path):
+    (tmp_path / "my-scenario.toml").write_text('extends = "ellipse"\nname = "my-scenario"\n')
+    for i, text in enumerate(blocks(name, "toml")):
+        data, file = tomllib.loads(text), tmp_path / f"block-{i}.toml"
+        file.write_text(text)
+        if "scenarios" in data:
+            load_sweep(file)
+        elif "name" in data and ({"robot", "extends"} & set(data)):
+            load(file)
+
+
+@pytest.mark.parametrize("name", having(commands))
+def test_the_commands_of_a_document_exist(name):
+    if any("--plugin my_module" in command for command in commands(name)):
+        exec(compile("\n".join(blocks(name, "python")), name, "exec"), {"__name__": "document"})
+    for command in commands(name):
+        check(shlex.split(command))
+
+
+def check(words):
+    """One command line: its name, options, scenarios and resolvers are known."""
+    first, second, *rest = words
+    if first == "hierarchy":
+        check_hierarchy(second, rest)
+    elif first == "make":
+        for target in (word for word in words[1:] if "=" not in word):
+            assert f"\n{target}:" in (ROOT / "Makefile").read_text(), words
+    elif first == "python":
+        assert importlib.util.find_spec(rest[0]) if second == "-m" else (ROOT / second).is_file()
+    else:
+        extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+            "optional-dependencies"]
+        for extra in re.findall(r"(?:task-hierarchy|\.)\[([^\]]+)\]", " ".join(words)):
+            assert set(extra.split(",")) <= set(extras), words
+
+
+def check_hierarchy(command, arguments):
+    if command.startswith("-"):
+        return
+    found = COMMANDS[command]
+    if command == "bench" and arguments and not arguments[0].startswith("-"):
+        found, arguments = found.commands[arguments[0]], arguments[1:]
+    if all(word.startswith("-") for word in arguments):  # a command that is only mentioned
+        assert set(arguments) <= {opt for one in found.params for opt in one.opts}
+        return
+    asked = found.make_context(command, list(arguments)).params
+    named = [*asked.get("scenarios", ()), asked.get("scenario"), asked.get("file")]
+    specs = [asked.get("resolver"), *(asked.get("resolvers") or "").split(",")]
+    for name in members(filter(is_name, named)):
+        if command == "sweep":
+            load_sweep(name)
+            continue
+        scenario = load(name, asked.get("changes") or [])
+        for spec in specs:
+            if spec and not spec.isupper():
+                scenario.with_resolver(spec)
+
+
+def is_name(text):
+    """Whether it names something shipped: no path, no robot of a package, no placeholder FILE."""
+    return bool(text) and not set("./:") & set(text) and not text.isupper()
+
+
+@pytest.mark.parametrize("document", FOLLOWED)
+def test_a_tutorial_can_be_followed_from_top_to_bottom(document, tmp_path):
+    """Files get the name in their first line, commands are run, Python goes on."""
+    if "standing" in document:
+        pytest.importorskip("mujoco")
+    names, followed = {"__name__": "document"}, set()
+    for language, text in BLOCK.findall(TEXTS[document]):
+        followed.add(language)
+        if language == "toml":
+            (tmp_path / text.splitlines()[0].removeprefix("# ")).write_text(text)
+        elif language == "python":
+            exec(compile(text, document, "exec"), names)
+        elif language == "sh":
+            for line in text.splitlines():
+                if line.startswith("hierarchy "):
+                    assert run_command(shlex.split(line, comments=True)[1:]) == 0, line
+    assert followed >= {"toml", "python", "sh"}

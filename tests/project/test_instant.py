@@ -14,8 +14,7 @@ from hierarchy.jit.caching import parts
 from scenarios.ahead.building import PARTS, is_current
 
 ROOT = Path(__file__).parents[2]
-pytestmark = [pytest.mark.slow,
-              pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")]
+pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -67,11 +67,12 @@ def test_make_says_what_is_missing_where_python_does_not_serve(interpreter, said
     assert said in done.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("statement", "heavy"), [
     ("import scenarios", {"numpy", "pydantic"}),
     ("import hierarchy", {"pinocchio"}), ("from hierarchy import Hierarchy", {"pinocchio"}),
     ("import solvers, solvers.qp.backends", {"pinocchio", "qpsolvers", "proxsuite", "osqp"}),
+    ("import solvers, hierarchy as h; solvers.make('hcod').solve(h.Hierarchy.from_levels("
+     "[([[1.0]], [1.0])]))", {"pinocchio", "matplotlib", "qpsolvers"}),
     ("import scenarios.cli.main", {"numpy", "numba", "pinocchio", "scipy", "matplotlib"}),
     ("import scenarios.cell.build", {"scipy.spatial", "matplotlib"}),
     ("from scenarios.cli.main import run_command; run_command(['--help'])",
@@ -120,6 +121,12 @@ def test_an_older_pinocchio_that_comes_first_is_named_in_one_line(tmp_path):
                           env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
                           capture_output=True, check=False, cwd=tmp_path)
     assert f"pinocchio 3.9.0 in {tmp_path / 'pinocchio.py'} is older" in done.stderr
+
+
+def test_every_test_in_the_list_of_slow_ones_exists():
+    for line in (ROOT / "tests" / "slow.txt").read_text(encoding="utf-8").split():
+        file, _, name = line.partition("::")
+        assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8"), line
 
 
 @pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])

@@ -186,7 +186,6 @@ def test_frames_that_cannot_be_used_are_refused_by_name(written, tmp_path):
             RecordedFrames(tmp_path, ROBOT)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "kind"), [("human", "no_frames"), ("human-hqp", "dark_frames")])
 def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
     """Frames at 0, 1/30, 2/30 s, then none up to 0.4 s; blind is 0.1 s after the last."""

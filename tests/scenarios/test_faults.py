@@ -67,7 +67,6 @@ def assert_within_limits(run):
         assert ((low - slack <= x) & (x <= up + slack)).all()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "policy", "name", "limited"), [
     (fault, policy, ("ellipse", "ellipse-velocity")[(i + j) % 2], (i // 2 + j) % 2 == 0)
     for i, fault in enumerate(FAULTS) for j, policy in enumerate(("brake", "hold", "stop"))])

@@ -1,14 +1,26 @@
-"""How far a run was from each goal, by signals made by hand."""
+"""How far a run was from each goal, what samples tell, and why an answer jumps."""
+
+import json
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from hand_made import recording
+from scipy.stats import rankdata
 
+from hierarchy import Hierarchy
 from scenarios import load, simulate
+from scenarios.cli.main import run_command
+from scenarios.measure.causes import Tick, causes
 from scenarios.measure.given_up import given_up
 from scenarios.measure.goals import goals
+from scenarios.measure.jumps import jumps
+from scenarios.measure.run_folder import save
 from scenarios.measure.runs import Run
-from scenarios.measure.verdict import lines, table, verdict, verdicts
+from scenarios.measure.statistics import best, paired, wilson
+from scenarios.measure.verdict import lines, table, verdicts
+from solvers import make
 
 
 def goal(name, fault=None, **signals):
@@ -36,19 +48,9 @@ def test_median_worst_and_share_count_from_when_the_target_was_first_reached():
     assert (one.flag, one.unit) == ("left", "m")
 
 
-def test_three_sentences_say_the_end_the_promises_and_the_targets():
-    found = [verdict(recording(**at([2, 2, 2, 2, 2])), "a 1/10/100 below 3 strict"),
-             verdict(recording(fault="the robot has fallen by 1 m", **joint([0, 0, 0, 0, 2.5])),
-                     "b")]
-    end, promises, targets = lines(found)
-    assert end.startswith("1 of 2 ran to the end; b fell at ")
-    assert promises == "Broken: joint limits by b, 0.5 rad at worst, for 20 % of the time."
-    assert targets == "Off in the median: position 0 mm (b) to 2 mm (a), 2 mm at worst."
-
-
 @pytest.mark.parametrize(("signals", "name", "flag", "worst", "unit"), [
     (at([0.25, 0.5, 0.25, 0.25, 1.0]), "position", "met", 1e-3, "m"),
-    (at([90, 0.5, 0.5, 0.25, 0.5]), "position", "met", 0.5e-3, "m"),
+    (at([90, 1.0, 0.5, 0.25, 0.5]), "position", "met", 1e-3, "m"),
     (at([437] * 5), "position", "never met", 0.437, "m"),
     (joint([0.0] * 5), "joint limits", "kept", 0.0, "rad"),
     (joint([2.5, 2.2, 1.9, 1.9, 1.9]), "joint limits", "kept", 0.0, "rad"),        # came back
@@ -98,7 +100,6 @@ def test_what_a_scenario_asks_is_in_its_words(name, asked):
     assert found.items() >= asked.items()
 
 
-@pytest.mark.slow
 def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
     run = simulate(load("strictness", ["control.duration=0.3"]))
     position, posture = given_up(run)
@@ -114,9 +115,149 @@ def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
     assert given_up(simulate(load("ellipse-hqp", ["control.duration=0.05"]))) == ()
 
 
-@pytest.mark.slow
-def test_only_how_long_is_said_where_the_rows_are_not_known():
-    changes = ["control.duration=0.05", "avoidance.distance=0.12", "avoidance.influence=0.4"]
-    for one in given_up(simulate(load("ellipse-smooth", changes))):
-        assert one.held_by == ()
-        assert 0.0 < one.share <= 1.0
+def enumerated(apart):
+    """The two-sided p-value of the signed-rank test, by trying all signs."""
+    ranks = rankdata(np.abs(apart))
+    middle = ranks.sum() / 2
+    off = abs(ranks[apart > 0].sum() - middle)
+    every = [abs(ranks @ np.array(signs) - middle) for signs in product((0, 1), repeat=len(apart))]
+    return np.mean(np.array(every) >= off - 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_p_value_is_that_of_all_signs_with_and_without_ties(seed):
+    random = np.random.default_rng(seed)
+    first = random.normal(size=9)
+    second = first + 0.4 + random.normal(size=9)
+    assert paired(first, second).p == pytest.approx(enumerated(second - first))
+    second = np.random.default_rng(seed).integers(-2, 5, 11).astype(float)
+    assert paired(np.zeros(11), second).p == pytest.approx(enumerated(second[second != 0.0]))
+
+
+def test_pairs_are_counted_by_their_direction():
+    first = np.array([1.0, 2.0, 3.0, 4.0, np.nan, 6.0])
+    second = np.array([1.0, 1.0, 5.0, 4.0 * (1 + 1e-4), 5.0, np.inf])
+    found = paired(first, second)
+    assert (found.count, found.same, found.lower, found.higher) == (4, 2, 1, 1)
+    assert [replace(found, p=p).distinguishable for p in (0.0499, 0.05)] == [True, False]
+    assert str(found) == "not distinguishable"
+
+
+RISING = np.arange(1.0, 17.0)
+
+
+@pytest.mark.parametrize(("shift", "said"), [
+    (0.1 + 0.01 * np.random.default_rng(0).random(16), "lower in 16 of 16, p < 0.001"),
+    (np.where(RISING <= 7.0, 0.5, 0.0), "lower in 7 of 16, the same in 9, p = 0.016")])
+def test_a_shift_of_pairs_is_told_beside_those_that_do_not_differ(shift, said):
+    found = paired(RISING, RISING - shift)
+    assert (found.distinguishable, str(found)) == (True, said)
+
+
+def test_too_few_pairs_tell_nothing():
+    assert not paired(np.zeros(5), np.ones(5)).distinguishable
+    assert paired(np.zeros(6), np.arange(1.0, 7.0)).distinguishable
+    assert str(paired(np.full(3, np.nan), np.ones(3))) == "no pair"
+
+
+LOW, NORMAL = np.linspace(1.0, 1.5, 16), np.random.default_rng(2).normal(size=(2, 16))
+# One pair of 8 against the trend: p = 0.016 alone, too much for ten rivals after Holm.
+APART = np.array([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, -0.5])
+
+
+@pytest.mark.parametrize(("columns", "lower", "marked"), [
+    ([LOW, LOW + 1.0, LOW * (1.0 + 1e-10), LOW + 2.0], True, (0, 2)),
+    ([LOW, LOW + 1.0, LOW * (1.0 + 1e-10), LOW + 2.0], False, (3,)),
+    ([NORMAL[0], NORMAL[0] + NORMAL[1], NORMAL[0] + 5.0], True, ()),
+    ([LOW, LOW.copy()], True, ()), ([LOW, np.full(16, np.nan)], True, ()), ([LOW], True, ()),
+    ([LOW, LOW + np.r_[np.full(12, 1.0), np.full(4, -50.0)]], True, ()),
+    ([np.zeros(8), APART], True, (0,)),
+    ([np.zeros(8), *(APART * (1.0 + 0.01 * i) for i in range(10))], True, ())])
+def test_the_best_is_marked_with_those_equal_to_it_where_all_others_can_be_told_from_it(
+        columns, lower, marked):
+    assert best(dict(enumerate(columns)), lower_is_better=lower) == marked
+
+
+@pytest.mark.parametrize(("met", "of", "low", "high"), [
+    (18, 24, 0.551, 0.880),  # Wilson 1927
+    (0, 10, 0.0, 0.2775), (5, 10, 0.2366, 0.7634), (81, 263, 0.2553, 0.3662), (0, 0, 0.0, 1.0)])
+def test_the_interval_of_a_share_is_wilsons(met, of, low, high):
+    assert wilson(met, of) == pytest.approx((low, high), abs=1e-4)
+
+
+NAMES = ("box", "task", "rest")
+
+
+def tick(box, task, rest=((0.0, 0.0), 0.0), reference=(0.0, 0.0), names=NAMES):
+    """A box of two unknowns (2, 2), a task and a last row, each (row, target), answered."""
+    levels = [(np.eye(2), *np.array(box, dtype=float)),
+              *((np.array([row], dtype=float), [target]) for row, target in (task, rest))]
+    h = Hierarchy.from_levels(levels, reference, names)
+    return Tick(h, answer(h), np.hstack([np.eye(2), np.zeros((2, 1))]))
+
+
+def answer(h):
+    return make("hcod").solve(h).x
+
+
+def said(before, after):
+    return [f"{kind}: {text}" for kind, text in causes(before, after, answer)]
+
+
+WIDE = ((-1.0, -1.0), (1.0, 1.0))
+
+
+def test_a_level_that_gains_nothing_by_another_corner_sits_at_a_vertex():
+    """x1 is at 1; the least weight of x2 in the task decides which of its ends is chosen."""
+    (text,) = said(tick(WIDE, ((1.0, -1e-6), 10.0)), tick(WIDE, ((1.0, 1e-6), 10.0)))
+    assert text.startswith("vertex: task, missed by 9, sits at a vertex: it gains ")
+    assert text.endswith("by another answer to the same data, 1 of the 2 apart")
+
+
+def test_what_moved_is_named_with_what_is_left_without_it():
+    before, after = (tick(((-1.0, -1.0), (upper, 1.0)), ((1.0, 0.0), 3.0)) for upper in (1.0, 2.0))
+    assert said(before, after) == [
+        "side: upper side of row 0 in box moved by 1, from 1 to 2; without that the change is 0"]
+    assert said(tick(WIDE, ((1.0, 0.0), 0.0)), tick(WIDE, ((1.0, 0.0), 3.0))) == [
+        "side: target of row 0 in task moved by 3, from 0 to 3; without that the change is 0",
+        "miss: task changed from met to missed by 2"]
+    (text,) = said(tick(WIDE, ((1.0, 0.0), 0.0)),
+                   tick(WIDE, ((1.0, 0.0), 0.0), reference=(0.0, 0.5)))
+    assert text == "reference: the reference moved; without that the change is 0"
+
+
+def test_levels_and_sides_that_come_and_go_are_all_that_is_said():
+    one = tick(WIDE, ((1.0, 0.0), 3.0))
+    other = tick(WIDE, ((1.0, 0.0), 3.0), names=("box", "hand", "rest"))
+    assert said(one, other) == ["stack: the levels were box, task, rest and are box, hand, rest"]
+    opened = tick(((-1.0, -1.0), (np.inf, 1.0)), ((1.0, 0.0), 3.0))
+    assert said(one, opened) == ["stack: the upper side of row 0 in box vanished"]
+
+
+def test_an_answer_that_the_resolver_does_not_give_is_not_blamed_on_the_rows():
+    before = tick(WIDE, ((1.0, 0.0), 0.5))
+    (text,) = said(before, before._replace(x=np.array([-0.9, 0.0])))
+    assert text.startswith("other: one of two answers to the same data was not sent as it is")
+
+
+def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
+    run = simulate(load("reach-torque-smooth").with_changes({"control.duration": 0.05}))
+    assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return save(simulate(load("ellipse-hqp").with_changes({"control.duration": 0.05})),
+                tmp_path_factory.mktemp("why") / "run")
+
+
+def test_the_command_names_the_largest_changes_of_a_run(folder, capsys):
+    assert run_command(["why", str(folder), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["jumps"]
+    sizes = [one["size"] for one in found]
+    assert len(found) == 3
+    assert sizes == sorted(sizes, reverse=True)
+    assert run_command(["why", str(folder), "--tick", str(found[0]["tick"])]) == 0
+    assert f"tick {found[0]['tick']} (t = " in capsys.readouterr().out
+    assert run_command(["why", str(folder), "--tick", "999"]) == 2
+    assert "tick 999: the run has ticks 0 to 49" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Scenarios whose rows are inequalities: limits, separation and cone in the stack at all times."""
+"""Limits, separation, cones and listed tasks in one stack at all times."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,6 @@ def names_of(*changes, scenario="ellipse-hqp"):
     return build(load(scenario, changes)).order(None, 0.0).order
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("resolver", ["hcod", "weighted"])
 def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
@@ -42,7 +41,6 @@ def test_the_order_is_fixed_and_limits_come_first():
     assert names_of("posture={role='task', target=[0,0,0,0,0,0,0]}")[-1] == "posture"
 
 
-@pytest.mark.slow
 def test_the_strictness_scenario_measures_what_a_lower_task_moves():
     scenario = load("strictness", ["control.duration=0.3"])
     strict, weighted = (measure(simulate(one))["moved_by_lower_max"].value for one in (
@@ -58,7 +56,6 @@ STARTS = {"stretched": "start.q=[0, 0, 0, 0, 0, 0, 0]",
           "too fast": "start.v=[3, -3, 3, -3, 4, -3, 3]"}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("how", STARTS)
 @pytest.mark.parametrize(("name", "resolver"), [
     ("human", "recursive"), ("human", "sns"), ("human-hqp", "hcod")])
@@ -76,7 +73,6 @@ def test_any_start_is_recovered_from_within_the_limit_of_acceleration(name, reso
     assert excess[-1].max() == 0.0
 
 
-@pytest.mark.slow
 def test_every_command_is_certified_in_the_inertia_of_its_tick():
     """In it bounds are for resolvers of any rows."""
     controller = Controller(load("ellipse-mass"))
@@ -89,3 +85,22 @@ def test_every_command_is_certified_in_the_inertia_of_its_tick():
     assert load("ellipse-limits").asks == "bounds"
     assert load("ellipse-limits", ["control.metric=mass"]).asks == "inequalities"
     assert load("ellipse", ["control.metric=mass"]).asks == "equalities"
+
+
+def test_all_levels_above_the_posture_are_met_and_their_errors_recorded():
+    standing = simulate(load("humanoid"))
+    assert standing.fault is None
+    found = measure(standing)
+    for name in ("left_foot", "right_foot", "centre_of_mass"):
+        assert found[f"task_{name}_rms"].value < 1e-5
+    for name in ("right_hand", "left_hand"):
+        assert found[f"task_{name}_max_settled"].value < 1e-4, "what a period of 5 ms leaves"
+        assert found[f"task_{name}_end"].value < 1e-5
+    assert found["task_gaze_max_settled"].value < 0.05
+    assert found["task_left_foot_turned_rms"].unit == "deg"
+    assert found["joint_limit_excess"].value == 0.0
+    cell, k = build(standing.scenario), 700
+    cell.state.move(standing["t"][k], standing["q"][k], standing["v"][k])
+    for task in cell.tasks.listed:
+        np.testing.assert_allclose(standing[f"task_error_{task.name.replace(' ', '_')}"][k],
+                                   task.error(cell.state), atol=1e-15)

@@ -1,21 +1,14 @@
 """Every kind of `[[tasks]]` in a scenario: what it reaches, and what is refused."""
 
 import re
-from typing import Annotated, ClassVar
 
 import numpy as np
 import pytest
 
 from hierarchy import HierarchyError, plugins
-from hierarchy.tasks import JointCoupling, Separation
+from hierarchy.tasks import Separation
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.cell.plants import KinematicArm
-from scenarios.cell.sensors import ExactDistances
-from scenarios.config.plant import AnyPlant
-from scenarios.config.sections import Unit
-from scenarios.config.sensor import AnySensor
-from scenarios.config.tasks import Listed
 from scenarios.measure.metrics import measure
 
 BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
@@ -43,7 +36,6 @@ def at_level(level):
     return {**BASE["control"], "level": level, "period": 0.005, "duration": 3.0}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize(("task", "metric"), [
     (COUPLING, "task_coupling_end"), (FRAME, "task_frame_end"), (LOOK, "task_look-at_end"),
@@ -64,7 +56,6 @@ def test_a_task_is_made_of_its_keys(task, tmp_path):
     assert made.damping == 3.0
 
 
-@pytest.mark.slow
 def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     avoidance = {"kind": "separation", "distance": 0.05, "obstacles": [[0.1, 0.5, 0.1]]}
     hold = {"kind": "position", "frame": "end_effector"}
@@ -76,7 +67,6 @@ def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     assert isinstance(later.stack["separation"], Separation)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", [
     {"kind": "line", "start": [0.0, 0.6, 0.1], "end": [0.1, 0.6, 0.2], "duration": 1.0},
     {"kind": "circle", "centre": [0.05, 0.6, 0.1], "radius": 0.05, "normal": [0.0, 1.0, 0.0]},
@@ -132,72 +122,7 @@ def test_what_does_not_fit_the_robot_is_named(task, said, tmp_path):
 
 def test_every_kind_has_a_test_here(request):
     text = request.path.read_text(encoding="utf-8")
-    tested = {"pose", "com", "pointing", "posture",  # in test_humanoid.py, test_mechanism.py
+    tested = {"pose", "com", "pointing", "posture",  # in scenarios that are run elsewhere
               "momentum", "contact-force", "least-force"}  # in shipped scenarios of torques
     assert [kind for kind in plugins.registered("tasks")
             if f'"{kind}"' not in text and kind not in tested] == []
-
-
-# A new kind is one section that nothing else lists, in the product and in a user's module.
-
-@pytest.fixture
-def kinds(monkeypatch):
-    """The registers, which forget at the end what a test adds."""
-    for register in ("_shipped", "_registered"):
-        monkeypatch.setattr(plugins, register, {
-            group: dict(kinds) for group, kinds in getattr(plugins, register).items()})
-
-
-@pytest.mark.parametrize("shipped", [True, False])
-def test_a_new_task_is_one_section(shipped, kinds, tmp_path):
-    @plugins.register("tasks", "elbow", shipped=shipped)
-    class Elbow(Listed):
-        joint: str
-        angle: Annotated[float, Unit("rad")] = 0.5
-
-        def make(self, at):
-            return JointCoupling(at.robot, {self.joint: 1.0}, self.angle, name=self.title)
-
-    cell = build(scenario_of(tmp_path, {"kind": "elbow", "joint": "joint_4"}))
-    assert cell.stack.names == ("elbow",)
-    with pytest.raises(HierarchyError, match=r"tasks\.0\.angle: .*, got 'wide' rad"):
-        scenario_of(tmp_path, {"kind": "elbow", "joint": "joint_4", "angle": "wide"})
-    with pytest.raises(HierarchyError, match="the kind here is 'elbow'"):
-        scenario_of(tmp_path, {"kind": "elbow", "joints": "joint_4"})
-
-
-class Slow(KinematicArm):
-    """Does a share of each command."""
-
-    def __init__(self, robot, q, v, period, level, section):
-        super().__init__(robot, q, v, period, level)
-        self.share = section.share
-
-    def act(self, command):
-        super().act(self.share * command)
-
-
-def test_a_new_plant_is_its_class_and_one_section(kinds, tmp_path):
-    @plugins.register("plants", "slow", shipped=True)
-    class SlowSection(AnyPlant):
-        made_by: ClassVar[str] = f"{__name__}:Slow"
-        share: float
-
-    runs = [simulate(scenario_of(tmp_path, COUPLING, plant=plant,
-                                 control={**BASE["control"], "duration": 0.02}))
-            for plant in ({"kind": "kinematic"}, {"kind": "slow", "share": 0.5})]
-    exact, slow = (run["q"][1] - run["q"][0] for run in runs)
-    np.testing.assert_allclose(slow, 0.5 * exact)
-
-
-def test_a_new_sensor_is_its_class_and_one_section(kinds, tmp_path):
-    @plugins.register("sensors", "near", shipped=True)
-    class NearSection(AnySensor):
-        foot: ClassVar[float] = 0.0
-
-        def made(self, robot, **given):
-            return given["exact"]
-
-    avoidance = {"kind": "separation", "obstacles": [[0.1, 0.5, 0.1]]}
-    cell = build(scenario_of(tmp_path, COUPLING, avoidance=avoidance, sensor={"kind": "near"}))
-    assert isinstance(cell.sensor, ExactDistances)

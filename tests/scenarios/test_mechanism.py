@@ -1,5 +1,7 @@
 """Scenarios with joints of every kind, mimic joints, closed chains and floating bases."""
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -141,10 +143,9 @@ def test_an_ankle_with_two_pushrods_stays_closed(level, rod, tmp_path):
 
 
 @pytest.mark.parametrize("added", [0.0, 0.5])
-def test_the_torque_plant_has_the_armature_of_the_robots_file(added, tmp_path):
+def test_the_torque_plant_has_the_armature_of_the_robots_file(added):
     mujoco = pytest.importorskip("mujoco")
-    path = tmp_path / "arm.xml"
-    path.write_text(FALLING)
+    path = Path(__file__).parents[1] / "data" / "robots" / "falling.xml"
     robot, model = Robot.load(path), mujoco.MjModel.from_xml_path(str(path))
     q, v = np.array([0.0, 0.0, 1.0, 0.0, 0.6, 0.0, 0.8, 0.3, 0.1]), np.zeros(8)
     plant = TorqueRobot(robot, Contacts(robot, []), q, v,
@@ -156,13 +157,6 @@ def test_the_torque_plant_has_the_armature_of_the_robots_file(added, tmp_path):
     expected = data.qacc.copy()
     expected[:3] = data.xmat[1].reshape(3, 3).T @ expected[:3]
     np.testing.assert_allclose(accelerations(plant, np.array([3.0, -2.0])), expected, rtol=1e-6)
-
-
-FALLING = """<mujoco><default><joint armature=".2"/></default><worldbody><body name="trunk">
-<joint type="free"/><geom type="box" size=".1 .2 .1" mass="3"/><body pos=".1 0 0"><joint name="arm"
-axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".03"/><body pos=".3 0 0"><joint
-name="slide" type="slide" axis="1 0 0" armature="1"/><geom size=".05"/></body></body></body>
-</worldbody></mujoco>"""
 
 
 def test_the_mechanism_is_the_first_level_and_bounds_of_a_resolver_of_bounds_come_before():
@@ -208,20 +202,3 @@ def test_a_mobile_base_goes_to_a_posture_by_values(level, measurement, tmp_path)
     data["start"]["joints"]["turn"] = [1.0, 1.0]
     with pytest.raises(ScenarioError, match="start: joint 'turn'"):
         build(Scenario.model_validate(data))
-
-
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-def test_limits_hold_for_a_floating_base(level):
-    data = {"name": "h", "robot": {"model": "humanoid"},
-            "control": {"level": level, "stack": "hierarchical", "resolver": "hcod",
-                        "duration": 0.5, "period": 0.005},
-            "limits": {"acceleration": 50.0, "base_speed": [0.3, 0.5]},
-            "tasks": [{"kind": "position", "frame": "left_hand", "stiffness": 400.0,
-                       "path": {"kind": "still", "position": [5.0, 0.0, 1.0]}}]}
-    run = simulate(Scenario.model_validate(data))
-    fastest = np.abs(run["v"][:, :6]).max(axis=0)
-    assert fastest[:3].max() == pytest.approx(0.3)
-    assert (fastest <= np.repeat([0.3, 0.5], 3) + 1e-9).all()
-    np.testing.assert_array_equal(run["velocity_limit"][:6], np.repeat([0.3, 0.5], 3))
-    with pytest.raises(ScenarioError, match="has a fixed base"):
-        build(scenario(limits={"acceleration": 5.0, "base_speed": [1.0, 1.0]}))

@@ -1,9 +1,13 @@
+"""Numbers of a run, by signals made by hand; jitter and singularities."""
+
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hand_made import HandMadeScenario, recording
+from hand_made import asked, recording
 
+from hierarchy.paths import Jittered, Still
+from scenarios import load, simulate
 from scenarios.measure.metrics import Metric, as_plain_data, measure
 from scenarios.recording import listed
 from solvers import Status
@@ -35,7 +39,7 @@ def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch)
     monkeypatch.setattr(listed, "errors", lambda run: [
         (hand, "m", np.array([0.0, 9e-10, 1e-12, 5e-10, 9e-10])),
         (elbow, "m", np.array([0.0, 0.0, 0.0, 0.0, 1e-9]))])
-    found = measure(recording(HandMadeScenario(tasks=(hand, elbow))))
+    found = measure(recording(asked(tasks=(hand, elbow))))
     assert found["task_hand_rms"].label == "Hand: error, rms"
     for key in ("rms", "max_settled", "end"):
         assert found[f"task_hand_{key}"].value == 0.0
@@ -83,7 +87,7 @@ def test_times_are_given_by_median_and_tails_for_each_part():
 
 
 def test_a_scenario_without_a_task_has_no_metric_of_it():
-    full = recording(HandMadeScenario(pointing=None))
+    full = recording(asked(pointing=None))
     for signal in ("minimal_distance", "ee_distance", "position_error"):
         del full.signals[signal]
     assert {"cone_violation_max", "body_distance_min", "ee_distance_min", "position_error_rms",
@@ -98,9 +102,8 @@ def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_
 
 
 def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
-    asked = HandMadeScenario()
-    asked.avoidance.promised = {"body": 0.2, "ee": 0.3}
-    found = measure(recording(asked, minimal_distance=[1, 0.05, 1, 1, 1],
+    far = load("ellipse-hqp", {"avoidance.distance": 0.2, "avoidance.influence": 0.3})
+    found = measure(recording(far, minimal_distance=[1, 0.05, 1, 1, 1],
                               ee_distance=[1, 1, 1, 0.02, 1],
                               true_minimal_distance=[1, 0.4, 0.3, 1, 1],
                               true_ee_distance=[1, 1, 0.35, 1, 1]))
@@ -109,12 +112,12 @@ def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
     measured = found["body_distance_min_measured"], found["ee_distance_min_measured"]
     assert [metric.value for metric in measured] == [0.05, 0.02]
     assert all(metric.detail and metric.lower_is_better is None for metric in measured)
-    found = measure(recording(asked, minimal_distance=np.zeros(5), ee_distance=np.zeros(5),
+    found = measure(recording(far, minimal_distance=np.zeros(5), ee_distance=np.zeros(5),
                               true_minimal_distance=[0.2, 0.19995, 0.1998, 0.1, 1.0],
-                              true_ee_distance=[0.3, 0.4, 0.2, 0.4, np.nan]))
+                              true_ee_distance=[0.2, 0.4, 0.1, 0.4, np.nan]))
     assert found["body_below_share"].value == pytest.approx(2 / 5)  # 0.05 mm is rounding
     assert found["ee_below_share"].value == pytest.approx(1 / 4)    # of the ticks in which known
-    assert found["ee_below_share"].note == "nearer than 0.3 m"
+    assert found["ee_below_share"].note == "nearer than 0.2 m"
 
 
 def test_steps_of_the_command_and_of_the_joints_are_told_apart():
@@ -124,11 +127,51 @@ def test_steps_of_the_command_and_of_the_joints_are_told_apart():
     assert found["velocity_step_max"].value == pytest.approx(0.3)
     assert found["velocity_step_max_measured"].value == pytest.approx(0.5)
     assert found["command_step_max"].value == pytest.approx(0.04)
-    asked = HandMadeScenario()
-    asked.control.level = "velocity"
+    slow = load("ellipse-velocity")
     command = np.array([[1.0], [1.5], [1.25], [1.25], [1.25]])
-    changed = measure(recording(asked, q=command, command=command))
+    changed = measure(recording(slow, q=command, command=command))
     assert changed["command_step_max"].value == 0.5
     labels = {found[name].label for name in ("velocity_step_max", "command_step_max",
                                              "velocity_step_max_measured")}
     assert len(labels) == 3
+
+
+NAMES = ("singular", "singular-limits", "singular-acceleration", "singular-acceleration-limits")
+
+
+def jittered(seed=3):
+    return Jittered(Still((1.0, 2.0, 3.0)), amplitude=0.002, rate=4.0, seed=seed)
+
+
+def test_jitter_is_bounded_moves_in_every_axis_and_depends_on_its_seed_alone():
+    offsets = np.array([jittered()(t)[0] for t in np.arange(0.0, 5.0, 0.01)]) - [1.0, 2.0, 3.0]
+    assert np.abs(offsets).max() <= 0.002
+    assert (np.abs(offsets).max(axis=0) > 0.0005).all()
+    assert np.array_equal(jittered()(0.7), jittered()(0.7))
+    assert not np.allclose(jittered()(0.7)[0], jittered(seed=4)(0.7)[0])
+
+
+@pytest.mark.parametrize(("spans", "frozen", "returned"), [
+    (((1.0, 2.0), (4.0, 4.5)), [3], [3]), (((1.0, 2.0),), [3, 4], [3, 4, 5]),
+    (((4.0, 5.0),), [1, 2, 3], [])])
+def test_frozen_returned_and_jerk_are_counted(spans, frozen, returned):
+    v, a, error = np.zeros((6, 7)), np.zeros((6, 7)), np.array([0.0, 1.0, 1.5, 2.0, 3.0, 4.0])
+    v[5], a[:, 2] = 1.0, [0.0, 1.0, 3.0, 3.0, 3.0, 3.0]
+    path = SimpleNamespace(out_of_reach=spans)
+    found = measure(recording(
+        asked(position=SimpleNamespace(path=path)), t=np.arange(6.0), v=v, a=a,
+        position_error=error[:, None] * [1.0, 0.0, 0.0]))
+    assert found["ticks_frozen"].value == len(frozen)
+    assert found["error_returned_max"].value == (error[returned].max() if returned else None)
+    assert found["error_returned_rms"].value == (
+        pytest.approx(np.sqrt(np.mean(error[returned]**2))) if returned else None)
+    assert found["jerk_max"].value == 2.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_run_has_the_metrics_of_singularities(name):
+    found = measure(simulate(load(name, ["control.duration=0.05"])))
+    assert found["ticks_frozen"].value == 0.0
+    assert found["error_returned_max"].value is None  # it has not been away
+    assert found["jerk_max"].value > 0.0
+    assert found["speed_limit_excess"].value == 0.0

@@ -44,7 +44,6 @@ def test_a_hierarchy_shows_its_levels(h):
     assert cells[-8:] == ["<limits>", "2", "0", "2", "hand & arm", "1", "1", "0"]
 
 
-@pytest.mark.slow
 def test_a_recording_shows_its_signals_and_a_comparison_a_column_for_each_run(run):
     cells = Balanced(run._repr_html_()).cells
     assert {"scenario", "resolver", "position_error", "20 x 7"} <= set(cells)
@@ -53,7 +52,6 @@ def test_a_recording_shows_its_signals_and_a_comparison_a_column_for_each_run(ru
     assert any(cell.startswith("Position error, rms [") for cell in cells)
 
 
-@pytest.mark.slow
 def test_plot_draws_a_panel_for_each_signal_with_its_unit(run):
     figure = run.plot("q", "position_error", "certified" if "certified" in run else "order")
     assert [ax.get_ylabel() for ax in figure.axes] == ["q [rad]", "position_error [m]", "order"]
@@ -63,7 +61,6 @@ def test_plot_draws_a_panel_for_each_signal_with_its_unit(run):
     assert figure._repr_png_().startswith(b"\x89PNG")  # what a notebook shows
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("library", ["pandas", "polars"])
 def test_a_data_frame_has_a_column_for_each_number(run, library, monkeypatch):
     fake = types.ModuleType(library)
@@ -82,7 +79,6 @@ def test_a_data_frame_has_a_column_for_each_number(run, library, monkeypatch):
         run.to_dataframe("panda")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_the_notebooks_of_the_documents_run_from_top_to_bottom(path, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

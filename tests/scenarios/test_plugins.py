@@ -5,6 +5,7 @@ import pickle
 import re
 import sys
 from importlib.metadata import distributions
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,34 +20,17 @@ MODULE = '''
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from hierarchy import Robot, Task
+from hierarchy import Robot
 from hierarchy.paths import Path
 from hierarchy.plugins import register
 from hierarchy.robot import Frame
-from hierarchy.tasks import Position
+from hierarchy.tasks import JointCoupling, Position
 from scenarios.cell.plants import KinematicArm
 from solvers import Resolution, Resolver, make
 
 @register("tasks", "elbow")
-@dataclass(frozen=True)
-class Elbow(Task):
-    robot: Robot
-    joint: str
-    angle: float
-    gain: float = 2.0
-    name: str = "elbow"
-    dimension = 1
-
-    def error(self, state):
-        return np.array([self.angle - state.q[self.robot.coordinate(self.joint)]])
-
-    def jacobian(self, state):
-        return np.eye(state.n)[self.robot.joint(self.joint) - 1][None]
-
-    def jacobian_derivative(self, state):
-        return np.zeros((1, state.n))
+def elbow(robot: Robot, joint: str, angle: float, name: str = "elbow"):
+    return JointCoupling(robot, {joint: 1.0}, angle, gain=2.0, name=name)
 
 @register("tasks", "along")
 def along(frame: Frame, path: Path, name: str):
@@ -76,24 +60,7 @@ class Weak(KinematicArm):
         super().act(self.share * command)
 '''
 
-SCENARIO = '''
-name = "own"
-plugins = ["doors_of_mine"]
-robot = {model = "my_arm"}
-start = {q = [0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]}
-control = {level = "velocity", stack = "hierarchical", period = 0.01, duration = 0.2, \
-resolver = "halved"}
-plant = {kind = "weak", share = 0.5}
-[[tasks]]
-kind = "elbow"
-joint = "joint_4"
-angle = 1.0
-[[tasks]]
-kind = "along"
-name = "hand"
-frame = "end_effector"
-path = {kind = "still", position = [0.1, 0.6, 0.1]}
-'''
+SCENARIO = (Path(__file__).parents[1] / "data" / "own.toml").read_text()
 
 
 @pytest.fixture(autouse=True)
@@ -140,7 +107,6 @@ def test_a_file_alone_loads_no_code(command, capsys, folder):
     assert "plugin 'doors_of_mine' cannot be imported: ZeroDivisionError" in text
 
 
-@pytest.mark.slow
 def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():
     plugins.allow("doors_of_mine")
     scenario = load("own.toml")
@@ -154,7 +120,6 @@ def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():
     np.testing.assert_allclose(exact["command"][0], 2.0 * run["command"][0], rtol=1e-9)
 
 
-@pytest.mark.slow
 def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(capsys):
     assert said(["run", "own.toml", "--plugin", "doors_of_mine", "--out", "a"], capsys)[0] == 0
     plugins._loaded.clear()

@@ -1,27 +1,31 @@
+"""Signals, what is saved of a run, and what a module of one's own adds."""
+
 import errno
 import json
 import os
 import subprocess
 import sys
-from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
 import pytest
-from hand_made import HandMadeScenario, recording
+from hand_made import recording
 
-from hierarchy.errors import HierarchyError
+from hierarchy import plugins
+from hierarchy.errors import HierarchyError, UnknownNameError
+from scenarios import load, simulate
+from scenarios.draw.figures.palette import looks
+from scenarios.draw.figures.panels import Panel
+from scenarios.export.mcap import grouped
 from scenarios.files import OutputError, claim, next_free, whole
-from scenarios.measure import run_folder
+from scenarios.measure.metrics import Metric
+from scenarios.measure.motions import motions
 from scenarios.measure.run_folder import load_run, save
+from scenarios.measure.runs import Run, table
+from scenarios.recording.signals import Signal, known
+from scenarios.results.sections import multiples
 
 
-@pytest.fixture
-def hand_made_scenarios(monkeypatch):
-    monkeypatch.setattr(run_folder, "load", lambda path, changes=(): HandMadeScenario())
-
-
-@pytest.mark.usefixtures("hand_made_scenarios")
 def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
     saved = recording(q=np.random.default_rng(0).normal(size=(5, 7)), fault="stopped at tick 5")
     loaded = load_run(save(saved, tmp_path / "run"))
@@ -43,16 +47,14 @@ def test_a_run_folder_holds_arrays_metrics_scenario_and_versions(tmp_path):
     assert json.loads((tmp_path / "run" / "metrics.json").read_text())["ticks"] == 5
 
 
-def test_a_save_that_breaks_leaves_nothing_behind(tmp_path):
+def test_a_save_that_breaks_leaves_nothing_behind(tmp_path, monkeypatch):
     broken = mock.Mock(side_effect=KeyboardInterrupt)
-    scenario = SimpleNamespace(pointing=None, to_toml=broken, tasks=(),
-                               control=SimpleNamespace(period=1.0))
+    monkeypatch.setattr("scenarios.config.Scenario.to_toml", broken)
     with pytest.raises(KeyboardInterrupt):
-        save(recording(scenario), tmp_path / "run")
+        save(recording(), tmp_path / "run")
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.usefixtures("hand_made_scenarios")
 def test_a_file_that_is_cut_off_or_has_wrong_bits_is_named(tmp_path):
     with pytest.raises(HierarchyError, match=r"no run\.npz"):
         load_run(tmp_path)
@@ -99,3 +101,47 @@ def test_a_folder_that_another_process_has_locked_cannot_be_claimed(tmp_path):
             claim(tmp_path / "run")
         other.stdin.close()
     assert claim(tmp_path / "run") == tmp_path / "run"
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate(load("dual-arm", ["control.duration=0.01"]))
+
+
+def test_a_signal_that_a_run_lacks_is_absent_and_a_misspelt_one_an_error_with_the_nearest(run):
+    assert "minimal_distance" not in run
+    assert run.get("minimal_distance", np.zeros(1)).shape == (1,)
+    for ask in (lambda: "minimal_distnce" in run, lambda: run["minimal_distnce"],
+                lambda: run.get("minimal_distnce", np.zeros(0))):
+        with pytest.raises(UnknownNameError, match="minimal_distance"):
+            ask()
+
+
+def test_every_recorded_signal_is_in_the_table_with_its_number_of_axes(run):
+    for name, values in run.signals.items():
+        assert known(name).shape.strip("(,)").count(",") + 1 == values.ndim, name
+
+
+def test_a_signal_of_a_plugin_has_its_unit_and_topic_everywhere(run, no_plugins):
+    plugins.register("signals", "strain")(Signal("strain", "Pa", "(T,)", "of a link", "/links"))
+    assert "strain" not in run
+    run.signals["strain"] = np.zeros(run.ticks)
+    assert ("strain", "Pa") in {column[:2] for column in run.columns()}
+    assert set(grouped(run)["/links"]) == {"strain"}
+    del run.signals["strain"]
+
+
+def test_a_metric_and_a_figure_of_a_plugin_are_in_the_table_and_on_the_page(run, no_plugins):
+    @plugins.register("metrics", "strained")
+    def strained(recording, by):
+        yield Metric("strain_max", "Strain, max", float(recording.ticks), "Pa")
+
+    def draw(ax, recording, colour):
+        ax.plot(recording["t"], recording["q"][:, 0], color=colour)
+
+    plugins.register("figures", "first-joint")(Panel("first-joint", "First", "rad", "q", draw))
+    ours = Run(run.scenario, "own", "own", run)
+    assert ours.metrics["strain_max"].shown_unit == "Pa"
+    assert {row.name for row in table([ours])} >= {"strain_max", "speed_max"}
+    found = motions([ours])
+    assert "own: First" in multiples("dual-arm", found, looks([ours.label]))

@@ -20,8 +20,8 @@ from scenarios.measure import metrics
 from scenarios.results import pool
 from scenarios.results.plan import load_sweep, plan, shipped_sweeps
 from scenarios.results.run import Job, Outcome, outcome
-from scenarios.results.sampled import Workers, compare_starts, sweep
-from scenarios.results.store import FullError, Store, read
+from scenarios.results.sampled import Workers, compare_starts
+from scenarios.results.store import FullError, Store
 
 BODY = {"name": '"small"', "scenarios": '["ellipse"]', "resolvers": '["tpm", "recursive"]',
         "duration": "0.02", "samples": "3", "seed": "7"}
@@ -140,7 +140,6 @@ def test_a_run_has_every_metric_of_its_scenario_as_sampled(tmp_path):
         m.name: m.value for m in expected.values() if m.group != "Computing"}
 
 
-@pytest.mark.slow
 def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path):
     distributed = pytest.importorskip("distributed", reason="needs the extra sweep")
     command = ["sweep", str(write(tmp_path)), "--out"]
@@ -156,15 +155,6 @@ def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path):
     assert first == second == third
     assert sum(metric == "reached_end" for _, _, metric in first) == 6
     assert ("tpm", "2", "start.q.6") in first
-
-
-@pytest.mark.slow
-def test_only_the_runs_that_are_not_there_are_made(tmp_path):
-    assert sweep(write(tmp_path), tmp_path / "out", ALONE).made == 6
-    more = write(tmp_path, samples="4", resolvers='["hcod", "tpm"]')
-    assert sweep(more, tmp_path / "out", ALONE).made == 5
-    assert set(made(tmp_path / "out").values()) == {1}
-    assert len(read(tmp_path / "out" / "results.csv")) == 8
 
 
 def test_a_run_that_kills_its_process_costs_only_itself():
@@ -218,7 +208,6 @@ def done(tmp_path_factory):
     return found, json.loads((folder / "results.json").read_text()), folder
 
 
-@pytest.mark.slow
 def test_strict_resolvers_are_the_same_and_none_is_best_among_them(done):
     found, data, _ = done
     columns = data["groups"]["ellipse"]["columns"]
@@ -229,7 +218,6 @@ def test_strict_resolvers_are_the_same_and_none_is_best_among_them(done):
     assert found.found["ellipse"].alike()[0] == ["recursive", "hcod"]
 
 
-@pytest.mark.slow
 def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_same(done):
     found, data, folder = done
     page = (folder / "index.html").read_text()

@@ -1,13 +1,15 @@
+"""A run to its end, the same bytes again, and the runs of the authors' code (data/ellipse)."""
+
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 import scenarios.loop.simulation
-from scenarios.config import load
-from scenarios.loop.simulation import simulate
-
-pytestmark = pytest.mark.slow
+from benchmark.studies.reference_runs import EVERY, RIGHT, RUNS, differences, reference
+from scenarios import load, save, simulate
 
 SHORT = ["control.duration=3.0"]
 
@@ -83,3 +85,64 @@ def test_a_run_whose_state_is_lost_or_diverges_ends_with_a_fault(monkeypatch, sp
     assert said in run.fault
     assert "from tick" in run.fault
     assert run.ticks <= 2
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_the_authors_runs_are_reproduced_tick_for_tick(name):
+    expected = reference(name)
+    run = simulate(load(*RUNS[name]))
+    every = slice(None, None, EVERY)
+    assert run.fault is None
+    assert run.ticks == (5000 if name.endswith("5s") else 18850)
+    np.testing.assert_allclose(run["t"][every], expected["t"], atol=1e-12)
+    np.testing.assert_array_equal(run["active_control_point"][every],
+                                  expected["active_control_point"])
+    np.testing.assert_allclose(run["q"][every], expected["q"], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(run["v"][every], expected["v"], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(run["a"][9::10][:len(expected["t"]) - 1],
+                               expected["a_previous"][1:], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(run["position_error"][every], expected["position_error"],
+                               rtol=0, atol=1e-8)
+    np.testing.assert_allclose(run["pointing_error"][every], expected["pointing_error"],
+                               rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_exact_derivatives_command_nearly_the_same_from_every_recorded_state(name):
+    found = differences(name)
+    assert len(found) == len(reference(name)["t"]) - 1
+    assert max(found) < 0.1
+    assert np.median(found) < 1e-3
+
+
+REPEATED = {"ellipse": ["control.duration=0.2"],
+        "ellipse-hqp": ["control.duration=0.05"],
+        "ellipse-noisy": ["control.duration=0.1", "plant.measurement.position_noise=0.001",
+                          "plant.measurement.seed=3"],
+        "humanoid": ["control.duration=0.1"],
+        "human": ["control.duration=0.1", "sensor.seed=4"]}
+
+
+def run_of(name, changes=()):
+    return simulate(load(name.removesuffix("-noisy"), [*REPEATED[name], *changes]))
+
+
+def bytes_of(run, folder):
+    return (save(run, folder) / "run.npz").read_bytes()
+
+
+@pytest.mark.parametrize("name", REPEATED)
+def test_the_same_run_is_written_as_the_same_bytes(name, tmp_path):
+    if name == "human":
+        pytest.importorskip("mujoco")
+    first, second = (bytes_of(run_of(name), tmp_path / folder) for folder in "ab")
+    assert first == second
+
+
+def test_another_process_writes_the_same_bytes(tmp_path):
+    mine = bytes_of(run_of("ellipse"), tmp_path / "mine")
+    code = ("import sys; from scenarios import load, save, simulate; "
+            "save(simulate(load('ellipse', [sys.argv[2]])), sys.argv[1])")
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "other"), *REPEATED["ellipse"]],
+                   check=True)
+    assert (tmp_path / "other" / "run.npz").read_bytes() == mine

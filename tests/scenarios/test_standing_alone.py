@@ -1,23 +1,23 @@
-"""A run's folder is all that a reader needs: the robot's file is gone, and no cell is built."""
+"""What a run's folder and `hierarchy check ROBOT` give serves as it is."""
 
 import json
 import shutil
 from dataclasses import asdict
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
-import pinocchio as pin
 import pytest
+import urdf_text
 from urdf_text import INERTIAL, joint, link, placed, shape, urdf
 
-from hierarchy import HierarchyError, Robot, State
-from hierarchy.robots import TABLES
+from hierarchy import HierarchyError, Robot
 from scenarios import load, load_run, save, simulate
+from scenarios.cell.robot import make_robot
+from scenarios.cli.main import run_command
 from scenarios.draw.replay.page import html
-from scenarios.recording.facts import robot_facts
 from scenarios.scene import scene
 
-pytestmark = pytest.mark.slow
 
 def tube(name, middle, length):
     return link(name, INERTIAL + shape(f'<cylinder radius="0.04" length="{length}"/>',
@@ -33,23 +33,7 @@ ARM = urdf(
     joint("elbow", "revolute", "two", "three", LIMIT, "0 0.8 0.6", placed("0 0 0.3", "0 0.9 0")),
     joint("wrist", "continuous", "three", "four", LIMIT, "1 0 0", placed("0 0 0.3")),
     joint("end", "fixed", "four", "tip", "", "", placed("0 0 0.12")))
-SCENARIO = """name = "alone"
-robot = {model = "arm.urdf", end_effector = "tip"}
-control = {level = "acceleration", duration = 0.3, stack = "hierarchical", resolver = "hcod"}
-limits = {acceleration = 30.0}
-damping = {value = 5.0}
-[position]
-stiffness = 40.0
-damping = 20.0
-path = {kind = "ellipse", centre = [0.4, 0, 0.4], cosine = [0, 0.1, 0], sine = [0, 0, 0.1]}
-[avoidance]
-kind = "separation"
-distance = 0.02
-influence = 0.3
-rate = 5.0
-obstacles = [{shape = "sphere", radius = 0.05, path = {kind = "ellipse", rate = 2.0, \
-centre = [0.3, 0.2, 0.5], cosine = [0.1, 0.0, 0.0], sine = [0.0, 0.1, 0.0]}}]
-"""
+SCENARIO = (Path(__file__).parents[1] / "data" / "alone.toml").read_text()
 
 
 @pytest.fixture(scope="module")
@@ -108,33 +92,76 @@ def test_facts_that_are_missing_or_damaged_are_named(made, tmp_path):
         load_run(tmp_path / "bad")
 
 
-CART = urdf(
-    *(link(name, "") for name in "abcde"),
-    joint("slide", "prismatic", "a", "b", LIMIT, "1 1 0", placed("0.1 0.2 0.3", "0.1 0.2 0.3")),
-    joint("wheel", "continuous", "b", "c", "", "0 0.6 0.8", placed("0.1 0.2 0.3", "0.1 0.2 0.3")),
-    joint("table", "planar", "c", "d", "", "0 0 1", placed("0.1 0 0.3", "0.3 0 0.3")),
-    joint("hinge", "revolute", "b", "e", LIMIT, "0 -1 0", placed("0 0.2 0.3")))
-DOLL = """<mujoco><worldbody><body name="a" pos="0 0 1"><freejoint/><geom size="0.1"/>
-<body name="b" pos="0 0 0.3" euler="10 20 30"><joint name="h1" axis="1 0 0" pos="0 0 0.1"/>
-<joint name="h2" axis="0 1 0" pos="0 0.1 0.1"/><joint name="s" type="slide" axis="0 1 1"/>
-<geom size="0.1"/><body name="c" pos="0 0 0.3"><joint name="ball" type="ball" pos="0.1 0 0"/>
-<geom size="0.1"/></body></body></body></worldbody></mujoco>"""
+CONTROL = """
+[damping]
+value = 5.0
+[control]
+stack = "hierarchical"
+resolver = "hcod"
+duration = 0.02
+[[tasks]]
+kind = "pose"
+"""
+NARROW = '<limit lower="0.5" upper="1" velocity="0" effort="1"/>'
 
 
-def robots(folder):
-    (folder / "cart.urdf").write_text(CART)
-    (folder / "doll.xml").write_text(DOLL)
-    yield from (Robot.named(name, base) for name in TABLES for base in ("fixed", "floating"))
-    yield from (Robot.from_file(folder / "cart.urdf", base=base) for base in ("fixed", "floating"))
-    yield Robot.from_file(folder / "doll.xml")
+def tree(*joints):
+    """A tree of joints (name, kind, parent, child, inside)."""
+    links = dict.fromkeys(end for _, _, *ends, _ in joints for end in ends)
+    return urdf_text.urdf(
+        *(link(name, INERTIAL + shape('<sphere radius="0.01"/>')) for name in links),
+        *(joint(*one, origin=placed("0.1 0.2 0.3")) for one in joints))
 
 
-def test_the_facts_place_every_joint_as_the_robot_does(tmp_path):
-    for robot in robots(tmp_path):
-        pin.seed(0)
-        q = np.array([pin.randomConfiguration(robot.model, -np.ones(robot.nq), np.ones(robot.nq))
-                      for _ in range(5)])
-        expected = [State.at(robot, one).placements.copy() for one in q]
-        facts = robot_facts(robot)
-        np.testing.assert_allclose(facts.placements(q), expected, atol=1e-14)
-        assert (len(facts.position_units), len(facts.velocity_units)) == (robot.nq, robot.n)
+FOLLOWING = [("f1", "revolute", "palm", "finger1", NARROW),
+             *((f"f{i}", "revolute", "palm", f"finger{i}", f'{NARROW}<mimic joint="f1"/>')
+               for i in (2, 3, 4))]
+ROBOTS = {
+    "gripper.urdf": tree(("wrist", "revolute", "arm", "palm", NARROW), *FOLLOWING),
+    "free.urdf": tree(("free", "floating", "world", "trunk", ""),
+                      ("hip", "revolute", "trunk", "leg", NARROW)),
+    "turning.urdf": tree(("pan", "continuous", "base", "head", ""),
+                         ("tilt", "continuous", "head", "eye", "")),
+    "odd.urdf": tree(("a &quot;joint&quot; \\ é&#9;", "revolute", "base", "tool 'x' = [1]", NARROW),
+                     ("left/wrist.pitch", "prismatic", "tool 'x' = [1]", "ns::tool0", NARROW)),
+    "UPPER.URDF": tree(("hip", "revolute", "trunk", "leg", NARROW)),
+    "scene.xml": """<mujoco><worldbody><geom type="plane" size="1 1 1"/><light pos="0 0 1"/>
+        <body name="arm" pos="0 0 0.2"><joint name="hinge" axis="0 1 0" range="-90 90"/>
+        <geom type="capsule" size="0.05" fromto="0 0 0 0 0 0.3"/><body name="hand" pos="0 0 0.3">
+        <joint name="wrist" axis="1 0 0" range="-90 90"/><geom size="0.05"/></body></body>
+        </worldbody></mujoco>""",
+}
+
+
+def pasted(model, folder, capsys):
+    """Return the robot that `check` described, and that of a scenario with what it printed."""
+    assert run_command(["check", model]) == 0
+    said = capsys.readouterr().out
+    assert said.count("  follows         f") == 3 * ("gripper" in model)
+    section, path = said[said.index("[robot]\n"):], folder / "pasted.toml"
+    end = next(line for line in section.splitlines() if line.startswith("end_effector = "))
+    path.write_text('name = "pasted"\n' + section + CONTROL
+                    + end.replace("end_effector", "frame", 1))
+    assert run_command(["check", str(path)]) == 0, capsys.readouterr().err
+    assert run_command(["run", str(path), "--out", str(folder / "run")]) == 0
+    return Robot.load(model), make_robot(load(path).robot)
+
+
+def expect_the_same(one, other):
+    assert (other.base, other.joint_names, other.end_effector) == (
+        one.base, one.joint_names, one.end_effector)
+    assert [c.joint for c in other.capsules] == [c.joint for c in one.capsules]
+    assert [p.joint for p in other.control_points] == [p.joint for p in one.control_points]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_section_to_paste_runs_as_it_is(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).write_text(ROBOTS[name])
+    expect_the_same(*pasted(name, tmp_path, capsys))
+
+
+@pytest.mark.usefixtures("example_robot_data")
+@pytest.mark.parametrize("name", ["pr2", "romeo"])
+def test_the_section_of_a_public_robot_runs_as_it_is(name, tmp_path, capsys):
+    expect_the_same(*pasted(f"example_robot_data:{name}", tmp_path, capsys))

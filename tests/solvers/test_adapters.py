@@ -1,5 +1,6 @@
 """Adapters against the packages that they are for."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,19 +16,7 @@ from solvers.qp.programs import level_problem
 
 DT = 0.01
 Q = np.array([0.1, 0.5, -0.2, -1.0, 0.3, 0.8, 0.0])
-ARM = """
-<mujoco><compiler angle="radian"/>
-  <worldbody><body name="upper" pos="0 0 0.1"><joint name="a" axis="0 0 1" range="-2 2"/>
-    <geom type="capsule" size="0.03" fromto="0 0 0 0 0 0.3"/>
-    <body name="middle" pos="0 0 0.3"><joint name="b" axis="0 1 0" range="-2 2"/>
-      <geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/>
-      <body name="lower" pos="0.3 0 0"><joint name="c" axis="0 1 0" range="-2 2"/>
-        <geom type="capsule" size="0.02" fromto="0 0 0 0.25 0 0"/>
-        <body name="wrist" pos="0.25 0 0"><joint name="d" axis="1 0 0" range="-2 2"/>
-          <geom name="pad" type="sphere" size="0.02" pos="0.1 0.02 0"/>
-          <site name="tip" pos="0.1 0.02 0"/>
-        </body></body></body></body></worldbody></mujoco>
-"""
+ARM = Path(__file__).parents[1] / "data" / "robots" / "four_joints.xml"
 POSE = np.array([0.3, 0.4, 0.5, -0.2])
 
 
@@ -242,14 +231,13 @@ def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, c
 @pytest.fixture
 def arm():
     mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(ARM)
+    model = mujoco.MjModel.from_xml_path(str(ARM))
     data = mujoco.MjData(model)
     data.qpos[:] = POSE
     mujoco.mj_forward(model, data)
     return model, data
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "kind"), [("tip", "site"), ("lower", "body"), ("pad", "geom")])
 def test_a_jacobian_of_mujoco_is_the_difference_of_its_frames(arm, name, kind):
     import mujoco

@@ -19,8 +19,6 @@ from scenarios.problems.reference import EQUALITIES
 from solvers import Status, certify, make, names
 from solvers.qp.backends import BACKENDS
 
-pytestmark = pytest.mark.slow
-
 HQP = [make("hqp", backend=name, form=form)
        for name in BACKENDS for form in ("null-space", "slack")]
 RESOLVERS = [*(make(name) for name in names() if name != "hqp"), make("tpm-published"),
@@ -111,6 +109,12 @@ def test_damping_means_the_same_to_every_strict_resolver(resolver, case):
     for threshold in (0.1, 3.0):
         damped = dataclasses.replace(resolver, damping=0.05, threshold=threshold)
         assert_close(resolver, damped.solve(h).x, oracle.solve(h, 0.05, threshold))
+
+
+def test_resolvers_whose_damping_means_something_else_say_so():
+    assert {r.label for r in RESOLVERS if r.damps != "each level"} == {
+        "tpm-published", "reverse", "reverse in-order", "weighted", "augmented", "merged"}
+    assert make("tpm").damps_with_bounds == make("hcod").damps_with_bounds
 
 
 @every(RESOLVERS)

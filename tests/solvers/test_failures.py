@@ -10,8 +10,6 @@ from solvers import Status, certify, make, problems
 from solvers.proof import prove
 from solvers.qp.backends import BACKENDS, installed
 
-pytestmark = pytest.mark.slow
-
 FOLDER = Path(__file__).parents[1] / "data" / "regressions" / "structured"
 SQRT2, SQRT5 = 2.0**0.5, 5.0**0.5
 RIGHT = {

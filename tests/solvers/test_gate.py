@@ -86,6 +86,32 @@ def test_a_copy_and_a_pickle_pass_the_gate_too(again):
     assert make("hcod").solve(other).status.name == "SOLVED"
 
 
+def test_a_violation_is_the_distance_to_the_rows_interval():
+    h = Hierarchy.from_levels([([[1, 0], [0, 1]], [3, 4]), ([[1, 0]], [-1], [1]),
+                               ([[0, 1]], [2], [np.inf])])
+    np.testing.assert_allclose(h.violations([0, 0]), [5, 0, 2])
+    np.testing.assert_allclose(h.slacks([2, 0]), [-1, -4, 1, -2])
+
+
+@pytest.mark.parametrize(("levels", "give", "said"), [
+    ([([[np.inf, 0]], [1])], None, "A[0, 0] is inf"),
+    ([(np.eye(2), [1, np.inf])], None, "level 1, row 1"),
+    ([([[1, 0]], [np.inf], [np.inf])], None, "level 1, row 0"),
+    ([(np.eye(2), [1])], None, "b has shape (1,), expected (2,)"),
+    ([(np.eye(2), [1, 2]), (np.eye(3), [1, 2, 3])], None, "level 2: A has 3 columns"),
+    ([(np.zeros((0, 0)), [])], None, "n = 0"), ([], None, "no levels"),
+    ([(np.eye(2),)], None, "expected (A, b) or (A, lower, upper)"),
+    ([("abc", [1])], None, "level 1: A is not an array of numbers"),
+    ([(np.eye(2), [1, 2])] * 2, [0.1], "give has 1 entries for 2 levels"),
+    ([(np.eye(2), [1, 2])] * 2, [0.1, np.inf], "level 2, row 0: give is inf"),
+    ([(np.eye(3), np.ones(3))], [[0.1, 0.2]],
+     "level 1: give has shape (2,), expected one number or (3,)")])
+def test_wrong_levels_are_named(levels, give, said):
+    with pytest.raises(HierarchyError) as error:
+        Hierarchy.from_levels(levels, give=give)
+    assert said in str(error.value)
+
+
 BROKEN_ONCE = '''
 import contextlib
 import numpy as np

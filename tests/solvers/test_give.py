@@ -1,4 +1,4 @@
-"""Levels that give: how far they may be missed beyond their least for the sake of those below."""
+"""Levels that give, and the distance to the reference in a metric."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,6 @@ from hierarchy.paths import Still
 from hierarchy.tasks import Position, Posture
 from solvers import Status, certify, explain, make, names
 from solvers.batch import Batch
-from solvers.give import giving
 from solvers.problems import generate
 
 STRICT = [make("hcod"), *(make("hqp", backend=name) for name in ("proxqp", "daqp"))]
@@ -44,18 +43,6 @@ def test_a_level_gives_up_to_what_it_may_and_those_below_gain(resolver, seed):
     assert lower[first] < were[first] - 1e-3
 
 
-def test_a_give_of_zero_is_no_give_and_a_boundless_one_drops_the_level():
-    hcod, strict = make("hcod"), problem(1, 0.0)
-    plain = Hierarchy(strict.A, strict.lower, strict.upper, strict.sizes, strict.reference,
-                      strict.names)
-    np.testing.assert_array_equal(hcod.solve(strict).x, hcod.solve(plain).x)
-    soft = problem(1, 1e6)
-    kept = np.r_[0:2, 5:soft.m]
-    without = Hierarchy(soft.A[kept], soft.lower[kept], soft.upper[kept],
-                        np.delete(soft.sizes, 1), soft.reference, ("a", "b", "c"))
-    np.testing.assert_allclose(hcod.solve(soft).x, hcod.solve(without).x, atol=1e-9)
-
-
 def hand_and_posture(reach):
     """Two tasks that give, of which the second is met while the first leaves it room."""
     rng = np.random.default_rng(4)
@@ -76,24 +63,10 @@ def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, me
     assert certify(h, warm.x, witnesses=warm.witnesses).certified
     assert warm.active.shape == (h.m,)
     assert np.array_equal(*cold.witnesses) == met
+    short = make("hcod", max_iterations=1).solve(h)
+    assert (short.status, short.memory) == (Status.ITERATION_LIMIT, None)
     for memory in (np.zeros(0), np.full(7, np.nan), hcod.solve(h.changed(give=None)).memory):
         np.testing.assert_allclose(hcod.solve(h, memory).x, cold.x, atol=1e-9)
-
-
-@pytest.mark.parametrize("settings", [{}, {"max_iterations": 1}, {"damping": 0.1}])
-@pytest.mark.parametrize("reach", [0.3, 8.0])
-def test_the_kernel_of_hcod_answers_as_the_solves_of_which_it_is_made(reach, settings):
-    hcod, memories = make("hcod", **settings), [None, None]
-    for shift in np.linspace(0.0, 1.0, 5):
-        h = hand_and_posture(reach + shift)
-        own, other = hcod.solve(h, memories[0]), giving(hcod.solve, h, h.giving, memories[1])
-        assert (own.status, own.iterations) == (other.status, other.iterations)
-        np.testing.assert_array_equal(own.x, other.x)
-        assert (own.memory is None) == (other.memory is None) == (own.witnesses is None)
-        if own.memory is not None:
-            np.testing.assert_array_equal(own.active, other.active)
-            np.testing.assert_array_equal(own.witnesses, other.witnesses)
-        memories = [own.memory, other.memory]
 
 
 def test_generated_hierarchies_that_give_are_certified_by_hcod():
@@ -132,15 +105,6 @@ def test_what_cannot_give_refuses_by_name():
             resolver.solve(h)
     with pytest.raises(HierarchyError, match="problem 0 gives"):
         Batch.of([h])
-
-
-@pytest.mark.parametrize(("give", "said"), [
-    ([0.1], "give has 1 entries for 2 levels"),
-    ([0.1, np.inf], "level 2, row 0: give is inf"), ([np.nan, 0.0], "level 1, row 0: give is nan"),
-    ([[0.1, 0.2], 0.0], r"level 1: give has shape \(2,\), expected one number or \(3,\)")])
-def test_a_wrong_give_is_named(give, said):
-    with pytest.raises(HierarchyError, match=said):
-        Hierarchy.from_levels([(np.eye(3), np.ones(3)), (np.eye(3)[:2], np.ones(2))], give=give)
 
 
 def test_a_stack_takes_it_by_the_name_of_a_task_in_any_order():
@@ -182,3 +146,90 @@ def test_explain_says_what_gives_how_much_and_for_whom():
     h = problem(1, 0.1)
     with pytest.raises(HierarchyError, match="explain: 1 units for 14 rows"):
         explain(h, make("hcod").solve(h), units=["m"])
+
+
+EVERY_STRICT = [make(name) for name in names() if make(name).strict]
+INEQUALITIES = [r for r in EVERY_STRICT if r.handles == "inequalities"]
+BOUNDS = [r for r in EVERY_STRICT if r.handles == "bounds"]
+every = pytest.mark.parametrize("resolver", EVERY_STRICT, ids=lambda r: r.label)
+
+
+def metric(rng, n):
+    """A metric whose eigenvalues are 0.01 to 100."""
+    Q = np.linalg.qr(rng.normal(size=(n, n)))[0]
+    return (Q * np.geomspace(0.01, 100.0, n)) @ Q.T
+
+
+def three_levels(rng, n=7, repeated=True):
+    """Levels of which one repeats a row of the first, with another target."""
+    A = [rng.normal(size=(m, n)) for m in (2, 2, 1)]
+    if repeated:
+        A[1][0] = A[0][1]
+    return [(rows, rng.normal(size=len(rows))) for rows in A]
+
+
+def closed_form(levels, reference, W):
+    """Level by level with weighted pseudoinverses, by another route than a change of variables.
+
+    x + N z with N a basis of the freedom left; the last step is the one of least z^T N^T W N z.
+    """
+    x, N = np.zeros(len(W)), np.eye(len(W))
+    for A, b in levels:
+        U, s, Vt = np.linalg.svd(A @ N)
+        rank = int((s > 1e-10).sum())
+        x = x + N @ (Vt[:rank].T @ ((U[:, :rank].T @ (b - A @ x)) / s[:rank]))
+        N = N @ Vt[rank:].T
+    return x + N @ np.linalg.solve(N.T @ W @ N, N.T @ W @ (reference - x))
+
+
+@every
+def test_the_answer_is_the_nearest_in_the_metric(resolver):
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        levels, W, reference = three_levels(rng), metric(rng, 7), rng.normal(size=7)
+        h = Hierarchy.from_levels(levels, reference, metric=W)
+        res = resolver.solve(h)
+        assert res.status is Status.SOLVED
+        expected = closed_form(levels, reference, W)
+        np.testing.assert_allclose(res.x, expected, atol=100.0 * resolver.accuracy)
+        assert certify(h, res.x, 1e-6).certified
+        without = Hierarchy.from_levels(levels, reference)
+        np.testing.assert_allclose(h.violations(res.x), without.violations(expected), atol=1e-7)
+
+
+@pytest.mark.parametrize("resolver", INEQUALITIES, ids=lambda r: r.label)
+def test_inequalities_are_resolved_in_a_metric(resolver):
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        W, reference, A = metric(rng, 6), rng.normal(size=6), rng.normal(size=(3, 6))
+        box = np.eye(6), np.full(6, -0.3), np.full(6, 0.3)
+        h = Hierarchy.from_levels([box, (A, rng.normal(size=3))], reference, metric=W)
+        res, exact = resolver.solve(h), make("hcod").solve(h)
+        assert res.status is Status.SOLVED
+        assert certify(h, exact.x).certified
+        np.testing.assert_allclose(res.x, exact.x, atol=1e-6)
+        warm = resolver.solve(h, res.memory)
+        np.testing.assert_allclose(warm.x, exact.x, atol=1e-6)
+
+
+@pytest.mark.parametrize("resolver", BOUNDS, ids=lambda r: r.label)
+def test_resolvers_of_bounds_take_them_with_a_diagonal_metric_alone(resolver):
+    rng = np.random.default_rng(6)
+    A, b = rng.normal(size=(2, 4)), np.array([0.5, -0.2])
+    box = np.eye(4), np.full(4, -1.0), np.full(4, 1.0)
+    diagonal = Hierarchy.from_levels([box, (A, b)], metric=np.diag([1.0, 4.0, 9.0, 2.0]))
+    np.testing.assert_allclose(resolver.solve(diagonal).x, make("hcod").solve(diagonal).x,
+                               atol=1e-8)
+    dense = Hierarchy.from_levels([box, (A, b)], metric=metric(rng, 4))
+    with pytest.raises(HierarchyError, match=r"level 1, row 0: an inequality.*a bound on one"):
+        resolver.solve(dense)
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_metric_that_loses_definiteness_is_a_numerical_failure(name):
+    h = Hierarchy.from_levels([([[1.0, 0.3]], [1.0])], [1.0, 1.0], metric=np.eye(2))
+    h.metric[1, 1] = -1.0
+    res = make(name).solve(h)
+    assert res.status is Status.NUMERICAL_FAILURE
+    assert not res.x.any()
+    assert not certify(h, [1.0, 0.0]).certified

@@ -1,11 +1,12 @@
-"""`hcod`: answers by hand, words for what holds back, how it ends, levels and rows of any size."""
+"""`hcod`: answers by hand, words for what holds back, its own check, rows of any size."""
 
 import numpy as np
 import pytest
 from rank_cases import family
 
-from hierarchy import Hierarchy
+from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, explain, make
+from solvers.problems import structured
 
 INF = np.inf
 HCOD = make("hcod")
@@ -27,7 +28,6 @@ def test_an_answer_found_by_hand():
     assert res.multipliers[:2] == pytest.approx([1.5, 0.75])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("limit", [1, 3, 6, 11])
 def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
     resolver = make("hcod", max_iterations=limit)
@@ -44,18 +44,32 @@ def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
         assert h.names[k] in explain(h, res)
 
 
-def test_explain_says_in_words_what_blocks_what():
-    h = two_joints()
-    text = explain(h, HCOD.solve(h)).splitlines()
-    assert text[0] == "limits is met."
-    assert text[1] == ("hand is missed by 1.5: held back by limits row 0 at its upper side and "
-                       "row 1 at its upper side.")
-    assert text[2].startswith("posture is missed by 1.25: held back by")
+BOX = Hierarchy.from_levels([(np.eye(3), np.full(3, -1.0), np.ones(3)),
+                             ([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]], [5.0, 0.5])])
+
+
+def test_a_solved_answer_is_verified_from_its_active_rows_and_no_other_is():
+    for seed in range(700, 740):
+        h = structured(seed)
+        res = HCOD.solve(h)
+        assert res.verified(h) == (res.status is Status.SOLVED)
+    res = HCOD.solve(BOX)
+    none = res.memory.copy()
+    none[:BOX.m] = 0.0
+    assert res.verified(BOX)
+    assert not res.verified(BOX.changed(upper=BOX.upper + 0.1 * (BOX.upper > BOX.lower)))
+    for x, memory in ((res.x + 1e-6, res.memory), (res.x, none)):
+        assert not type(res)(x, res.status, memory).verified(BOX)
+    with pytest.raises(HierarchyError, match=r"certify\(h, x\)"):
+        make("weighted").solve(BOX).verified(BOX.changed(metric=np.eye(3)))
 
 
 X, Y = ([[1.0, 0.0]], [0.0]), ([[0.0, 1.0]], [0.0])
 STRAIGHT = np.array([[0.0, 0.0], [0.6, 0.3], [0.8, 0.4]])  # rows x, y, z of a straight arm
 EXPLAINED = {
+    "a box": ([(np.eye(2), [-1.0] * 2, [1.0] * 2), ([[1.0, 0.5]], [3.0])],
+              ["level 1 is met.", "level 2 is missed by 1.5: held back by level 1 row 0 at its "
+               "upper side and row 1 at its upper side."]),
     "equalities, and rows that disagree": (
         [([[1.0, 0.0]], [1.0]), ([[1.0, 0.0]], [2.0]), (np.zeros((0, 2)), []),
          ([[0.0, 1.0], [0.0, 1.0]], [0.0, 1.0])],

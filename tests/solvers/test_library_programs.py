@@ -38,7 +38,6 @@ needs_c = pytest.mark.skipif(COMPILER is None, reason="no compiler of C")
 LIBM = {"hypot", "memset", "memcpy"}  # all that the library asks for
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("nm") is None, reason="no nm")
 def test_it_asks_for_nothing_but_libm_and_owns_no_variable(folder):
     done = subprocess.run(["nm", folder / "lib" / "libtask_hierarchy.a"], capture_output=True,
@@ -81,7 +80,6 @@ def compiler_of(name):
     return found
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ONCE)
 def test_the_examples_of_one_call_compile_without_a_warning_and_run(folder, tmp_path, name):
     once = built(tmp_path / "once", EXAMPLES / name, folder, *ONCE[name],
@@ -97,7 +95,6 @@ def replay(folder, tmp_path_factory):
                  "-std=c99", *STRICT)
 
 
-@pytest.mark.slow
 def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(replay, tmp_path):
     pytest.importorskip("mujoco")
     recorded.main("stand-push", tmp_path / "ticks", 15)
@@ -106,7 +103,6 @@ def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(replay
         "0 unsolved")
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(CXX is None, reason="no compiler of C++")
 def test_the_controller_of_ros2_control_sends_what_python_sends(folder, tmp_path):
     """Against stub headers: the same arm, tasks and period, with two writers of the rows."""
@@ -130,7 +126,6 @@ def test_the_controller_of_ros2_control_sends_what_python_sends(folder, tmp_path
 
 
 @needs_c
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")
 @pytest.mark.parametrize("linked", ["task_hierarchy", "shared"])
 def test_cmake_finds_it(folder, tmp_path, linked):
@@ -146,7 +141,6 @@ def test_cmake_finds_it(folder, tmp_path, linked):
 
 
 @needs_c
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "resolver"), [("INEQ7", "hcod"), ("EQ7", "tpm")])
 def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, name, resolver):
     record_sequence(tmp_path / "ticks", sequence(family(name)[0].h, 100))
@@ -157,7 +151,6 @@ def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, na
 
 
 @needs_c
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "words"), [("loop.c", "6000 ticks, 0 braked, speeds"),
                                              ("once.cpp", "status 0, x = 0.9 0.1")])
 def test_the_examples_pass_the_address_sanitizer(folder, tmp_path, name, words):
@@ -167,7 +160,6 @@ def test_the_examples_pass_the_address_sanitizer(folder, tmp_path, name, words):
     assert said(program).startswith(words)
 
 
-@pytest.mark.slow
 def test_check_compares_the_kernels(folder, tmp_path, capsys):
     assert run_command(["library", "--check", "--out", str(folder)]) == 0
     assert "same kernels" in capsys.readouterr().out
@@ -183,7 +175,6 @@ def test_check_compares_the_kernels(folder, tmp_path, capsys):
     assert f"those installed have {digest}" in capsys.readouterr().err
 
 
-@pytest.mark.slow
 def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and_for_arm(
         tmp_path, capsys):
     out, here = tmp_path / "lib", os.uname().machine == "x86_64"

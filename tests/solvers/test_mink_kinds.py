@@ -1,5 +1,7 @@
 """Every kind of task, constraint and limit that mink has, on a floating robot with two arms."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -12,28 +14,12 @@ from solvers.adapters.for_mink import solve_ik
 mink, mujoco = pytest.importorskip("mink"), pytest.importorskip("mujoco")
 
 DT = 0.01
-ARM = """
-<body name="{side}_upper" pos="0 {y} 0.3">
-  <joint name="{side}_a" axis="0 1 0" range="-2 2"/><geom name="{side}_g" type="capsule" size="0.03"
-   fromto="0 0 0 0.25 0 0"/>
-  <body name="{side}_fore" pos="0.25 0 0">
-    <joint name="{side}_b" axis="0 0 1" range="-2 2"/>
-    <joint name="{side}_c" axis="0 1 0" range="-2 2"/>
-    <geom name="{side}_h" type="capsule" size="0.03" fromto="0 0 0 0.25 0 0"/>
-    <site name="{side}_tip" pos="0.25 0 0"/>
-  </body>
-</body>"""
-ROBOT = f"""<mujoco><compiler angle="radian"/><worldbody>
-<body name="trunk" pos="0 0 1"><freejoint name="base"/>
-<geom type="box" size="0.1 0.2 0.3"/>{ARM.format(side="left", y=0.25)}
-{ARM.format(side="right", y=-0.25)}</body></worldbody><equality>
-<connect body1="left_fore" body2="right_fore" anchor="0.2 0 0"/>
-<joint joint1="left_b" joint2="right_b" polycoef="0.1 1 0 0 0"/></equality></mujoco>"""
+ROBOT = Path(__file__).parents[1] / "data" / "robots" / "two_arms.xml"
 
 
 @pytest.fixture
 def configuration():
-    model = mujoco.MjModel.from_xml_string(ROBOT)
+    model = mujoco.MjModel.from_xml_path(str(ROBOT))
     q = mujoco.MjData(model).qpos.copy()
     q[7:] = [0.3, -0.4, 0.6, 0.2, 0.5, 0.7]
     return mink.Configuration(model, q=q)

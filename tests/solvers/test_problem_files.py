@@ -7,10 +7,13 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import pinned
 import pytest
+from hypothesis import given, settings
 
 from hierarchy import Hierarchy, HierarchyError
-from solvers import make, problems
+from solvers import certify, make, problems
+from solvers.problems import KINDS, Recipe, structured
 from solvers.problems.files import Collection, Head, ProblemFileError, read
 from solvers.proof import prove
 
@@ -44,7 +47,6 @@ def test_a_file_has_what_was_written_to_the_last_bit(collection, file):
         assert one.judged == other.judged
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
 def test_the_reader_in_cpp_finds_the_same_numbers(collection, file, tmp_path):
     program = tmp_path / "reader"
@@ -162,3 +164,36 @@ def test_a_metric_and_levels_that_give_cannot_be_written(tmp_path, what, said):
     h = Hierarchy.from_levels([([[1.0]], [1.0])], **what)
     with pytest.raises(HierarchyError, match=f"problem 0 {said}"):
         Collection(Head("one", "", "public", 0), (h,)).save(tmp_path / "one.npz")
+
+
+@pytest.mark.parametrize(("knob", "value"), [
+    ("joints", (0, 5)), ("joints", (5, 2)), ("rows", (-1, 3)), ("spread", 0.5), ("ties", 1.5),
+    ("scales", (1.0, np.inf)), ("empty", float("nan"))])
+def test_a_knob_out_of_range_is_named(knob, value):
+    with pytest.raises(HierarchyError, match=f"recipe: {knob} = "):
+        Recipe(**{knob: value})
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(problems.strategy(Recipe(joints=(1, 8), levels=(1, 4), rows=(0, 6), equalities_only=True)))
+def test_hypothesis_draws_the_same_kind_of_problem(h):
+    assert h.n <= 8
+    assert certify(h, make("tpm").solve(h).x).certified
+
+
+def test_a_seed_means_the_problem_that_it_meant_when_it_was_reported():
+    expected = pinned.read("problems")
+    for kind, sums in pinned.problem_sums().items():
+        allowed = 1e-6 if kind == "bounded" else 1e-10  # a box lies around a solution, as rounded
+        assert sums == pytest.approx(expected.pop(kind), rel=0.0, abs=allowed), kind
+    assert not expected
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_is_a_valid_hierarchy_also_of_equalities_alone(kind):
+    for seed in range(10):
+        h = structured(seed, (kind,))
+        Hierarchy.from_levels(list(h.levels()), h.reference)
+        assert structured(seed, (kind,), equalities_only=True).is_equality
+    with pytest.raises(HierarchyError, match="'arms'"):
+        structured(0, ("arms",))

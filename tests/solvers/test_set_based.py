@@ -1,4 +1,4 @@
-"""Set-based tasks against the few lines of Moe et al. (2016), on planar arms."""
+"""Set-based tasks and smooth activation against their papers in a few lines."""
 
 from itertools import combinations
 
@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from hierarchy import Hierarchy, HierarchyError
+from hierarchy.activation import activation
 from solvers import Status, make
 from solvers.resolvers.set_based import SetBased
 from solvers.resolvers.settled import Settled
@@ -15,19 +16,11 @@ SET_BASED = SetBased(inner=make("recursive"))
 INF = np.inf
 
 
-def tip(q):
-    """Position (2,) of the tip of a planar arm of links of length 1, and its Jacobian (2, n)."""
+def jacobian(q):
+    """Jacobian (2, n) of the tip of a planar arm of links of length 1."""
     angles = np.cumsum(q)
-    J = np.array([[-np.sin(angles[j:]).sum() for j in range(len(q))],
-                  [np.cos(angles[j:]).sum() for j in range(len(q))]])
-    return np.array([np.cos(angles).sum(), np.sin(angles).sum()]), J
-
-
-def in_tangent_cone(rate, value, least, most):
-    """in_T_RC of the paper: whether a rate is in the extended tangent cone."""
-    if least < value < most:
-        return True
-    return rate >= -1e-9 if value <= least else rate <= 1e-9
+    return np.array([[-np.sin(angles[j:]).sum() for j in range(len(q))],
+                     [np.cos(angles[j:]).sum() for j in range(len(q))]])
 
 
 def pseudoinverse(M):
@@ -37,8 +30,9 @@ def pseudoinverse(M):
 
 
 def by_the_paper(sets, tasks, n):
-    """Resolve with set-based tasks (J, value, least, most) above equality tasks (J, rate).
+    """Resolve with set-based tasks (J, sign) at bounds above equality tasks (J, rate).
 
+    The rate of a set-based task may have its sign: the extended tangent cone of the paper.
     All modes in the paper's order, from none frozen to all; each by null-space projections.
     """
     for count in range(len(sets) + 1):
@@ -48,7 +42,7 @@ def by_the_paper(sets, tasks, n):
                 inverse = pseudoinverse(J @ N)
                 x = x + inverse @ (rate - J @ x)
                 N = N - inverse @ J @ N
-            if all(in_tangent_cone(float(J[0] @ x), *bounds) for k, (J, *bounds) in enumerate(sets)
+            if all(sign * (J[0] @ x) >= -1e-9 for k, (J, sign) in enumerate(sets)
                    if k not in frozen):
                 return x, frozen
     raise AssertionError("the last mode has no condition")
@@ -56,22 +50,19 @@ def by_the_paper(sets, tasks, n):
 
 def as_rows(sets, tasks):
     """The same problem as a Hierarchy: one level of tangent cones, then the equalities."""
-    sides = [(0.0, INF) if value <= least else (-INF, 0.0) if value >= most else (-INF, INF)
-             for _, value, least, most in sets]
-    rows = np.vstack([J for J, *_ in sets])
+    sides = [(0.0, INF) if sign > 0.0 else (-INF, 0.0) for _, sign in sets]
+    rows = np.vstack([J for J, _ in sets])
     return Hierarchy.from_levels([(rows, *np.array(sides).T), *tasks])
 
 
-def problems(count, inside=0.0):
+def problems(count):
     """Random arms with joint limits, a wall for the tip, and a rate asked of the tip."""
     rng = np.random.default_rng(7)
     for _ in range(count):
         n = int(rng.integers(4, 7))
-        q = rng.uniform(-2.0, 2.0, n)
-        J = tip(q)[1]
+        J = jacobian(rng.uniform(-2.0, 2.0, n))
         rows = [np.eye(n)[[j]] for j in rng.permutation(n)[:2]] + [J[:1]]
-        values = np.where(rng.random(3) < inside, 0.5, rng.choice([0.0, 1.0], 3))
-        sets = [(row, float(value), 0.0, 1.0) for row, value in zip(rows, values, strict=True)]
+        sets = list(zip(rows, rng.choice([-1.0, 1.0], 3), strict=True))
         yield sets, [(J, rng.normal(size=2)), (np.eye(n)[-1:], rng.normal(size=1))], n
 
 
@@ -147,3 +138,97 @@ def test_levels_below_do_not_move_what_a_level_settled_on(inner):
         [limits, (A, b), (np.eye(6), np.ones(6))], names=["limits", "a", "posture"])).x
     np.testing.assert_allclose(A @ both, A @ alone, atol=1e-5)
     assert np.linalg.norm(both - alone) > 1e-3
+
+
+LAMBDA, THRESHOLD, ETA = 1e-4, 1e-2, 10.0
+SMOOTH = make("smooth")
+
+
+def activated_pseudoinverse(X, A, Q):
+    """X^(#,A,Q) of the paper, with the singular values and vectors of the matrix inverted."""
+    n = len(Q)
+    M = X.T @ A @ X + ETA * (np.eye(n) - Q).T @ (np.eye(n) - Q)
+    _, s, V = np.linalg.svd(M)
+    P = np.diag([LAMBDA * (1 + np.cos(np.pi * one / THRESHOLD)) / 2 if one < THRESHOLD else 0.0
+                 for one in s])
+    return np.linalg.pinv(M + V.T @ P @ V) @ X.T @ A @ A
+
+
+def by_simetti_and_casalino(levels, n):
+    """The recursion of the paper over (J, activations, rates) with all rows, and the identity."""
+    rho, Q, one = np.zeros(n), np.eye(n), np.eye(n)
+    for J, a, rate in [*levels, (one, np.ones(n), np.zeros(n))]:
+        A, X = np.diag(a), J @ Q
+        W = X @ activated_pseudoinverse(X, A, Q)
+        T = one - Q @ activated_pseudoinverse(X, A, one) @ W @ J
+        rho, Q = (T @ rho + Q @ activated_pseudoinverse(X, A, one) @ W @ rate,
+                  Q @ (one - activated_pseudoinverse(X, A, one) @ X))
+    return rho
+
+
+def problem(rng, n, sizes, choices):
+    """Random rows of unit size, with activations of which some are exactly 0 or 1."""
+    levels = [(rng.normal(size=(m, n)), rng.normal(size=m)) for m in sizes]
+    acts = [np.where(rng.random(m) < 0.5, rng.choice(choices, m), rng.random(m)) for m in sizes]
+    return levels, acts
+
+
+def solved(levels, acts, resolver=SMOOTH):
+    return resolver.solve_activated(Hierarchy.from_levels(levels), np.concatenate(acts))
+
+
+def test_the_answer_is_that_of_the_paper_with_all_its_matrices():
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        levels, acts = problem(rng, 7, rng.integers(1, 5, 3), [0.0, 1.0])
+        want = by_simetti_and_casalino(
+            [(J, a, rate) for (J, rate), a in zip(levels, acts, strict=True)], 7)
+        found = solved(levels, acts)
+        assert found.status is Status.SOLVED
+        np.testing.assert_allclose(found.x, want, atol=1e-7 * (1 + np.abs(want).max()))
+
+
+def test_near_a_singularity_it_is_regularised_as_in_the_paper():
+    rng = np.random.default_rng(4)
+    for scale in (1e-1, 1e-2, 1e-3, 0.0):
+        row = rng.normal(size=(1, 4))
+        J = np.vstack([row, row + scale * rng.normal(size=(1, 4))])
+        levels, acts = [(J, rng.normal(size=2)), (rng.normal(size=(1, 4)), [1.0])], [[1, 0.7], [1]]
+        want = by_simetti_and_casalino([(*levels[0][:1], np.array(acts[0]), levels[0][1]),
+                             (levels[1][0], np.ones(1), np.ones(1))], 4)
+        np.testing.assert_allclose(solved(levels, list(map(np.array, acts))).x, want,
+                                   atol=1e-6 * (1 + np.abs(want).max()))
+        assert np.abs(want).max() < 1e4
+
+
+def test_the_activation_is_one_at_the_bound_zero_beyond_the_buffer_and_has_no_kink():
+    error = np.array([-0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.9])  # to the far end of a buffer of 0.4
+    found = activation(error, 0.4)
+    np.testing.assert_allclose(found[[0, 1, 3, 5, 6]], [0.0, 0.0, 0.5, 1.0, 1.0], atol=1e-15)
+    assert (np.diff(found) >= 0.0).all()
+    step = 1e-5
+    slopes = np.diff(activation(np.array([-step, 0.0, step, 0.4 - step, 0.4, 0.4 + step]), 0.4))
+    np.testing.assert_allclose(slopes[[0, 1, 3, 4]] / step, 0.0, atol=1e-3)
+
+
+def test_what_has_no_answer_is_refused_or_has_a_status():
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [INF])], names=["walls"])
+    with pytest.raises(HierarchyError, match=r"walls, row 0: an inequality.*activation"):
+        SMOOTH.solve(h)
+    with pytest.raises(HierarchyError, match=r"walls, row 0: activation 1\.5 is outside 0 \.\. 1"):
+        SMOOTH.solve_activated(h, np.array([1.5]))
+    below = Hierarchy.from_levels([(np.eye(2), np.zeros(2)), (np.eye(2), np.zeros(2))],
+                                  names=["walls", "tip"])
+    with pytest.raises(HierarchyError, match=r"tip, row 1: activation -1\.0 is outside 0 \.\. 1"):
+        SMOOTH.solve_activated(below, np.array([1.0, 0.5, 0.0, -1.0]))
+    with pytest.raises(HierarchyError, match=r"shape \(2,\), expected \(1,\)"):
+        SMOOTH.solve_activated(h, np.ones(2))
+    with pytest.raises(HierarchyError, match="eta = 0"):
+        make("smooth", eta=0.0)
+    rows = Hierarchy.from_levels([([[1.0, 0.0]], [0.0])])
+    for spoilt, array, value in ((h, h.lower, np.nan), (rows, rows.A, np.nan),
+                                 (rows, rows.A, np.inf)):
+        array[0] = value
+        found = SMOOTH.solve_activated(spoilt, np.ones(1))
+        assert found.status is Status.NUMERICAL_FAILURE
+        assert (found.x == 0.0).all()

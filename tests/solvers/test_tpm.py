@@ -115,6 +115,15 @@ def test_bounds_that_exclude_each_other_give_the_point_of_least_violation():
     assert res.scaling[0] == 0.0
 
 
+@pytest.mark.parametrize("name", ["tpm", "hcod", "hqp", "sns"])
+def test_bounds_are_never_damped(name):
+    """Else a joint that must move away from its limit would do so only in part."""
+    low, up = np.array([0.02, -1.0]), np.array([1.0, 1.0])
+    h = Hierarchy.from_levels([(np.eye(2), low, up), ([[1.0, 1.0]], [0.0])])
+    x = make(name, damping=0.05, threshold=0.1).solve(h).x
+    assert ((low - 1e-7 <= x) & (x <= up + 1e-7)).all()
+
+
 @pytest.mark.parametrize("name", ["tpm", "hcod"])
 def test_a_joint_that_a_light_row_fixes_among_bounds_is_not_damped(name):
     """x_1 was 0.02: the light equality counted as a task near a singularity."""

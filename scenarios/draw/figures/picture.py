@@ -17,7 +17,7 @@ from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.recording.facts import RobotFacts
 from scenarios.recording.recording import Recording
-from scenarios.scene import ends, place
+from scenarios.scene import ends, placed_points
 
 _VERTICES = 800
 _OTHER_POSES = 5
@@ -135,7 +135,7 @@ def _arms(ax: Axes, robot: RobotFacts, recording: Recording) -> None:
         if k == nearest:
             ax.plot(*chain.T, "o", color=INK, markersize=6)
             points = robot.points[:-1]
-            body = place(placements, [p.joint for p in points], [p.offset for p in points])
+            body = placed_points(placements, [p.joint for p in points], [p.offset for p in points])
             if len(body):
                 ax.plot(*drawing.project(body).T, "o", color=ALERT, markersize=3)
             centres = _obstacles_at(recording, k).centres
