@@ -79,7 +79,8 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
         best = min(best, found, key=lambda one: one[0])
     if max(best[0]) > until:
         best = search.descend(best[1], search.settled, _AT_REST)
-    return search.answer(best[1], iterations + best[2], count)
+        iterations += best[2]
+    return search.answer(best[1], iterations, count)
 
 
 def stacked(robot: Robot, tasks: Sequence[Task], period: float, limits: Sequence[Task],

@@ -50,6 +50,5 @@ class Row(IntEnum):
 SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, BACKEND_FAILURE, INACCURATE = map(int, Status)
 UNPROVED = 7        # no active set was verified: another kernel takes over
 TOO_SMALL = 8       # the work space is too small; nothing was computed
-TURNED = 9          # verified for rows that were turned within rank_tolerance, not for all such
 CONTRADICTION = 10  # two bounds on one unknown contradict each other
 FREE, UPPER, LOWER, EQUAL = map(int, Row)

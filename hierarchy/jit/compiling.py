@@ -60,9 +60,10 @@ def _allocates(function: Kernel) -> bool:
     One that does not needs no reference counts; without them a call costs half (7 arrays: 0.15 us
     in place of 0.3), and a view of a row nothing.
     """
-    names = function.__code__.co_names
-    return not _MAKERS.isdisjoint(names) or any(
-        getattr(function.__globals__.get(name), "allocates", False) for name in names)
+    names, known = set(function.__code__.co_names), function.__globals__
+    kernels = {name for name in names if hasattr(known.get(name), "allocates")}
+    return (not _MAKERS.isdisjoint(names - kernels)
+            or any(known[name].allocates for name in kernels))
 
 
 if hasattr(os, "register_at_fork"):  # a child of a thread that waits would wait for ever

@@ -49,7 +49,6 @@ from solvers.status import (
     NUMERICAL_FAILURE,
     SOLVED,
     TOO_SMALL,
-    TURNED,
     UNPROVED,
 )
 
@@ -215,9 +214,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
         steps, blocks = steps + tries + more, blocks + tries
     elif code not in (SOLVED, NUMERICAL_FAILURE):
         finished = s.count[FINISHED]
-        keeps = code != TURNED and (
-            finished == sizes.size or (code == UNPROVED and finished > 0))
-        for c in range(n if keeps else 0):
+        for c in range(n if finished == sizes.size or (code == UNPROVED and finished > 0) else 0):
             x[c] = saved[c]
         code = ZERO + (ITERATION_LIMIT if steps >= most else INACCURATE)
     _keep(s, record, blocks, steps - blocks)
@@ -274,7 +271,7 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
             write_multipliers(s, MET)
             for c in range(n):
                 s.x[c] = x[c]
-            proved = verify(s, YES) == SOLVED and not neglects(s)
+            proved = verify(s, YES) and not neglects(s)
     return ZERO + (SOLVED if proved else INACCURATE if code == SOLVED else code)
 
 
@@ -322,11 +319,8 @@ def _resumed_at(number, levels):
 
 @inlined
 def _verified(s, code, factored):
-    """Return the code of a search; where it is SOLVED, that of its claims, INACCURATE if none."""
-    if code == SOLVED:
-        code = verify(s, factored)
-        code = ZERO + INACCURATE if code == UNPROVED else code
-    return code
+    """Return the code of a search: INACCURATE in place of SOLVED if its claims are no proof."""
+    return ZERO + (INACCURATE if code == SOLVED and not verify(s, factored) else code)
 
 
 @inlined

@@ -111,9 +111,8 @@ def _points_inward(s):
 def pivot_in_blocks(s, limit, keep):
     """Change all wrong rows at once while their number falls; return the code and the tries.
 
-    SOLVED and TURNED are verified; INACCURATE: nothing is wrong, but that is not verified;
-    UNPROVED: the number does not fall. With `keep` the working set is then the one that it began
-    with.
+    SOLVED is verified; INACCURATE: nothing is wrong, but that is not verified; UNPROVED: the number
+    does not fall. With `keep` the working set is then the one that it began with.
     """
     levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, PATIENCE, ZERO
     _copy_states(s, STATE, SEED)
@@ -121,9 +120,8 @@ def pivot_in_blocks(s, limit, keep):
         tries += 1
         meet(s, levels)
         write_multipliers(s, MET)
-        code = verify(s, YES) if not _points_inward(s) else ZERO + UNPROVED
-        if code != UNPROVED:
-            return code, tries
+        if not _points_inward(s) and verify(s, YES):
+            return ZERO + SOLVED, tries
         found = judge(s, levels, ZERO - 1)
         if found.wrong == 0:
             return ZERO + INACCURATE, tries

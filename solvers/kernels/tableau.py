@@ -222,6 +222,8 @@ def is_independent(t, i, square):
         return True
     if share > NEGLIGIBLE:
         s.number[CUT, i] = max(s.number[CUT, i], share * norm)
+        for c in range(s.x.size):  # noted, not cut
+            s.C[i, c] = s.A[i, c]
     return False
 
 

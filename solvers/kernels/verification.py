@@ -22,7 +22,7 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.multipliers import refine
-from solvers.kernels.rows import ZERO, length_of
+from solvers.kernels.rows import length_of
 from solvers.kernels.tolerances import (
     BAND,
     CANCELLED,
@@ -42,7 +42,6 @@ from solvers.kernels.tolerances import (
 from solvers.kernels.working_set import (
     CHANGE,
     CUT,
-    DIRTY,
     FIRST,
     GRADIENT,
     LOWER,
@@ -59,7 +58,7 @@ from solvers.kernels.working_set import (
     WHOLE,
     row_times_x,
 )
-from solvers.status import EQUAL, FREE, SOLVED, TURNED, UNPROVED
+from solvers.status import EQUAL, FREE
 
 # What is known of an inequality that acts: nothing, a weak multiplier decided, decided.
 OPEN, WEAKLY, DECIDED = range(3)
@@ -67,27 +66,17 @@ OPEN, WEAKLY, DECIDED = range(3)
 
 @compiled
 def verify(s, factored):
-    """Return SOLVED if the claims of a working set prove its x, else UNPROVED.
+    """Whether the claims of a working set prove its x.
 
-    TURNED if they do for the rows as cut, but what was cut may decide the sign of a multiplier: of
-    two problems within `rank_tolerance`, x is optimal for one, and no search decides for which.
     factored: whether `meet` has factored this set, so that its multipliers can be refined.
     """
-    reach, code = 1.0 + length_of(s.x), ZERO + UNPROVED
-    if np.isfinite(reach) and _rows_hold(s, reach):
-        if _all_balance(s, reach, factored, 1.0):
-            code = ZERO + SOLVED
-        elif s.count[DIRTY] == 1 and _rows_hold(s, reach) and _all_balance(s, reach, factored, 0.0):
-            code = ZERO + TURNED
-    return code
-
-
-@inlined
-def _all_balance(s, reach, factored, doubt):
-    """Whether (2) and (3) hold for all levels, down to one that sets all of x; see `_balances`."""
-    levels, whole, proved = s.multiplier.shape[0] - 1, s.count[WHOLE], True
+    levels, whole = s.multiplier.shape[0] - 1, s.count[WHOLE]
+    reach = 1.0 + length_of(s.x)
+    if not np.isfinite(reach) or not _rows_hold(s, reach):
+        return False
+    proved = True
     for p in range(levels + 1 if whole < 0 else whole + 1):
-        proved = proved and _balances(s, p, reach, factored, doubt)
+        proved = proved and _balances(s, p, reach, factored)
     return proved
 
 
@@ -150,11 +139,8 @@ class Level(NamedTuple):
 
 
 @inlined
-def _balances(s, p, reach, factored, doubt):
-    """Whether (2) and (3) hold for level p.
-
-    doubt: share of what was cut that may decide a sign.
-    """
+def _balances(s, p, reach, factored):
+    """Whether (2) and (3) hold for level p, for the rows as cut; no sign hangs on what was cut."""
     last = p == s.multiplier.shape[0] - 1
     level = _measured(s, p, last)
     met = not last and level.missed <= BAND * reach
@@ -174,7 +160,7 @@ def _balances(s, p, reach, factored, doubt):
     holds = (not outside and rest <= allowed
              and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     left = length_of(s.number[GRADIENT, :s.x.size])
-    unsure = SIGN_MARGIN * (left + rounding + doubt * turned) / s.scalar[PIVOT]
+    unsure = SIGN_MARGIN * (left + rounding + turned) / s.scalar[PIVOT]
     holds = holds and _signs_hold(s, level, unsure, reach, allowed)
     if holds:
         _decide(s, level, unsure, reach)
