@@ -25,9 +25,8 @@ Double precision sets two limits. First, rows that agree up to an angle of `para
 dependent: a direction that only their difference can see is free, and lower levels may use it.
 Their span is then known only up to that angle, so x may be right under either reading, with angles
 from a tenth of `parallel` to four times it, or for rows turned by no more than it that are exactly
-dependent. Second, a row smaller than 1e-13 of the largest row
-of its level is dust, which rounding in the large row could have produced: an x that meets it is
-accepted, and so is one that ignores it.
+dependent. Second, a row smaller than 1e-13 of the largest row of its level is dust, which rounding
+in the large row could have produced: an x that meets it is accepted, and so is one that ignores it.
 
 The smallest change is a non-negative least-squares problem in coordinates that put large rows
 first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
@@ -35,7 +34,7 @@ first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -166,16 +165,14 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
     with np.errstate(all="ignore"):
         slack = h.slacks(x)
         h, x = _euclidean(h, np.asarray(x, dtype=np.float64))
-        pairs = list(zip(h.offsets[:-1].tolist(), h.offsets[1:].tolist(), strict=True))
-        violations = np.array([_length(slack[i:j]) for i, j in pairs])
+        violations = np.array([_length(slack[level]) for level in _levels(h)])
         rows = _Rows.of(h, x, tolerance)
         if rows is None:
-            unknown = np.full(len(pairs), np.inf)
+            unknown = np.full(len(violations), np.inf)
             return Certificate(unknown, unknown.copy(), np.inf, tolerance, h.names)
-        verdicts = (Certificate(violations, *_judged([read.part(slice(*pair)) for pair in pairs],
-                                                     x - h.reference, rows.reach, tolerance, angle),
-                                tolerance, h.names)
-                    for read, angle in _readings(h, x, rows, pairs, tolerance, parallel))
+        verdicts = (Certificate(violations, *_judged(levels, x - h.reference, rows.reach, tolerance,
+                                                     angle), tolerance, h.names)
+                    for levels, angle in _readings(h, x, rows, tolerance, parallel))
         first = next(verdicts)
         return first if first.certified else next((v for v in verdicts if v.certified), first)
 
@@ -210,29 +207,32 @@ def _euclidean(h: Hierarchy, x: Array) -> tuple[Hierarchy, Array]:
     return changed, L.T @ (x - h.reference)
 
 
-def _readings(h: Hierarchy, x: Array, rows: _Rows, pairs: Sequence[tuple[int, int]],
-              tolerance: float, parallel: float) -> Iterator[tuple[_Rows, float]]:
-    """Yield the rows that x may be optimal for, each with the angle up to which they depend."""
+def _levels(h: Hierarchy) -> list[slice]:
+    first, last = h.offsets[:-1].tolist(), h.offsets[1:].tolist()
+    return [slice(*pair) for pair in zip(first, last, strict=True)]
+
+
+def _readings(h: Hierarchy, x: Array, rows: _Rows, tolerance: float, parallel: float
+              ) -> Iterator[tuple[list[_Rows], float]]:
+    """Yield the levels that x may be optimal for, and the angle up to which their rows depend."""
+    levels = [rows.part(level) for level in _levels(h)]
     for factor in (1.0, *_EITHER):
-        yield rows, factor * parallel
-    turned = _Rows.of(_made_dependent(h, rows, pairs, parallel), x, tolerance)
+        yield levels, factor * parallel
+    turned = _Rows.of(_made_dependent(h, rows, parallel), x, tolerance)
     if turned is not None:
-        yield turned, _EXACTLY * parallel
+        yield [turned.part(level) for level in _levels(h)], _EXACTLY * parallel
 
 
-def _made_dependent(h: Hierarchy, rows: _Rows, pairs: Sequence[tuple[int, int]],
-                    parallel: float) -> Hierarchy:
+def _made_dependent(h: Hierarchy, rows: _Rows, parallel: float) -> Hierarchy:
     """Return h with those rows on a side exactly dependent that are so up to an angle.
 
     In each level the row with the largest remainder is independent, as long as there is one.
     """
     A, basis, on = h.A.copy(), np.empty((0, h.n)), rows.fixed | rows.upper | rows.lower
-    for first, last in pairs:
-        left = first + np.flatnonzero(on[first:last])
+    for level in _levels(h):
+        left = level.start + np.flatnonzero(on[level])
         while len(left) and len(basis) < h.n:
-            rest = rows.unit[left]
-            for _ in range(2):  # once more: of a row nearly in the span, rounding remains
-                rest = rest - (rest @ basis.T) @ basis
+            rest = _outside(rows.unit[left], basis)
             size = norm(rest, axis=1)
             chosen, near = int(np.argmax(size)), size <= parallel
             A[left[near]] -= rest[near] * np.exp(rows.size[left[near]])[:, None]
@@ -464,14 +464,19 @@ def _unrepeated(C: Array, terms: Array) -> Array:
     C, basis = C.copy(), np.empty((0, C.shape[1]))
     for i in np.argsort(-np.abs(C).max(axis=1, initial=0.0), kind="stable"):
         size = _length(C[i])
-        left = C[i] / size if size > 0.0 else C[i]
-        for _ in range(2):  # once more: of a row nearly in the span, rounding remains
-            left = left - (basis @ left) @ basis
+        left = _outside(C[i] / size if size > 0.0 else C[i], basis)
         if size * _length(left) <= _ROUNDING * _length(terms[i]):
             C[i] = 0.0
         else:
             basis = np.vstack([basis, left / _length(left)])
     return C
+
+
+def _outside(rows: Array, basis: Array) -> Array:
+    """Return what rows (.., n) have outside the span of an orthonormal basis (k, n)."""
+    for _ in range(2):  # once more: of a row nearly in the span, rounding remains
+        rows = rows - (rows @ basis.T) @ basis
+    return rows
 
 
 @final

@@ -21,7 +21,7 @@ from solvers.kernels.levels import pass_through_levels
 from solvers.kernels.multipliers import write_multipliers
 from solvers.kernels.rows import NO, YES, ZERO, all_equal, finish, length_of
 from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
-from solvers.kernels.space import matrix, vector
+from solvers.kernels.space import assign, matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
 from solvers.kernels.tolerances import LARGER, MET, PASS_STEPS, SOLVE_STEPS
@@ -85,14 +85,12 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
         return ZERO + TOO_SMALL
     reference, at = vector(work, ZERO, n)
     if all_equal(lower, upper):
-        for c in range(n):
-            reference[c] = x[c]
+        assign(reference, x)
         code = solve_by_staircase(A, lower, upper, sizes, x, settings, work[at:])
         if code != INACCURATE:
             _keep_staircase(lower, upper, record)
             return code
-        for c in range(n):
-            x[c] = reference[c]
+        assign(x, reference)
     return solve_exactly(A, lower, upper, sizes, x, record, settings, work[at:])
 
 
@@ -108,16 +106,14 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
     reference, at = vector(work, at, n)
     limits, at = vector(work, at, settings.size)
     inner, at = vector(work, at, 3 * (m + n) + 3)
-    for c in range(n):
-        reference[c] = x[c]
+    assign(reference, x)
     for c in range(settings.size):
         limits[c] = settings[c] if c != DAMPING else 0.0
     for i in range(record.size):
         record[i] = -1.0 if m <= i < 2 * m or i == 3 * m + 2 else 0.0
     met, staircase = open_damped(d, A, lower, upper, sizes, x, settings, work[at:])
     if met or staircase == NUMERICAL_FAILURE:
-        for c in range(n):
-            x[c] = d.free[c]
+        assign(x, d.free)
         _keep_staircase(lower, upper, record)
         return finish(x, staircase)
     whole = last >= 0 and d.factor[last] > 0.0
@@ -130,8 +126,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
             d.sizes[k] += n
         for i in range(3 * rows + 3):
             inner[i] = 0.0
-        for c in range(n):
-            x[c] = reference[c]
+        assign(x, reference)
         code = solve_hierarchy(d.A[:rows], d.lower[:rows], d.upper[:rows], d.sizes[:levels], x,
                                inner[:3 * rows + 3], limits, work[at:])
         if k <= last:
@@ -214,8 +209,8 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
         steps, blocks = steps + tries + more, blocks + tries
     elif code not in (SOLVED, NUMERICAL_FAILURE):
         finished = s.count[FINISHED]
-        for c in range(n if finished == sizes.size or (code == UNPROVED and finished > 0) else 0):
-            x[c] = saved[c]
+        if finished == sizes.size or (code == UNPROVED and finished > 0):
+            assign(x, saved)
         code = ZERO + (ITERATION_LIMIT if steps >= most else INACCURATE)
     _keep(s, record, blocks, steps - blocks)
     record[3 * m + 2] = -1.0
@@ -230,9 +225,8 @@ def _solve_with_light_rows(s, current, saved, limit):
 
     Else INACCURATE, with x as it was; and the tries in blocks and row by row.
     """
-    n, steps, largest = s.x.size, ZERO, LARGER * (1.0 + length_of(s.x))
-    for c in range(n):
-        saved[c] = s.x[c]
+    steps, largest = ZERO, LARGER * (1.0 + length_of(s.x))
+    assign(saved, s.x)
     s.count[FINISHED] = s.multiplier.shape[0]  # nothing else is saved
     restore(s)
     take_up(s)
@@ -243,8 +237,7 @@ def _solve_with_light_rows(s, current, saved, limit):
         code = _verified(s, code, YES)
     if code == SOLVED and length_of(s.x) <= largest:
         return code, tries, steps
-    for c in range(n):
-        s.x[c] = saved[c]
+    assign(s.x, saved)
     return ZERO + INACCURATE, tries, steps
 
 
@@ -259,8 +252,7 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
     if n + exact_size(n, m, sizes.size) > work.size:
         return ZERO + TOO_SMALL
     found, at = vector(work, ZERO, n)
-    for c in range(n):
-        found[c] = x[n + c]
+    assign(found, x[n:])
     s, code, _ = _open(A, lower, upper, sizes, found, record, settings, work[at:])
     for reading in range(1 + (s.count[NEGLECTED] > 0) if code == SOLVED else 0):
         if not proved:
@@ -269,8 +261,7 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
                 take_up(s)
             meet(s, sizes.size)
             write_multipliers(s, MET)
-            for c in range(n):
-                s.x[c] = x[c]
+            assign(s.x, x[:n])
             proved = verify(s, YES) and not neglects(s)
     return ZERO + (SOLVED if proved else INACCURATE if code == SOLVED else code)
 

@@ -17,7 +17,7 @@ import numpy as np
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.multipliers import INWARD, UNDECIDED, write_multipliers
 from solvers.kernels.rows import YES, ZERO, length_of
-from solvers.kernels.space import View
+from solvers.kernels.space import View, assign
 from solvers.kernels.tolerances import (
     MET,
     PATIENCE,
@@ -205,8 +205,7 @@ def save(s, saved, finished):
     """Keep x if it meets more levels than the one kept."""
     if finished > s.count[FINISHED]:
         s.count[FINISHED] = finished
-        for c in range(saved.size):
-            saved[c] = s.x[c]
+        assign(saved, s.x)
 
 
 @inlined

@@ -94,7 +94,7 @@ def fill(x, value):
 
 
 @inlined
-def assign(x, source):  # not `copy`: for `hierarchy.jit` that makes an array
+def assign(x, source):
     """Write the source into x, which has the size."""
     for c in range(x.size):
         x[c] = source[c]

@@ -20,7 +20,7 @@ import numpy as np
 
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product
 from solvers.kernels.rows import ZERO, swap
-from solvers.kernels.space import View, integers, matrix, vector
+from solvers.kernels.space import View, assign, integers, matrix, vector
 from solvers.kernels.tolerances import CLEAR_SQUARE, FLOOR, NEGLIGIBLE
 from solvers.kernels.working_set import (
     CUT,
@@ -222,8 +222,7 @@ def is_independent(t, i, square):
         return True
     if share > NEGLIGIBLE:
         s.number[CUT, i] = max(s.number[CUT, i], share * norm)
-        for c in range(s.x.size):  # noted, not cut
-            s.C[i, c] = s.A[i, c]
+        assign(s.C[i], s.A[i])  # noted, not cut
     return False
 
 
