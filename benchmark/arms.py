@@ -1,7 +1,5 @@
 """Random arms of six revolute joints, in batches, and configurations near a singularity."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -6,8 +6,6 @@ Problems of a reference family, each with its own targets and reference, are sol
 from a CPU.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.util import find_spec

@@ -1,7 +1,5 @@
 """The figures of the benchmarks: time against error, profiles, shares, bars, times over sizes."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

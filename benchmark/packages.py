@@ -98,7 +98,7 @@ def python_of(package: Package) -> str:
     raise MissingError(f"not installed; {INSTALL if package.requirements else 'pip install daqp'}")
 
 
-def install(packages: Iterable[Package] = PACKAGES) -> dict[str, str]:
+def install(packages: Iterable[Package]) -> dict[str, str]:
     """Make missing environments; return "" or the reason of a failure by name."""
     said = {}
     for package in packages:

@@ -1,7 +1,5 @@
 """The one runner: entrants in a process each, which take turns, and start again if they end."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

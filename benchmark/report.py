@@ -1,7 +1,5 @@
 """What a benchmark found: printed, written as CSV and figures, and as one HTML page."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from collections.abc import Mapping, Sequence

@@ -3,8 +3,6 @@
 Each number is measured in a new process.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import resource

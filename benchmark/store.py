@@ -1,7 +1,5 @@
 """Raw rows as lines of JSON, compressed: one file for each entrant and file of problems."""
 
-from __future__ import annotations
-
 import gzip
 import json
 from collections.abc import Iterable

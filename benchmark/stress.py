@@ -9,14 +9,12 @@ NUMBA_BOUNDSCHECK=1 (and a separate NUMBA_CACHE_DIR) a kernel that accesses memo
 arrays raises instead of corrupting memory.
 """
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import final
+from typing import Self, final
 
 import numpy as np
 
@@ -55,7 +53,7 @@ class Tally:
     lost: list[range] = field(default_factory=list)
     effort: Counter[int] = field(default_factory=Counter)
 
-    def add(self, other: Tally) -> None:
+    def add(self, other: Self) -> None:
         """Add the counts of another tally."""
         self.counts.update(other.counts)
         self.failing += other.failing

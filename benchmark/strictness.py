@@ -6,8 +6,6 @@ posture: the scene `step` of the packages' comparison, asked of every resolver t
 A resolver whose answer is clipped at the limits shows what a lack of strictness looks like.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """Tables of rows: on the screen, as HTML, as CSV. A column says how its cells are written."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

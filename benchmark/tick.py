@@ -1,7 +1,5 @@
 """Time of a whole tick of `ellipse`: sense, allocate, rows, resolve, integrate, record."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from time import perf_counter
 from typing import Any

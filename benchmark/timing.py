@@ -1,7 +1,5 @@
 """The machine, one core of it, and calls timed in turns, so that its noise affects all equally."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """A robot of ours as a URDF file, so that every package reads the same robot."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 

@@ -8,8 +8,6 @@ ARGUMENTS...] in JSON, is a call whose result is the next. ADAPTER is MODULE:NAM
 a class or function, OPTIONS its arguments in JSON.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

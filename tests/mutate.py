@@ -18,8 +18,6 @@ Not mutated: compiled kernels and the numbers they read (each mutant would compi
 checker reads, and solvers/batch/on_jax.py where jax is not installed.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import contextlib

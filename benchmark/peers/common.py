@@ -1,7 +1,5 @@
 """What pink and mink share, and steps until the error is small or does not fall, start by start."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

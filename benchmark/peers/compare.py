@@ -1,7 +1,5 @@
 """Packages that take turns of ticks, each in its own process, all on one core."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

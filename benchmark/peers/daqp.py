@@ -1,7 +1,5 @@
 """Inverse kinematics without a framework: pinocchio, numpy and DAQP's hierarchical call."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import daqp

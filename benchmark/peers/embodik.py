@@ -1,7 +1,5 @@
 """embodiK: its solver of velocities, with priorities and limits."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import embodik

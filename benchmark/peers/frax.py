@@ -4,8 +4,6 @@ As in its demonstration: pseudoinverse of the position's Jacobian, posture in it
 velocities clipped to their limits at the end. Its settings for a single core are those it advises.
 """
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as ET
 from pathlib import Path

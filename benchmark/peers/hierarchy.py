@@ -1,7 +1,5 @@
 """Our own ticks, State.move, Stack.hierarchy and Resolver.solve, and our inverse kinematics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

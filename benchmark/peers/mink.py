@@ -1,7 +1,5 @@
 """mink: like pink, with MuJoCo's kinematics."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

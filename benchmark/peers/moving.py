@@ -1,7 +1,5 @@
 """The scenes `ellipse` and `step`: a whole tick of inverse kinematics of an arm, judged."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, replace

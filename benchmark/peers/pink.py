@@ -1,7 +1,5 @@
 """pink: tasks weighted in one quadratic program, or the position as its constraint."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

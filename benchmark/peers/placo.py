@@ -1,7 +1,5 @@
 """placo: tasks weighted, hard, or hard but scaled, in one quadratic program built in C++."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

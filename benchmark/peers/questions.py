@@ -1,7 +1,5 @@
 """What a package is asked, in its own process. Needs only numpy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from time import perf_counter, perf_counter_ns, process_time

@@ -1,7 +1,5 @@
 """Whole inverse kinematics beside other packages: success and time on poses of three robots."""
 
-from __future__ import annotations
-
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path

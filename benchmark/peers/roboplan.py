@@ -1,7 +1,5 @@
 """roboplan's OInK: tasks weighted in one quadratic program, or in levels; targets as in `pink`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -15,8 +15,6 @@ best configuration for poses (frames, 4, 4) from starts (s, nq), and whether it 
 tolerance. Any exception is a failure.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final

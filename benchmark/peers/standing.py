@@ -3,8 +3,6 @@
 Every answer is judged by our model, and from its accelerations, torques and wrenches alone.
 """
 
-from __future__ import annotations
-
 import tempfile
 from dataclasses import asdict
 from itertools import product

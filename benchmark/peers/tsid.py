@@ -3,8 +3,6 @@
 It holds no references of its own: tasks, contacts and samples are kept by what is returned.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """How well a run does what its avoidance task asks, and how abruptly the repulsion turns."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, final
 

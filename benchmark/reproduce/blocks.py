@@ -1,7 +1,5 @@
 """The blocks of the documents: claims, what was found about them, sentences with numbers."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib
@@ -11,7 +9,7 @@ from functools import partial
 from itertools import dropwhile, takewhile
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, Self
 
 from benchmark.reproduce import fronts, protocol
 from benchmark.reproduce.fronts import Point
@@ -41,7 +39,7 @@ class Stored:
     points: list[Point]
 
     @classmethod
-    def read(cls, root: Path) -> Stored:
+    def read(cls, root: Path) -> Self:
         """Return what a checkout has stored."""
         rows, points = root / ROWS, root / POINTS
         return cls(protocol.read(rows) if rows.is_file() else None,

@@ -15,8 +15,6 @@ with medians. `text of`: the paragraphs as they are. `kept`: a file of outputs t
 again as it is.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

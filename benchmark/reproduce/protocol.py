@@ -1,7 +1,5 @@
 """The protocol of `protocol.toml`: columns, layouts, claims, and the runs that decide them."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import re
@@ -11,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +87,7 @@ class Protocol:
     untested: Mapping[str, str]
 
     @classmethod
-    def read(cls, path: Path) -> Protocol:
+    def read(cls, path: Path) -> Self:
         """Return the protocol of a file."""
         given = tomllib.loads(path.read_text(encoding="utf-8"))
         return cls(given["layout"],

@@ -1,7 +1,5 @@
 """What runs say about the claims of the protocol: effect, interval, Holm's p, and a verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import erfc, sqrt

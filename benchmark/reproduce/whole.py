@@ -1,7 +1,5 @@
 """Make the runs of the protocol and the outputs of commands, store them, and write the pages."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace

@@ -4,8 +4,6 @@ The first experiment of the paper that introduced the Task Priority Matrix: F. F
 Priority Matrix: a new tool for hierarchical redundancy resolution" (2016).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import nan

@@ -4,8 +4,6 @@ One program for each level, in x and the violations w of its rows: minimise |w|^
 above within what they have reached. A last program finds the x nearest to the reference.
 """
 
-from __future__ import annotations
-
 from importlib.metadata import version
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A solver in a shared library that has the functions of solver.h."""
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
 import sys

@@ -1,7 +1,5 @@
 """The table of solvers: one row each."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

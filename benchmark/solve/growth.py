@@ -1,7 +1,5 @@
 """Growth of the time of a solve with the numbers of tasks, rows and joints."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any

@@ -3,12 +3,10 @@
 A solver is one class in one file: docs/extending/entrant.md shows one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple, final
+from typing import Any, NamedTuple, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +42,7 @@ class Problem:
         """Row after the last of each level: (L,)."""
         return np.cumsum(self.sizes)
 
-    def without_last(self) -> Problem | None:
+    def without_last(self) -> Self | None:
         """Return the problem without its last level that has rows; None if there is only one."""
         full = np.flatnonzero(self.sizes)
         if len(full) < 2:
@@ -53,13 +51,13 @@ class Problem:
         return replace(self, A=self.A[:m].copy(), lower=self.lower[:m].copy(),
                        upper=self.upper[:m].copy(), sizes=self.sizes[:full[-1]].copy())
 
-    def shifted(self) -> Problem:
+    def shifted(self) -> Self:
         """Return the problem of x - reference, for solvers that know no reference."""
         by = self.A @ self.reference
         return replace(self, lower=self.lower - by, upper=self.upper - by,
                        reference=np.zeros(len(self.reference)))
 
-    def moved(self, seed: int) -> Problem:
+    def moved(self, seed: int) -> Self:
         """Return the problem with both sides of each row changed by a factor within 1 % of 1."""
         factor = 1.0 + _MOVED * np.random.default_rng(seed).uniform(-1.0, 1.0, len(self.A))
         return replace(self, lower=self.lower * factor, upper=self.upper * factor)

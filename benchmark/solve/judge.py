@@ -4,8 +4,6 @@ Where the answer of a problem is proved, x is compared with the least violations
 `certify` finds from the data alone.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The open benchmark: every solver on every family, public and fresh; continued if interrupted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product

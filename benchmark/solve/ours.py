@@ -1,7 +1,5 @@
 """The resolvers of this project, through their common interface."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a solver is asked about a problem: answers cold and warm, times, the same bits twice."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 from pathlib import Path

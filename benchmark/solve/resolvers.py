@@ -4,8 +4,6 @@ Solvers have been tuned on the 50 stored problems of each family. Fresh problems
 families, with seeds not used for tuning, are timed and reported separately.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import nan
 from typing import Any

@@ -1,7 +1,5 @@
 """What is shown of a set of problems: tables, figures, and three sentences of fixed form."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from math import isnan
 

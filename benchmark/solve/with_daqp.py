@@ -1,7 +1,5 @@
 """DAQP's hierarchical mode."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import daqp

@@ -1,7 +1,5 @@
 """embodiK's velocity solver: limits as rows of their own, then levels of equalities."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -4,8 +4,6 @@
 `--documents` draws the pictures of runs in the other documents.
 """
 
-from __future__ import annotations
-
 import io
 import tempfile
 from pathlib import Path

@@ -5,8 +5,6 @@ Takes the folder `examples` of a checkout of pink. Those run whose robot lies be
 answers are compared with the proved minimum of pink's cost. Prints a table.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import runpy

@@ -5,8 +5,6 @@ MuJoCo and every URDF with pinocchio's own parser: joints, masses and limits, an
 configurations the places of all bodies, sites or frames and the mass matrix.
 """
 
-from __future__ import annotations
-
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ The file has the first ticks of the run and the answers of `hcod`, each from the
 before; examples/c/replay.c solves them again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

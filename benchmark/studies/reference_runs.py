@@ -5,8 +5,6 @@ commands with exact derivatives are from the recorded ones, at the recorded stat
 are what the tests judge by; a benchmark is no product, so it may read them where they are.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

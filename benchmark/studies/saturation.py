@@ -7,8 +7,6 @@ that few joints meet, and severe ones. The exact answer is that of `hcod`, used 
 accepts it from the data alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final

@@ -1,7 +1,5 @@
 """A page in headless Chromium, through the DevTools protocol; skipped where there is none."""
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil
