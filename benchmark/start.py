@@ -211,8 +211,7 @@ def _measured(case: Case) -> Done:
     """
     print(f"{case.what} ...", file=sys.stderr, flush=True)
     kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-    kept["PYTHONPATH"] = os.pathsep.join(
-        filter(None, [str(_ROOT), kept.get("PYTHONPATH")]))
+    kept["PYTHONPATH"] = os.pathsep.join(filter(None, [str(_ROOT), kept.get("PYTHONPATH")]))
     found = []
     for _ in range(1 + case.repeated):
         began, before = perf_counter(), _busy()

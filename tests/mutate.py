@@ -235,8 +235,7 @@ def known() -> dict[str, dict[int, list[str]]]:
 @cache
 def footprints() -> Counter[str]:
     """Return how many lines each test runs."""
-    return Counter(test for lines in known().values() for tests in lines.values()
-                   for test in tests)
+    return Counter(test for lines in known().values() for tests in lines.values() for test in tests)
 
 
 @cache

@@ -54,8 +54,7 @@ def run(seconds: float = 40.0, larger: bool = False) -> Report:
         {"growth": rows})
 
 
-def _field(figure: str, sizes: Sequence[Size], seed: int
-           ) -> list[tuple[Row, Callable[[], Any]]]:
+def _field(figure: str, sizes: Sequence[Size], seed: int) -> list[tuple[Row, Callable[[], Any]]]:
     solvers = {one.label: load(one.adapter)(**one.options) for one in entrants()
                if one.label not in LEVEL_LESS}
     found: list[tuple[Row, Callable[[], Any]]] = []

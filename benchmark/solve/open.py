@@ -53,8 +53,7 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
         if not file.is_file():
             told(f"{family.name}, seed {seed}: problems and their proofs")
             export(family, seed, count, True, store.problems)
-        left[file] = [one.label for one in entrants
-                      if not store.file_of(one.label, file).is_file()]
+        left[file] = [one.label for one in entrants if not store.file_of(one.label, file).is_file()]
     store.note("machine", machine())
     store.note("limits", store.notes("limits") | {one.label: one.limits for one in entrants})
     with Field([one for one in entrants if any(one.label in some for some in left.values())],

@@ -33,8 +33,7 @@ class Ours(Solver):
 
     def prepare(self, problem: Problem) -> Hierarchy:
         """Wrap the arrays."""
-        return Hierarchy(problem.A, problem.lower, problem.upper, problem.sizes,
-                         problem.reference)
+        return Hierarchy(problem.A, problem.lower, problem.upper, problem.sizes, problem.reference)
 
     def solve(self, prepared: Hierarchy) -> Resolution:
         """Solve without memory."""

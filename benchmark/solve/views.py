@@ -8,15 +8,7 @@ from rich.console import Console
 
 from benchmark import figures
 from benchmark.report import Section
-from benchmark.solve.judge import (
-    RIGHT,
-    by,
-    cells,
-    profile,
-    right_within,
-    steps_of,
-    summaries,
-)
+from benchmark.solve.judge import RIGHT, by, cells, profile, right_within, steps_of, summaries
 from benchmark.tables import Column, Row, Table, digits, percent, power, text, whole, wide, yes
 from hierarchy.words import listed
 from solvers.problems.files import Collection

@@ -46,8 +46,7 @@ def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters(chan
         found = verdict(rows(x=x, y=y), below="y", percent=True, matters=matters)
         assert found.decided == expected
     assert found.p < 1e-6
-    assert verdict(rows(x=x, y=y), above="y", percent=True, matters=5.0
-                   ).decided == "contradicted"
+    assert verdict(rows(x=x, y=y), above="y", percent=True, matters=5.0).decided == "contradicted"
     assert verdicts.shown(found.claim, rows(x=x, y=y), found.effect).startswith("-19.8 [")
 
 
@@ -140,8 +139,7 @@ def test_every_output_that_is_stored_stands_in_a_page_or_is_linked():
 
 def test_an_unknown_block_is_named(tmp_path):
     with pytest.raises(HierarchyError, match=r"page\.md: block 'other'"):
-        pages.filled("<!-- reproduce: other -->\n<!-- end -->", tmp_path, "page.md",
-                     STORED)
+        pages.filled("<!-- reproduce: other -->\n<!-- end -->", tmp_path, "page.md", STORED)
 
 
 BENCH = """\

@@ -33,8 +33,7 @@ EQUAL = ["control.resolver=weighted", "control.options.ratio=1", "control.dampin
 
 
 def test_the_ur5_keeps_clear_of_the_ball_and_of_itself_and_with_equal_weights_does_not():
-    strict, equal = (simulate(load(EXAMPLES / "ur5.toml", changes))
-                     for changes in ([], EQUAL))
+    strict, equal = (simulate(load(EXAMPLES / "ur5.toml", changes)) for changes in ([], EQUAL))
     assert min(strict["minimal_distance"].min(), strict["ee_distance"].min()) > 0.0499
     cell = build(strict.scenario)
     links = [cell.stack["self-separation"].distances(State.at(cell.robot, q)).min()
@@ -46,8 +45,7 @@ def test_the_ur5_keeps_clear_of_the_ball_and_of_itself_and_with_equal_weights_do
 def test_two_hands_hold_their_tray_and_with_equal_weights_do_not():
     strict, equal = (simulate(load(EXAMPLES / "tray.toml", ["control.duration=2", *changes]))
                      for changes in ([], EQUAL))
-    apart = [np.linalg.norm(run["task_error_grip"][:, :3], axis=1).max()
-             for run in (strict, equal)]
+    apart = [np.linalg.norm(run["task_error_grip"][:, :3], axis=1).max() for run in (strict, equal)]
     assert apart[0] < 0.002
     assert apart[1] > 0.05
 

@@ -11,13 +11,7 @@ from hierarchy import Stack, State
 from hierarchy.allocation import allocate
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion, SurveillanceAreas
 from hierarchy.paths import Waypoints
-from hierarchy.tasks import (
-    CumulatedRepulsion,
-    DangerBounds,
-    JointDamping,
-    JointLimits,
-    Posture,
-)
+from hierarchy.tasks import CumulatedRepulsion, DangerBounds, JointDamping, JointLimits, Posture
 from scenarios.cell.sensors import ExactDistances
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])

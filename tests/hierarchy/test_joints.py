@@ -284,8 +284,7 @@ def test_a_chain_in_a_plane_moves_although_its_file_is_rounded(rigid, rounding):
     robot, ends = planar_bar(rigid, rounding), []
     begin = Mechanism(robot).closed(robot.configuration({"crank": -0.8}), ["crank"])
     for resolver in ("hcod", "recursive"):
-        stack = Stack([*model_rows(robot, PERIOD), Posture({"crank": -0.4}, gain=10.0)],
-                      "velocity")
+        stack = Stack([*model_rows(robot, PERIOD), Posture({"crank": -0.4}, gain=10.0)], "velocity")
         q, state, solver = begin, State(robot), make(resolver)
         for _ in range(500):
             state.move(0.0, q, np.zeros(robot.n))

@@ -4,17 +4,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
-from scene import (
-    FRAME,
-    PATH,
-    ROBOT,
-    TASKS,
-    Elbow,
-    compiled_rows,
-    place_of,
-    state_at,
-    states,
-)
+from scene import FRAME, PATH, ROBOT, TASKS, Elbow, compiled_rows, place_of, state_at, states
 from scipy.linalg import expm
 
 from hierarchy import HierarchyError, Stack, State

@@ -98,8 +98,7 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
     def bodies(q):
         p, R = motion_of(robot, q, along)
         arm = R * Rotation.from_rotvec([0.0, q[4], 0.0])
-        return ((p + R.apply(CENTRE), R),
-                (p + R.apply([0.0, 0.0, 0.5]) + arm.apply(CENTRE), arm))
+        return ((p + R.apply(CENTRE), R), (p + R.apply([0.0, 0.0, 0.5]) + arm.apply(CENTRE), arm))
 
     energy = 0.0
     for (later, R2), (before, R1) in zip(bodies(robot.integrate(q, h * v)),

@@ -183,8 +183,7 @@ def test_the_code_of_a_document_runs(name):
     exec(compile("\n".join(blocks(name, "python")), name, "exec"), {"__name__": "document"})
 
 
-@pytest.mark.parametrize("name", having(
-    lambda name: name not in FOLLOWED and blocks(name, "toml")))
+@pytest.mark.parametrize("name", having(lambda name: name not in FOLLOWED and blocks(name, "toml")))
 def test_the_files_that_a_document_shows_can_be_read(name, tmp_path):
     (tmp_path / "my-scenario.toml").write_text('extends = "ellipse"\nname = "my-scenario"\n')
     for i, text in enumerate(blocks(name, "toml")):

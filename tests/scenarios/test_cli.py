@@ -62,8 +62,7 @@ def test_compare_writes_page_numbers_and_a_folder_for_each_run_in_80_columns(tmp
     assert {path.name for path in (tmp_path / "b" / "ellipse").iterdir()} == {
         "tpm-published", "tpm", "recursive"}
     numbers = json.loads((tmp_path / "b" / "comparison.json").read_text())
-    assert [run["label"] for run in numbers["runs"]] == [
-        "tpm-published", "tpm", "recursive"]
+    assert [run["label"] for run in numbers["runs"]] == ["tpm-published", "tpm", "recursive"]
     assert numbers["runs"][0]["settings"]["damping"] == 0.05
 
 
@@ -264,7 +263,6 @@ def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, capsys):
 def test_a_run_that_cannot_be_saved_where_it_should_is_saved_elsewhere(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     (tmp_path / "file").touch()
-    said = run_folder.kept(simulate(load("ellipse", ["control.duration=0.02"])),
-                           tmp_path / "file")
+    said = run_folder.kept(simulate(load("ellipse", ["control.duration=0.02"])), tmp_path / "file")
     assert "cannot be written" in said
     assert load_run(said.partition("the run is in ")[2]).ticks == 20

@@ -121,8 +121,7 @@ def sensor_of(source, stale_after=0.2, region=0.4, least_readings=0.1, **setting
     points = ExactDistances(ROBOT, Obstacles()).points
     space = space_of(source.pinhole, points, CAPSULES, region, **settings)
     section = ImageSection(kind="camera", stale_after=stale_after, least_readings=least_readings)
-    return (DepthSensor(section, source, space),
-            lambda t, q=STATE.q: State.at(ROBOT, q, t=t))
+    return (DepthSensor(section, source, space), lambda t, q=STATE.q: State.at(ROBOT, q, t=t))
 
 
 def test_frames_are_used_from_their_latency_on_until_the_next_or_a_clock_is_set_back():

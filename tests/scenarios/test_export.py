@@ -39,8 +39,7 @@ def messages(run, tmp_path_factory):
         for schema, channel, message in reader.make_reader(stream).iter_messages():
             assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
             schemas[channel.topic] = (schema.name, json.loads(schema.data))
-            found.setdefault(channel.topic, []).append(
-                (message.log_time, json.loads(message.data)))
+            found.setdefault(channel.topic, []).append((message.log_time, json.loads(message.data)))
     return found, schemas, json.loads(written[1].read_text())
 
 

@@ -61,8 +61,7 @@ def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     hold = {"kind": "position", "frame": "end_effector"}
     first = build(scenario_of(tmp_path, hold, avoidance=avoidance))
     assert first.stack.names == ("separation", "position")
-    later = build(scenario_of(tmp_path, hold, {"kind": "collision"}, COUPLING,
-                              avoidance=avoidance))
+    later = build(scenario_of(tmp_path, hold, {"kind": "collision"}, COUPLING, avoidance=avoidance))
     assert later.stack.names == ("position", "separation", "coupling")
     assert isinstance(later.stack["separation"], Separation)
 

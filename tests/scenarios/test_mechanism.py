@@ -55,8 +55,7 @@ def largest_gap(q):
         pin.framesForwardKinematics(robot.model, data, row)
         end, tip = (data.oMf[robot.model.getFrameId(name)].translation for name in ("end", "tip"))
         finger, thumb = row[robot.coordinate("finger")], row[robot.coordinate("thumb")]
-        worst = max(worst, np.linalg.norm(end - tip),
-                    abs(thumb - (0.1 - finger + 0.5 * finger**2)))
+        worst = max(worst, np.linalg.norm(end - tip), abs(thumb - (0.1 - finger + 0.5 * finger**2)))
     return worst
 
 

@@ -49,8 +49,7 @@ def test_the_tangent_cone_of_the_letters_cone_has_its_jacobian_and_refuses_accel
         state = state_at(q, v)
         cosine = np.array([1.0, 0.2, 0.0]) / np.sqrt(1.04) @ state.rotation(FRAME)[:, 2]
         outside = cosine <= np.cos(0.3)
-        np.testing.assert_array_equal(cone.reference_velocity(state),
-                                      [0.0 if outside else -np.inf])
+        np.testing.assert_array_equal(cone.reference_velocity(state), [0.0 if outside else -np.inf])
         np.testing.assert_array_equal(cone.jacobian(state), cone.task.jacobian(state))
     with pytest.raises(HierarchyError, match="velocity level, got level = 'acceleration'"):
         cone.writer(state, "acceleration", Rows.empty(1, ROBOT.n))

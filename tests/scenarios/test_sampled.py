@@ -223,8 +223,7 @@ def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_sa
     page = (folder / "index.html").read_text()
     assert all(line in page for line in data["groups"]["ellipse"]["verdict"])
     for metric, run in found.found["ellipse"].worst()[:3]:
-        name = next(file for file in (folder / "worst").iterdir()
-                    if run.key[:6] in file.name)
+        name = next(file for file in (folder / "worst").iterdir() if run.key[:6] in file.name)
         assert f"worst/{name.name}" in page
         again = metrics.measure(simulate(load(name)))
         assert again[metric.name].value == metric.value

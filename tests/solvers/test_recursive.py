@@ -27,8 +27,7 @@ def chiaverini(B, e, lam_max, epsilon, beta=0.0):
     U, s, _ = np.linalg.svd(B)
     lam2 = (1.0 - (s[-1] / epsilon) ** 2) * lam_max**2 if s[-1] < epsilon else 0.0
     u = U[:, len(B) - 1]
-    return B.T @ np.linalg.solve(
-        B @ B.T + beta**2 * np.eye(len(B)) + lam2 * np.outer(u, u), e)
+    return B.T @ np.linalg.solve(B @ B.T + beta**2 * np.eye(len(B)) + lam2 * np.outer(u, u), e)
 
 
 def clamp(v, largest):

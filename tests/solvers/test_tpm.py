@@ -65,8 +65,7 @@ def test_the_published_form_is_what_its_equations_say(case, damping):
     h = build(case, True)
     x, F = oracle.published(h, damping=damping)
     close(make("tpm-published", damping=damping).solve(h).x, x)
-    close(task_priority_matrix(h, form="published", damping=damping).F.T @ h.lower,
-          F.T @ h.lower)
+    close(task_priority_matrix(h, form="published", damping=damping).F.T @ h.lower, F.T @ h.lower)
 
 
 @pytest.mark.parametrize("case", ARBITRARY)
