@@ -4,25 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hierarchy import Robot, State, Task
+from hierarchy import Robot, State, Task, tasks
 from hierarchy.avoidance import Obstacle, Obstacles, Pairs, Repulsion, measure_pairs
 from hierarchy.paths import Ellipse, Still
 from hierarchy.task import Rows
-from hierarchy.tasks import (
-    Along,
-    Avoidance,
-    CentreOfMass,
-    FrameLog,
-    JointCoupling,
-    JointDamping,
-    LookAt,
-    Manipulability,
-    Pointing,
-    Pose,
-    Position,
-    Posture,
-    RelativePose,
-)
 from scenarios.cell.sensors import ExactDistances
 
 ROBOT = Robot.named("kuka_lwr")
@@ -35,25 +20,25 @@ BODY, TIP = Repulsion(0.15, 0.15, 2.0, 3.0), Repulsion(5.0, 0.1, 10.0, 1.5)
 SENSOR = ExactDistances(ROBOT, OBSTACLES, BODY, TIP)
 
 TASKS = {
-    "position": Position(FRAME, PATH, repulsion_within=0.5),
-    "along": Along(Position(FRAME, PATH), ((0.6, 0.0, 0.8), (0.0, 1.0, 0.0))),
-    "pointing": Pointing(FRAME, (1.0, 0.2, 0.0), 0.3),
-    "cone": Pointing(FRAME, (1.0, 0.2, 0.0), 0.3, "inequality"),
-    "avoidance 1-D": Avoidance(ROBOT.control_points, 1),
-    "avoidance 3-D": Avoidance(ROBOT.control_points, 3),
-    "pose": Pose(FRAME, PATH, np.eye(3)),
-    "frame": FrameLog(FRAME, Still((0.1, 0.5, 0.1)), np.eye(3)[[1, 2, 0]]),
-    "centre of mass": CentreOfMass(ROBOT, PATH),
-    "centre of mass, x and z": CentreOfMass(ROBOT, PATH, (0, 2)),
-    "posture": Posture((0.1,) * 7),
-    "damping": JointDamping(7),
-    "relative pose": RelativePose(FRAME, ROBOT.frame("joint_3"), (0.1, 0.2, 0.3),
+    "position": tasks.Position(FRAME, PATH, repulsion_within=0.5),
+    "along": tasks.Along(tasks.Position(FRAME, PATH), ((0.6, 0.0, 0.8), (0.0, 1.0, 0.0))),
+    "pointing": tasks.Pointing(FRAME, (1.0, 0.2, 0.0), 0.3),
+    "cone": tasks.Pointing(FRAME, (1.0, 0.2, 0.0), 0.3, "inequality"),
+    "avoidance 1-D": tasks.Avoidance(ROBOT.control_points, 1),
+    "avoidance 3-D": tasks.Avoidance(ROBOT.control_points, 3),
+    "pose": tasks.Pose(FRAME, PATH, np.eye(3)),
+    "frame": tasks.FrameLog(FRAME, Still((0.1, 0.5, 0.1)), np.eye(3)[[1, 2, 0]]),
+    "centre of mass": tasks.CentreOfMass(ROBOT, PATH),
+    "centre of mass, x and z": tasks.CentreOfMass(ROBOT, PATH, (0, 2)),
+    "posture": tasks.Posture((0.1,) * 7),
+    "damping": tasks.JointDamping(7),
+    "relative pose": tasks.RelativePose(FRAME, ROBOT.frame("joint_3"), (0.1, 0.2, 0.3),
                                   np.eye(3)[[1, 2, 0]]),
-    "relative position": RelativePose(FRAME, ROBOT.frame("joint_3"), (0.1, 0.2, 0.3)),
-    "coupling": JointCoupling(ROBOT, {"joint_2": 1.0, "joint_5": -0.5}, 0.3),
-    "look-at": LookAt(FRAME, (0.3, 0.9, 1.4)),
-    "manipulability": Manipulability(ROBOT.frame("joint_6"), 0.1),
-    "manipulability of the pose": Manipulability(FRAME, 0.1, "pose", "equality"),
+    "relative position": tasks.RelativePose(FRAME, ROBOT.frame("joint_3"), (0.1, 0.2, 0.3)),
+    "coupling": tasks.JointCoupling(ROBOT, {"joint_2": 1.0, "joint_5": -0.5}, 0.3),
+    "look-at": tasks.LookAt(FRAME, (0.3, 0.9, 1.4)),
+    "manipulability": tasks.Manipulability(ROBOT.frame("joint_6"), 0.1),
+    "manipulability of the pose": tasks.Manipulability(FRAME, 0.1, "pose", "equality"),
 }
 
 

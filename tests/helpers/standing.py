@@ -3,26 +3,13 @@
 import numpy as np
 import pinocchio as pin
 
-from hierarchy import Robot, Stack, State
+from hierarchy import Robot, Stack, State, tasks
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.paths import Still
 from hierarchy.task import Rows
-from hierarchy.tasks import (
-    BaseDynamics,
-    CentreOfMass,
-    ContactMotion,
-    Friction,
-    LeastForce,
-    Position,
-    Posture,
-    Together,
-    TorqueLimits,
-)
 
 ROBOT = Robot.named("humanoid")
-GRAVITY = 9.81
-WEIGHT = GRAVITY * ROBOT.masses.sum()
-HANDS = "left_hand", "right_hand"
+WEIGHT = 9.81 * ROBOT.masses.sum()  # [N]
 
 
 def feet(friction=0.7, robot=ROBOT):
@@ -32,31 +19,31 @@ def feet(friction=0.7, robot=ROBOT):
                             for side in ("left", "right")])
 
 
-def soles_and_palm(robot=ROBOT):
+def soles_and_palm():
     """A sole, a point of a hand on a wall, and the other sole: every kind of contact."""
-    sole, other = feet(robot=robot).contacts
-    palm = Contact(robot.frame("left_hand"), [(0.01, 0.02, 0.03)], 0.4, (-1.0, 0.2, 0.1))
-    return Contacts(robot, [sole, palm, other])
+    sole, other = feet().contacts
+    palm = Contact(ROBOT.frame("left_hand"), [(0.01, 0.02, 0.03)], 0.4, (-1.0, 0.2, 0.1))
+    return Contacts(ROBOT, [sole, palm, other])
 
 
-def moving_state(seed, spread=0.3):
+def moving_state(seed):
     """A state near the rest posture that moves in all joints."""
     rng = np.random.default_rng(seed)
-    q = pin.integrate(ROBOT.model, ROBOT.rest, spread * rng.normal(size=ROBOT.n))
+    q = pin.integrate(ROBOT.model, ROBOT.rest, 0.3 * rng.normal(size=ROBOT.n))
     return State.at(ROBOT, q, rng.normal(size=ROBOT.n))
 
 
 def standing_stack(state, contacts, shift=(0.0, 0.0, 0.0), fraction=1.0, faces=4):
     """Seven levels: the centre of mass is asked `shift` [m] beside where it is."""
-    com = CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(state)
-    hands = [Position(ROBOT.frame(hand), Still(state.position(ROBOT.frame(hand))), name=hand)
-             for hand in HANDS]
+    com = tasks.CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(state)
+    hands = [tasks.Position(ROBOT.frame(hand), Still(state.position(ROBOT.frame(hand))), name=hand)
+             for hand in ("left_hand", "right_hand")]
     return Stack([
-        Together([BaseDynamics(contacts), ContactMotion(contacts)], "physics"),
-        Together([TorqueLimits(ROBOT, fraction, contacts=contacts), Friction(contacts, faces)],
-                 "limits"),
-        CentreOfMass(ROBOT, Still(com + shift)), *hands,
-        Posture(tuple(state.q[7:])), LeastForce(contacts),
+        tasks.Together([tasks.BaseDynamics(contacts), tasks.ContactMotion(contacts)], "physics"),
+        tasks.Together([tasks.TorqueLimits(ROBOT, fraction, contacts=contacts),
+                        tasks.Friction(contacts, faces)], "limits"),
+        tasks.CentreOfMass(ROBOT, Still(com + shift)), *hands,
+        tasks.Posture(tuple(state.q[7:])), tasks.LeastForce(contacts),
     ], "torque", contacts=contacts)
 
 

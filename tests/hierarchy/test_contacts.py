@@ -6,20 +6,10 @@ import pinocchio as pin
 import pytest
 from standing import ROBOT, drift_of, external_forces, feet, moving_state, soles_and_palm, written
 
-from hierarchy import HierarchyError, Stack, State
+from hierarchy import HierarchyError, Stack, State, tasks
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.errors import UnknownNameError
 from hierarchy.task import Rows, Task
-from hierarchy.tasks import (
-    BaseDynamics,
-    CentreOfPressure,
-    ContactForce,
-    ContactMotion,
-    Friction,
-    Momentum,
-    Together,
-    TorqueLimits,
-)
 
 STEP = 1e-6
 CONTACTS = soles_and_palm()
@@ -56,7 +46,7 @@ def test_base_rows_hold_exactly_where_forward_dynamics_does():
     a = pin.aba(ROBOT.model, ROBOT.model.createData(), state.q, state.v, tau,
                 external_forces(state, CONTACTS, forces))
     x = np.concatenate([a, forces.ravel()])
-    A, lower, upper = BaseDynamics(CONTACTS).rows(state)
+    A, lower, upper = tasks.BaseDynamics(CONTACTS).rows(state)
     np.testing.assert_array_equal(lower, upper)
     np.testing.assert_allclose(A @ x, lower, atol=1e-9)
     np.testing.assert_allclose(CONTACTS.torques(state, x), tau[6:], atol=1e-9)
@@ -65,7 +55,7 @@ def test_base_rows_hold_exactly_where_forward_dynamics_does():
 @pytest.mark.parametrize("faces", [4, 8])
 def test_what_friction_rows_allow_is_in_the_cone_and_their_edges_touch_it(faces):
     contact = CONTACTS["left_hand"]
-    task = Friction(Contacts(ROBOT, [contact]), faces)
+    task = tasks.Friction(Contacts(ROBOT, [contact]), faces)
     rows, lower, _ = task.fixed
     normal = np.array(contact.normal) / np.linalg.norm(contact.normal)
     rng, allowed = np.random.default_rng(7), []
@@ -84,7 +74,7 @@ def test_what_friction_rows_allow_is_in_the_cone_and_their_edges_touch_it(faces)
 
 def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
     contacts, margin = feet(), 0.02
-    task = CentreOfPressure(contacts, margin)
+    task = tasks.CentreOfPressure(contacts, margin)
     assert task.row_names == tuple(f"{side}_foot edge {i}" for side in ("left", "right")
                                    for i in (1, 2, 3, 4))
     corners = np.array(contacts["right_foot"].points)[:, :2]
@@ -124,16 +114,16 @@ def test_the_load_of_a_contact_ramps_around_the_time_in_which_it_is_open(t, ramp
 def test_an_open_contact_has_no_force_and_is_free_to_move(faces):
     contacts = opening()
     state = State.at(ROBOT, ROBOT.rest, t=1.5)
-    A, lower, upper = Friction(contacts, faces, largest=50.0).rows(state)
+    A, lower, upper = tasks.Friction(contacts, faces, largest=50.0).rows(state)
     of_right = slice(4 * (faces + 1), None)
     held = (lower == upper)[of_right]
     assert np.linalg.matrix_rank(A[of_right][held]) == held.sum() == 12
     assert not lower[of_right][held].any()
     assert np.isinf(lower[of_right][~held]).all()
-    closed = Friction(feet(), faces, largest=50.0).rows(state)
+    closed = tasks.Friction(feet(), faces, largest=50.0).rows(state)
     for now, plain in zip((A, lower, upper), closed, strict=True):
         np.testing.assert_array_equal(now[:4 * (faces + 1)], plain[:4 * (faces + 1)])
-    A, lower, upper = written(ContactMotion(contacts), state)
+    A, lower, upper = written(tasks.ContactMotion(contacts), state)
     assert A[:6].any(axis=1).all()
     for rows in (A[6:], lower[6:], upper[6:]):
         assert not rows.any()
@@ -141,7 +131,7 @@ def test_an_open_contact_has_no_force_and_is_free_to_move(faces):
 
 def load_row(contacts, carried=None, **settings):
     """A function of time: the sides of the row that has all the normal force of the right sole."""
-    task, state = Friction(contacts, **settings), State.at(ROBOT, ROBOT.rest)
+    task, state = tasks.Friction(contacts, **settings), State.at(ROBOT, ROBOT.rest)
     rows = Rows.empty(41, 60)
     write = task.writer(state, "torque", rows)
     state.carried = None if carried is None else np.array([300.0, carried])
@@ -178,7 +168,7 @@ def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_
 @pytest.mark.parametrize("name", ["left_hand", "right_foot"])
 def test_contact_force_rows_are_the_sum_over_the_points(target, name):
     state, x = moving_state(9), random_x(9)
-    task, contact = ContactForce(CONTACTS, name, target), CONTACTS[name]
+    task, contact = tasks.ContactForce(CONTACTS, name, target), CONTACTS[name]
     A, lower, upper = task.rows(state)
     forces = CONTACTS.forces(x, name)
     R = state.rotation(contact.frame)
@@ -196,7 +186,7 @@ def test_contact_force_rows_are_the_sum_over_the_points(target, name):
 def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_terms():
     state = moving_state(11)
     start = State.at(ROBOT, ROBOT.rest)
-    task = ContactMotion.at(start, CONTACTS, stiffness=100.0, damping=20.0)
+    task = tasks.ContactMotion.at(start, CONTACTS, stiffness=100.0, damping=20.0)
     assert task.dimension == len(task.row_names) == 15
     A, lower, upper = written(task, state)
     J, dJ = CONTACTS.jacobian(state)[12:15], drift_of(CONTACTS, state)[12:15]  # of the palm
@@ -210,7 +200,7 @@ def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_t
 @pytest.mark.parametrize("part", ["both", "linear", "angular"])
 def test_momentum_rows_are_the_rate_of_the_momentum(part):
     state, a = moving_state(14), random_x(14)[:N]
-    task = Momentum(part, damping=4.0)
+    task = tasks.Momentum(part, damping=4.0)
     of_part = {"both": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}[part]
     A, lower, _ = written(task, state)
     data = ROBOT.model.createData()
@@ -224,11 +214,11 @@ def test_momentum_rows_are_the_rate_of_the_momentum(part):
     assert not written(task, state, "velocity")[1].any()
     assert len(task.row_names) == task.dimension
     target = np.arange(1.0, task.dimension + 1.0)
-    np.testing.assert_allclose(Momentum(part, tuple(target), 5.0).reference_acceleration(state),
-                               5.0 * (target - task.jacobian(state) @ state.v))
+    aimed = tasks.Momentum(part, tuple(target), 5.0).reference_acceleration(state)
+    np.testing.assert_allclose(aimed, 5.0 * (target - task.jacobian(state) @ state.v))
 
 
-FRAME = ROBOT.frame("left_foot")
+FRAME, A, B = ROBOT.frame("left_foot"), np.eye(3), np.eye(4, 3)
 
 
 @pytest.mark.parametrize(("make", "said"), [
@@ -236,20 +226,20 @@ FRAME = ROBOT.frame("left_foot")
     (lambda: Contact(FRAME, friction=0.0), "contact 'left_foot': friction 0.0 must be positive"),
     (lambda: Contact(FRAME, [(0, 0)]), "are not (k, 3) numbers"),
     (lambda: Contacts(ROBOT, [Contact(FRAME), Contact(FRAME)]), "two contacts have this name"),
-    (lambda: Friction(CONTACTS, 6), "6 faces, expected 4 or 8"),
-    (lambda: Friction(CONTACTS, least=5.0, largest=5.0), "largest 5.0 N"),
-    (lambda: CentreOfPressure(Contacts(ROBOT, [Contact(FRAME)])), "no contact is a surface"),
-    (lambda: ContactForce(CONTACTS, "left_foot", (1.0, 2.0)), "is not 1, 3 or 6"),
-    (lambda: ContactMotion(CONTACTS, [np.eye(3)] * 3), "anchors are not (4, 3) for each of 3"),
+    (lambda: tasks.Friction(CONTACTS, 6), "6 faces, expected 4 or 8"),
+    (lambda: tasks.Friction(CONTACTS, least=5.0, largest=5.0), "largest 5.0 N"),
+    (lambda: tasks.CentreOfPressure(Contacts(ROBOT, [Contact(FRAME)])), "no contact is a surface"),
+    (lambda: tasks.ContactForce(CONTACTS, "left_foot", (1.0, 2.0)), "is not 1, 3 or 6"),
+    (lambda: tasks.ContactMotion(CONTACTS, [A] * 3), "anchors are not (4, 3) for each of 3"),
     (lambda: Contact(FRAME, open=((2.0, 1.0),)), "it cannot be open from 2.0 s until 1.0 s"),
-    (lambda: ContactMotion(opening(), [np.eye(4, 3)] * 2, 9.0), "opens, so its stiffness must be"),
-    (lambda: Momentum("all"), "part 'all' is not one of both, linear, angular"),
-    (lambda: Together([]), "there are no tasks in it"),
-    (lambda: TorqueLimits(ROBOT), "give the contacts"),
+    (lambda: tasks.ContactMotion(opening(), [B] * 2, 9.0), "opens, so its stiffness must be"),
+    (lambda: tasks.Momentum("all"), "part 'all' is not one of both, linear, angular"),
+    (lambda: tasks.Together([]), "there are no tasks in it"),
+    (lambda: tasks.TorqueLimits(ROBOT), "give the contacts"),
     (lambda: Stack(level="torque"), "level 'torque' needs contacts, Contacts(robot) for none"),
     (lambda: Stack(contacts=CONTACTS), "contacts need the level 'torque', not 'acceleration'"),
-    (lambda: Stack([Friction(CONTACTS)]), "task 'friction': contact forces need the level"),
-    (lambda: Stack([Friction(feet())], "torque", contacts=CONTACTS), "not those of the stack")])
+    (lambda: Stack([tasks.Friction(CONTACTS)]), "task 'friction': contact forces need the level"),
+    (lambda: Stack([tasks.Friction(feet())], "torque", contacts=CONTACTS), "not those of the st")])
 def test_bad_input_is_named(make, said):
     with pytest.raises((HierarchyError, UnknownNameError)) as error:
         make()

@@ -5,31 +5,20 @@ from pathlib import Path as FilePath
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError
-from hierarchy.paths import (
-    Blended,
-    Ellipse,
-    Jittered,
-    Recorded,
-    Shifted,
-    Waypoints,
-    circle,
-    line,
-    read_bvh,
-)
+from hierarchy import HierarchyError, paths
 
 TIMES = (0.5, 1.2, 2.0, 3.5)
 POINTS = ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2), (0.3, 0.5, 0.0), (0.1, 0.2, 0.4))
 PATHS = {
-    "line": line(POINTS[0], POINTS[1], 1.5, begin=0.4),
-    "circle": circle((0.1, 0.2, 0.3), 0.2, (0.2, -0.4, 1.0), rate=1.7, phase=0.4),
-    "circle about x": circle((0.1, 0.2, 0.3), 0.2, (1.0, 0.0, 0.0)),
-    "waypoints": Waypoints(TIMES, POINTS),
-    "blended": Blended(TIMES, POINTS, blend=0.3),
-    "recorded": Recorded(TIMES, POINTS),
-    "ellipse": Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0), rate=1.3),
-    "shifted": Shifted(Blended(TIMES, POINTS, blend=0.7), (0.1, 0.0, 0.0)),
-    "jittered": Jittered(line(POINTS[0], POINTS[1], 2.0), 0.01, 1.0, 3),
+    "line": paths.line(POINTS[0], POINTS[1], 1.5, begin=0.4),
+    "circle": paths.circle((0.1, 0.2, 0.3), 0.2, (0.2, -0.4, 1.0), rate=1.7, phase=0.4),
+    "circle about x": paths.circle((0.1, 0.2, 0.3), 0.2, (1.0, 0.0, 0.0)),
+    "waypoints": paths.Waypoints(TIMES, POINTS),
+    "blended": paths.Blended(TIMES, POINTS, blend=0.3),
+    "recorded": paths.Recorded(TIMES, POINTS),
+    "ellipse": paths.Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0), rate=1.3),
+    "shifted": paths.Shifted(paths.Blended(TIMES, POINTS, blend=0.7), (0.1, 0.0, 0.0)),
+    "jittered": paths.Jittered(paths.line(POINTS[0], POINTS[1], 2.0), 0.01, 1.0, 3),
 }
 MOMENTS = np.linspace(-0.2, 5.0, 401) + 1e-4  # not where a piece begins
 
@@ -60,7 +49,7 @@ def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
 def test_a_path_of_a_csv_file_passes_its_points_with_continuous_acceleration(names, tmp_path):
     rows = "\n".join(",".join(map(str, (t, *p))) for t, p in zip(TIMES, POINTS, strict=True))
     (tmp_path / "a.csv").write_text(f"{names}{rows}\n\n")
-    path = Recorded.from_csv(tmp_path / "a.csv")
+    path = paths.Recorded.from_csv(tmp_path / "a.csv")
     for t, point in zip(TIMES, POINTS, strict=True):
         np.testing.assert_allclose(path(t)[0], point, atol=1e-12)
     for t in TIMES[1:-1]:
@@ -78,11 +67,11 @@ def test_a_path_of_a_csv_file_passes_its_points_with_continuous_acceleration(nam
 def test_a_wrong_csv_file_is_named_with_its_line(text, said, tmp_path):
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(HierarchyError) as error:
-        Recorded.from_csv(tmp_path / "a.csv")
+        paths.Recorded.from_csv(tmp_path / "a.csv")
     assert str(error.value).startswith(str(tmp_path / "a.csv"))
     assert said in str(error.value)
     with pytest.raises(HierarchyError, match="cannot be read"):
-        Recorded.from_csv(tmp_path / "none.csv")
+        paths.Recorded.from_csv(tmp_path / "none.csv")
 
 
 # BVH files.
@@ -91,7 +80,7 @@ TEXT = (FilePath(__file__).parents[1] / "data" / "motion.bvh").read_text()
 
 
 def test_turns_follow_the_order_of_the_channels(tmp_path):
-    motion = read_bvh(written(tmp_path, TEXT))
+    motion = paths.read_bvh(written(tmp_path, TEXT))
     np.testing.assert_array_equal(motion.times, [0.0, 0.5])
     expected = {"hips": ([1, 0, 0], [1, 10, 0]), "knee": ([1, -2, 0], [3, 10, 0]),
                 # Rz(90) Ry(90) takes x to -z and y to -x; the knee's turn takes -y to -z.
@@ -111,10 +100,10 @@ def test_turns_follow_the_order_of_the_channels(tmp_path):
 def test_a_wrong_file_is_named(tmp_path, old, new, said):
     file = written(tmp_path, TEXT.replace(old, new, 1))
     with pytest.raises(HierarchyError, match=said) as error:
-        read_bvh(file)
+        paths.read_bvh(file)
     assert str(file) in str(error.value)
     with pytest.raises(HierarchyError, match="cannot be read"):
-        read_bvh(tmp_path / "none.bvh")
+        paths.read_bvh(tmp_path / "none.bvh")
 
 
 def written(folder, text):

@@ -7,33 +7,14 @@ import pytest
 from scene import FRAME, PATH, ROBOT, TASKS, Elbow, compiled_rows, place_of, state_at, states
 from scipy.linalg import expm
 
-from hierarchy import HierarchyError, Stack, State
+from hierarchy import HierarchyError, Stack, State, tasks
 from hierarchy.avoidance import Barrier
 from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
 from hierarchy.robots import TABLES as ROBOT_TABLES
 from hierarchy.robots import link_capsules
 from hierarchy.task import Rows
-from hierarchy.tasks import (
-    DangerBounds,
-    FrameLog,
-    JointDamping,
-    JointLimits,
-    LookAt,
-    Pose,
-    Position,
-    SelfSeparation,
-    Separation,
-    TorqueLimits,
-)
-from scenarios.config.kinds import (
-    ListedCentreOfMass,
-    ListedFrame,
-    ListedPointing,
-    ListedPose,
-    ListedPosition,
-    ListedPosture,
-)
+from scenarios.config import kinds
 
 STEP = 1e-6
 STATES = states(11)
@@ -122,7 +103,7 @@ def test_rates_of_a_frame_that_follows_a_path_are_the_derivatives_of_its_error(a
     h, (q, v) = 1e-4, STATES[4]
     a = np.arange(7.0) - 3.0
     start = State.at(ROBOT, q)
-    task = FrameLog(FRAME, Ellipse(start.position(FRAME), (0.2, 0.0, 0.1), (0.0, 0.2, 0.1)),
+    task = tasks.FrameLog(FRAME, Ellipse(start.position(FRAME), (0.2, 0.0, 0.1), (0.0, 0.2, 0.1)),
                     start.rotation(FRAME) @ expm(angle * cross(np.array([0.6, 0.0, 0.8]))))
 
     def error(t):
@@ -158,10 +139,10 @@ def test_a_wrong_task_is_named(method, value, said, monkeypatch):
     assert said in str(error.value)
 
 
-MADE = [*TASKS.values(), JointLimits(ROBOT, 10.0, 1e-3), TorqueLimits(ROBOT),
-        DangerBounds(JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
-        Separation(ROBOT.control_points, Barrier(0.05)),
-        SelfSeparation(link_capsules(ROBOT_TABLES["kuka_lwr"], foot=0.3), Barrier(0.05))]
+MADE = [*TASKS.values(), tasks.JointLimits(ROBOT, 10.0, 1e-3), tasks.TorqueLimits(ROBOT),
+        tasks.DangerBounds(tasks.JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
+        tasks.Separation(ROBOT.control_points, Barrier(0.05)),
+        tasks.SelfSeparation(link_capsules(ROBOT_TABLES["kuka_lwr"], foot=0.3), Barrier(0.05))]
 
 
 @pytest.mark.parametrize("task", MADE, ids=lambda task: task.name)
@@ -173,16 +154,16 @@ def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(tas
 
 
 def test_tasks_with_arrays_of_the_same_numbers_are_equal():
-    one, other = (Pose(ROBOT.frame("end_effector"), PATH, np.eye(3)) for _ in range(2))
+    one, other = (tasks.Pose(ROBOT.frame("end_effector"), PATH, np.eye(3)) for _ in range(2))
     assert one == other
     assert one != replace(other, rotation=np.diag([1.0, -1.0, -1.0]))
 
 
 @pytest.mark.parametrize(("task", "section"), [
-    (Position(FRAME, PATH), ListedPosition), (TASKS["pose"], ListedPose),
-    (TASKS["frame"], ListedFrame),
-    (TASKS["centre of mass"], ListedCentreOfMass), (TASKS["pointing"], ListedPointing),
-    (TASKS["posture"], ListedPosture)], ids=lambda one: getattr(one, "name", ""))
+    (tasks.Position(FRAME, PATH), kinds.ListedPosition), (TASKS["pose"], kinds.ListedPose),
+    (TASKS["frame"], kinds.ListedFrame),
+    (TASKS["centre of mass"], kinds.ListedCentreOfMass), (TASKS["pointing"], kinds.ListedPointing),
+    (TASKS["posture"], kinds.ListedPosture)], ids=lambda one: getattr(one, "name", ""))
 def test_a_gain_that_is_left_out_is_the_same_in_python_and_in_a_file(task, section):
     for gain in ("stiffness", "damping", "gain"):
         assert getattr(task, gain) == section.model_fields[gain].default
@@ -191,7 +172,7 @@ def test_a_gain_that_is_left_out_is_the_same_in_python_and_in_a_file(task, secti
 def test_manipulability_is_yoshikawas_and_has_no_row_at_a_singular_posture():
     task = TASKS["manipulability"]
     state = state_at(*STATES[4])
-    J = np.array(Position(task.frame, PATH).jacobian(state))
+    J = np.array(tasks.Position(task.frame, PATH).jacobian(state))
     assert task.value(state) == pytest.approx(np.sqrt(np.linalg.det(J @ J.T)), rel=1e-9)
     task = TASKS["manipulability"]
     straight = State.at(ROBOT, np.zeros(7))
@@ -220,7 +201,7 @@ def test_insert_remove_swap_and_reorder_by_name():
 
 
 def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_buffers():
-    s = Stack([TASKS["position"], LookAt(FRAME, (0.3, 0.3, 0.6))])
+    s = Stack([TASKS["position"], tasks.LookAt(FRAME, (0.3, 0.3, 0.6))])
     assert s.row_names() == ("x", "y", "z", "x", "y")
     assert s.row_names(("look-at",)) == ("x", "y")
     state = state_at(Q, V)
@@ -238,7 +219,7 @@ def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_bu
 
 
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
-@pytest.mark.parametrize("task", [JointDamping(7, 5.0), JointDamping(7, 2.0, "mass"),
+@pytest.mark.parametrize("task", [tasks.JointDamping(7, 5.0), tasks.JointDamping(7, 2.0, "mass"),
                                   TASKS["posture"]], ids=["identity", "mass", "posture"])
 def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
     state = state_at(Q, V)
@@ -261,7 +242,7 @@ def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
     (lambda s: s.reorder(["position", "position", "pointing"]), "each of"),
     (lambda s: s.hierarchy(state_at(Q, V), ("posture",)), "unknown task 'posture'"),
     (lambda s: Stack(level="effort"), "level must be"),
-    (lambda s: Stack([JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot has 7")])
+    (lambda s: Stack([tasks.JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot ha")])
 def test_bad_edits_are_named(edit, said):
     with pytest.raises(HierarchyError) as error:
         edit(stack())
@@ -275,7 +256,7 @@ def test_an_empty_stack_is_an_error_and_an_empty_order_is_not():
 
 
 @dataclass(frozen=True)
-class Crossed(JointLimits):
+class Crossed(tasks.JointLimits):
     """Limits whose kernel writes sides that cross in the third row."""
 
     def writer(self, state, level, rows):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scene import Elbow
 
-from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
+from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State, tasks
 from hierarchy.activation import Activation
 from hierarchy.avoidance import Barrier, Capsule, Obstacle, Repulsion, SurveillanceAreas
 from hierarchy.gate import check_rotation
@@ -12,22 +12,6 @@ from hierarchy.limits import Limits
 from hierarchy.loop import Loop
 from hierarchy.paths import Blended, Jittered, Still, circle
 from hierarchy.robots import TABLES, link_capsules
-from hierarchy.tasks import (
-    Avoidance,
-    CentreOfMass,
-    CumulatedRepulsion,
-    DangerBounds,
-    JointCoupling,
-    JointDamping,
-    JointLimits,
-    Manipulability,
-    Pointing,
-    Position,
-    Posture,
-    SelfSeparation,
-    Separation,
-    TorqueLimits,
-)
 
 NAN, INF = float("nan"), float("inf")
 A, B = np.eye(2), np.ones(2)
@@ -35,29 +19,30 @@ ROBOT, HUMANOID = Robot.load("kuka_lwr"), Robot.load("humanoid")
 STATE = State.at(ROBOT, [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0])
 FRAME = ROBOT.frame("end_effector")
 THERE = Still([0.3, 0.5, 0.1])
-LIMITS, POINTS = JointLimits(ROBOT, 10.0, 0.01), ROBOT.control_points
+HAND = tasks.Position(FRAME, THERE)
+LIMITS, POINTS = tasks.JointLimits(ROBOT, 10.0, 0.01), ROBOT.control_points
 ARM, KEPT = link_capsules(TABLES["kuka_lwr"], foot=0.3105), Barrier(0.02)
 TIMES, CORNERS = (0.5, 1.2), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2))
 
 
 def limits(**settings):
-    return JointLimits(**({"robot": ROBOT, "acceleration": 10.0, "period": 1e-3} | settings))
+    return tasks.JointLimits(**({"robot": ROBOT, "acceleration": 10.0, "period": 1e-3} | settings))
 
 
 @pytest.mark.parametrize(("make", "said"), [
     (lambda: Still("a"), "position [m]: expected 3 finite numbers, got str"),
-    (lambda: Position(FRAME, None), "task 'position': path: expected a Path, got NoneType None"),
-    (lambda: Position(FRAME, THERE, damping=INF), "damping = inf, expected a number >= 0"),
+    (lambda: tasks.Position(FRAME, None), "k 'position': path: expected a Path, got NoneType None"),
+    (lambda: tasks.Position(FRAME, THERE, damping=INF), "damping = inf, expected a number >= 0"),
     (lambda: ROBOT.integrate(np.zeros(7), np.zeros(6)), "step: expected 7 finite numbers"),
-    (lambda: Avoidance(["x"]), "control points[0]: expected a ControlPoint, got str 'x'"),
+    (lambda: tasks.Avoidance(["x"]), "control points[0]: expected a ControlPoint, got str 'x'"),
     (lambda: Hierarchy.from_levels([(A, ["1", "2"])]), "b is not an array of numbers: list ['1'"),
     (lambda: Hierarchy.from_levels("A"), "levels: expected a list of (A, b)"),
     (lambda: Hierarchy.from_levels([(A, B)] * 2, names=["a"] * 2), "2 levels are named 'a'"),
     (lambda: State.at("kuka_lwr", np.zeros(7)), "State.at: robot: expected a Robot, got str"),
-    (lambda: Position("end_effector", THERE), "'position': frame is the name 'end_effector'; give"),
-    (lambda: JointLimits("kuka_lwr", 10.0, 0.01), "give Robot.load('kuka_lwr')"),
+    (lambda: tasks.Position("hand", THERE), "'position': frame is the name 'hand'; give"),
+    (lambda: tasks.JointLimits("kuka_lwr", 10.0, 0.01), "give Robot.load('kuka_lwr')"),
     (lambda: Stack(["position"]), "a stack: expected a Task, got str 'position'"),
-    (lambda: Stack([Position(FRAME, THERE)]).hierarchy(ROBOT), "state: expected a State, got Rob"),
+    (lambda: Stack([HAND]).hierarchy(ROBOT), "state: expected a State, got Rob"),
     # values out of their range
     (lambda: Obstacle("cone", (0, 0, 0)), "unknown obstacle shape 'cone'"),
     (lambda: Obstacle("point", (0, NAN, 0)), "not finite"),
@@ -66,31 +51,31 @@ def limits(**settings):
     (lambda: Barrier(0.1, recovery=NAN), "recovery = nan"),
     (lambda: Barrier(0.1, influence=0.1), "influence = 0.1 m must be more"),
     (lambda: Capsule("x", 1, (0, 0, 0), (0, 0, 1), -1.0), "capsule 'x': radius [m] = -1"),
-    (lambda: SelfSeparation(ARM[:2], KEPT), "'self-separation': no pair among 2"),
-    (lambda: SelfSeparation(ARM, KEPT, kind="equality"), "are inequalities"),
-    (lambda: Separation((), KEPT), "'separation': needs at least one control point"),
-    (lambda: Separation(POINTS, KEPT, 3, kind="equality"), "are inequalities"),
-    (lambda: CumulatedRepulsion(7, (), 0.1), "at least one control point"),
-    (lambda: CumulatedRepulsion(7, POINTS, 0.1, lever=0.0), "lever 0.0 m"),
-    (lambda: CumulatedRepulsion(7, POINTS, 0.1).reference_velocity(STATE), "no measurement"),
-    (lambda: DangerBounds(LIMITS, POINTS, reach=0.0), "bounds': repulsion reach must be positive"),
-    (lambda: Pointing(FRAME, (0.0, 0.0, 0.0), 0.1), "axis"),
-    (lambda: Avoidance(POINTS, 2), "rows must be 1 or 3"),
-    (lambda: Avoidance(POINTS, 1).jacobian(STATE), "no measurement"),
-    (lambda: JointDamping(7, 1.0, "momentum"), "weight"),
-    (lambda: CentreOfMass(ROBOT, THERE, (1, 0)), "in this order"),
-    (lambda: CentreOfMass(ROBOT, THERE, (0, 3)), "must be some of 0, 1, 2"),
-    (lambda: JointCoupling(ROBOT, {"joint_9": 1.0}), "unknown joint 'joint_9'"),
-    (lambda: JointCoupling(ROBOT, {"joint_1": 0.0}), "no factor other than zero"),
-    (lambda: Manipulability(FRAME, -0.1), "least = -0.1"),
+    (lambda: tasks.SelfSeparation(ARM[:2], KEPT), "'self-separation': no pair among 2"),
+    (lambda: tasks.SelfSeparation(ARM, KEPT, kind="equality"), "are inequalities"),
+    (lambda: tasks.Separation((), KEPT), "'separation': needs at least one control point"),
+    (lambda: tasks.Separation(POINTS, KEPT, 3, kind="equality"), "are inequalities"),
+    (lambda: tasks.CumulatedRepulsion(7, (), 0.1), "at least one control point"),
+    (lambda: tasks.CumulatedRepulsion(7, POINTS, 0.1, lever=0.0), "lever 0.0 m"),
+    (lambda: tasks.CumulatedRepulsion(7, POINTS, 0.1).reference_velocity(STATE), "no measurement"),
+    (lambda: tasks.DangerBounds(LIMITS, POINTS, reach=0.0), "bounds': repulsion reach must be pos"),
+    (lambda: tasks.Pointing(FRAME, (0.0, 0.0, 0.0), 0.1), "axis"),
+    (lambda: tasks.Avoidance(POINTS, 2), "rows must be 1 or 3"),
+    (lambda: tasks.Avoidance(POINTS, 1).jacobian(STATE), "no measurement"),
+    (lambda: tasks.JointDamping(7, 1.0, "momentum"), "weight"),
+    (lambda: tasks.CentreOfMass(ROBOT, THERE, (1, 0)), "in this order"),
+    (lambda: tasks.CentreOfMass(ROBOT, THERE, (0, 3)), "must be some of 0, 1, 2"),
+    (lambda: tasks.JointCoupling(ROBOT, {"joint_9": 1.0}), "unknown joint 'joint_9'"),
+    (lambda: tasks.JointCoupling(ROBOT, {"joint_1": 0.0}), "no factor other than zero"),
+    (lambda: tasks.Manipulability(FRAME, -0.1), "least = -0.1"),
     (lambda: limits(acceleration=0.0), "joint 0: acceleration must be positive and finite, got 0"),
     (lambda: limits(acceleration=[1.0, 2.0]), "has shape (2,), expected a number or (7,)"),
     (lambda: limits(margin=2.2), "margin 2.2 leaves joint_2 no room between -2.094 and 2.094"),
     (lambda: Limits([0], [NAN], [1], [1], 1e-3), "joint 0: no position lies between lower and upp"),
     (lambda: Limits([0], [1], [0], [1], 1e-3), "joint 0: velocity must be positive, got 0.0"),
-    (lambda: Stack([TorqueLimits(ROBOT)], "velocity").hierarchy(STATE),
+    (lambda: Stack([tasks.TorqueLimits(ROBOT)], "velocity").hierarchy(STATE),
      "'torque limits': torque limits need the acceler"),
-    *((lambda fraction=fraction: TorqueLimits(ROBOT, fraction),
+    *((lambda fraction=fraction: tasks.TorqueLimits(ROBOT, fraction),
        f"fraction {fraction} is not more than 0") for fraction in (0.0, -1.0, 80.0, NAN)),
     (lambda: Blended(TIMES, CORNERS, 0.0), "blend 0.0 s must be positive"),
     (lambda: Blended(TIMES[:1], CORNERS, 0.1), "1 times for 2 points"),
@@ -108,13 +93,13 @@ def limits(**settings):
     (lambda: HUMANOID.limit_base(0.0, 1.0), "linear speed of the base = 0"),
     (lambda: Robot.named("kuka_lvr"), "did you mean 'kuka_lwr'"),
     (lambda: ROBOT.control_point("elbow", (0, 0, 0)), "unknown joint 'elbow'"),
-    (lambda: Posture((0.0,) * 4).error(STATE), "'posture': 4 values for 7 joint positions"),
-    (lambda: Posture({"leg": 0.0}, robot=ROBOT), "'posture': unknown joint 'leg'"),
-    (lambda: Posture({"arm": 0.0}).dimension, "give Posture(..., robot=robot)"),
-    (lambda: DangerBounds(LIMITS, ()), "needs at least one control point"),
-    (lambda: DangerBounds(LIMITS, POINTS).box(STATE, "velocity"), "carries no measurement"),
-    (lambda: TorqueLimits(HUMANOID), "contact forces"),
-    (lambda: DangerBounds(JointLimits(HUMANOID, 5.0, 0.01), HUMANOID.control_points),
+    (lambda: tasks.Posture((0.0,) * 4).error(STATE), "'posture': 4 values for 7 joint positions"),
+    (lambda: tasks.Posture({"leg": 0.0}, robot=ROBOT), "'posture': unknown joint 'leg'"),
+    (lambda: tasks.Posture({"arm": 0.0}).dimension, "give Posture(..., robot=robot)"),
+    (lambda: tasks.DangerBounds(LIMITS, ()), "needs at least one control point"),
+    (lambda: tasks.DangerBounds(LIMITS, POINTS).box(STATE, "velocity"), "carries no measurement"),
+    (lambda: tasks.TorqueLimits(HUMANOID), "contact forces"),
+    (lambda: tasks.DangerBounds(tasks.JointLimits(HUMANOID, 5.0, 0.01), HUMANOID.control_points),
      "floating base"),
     (lambda: Activation(None, (), {"wall": 0.0}), "must be positive and finite"),
     (lambda: check_rotation("R", np.diag([1.0, 1.0, -1.0])), "a reflection, of determinant -1"),
@@ -128,7 +113,7 @@ def test_a_wrong_value_is_refused_and_named(make, said):
 
 
 @pytest.mark.parametrize("given", ["state", None, 3, ROBOT])
-@pytest.mark.parametrize("task", [Position(FRAME, THERE), Posture((0.0,) * 7), Elbow()],
+@pytest.mark.parametrize("task", [HAND, tasks.Posture((0.0,) * 7), Elbow()],
                          ids=lambda task: task.name)
 def test_what_takes_a_state_refuses_anything_else(task, given):
     for method in (task.error, task.jacobian, task.jacobian_derivative, task.reference_velocity,
