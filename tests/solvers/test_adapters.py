@@ -173,12 +173,6 @@ def test_a_solver_of_qpsolvers_is_answered_by_hcod_with_a_note(configuration):
                                expected)
 
 
-def damped(configuration):
-    hand = frame_task(configuration)
-    hand.lm_damping = 1.0
-    return hand
-
-
 def renamed(robot):
     import pink
 
@@ -201,7 +195,8 @@ def rows_at(robot, configuration, level):
     (lambda c, r: solve_ik(c, [posture_task(np.full(7, np.nan))], DT), "PostureTask"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, limits=[limit((0, np.nan, 1.0))]),
      "SimpleNamespace, row 0"),
-    (lambda c, r: pink_hierarchy(c, [damped(c)], DT), "FrameTask of end_effector: lm_damping = 1"),
+    (lambda c, r: pink_hierarchy(c, arm_scene(c, lm_damping=1.0)[1], DT),
+     "FrameTask of end_effector: lm_damping = 1"),
     (lambda c, r: pink_hierarchy(c, [posture_task(Q)], DT, barriers=[wall(c, 1.0, 1.0, 2.0)]),
      "Backing: safe_displacement_gain = 2"),
     (lambda c, r: rows_at(r, c, "acceleration"), "pink does not support accelerations"),

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from rank_cases import family, rng
+from rank_cases import boxed, family, rng
 from sequences import moved
 
 from hierarchy import Hierarchy, HierarchyError
@@ -30,18 +30,15 @@ def problems_of(name, copies=COPIES):
     r, originals = rng(7), [h for h, _, _ in family(name)][:FEW]
     found = list(originals)
     for _ in range(copies - 1):
-        for h in originals:
-            x = h.reference + r.normal(size=h.n)
-            found.append(Hierarchy(h.A, h.lower, h.upper, h.sizes, x, h.names))
+        found += [h.changed(reference=h.reference + r.normal(size=h.n)) for h in originals]
     return found
 
 
-def bounded(seed, half, L=2):
-    """Bounds on the joints over L levels of three rows."""
-    r, n = rng(seed), 7
-    levels = [(np.eye(n), -half * np.ones(n), half * np.ones(n))]
-    levels += [(r.normal(size=(3, n)), r.normal(size=3)) for _ in range(L)]
-    return Hierarchy.from_levels(levels, r.normal(size=n))
+def bounded(seed, half):
+    """Bounds on the joints over two levels of three rows."""
+    r = rng(seed)
+    levels = [(r.normal(size=(3, 7)), r.normal(size=3)) for _ in range(2)]
+    return boxed(Hierarchy.from_levels(levels, r.normal(size=7)), -half, half)
 
 
 def assert_same(answer, alone):

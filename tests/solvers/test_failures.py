@@ -96,15 +96,12 @@ def test_what_hcod_calls_solved_is_right_and_found_soon_with_its_memory_too(path
     assert not certain or certify(h, cold.x).certified
 
 
-@pytest.mark.parametrize("name", ["tpm_wrong_min_3000097", "tpm_wrong_min_3000542",
-                                  "tpm_wrong_min_3009328"])
-def test_a_small_row_that_could_be_met_is_not_hidden_by_a_large_one(name):
+@pytest.mark.parametrize(("name", "wrong"), [
+    ("tpm_wrong_min_3000097", [0.9981079094, -10.0]), ("tpm_wrong_min_3000542", [0.0, -1.0, 1.0]),
+    ("tpm_wrong_min_3009328", [0.1, 7.5, -0.3, 0.1])])
+def test_a_small_row_that_could_be_met_is_not_hidden_by_a_large_one(name, wrong):
     """What tpm once gave: at least the small row of level 2 is missed, or the large one moved."""
-    wrong = {"tpm_wrong_min_3000097": [0.9981079094, -10.0],
-             "tpm_wrong_min_3000542": [0.0, -1.0, 1.0],
-             "tpm_wrong_min_3009328": [0.1, 7.5, -0.3, 0.1]}[name]
-    h = read(name)
-    assert certify(h, wrong).level == 1
+    assert certify(read(name), wrong).level == 1
 
 
 @pytest.mark.parametrize("backend", [name for name in BACKENDS if installed(name)])

@@ -86,8 +86,7 @@ def test_the_certificate_rejects_another_x_and_a_witness_that_misses_more(wrong)
     h = problem(3, 0.2)
     res = make("hcod").solve(h)
     x, witnesses = res.x.copy(), res.witnesses.copy()
-    target = x if wrong == "x" else witnesses[0]
-    target += 1e-3 * np.ones(h.n)
+    (x if wrong == "x" else witnesses[0])[:] += 1e-3
     assert not certify(h, x, witnesses=witnesses).certified
     strict = make("hcod").solve(problem(3, 0.0)).x
     assert not certify(h, strict, witnesses=res.witnesses).certified
@@ -97,10 +96,7 @@ def test_the_certificate_rejects_another_x_and_a_witness_that_misses_more(wrong)
 
 def test_what_cannot_give_refuses_by_name():
     h = problem(1, 0.1)
-    for name in names():
-        resolver = make(name)
-        if resolver.strict and resolver.handles == "inequalities":
-            continue
+    for resolver in map(make, set(names()) - {"hcod", "hqp"}):
         with pytest.raises(HierarchyError, match=r"level 2: it gives, .* has none \(hcod, hqp\)"):
             resolver.solve(h)
     with pytest.raises(HierarchyError, match="problem 0 gives"):
@@ -160,11 +156,10 @@ def metric(rng, n):
     return (Q * np.geomspace(0.01, 100.0, n)) @ Q.T
 
 
-def three_levels(rng, n=7, repeated=True):
+def three_levels(rng):
     """Levels of which one repeats a row of the first, with another target."""
-    A = [rng.normal(size=(m, n)) for m in (2, 2, 1)]
-    if repeated:
-        A[1][0] = A[0][1]
+    A = [rng.normal(size=(m, 7)) for m in (2, 2, 1)]
+    A[1][0] = A[0][1]
     return [(rows, rng.normal(size=len(rows))) for rows in A]
 
 

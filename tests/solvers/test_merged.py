@@ -31,11 +31,6 @@ def targets(seed, size=1.0):
     return size * np.random.default_rng(seed).normal(size=11)
 
 
-def weighted_rows(levels):
-    W = np.repeat([RATIO**2, RATIO, 1.0], [2, 3, N])
-    return W, np.vstack([A for A, _, _ in levels[2:]])
-
-
 def solved(resolver, h, memory=None):
     found = resolver.solve(h, memory)
     assert found.status is Status.SOLVED
@@ -45,7 +40,8 @@ def solved(resolver, h, memory=None):
 @pytest.mark.parametrize("seed", range(20))
 def test_x_and_torques_move_no_faster_than_the_targets(seed):
     levels, resolver = arm(seed), make("merged", ratio=RATIO, cap=0.0)
-    W, A = weighted_rows(levels)
+    W = np.repeat([RATIO**2, RATIO, 1.0], [2, 3, N])
+    A = np.vstack([A for A, _, _ in levels[2:]])
     T = np.random.default_rng(seed + 100).normal(size=(4, N))
     null = np.linalg.svd(levels[0][0])[2][1:].T
     gamma = np.linalg.norm(T @ null @ np.linalg.pinv(W[:, None] * A @ null), axis=1)

@@ -166,21 +166,17 @@ def by_simetti_and_casalino(levels, n):
     return rho
 
 
-def problem(rng, n, sizes, choices):
-    """Random rows of unit size, with activations of which some are exactly 0 or 1."""
-    levels = [(rng.normal(size=(m, n)), rng.normal(size=m)) for m in sizes]
-    acts = [np.where(rng.random(m) < 0.5, rng.choice(choices, m), rng.random(m)) for m in sizes]
-    return levels, acts
-
-
-def solved(levels, acts, resolver=SMOOTH):
-    return resolver.solve_activated(Hierarchy.from_levels(levels), np.concatenate(acts))
+def solved(levels, acts):
+    return SMOOTH.solve_activated(Hierarchy.from_levels(levels), np.concatenate(acts))
 
 
 def test_the_answer_is_that_of_the_paper_with_all_its_matrices():
     rng = np.random.default_rng(3)
     for _ in range(60):
-        levels, acts = problem(rng, 7, rng.integers(1, 5, 3), [0.0, 1.0])
+        sizes = rng.integers(1, 5, 3)
+        levels = [(rng.normal(size=(m, 7)), rng.normal(size=m)) for m in sizes]
+        acts = [np.where(rng.random(m) < 0.5, rng.choice([0.0, 1.0], m), rng.random(m))
+                for m in sizes]
         want = by_simetti_and_casalino(
             [(J, a, rate) for (J, rate), a in zip(levels, acts, strict=True)], 7)
         found = solved(levels, acts)
