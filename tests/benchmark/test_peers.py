@@ -25,12 +25,11 @@ from hierarchy.tasks import Pose, Position
 from solvers.problems.files import Collection, Head
 
 ROOT = Path(__file__).parents[2]
-NUMPY = Package("numpy", "numpy")
 NOBODY = Entrant("nobody", Package("nobody", "no_such_module", ("nobody==1",)), "a:B")
 
 
 def fake(name, **options):
-    return Entrant(name, NUMPY, f"fake_peers:{name}", options)
+    return Entrant(name, Package("numpy", "numpy"), f"fake_peers:{name}", options)
 
 
 @pytest.fixture

@@ -13,7 +13,6 @@ from hierarchy.task import Rows, Task
 
 STEP = 1e-6
 CONTACTS = soles_and_palm()
-P = len(CONTACTS.points.joints)
 N = ROBOT.n
 
 
@@ -41,7 +40,7 @@ def test_contact_jacobian_is_the_derivative_of_the_positions():
 def test_base_rows_hold_exactly_where_forward_dynamics_does():
     """aba gives the acceleration that contact forces and joint torques cause."""
     state, rng = moving_state(5), np.random.default_rng(5)
-    forces, tau = 50.0 * rng.normal(size=(P, 3)), rng.normal(size=N)
+    forces, tau = 50.0 * rng.normal(size=(len(CONTACTS.points.joints), 3)), rng.normal(size=N)
     tau[:6] = 0.0
     a = pin.aba(ROBOT.model, ROBOT.model.createData(), state.q, state.v, tau,
                 external_forces(state, CONTACTS, forces))

@@ -195,9 +195,6 @@ def wide(joints, T, velocity=np.inf):
                      np.full(joints, 10.0)]), np.full(joints, T)
 
 
-PERIODS = pytest.mark.parametrize("period", [0.01, 0.05] if PLAIN else [1e-4, 2e-3, 0.05])
-
-
 @LEVELS
 @pytest.mark.parametrize(("seed", "ticks"), [(6, 0), (7, 0), (6, 10)])
 def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, seed, ticks):
@@ -216,7 +213,7 @@ def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, s
 
 
 @LEVELS
-@PERIODS
+@pytest.mark.parametrize("period", [0.01, 0.05] if PLAIN else [1e-4, 2e-3, 0.05])
 @pytest.mark.parametrize("velocity", [0.3, np.inf])
 @pytest.mark.parametrize("side", [-1, 1])
 def test_a_joint_outside_returns_without_turning_and_in_finite_time(level, period, velocity, side):

@@ -89,10 +89,7 @@ def test_a_robot_is_what_mujoco_has(kind, written):
     assert public_robots.of_mjcf(written(KINDS[kind])) == "equal"
 
 
-PACKAGES = public_robots.MJCF + public_robots.URDF
-
-
-@pytest.mark.parametrize("package", PACKAGES)
+@pytest.mark.parametrize("package", public_robots.MJCF + public_robots.URDF)
 def test_robots_of_public_packages_are_what_mujoco_and_pinocchio_have(package):
     judged = [(str(file), verdict, why) for file, verdict, why in public_robots.tried(package)]
     if not judged:

@@ -18,12 +18,11 @@ from scenarios.config.robot import RobotSection
 ROBOTS = Path(__file__).parents[1] / "data" / "robots"
 ARM = (ROBOTS / "arm.urdf.txt").read_text()
 LIMIT = '<limit lower="0.5" upper="2" velocity="3" effort="10"/>'
-SPHERE = '<sphere radius="0.04"/>'
 
 
 @pytest.fixture
 def arm(tmp_path):
-    def write(shape=SPHERE, limit=LIMIT, kind="revolute"):
+    def write(shape='<sphere radius="0.04"/>', limit=LIMIT, kind="revolute"):
         path = tmp_path / "arm.urdf"
         path.write_text(ARM.format(shape=shape, limit=limit, kind=kind))
         return path
@@ -153,7 +152,6 @@ def test_arms_of_example_robot_data_are_read_with_their_meshes(name, joints, end
 # What is wrong in a file is named before pinocchio reads it, which would end the process or say
 # "not a valid URDF model".
 
-TWO_JOINTS = (ROBOTS / "two_joints.urdf.txt").read_text()
 PLAIN = {"link": "", "kind": "revolute", "parent": "base", "axis": "0 0 1", "mimic": "", "more": "",
          "limit": '<limit lower="-2" upper="2" velocity="1" effort="10"/>'}
 LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"/></joint>'
@@ -174,7 +172,7 @@ LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"
     ({"mimic": '<mimic joint="elbow"/>'}, "joint 'elbow': it is to follow itself")])
 def test_a_wrong_urdf_is_refused_with_the_name_of_its_joint(changed, said, tmp_path, capfd):
     path = tmp_path / "arm.urdf"
-    path.write_text(TWO_JOINTS.format(**{**PLAIN, **changed}))
+    path.write_text((ROBOTS / "two_joints.urdf.txt").read_text().format(**{**PLAIN, **changed}))
     with pytest.raises(RobotError) as error:
         Robot.load(path)
     assert said in str(error.value)

@@ -27,8 +27,6 @@ SHAPES = [
     Obstacle("box", (0, 0, 0), (0.02, 0.1, 0.05), TURN, path=ROUND),
 ]
 STATES = states(20, seed=6)
-LEVELS = ["velocity", "acceleration"]
-START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
 
 
 def sensor_of(obstacles):
@@ -36,7 +34,6 @@ def sensor_of(obstacles):
 
 
 SENSOR = sensor_of(SHAPES)
-EVERYWHERE = Barrier(0.05, influence=5.0)
 
 
 def seen_at(q, v, t=0.7, differences=None):
@@ -76,8 +73,8 @@ def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
     (Pairs(8, 1), 1, "8 points .* expected 9"),
     (Pairs(9, 0), None, "9 points are measured against 0 obstacles, .* one at least")])
 def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
-    state = State.at(ROBOT, START)
-    task = Separation(SENSOR.points, EVERYWHERE, obstacles)
+    state = State.at(ROBOT, np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]))
+    task = Separation(SENSOR.points, Barrier(0.05, influence=5.0), obstacles)
     with pytest.raises(HierarchyError, match="measurement of pairs"):
         task.writer(state, "velocity", Rows.empty(18, 7))()
     state.measurement = Measurement(8)
@@ -86,16 +83,14 @@ def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
         task.writer(state, "velocity", Rows.empty(18, 7))()
 
 
-ARM = link_capsules(TABLES["kuka_lwr"], foot=0.3105)
 # Capsules at odds with the links' own axes, so that every kind of nearest points comes up.
 ODD = (Capsule("ball", 1, (0.1, 0.1, 0.1), (0.1, 0.1, 0.1), 0.05),
        Capsule("bar", 3, (-0.3, 0.1, 0.2), (0.3, 0.0, 0.3), 0.02),
        Capsule("rod", 5, (0.1, -0.3, 0.1), (0.0, 0.4, 0.3), 0.03),
        Capsule("hand", 7, (0.0, -0.2, 0.1), (0.0, 0.2, 0.0), 0.0))
 ALL_PAIRS = Barrier(0.02, influence=5.0)
-TASKS = {"arm": SelfSeparation(ARM, ALL_PAIRS),
+TASKS = {"arm": SelfSeparation(link_capsules(TABLES["kuka_lwr"], foot=0.3105), ALL_PAIRS),
          "odd": SelfSeparation(ODD, ALL_PAIRS, ((0, 1), (0, 2), (3, 1), (1, 2), (2, 3)))}
-POSTURES = states(40, seed=3)
 IDENTITY = np.r_[np.eye(3).ravel(), np.zeros(3)][None]
 
 
@@ -145,7 +140,7 @@ def test_rows_give_the_second_derivative_with_nearest_points_that_slide():
     rate, kept, slow = 10.0, 0.02, 0.2
     task = replace(TASKS["odd"], barrier=Barrier(kept, rate, 5.0, slow, limit=1e9))
     h, rng, kinds = 5e-5, np.random.default_rng(0), set()
-    for q, v in POSTURES:
+    for q, v in states(40, seed=3):
         a, d, free = rng.normal(size=7), [], []
         for t in (-h, 0.0, h):
             state = State.at(ROBOT, q + v * t + a * t * t / 2)
@@ -165,7 +160,7 @@ def test_rows_give_the_second_derivative_with_nearest_points_that_slide():
     assert len(kinds) == 4
 
 
-@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("differences", [None, 1e-3])
 @pytest.mark.parametrize("task", [
     *(Separation(SENSOR.points, Barrier(0.05, influence=0.6), of) for of in (len(SHAPES), None)),

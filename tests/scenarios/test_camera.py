@@ -10,8 +10,7 @@ from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.config.sensor import CameraSection, DepthErrors
 from tests.helpers.camera_by_hand import bound, deproject
 
-ROBOT = Robot.named("kuka_lwr")
-STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
+STATE = State.at(Robot.named("kuka_lwr"), [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
 SMALL = {"width": 80, "height": 60, "fx": 70.0, "fy": 65.0}
 EXACT = {"noise_floor": 0.0, "noise_growth": 0.0, "rounding": "step", "step": 0.0, "missing": 0.0,
          "missing_at_edges": 0.0, "outliers": 0.0}

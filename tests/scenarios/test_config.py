@@ -80,16 +80,13 @@ def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_besid
     assert np.median(away) == pytest.approx(0.1 * 0.5 ** (1.0 / 3.0), rel=0.05)  # of a ball
 
 
-EXTENSIONS = Path(__file__).parents[2] / "docs" / "_ext"
-
-
 def test_every_key_has_a_meaning():
     assert not [f"{place} {section.__name__}.{key.name}" for place, section in sections()
                 for key in keys_of(section) if not key.meaning]
 
 
 def test_the_page_of_keys_is_as_the_program_has_them(monkeypatch):
-    monkeypatch.setattr(sys, "path", [str(EXTENSIONS), *sys.path])
+    monkeypatch.setattr(sys, "path", [str(Path(__file__).parents[2] / "docs" / "_ext"), *sys.path])
     import scenario_keys
 
     assert scenario_keys.written() == scenario_keys.PAGE.read_text(encoding="utf-8"), (

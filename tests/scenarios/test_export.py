@@ -16,8 +16,6 @@ from scenarios.export import export, foxglove
 from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Event
 
-CONSTANT = {"joint_lower", "joint_upper", "velocity_limit"}
-
 
 @pytest.fixture(scope="module")
 def run():
@@ -51,7 +49,7 @@ def test_an_mcap_file_has_every_signal_of_every_tick(run, messages):
         for name in found[topic][0][1]:
             read[name] = [message[name] for _, message in found[topic]]
     assert read.pop("tasks") == [run.orders[i] for i in run["order"]]
-    assert set(read) | {"t"} == set(run.signals) - CONSTANT
+    assert set(read) | {"t"} == set(run.signals) - {"joint_lower", "joint_upper", "velocity_limit"}
     for name, values in read.items():
         signal = run[name].astype(float)
         np.testing.assert_array_equal(np.array(values, dtype=float),

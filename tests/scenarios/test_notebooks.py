@@ -14,14 +14,12 @@ from hierarchy import Hierarchy, HierarchyError
 from hierarchy.notebook import html_table
 from scenarios import compare, load, simulate
 
-ROOT = Path(__file__).parents[2]
-NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
-SHORT = ["control.duration=0.02"]
+NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs" / "notebooks").glob("*.ipynb"))
 
 
 @pytest.fixture(scope="module")
 def run():
-    return simulate(load("ellipse", SHORT))
+    return simulate(load("ellipse", ["control.duration=0.02"]))
 
 
 @pytest.fixture(scope="module")

@@ -95,13 +95,12 @@ def test_every_shipped_scenario_of_torques_can_be_replayed(name):
             np.testing.assert_allclose(now.wanted[0], path.wanted[0], atol=1e-9)
 
 
-SHORT = ["control.duration=1.5"]
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
 
 
 @pytest.fixture(scope="module")
 def runs():
-    return {name: simulate(load(name, SHORT)) for name in NAMES}
+    return {name: simulate(load(name, ["control.duration=1.5"])) for name in NAMES}
 
 
 @pytest.fixture(scope="module")

@@ -34,7 +34,6 @@ pointing.alpha_d = { choice = [5.0, 15.0] }
 plant.measurement.seed = { integers = [3, 5] }
 """
 SHORT = {"control.duration": 0.03}
-ALONE = Workers(1)
 
 
 def write(folder, parameters=PARAMETERS, **changed):
@@ -204,7 +203,7 @@ def test_a_folder_in_use_or_of_something_else_is_refused(tmp_path):
 def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("starts") / "out"
     found = compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], 7, 3,
-                           folder, workers=ALONE)
+                           folder, workers=Workers(1))
     return found, json.loads((folder / "results.json").read_text()), folder
 
 

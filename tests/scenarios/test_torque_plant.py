@@ -141,12 +141,11 @@ def test_a_robot_stands_only_at_rest_upright_and_within_its_limits_until_the_end
 
 
 changed = load("stand-push").with_changes
-ANKLE = ROBOT.rest[ROBOT.coordinate("left_ankle_pitch")]
 
 
 def tilted(degrees):
     """Both soles turned by their ankles from where they are flat."""
-    angle = float(ANKLE + np.radians(degrees))
+    angle = float(ROBOT.rest[ROBOT.coordinate("left_ankle_pitch")] + np.radians(degrees))
     return {"start.on_floor": True,
             "start.joints": {"left_ankle_pitch": angle, "right_ankle_pitch": angle}}
 

@@ -20,10 +20,8 @@ TINY = Recipe(joints=(2, 3), levels=(2, 4), rows=(1, 3), scales=(1.0, 1.0), spre
               angles=(1e-2, 1e-1), ties=0.5, zero_rows=0.1, duplicates=0.3, near_parallel=0.1)
 OFF = 1e-4
 
-every_family = pytest.mark.parametrize("name", FAMILIES)
 
-
-@every_family
+@pytest.mark.parametrize("name", FAMILIES)
 def test_the_stored_solutions_are_certified_far_below_the_tolerance(name):
     for h, x, _ in family(name):
         verdict = certify(h, x)

@@ -216,7 +216,6 @@ def test_bounds_of_a_first_level_are_kept_and_change_nothing_where_they_are_far(
 
 # -- memory ----------------------------------------------------------------------------------------
 
-REMEMBER = [make("hcod"), make("tpm"), make("weighted")]
 ODD = [np.nan, np.inf, -np.inf, 1e300, -1.0, 0.0, 1.0, 2.0, 3.0, 0.5, 1e18, -7.0]
 
 
@@ -229,7 +228,7 @@ def remembered(resolver):
             yield from (h for h, _, _ in list(family(name))[:PROBLEMS if resolver.strict else 3])
 
 
-@every(REMEMBER)
+@every([make("hcod"), make("tpm"), make("weighted")])
 def test_no_memory_changes_the_answer_and_its_own_leaves_little_to_do(resolver):
     """Of a tick before, of rows at random sides, of numbers of any size, of another hierarchy."""
     r, tried, close = rng(3), 0, 1e-10 if resolver.name == "tpm" else 1e-8

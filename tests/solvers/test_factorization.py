@@ -10,7 +10,6 @@ from solvers.factorization import Factorization
 from solvers.resolvers.tpm import task_priority_matrix
 
 TPM = make("tpm")
-every_case = pytest.mark.parametrize("case", CASES)
 
 
 def new_rows(size, factored, rng):
@@ -80,7 +79,7 @@ def test_after_random_edits_the_answers_are_those_of_tpm():
     assert np.percentile(gaps, 99.9) < 1e-12
 
 
-@every_case
+@pytest.mark.parametrize("case", CASES)
 def test_f_and_g_are_those_of_the_matrix_made_from_the_rows(case):
     factored = Factorization.of(build(case, True))
     for _ in range(2):

@@ -30,7 +30,6 @@ RIGHT = {
 # A row of 5e-14 beside one of 1000 takes no part, and an answer that misses it says so.
 NEGLECTED = "tpm_wrong_min_3000097", Status.INACCURATE
 UNKNOWN = ["hcod_nested_2004163_shift"]  # near-ties of 1e-9: any answer that says it is not sure
-RESOLVERS = ("hcod", "tpm", "hqp")
 # Found by `hierarchy bench stress` (seeds from 50,000,000 on), reduced: an answer was
 # called solved and wrong, the certificate rejected a right one (CERTAIN), or steps cycled.
 # Or of the exact engine: levels missed by a fiftieth, 169 steps for 10 rows (certain but IN_DOUBT).
@@ -51,7 +50,7 @@ def read(name):
 
 def cases(names):
     return [pytest.param(name, resolver, id=f"{name}-{resolver}")
-            for name in names for resolver in RESOLVERS]
+            for name in names for resolver in ("hcod", "tpm", "hqp")]
 
 
 def solved(name, resolver):

@@ -11,7 +11,6 @@ from solvers.batch import Batch
 from solvers.problems import generate
 
 STRICT = [make("hcod"), *(make("hqp", backend=name) for name in ("proxqp", "daqp"))]
-each = pytest.mark.parametrize("resolver", STRICT, ids=lambda one: one.label)
 
 
 def problem(seed, give, n=6, half=0.5):
@@ -24,7 +23,7 @@ def problem(seed, give, n=6, half=0.5):
          (np.eye(n), rng.normal(size=n))], give=[0.0, give, 0.0, 0.0])
 
 
-@each
+@pytest.mark.parametrize("resolver", STRICT, ids=lambda one: one.label)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_level_gives_up_to_what_it_may_and_those_below_gain(resolver, seed):
     strict, soft = problem(seed, 0.0), problem(seed, [0.3, 0.1, 0.2])
@@ -147,7 +146,6 @@ def test_explain_says_what_gives_how_much_and_for_whom():
 EVERY_STRICT = [make(name) for name in names() if make(name).strict]
 INEQUALITIES = [r for r in EVERY_STRICT if r.handles == "inequalities"]
 BOUNDS = [r for r in EVERY_STRICT if r.handles == "bounds"]
-every = pytest.mark.parametrize("resolver", EVERY_STRICT, ids=lambda r: r.label)
 
 
 def metric(rng, n):
@@ -177,7 +175,7 @@ def closed_form(levels, reference, W):
     return x + N @ np.linalg.solve(N.T @ W @ N, N.T @ W @ (reference - x))
 
 
-@every
+@pytest.mark.parametrize("resolver", EVERY_STRICT, ids=lambda r: r.label)
 def test_the_answer_is_the_nearest_in_the_metric(resolver):
     rng = np.random.default_rng(1)
     for _ in range(5):

@@ -8,7 +8,6 @@ from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, explain, make
 from solvers.problems import structured
 
-INF = np.inf
 HCOD = make("hcod")
 
 
@@ -139,7 +138,7 @@ def test_damped_x_is_continuous_where_a_bound_begins_to_act(name):
 @pytest.mark.filterwarnings("ignore:overflow")
 @pytest.mark.parametrize("below", [0, 1])
 def test_rows_of_any_size_are_solved_and_numbers_that_overflow_are_a_failure(below):
-    tiny = Hierarchy.from_levels([([[1e-200]], [1e-200], [INF if below else 1e-200])])
+    tiny = Hierarchy.from_levels([([[1e-200]], [1e-200], [np.inf if below else 1e-200])])
     np.testing.assert_array_equal(HCOD.solve(tiny).x, [1.0])
     small = Hierarchy.from_levels([([[1e-150, 0.0], [0.0, 2e-150]], [1e-150] * 2, [1e-150, 3e-150]),
                                    ([[1e-150, 1e-150]], [4e-150])])

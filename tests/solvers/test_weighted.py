@@ -12,7 +12,6 @@ from solvers.qp import backends, programs
 from solvers.resolvers.weighted import lexicographic_weights
 
 EXACT = 1e-9
-every_case = pytest.mark.parametrize("case", CASES)
 LIMIT = 0.7
 
 
@@ -28,7 +27,7 @@ def as_two_levels(h, resolver, hard):
                                  h.reference)
 
 
-@every_case
+@pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3])
 def test_within_limits_it_is_the_minimiser_and_shown_to_be(case, ratio):
     h, weighted = boxed(build(case, True), -LIMIT, LIMIT), make("weighted", ratio=ratio)
