@@ -39,15 +39,13 @@ def published(h, rank_tolerance=1e-9, damping=0.0, threshold=0.1):
     """Return x and F of the published Task Priority Matrix: eqs. (8)-(10), (14)."""
     A, b = h.A, h.lower
     m, n = A.shape
-    square = np.hstack([A, np.zeros((m, max(0, m - n)))])
-    F = np.linalg.qr(square.T)[1]
+    F = np.linalg.qr(np.hstack([A, np.zeros((m, max(0, m - n)))]).T)[1]
     tolerance = rank_tolerance * np.linalg.norm(A, axis=1).max()
     for i, j in zip(h.offsets[:-1], h.offsets[1:], strict=True):
         F[i:j] = _pivot(F[i:j, i:j], tolerance, damping, threshold) @ F[i:j]
         F[:i] -= F[:i, i:j] @ F[i:j]
     F = F.T
-    J = np.linalg.pinv(A, rcond=rank_tolerance)
-    return J @ (F @ b - A @ h.reference) + h.reference, F
+    return np.linalg.pinv(A, rcond=rank_tolerance) @ (F @ b - A @ h.reference) + h.reference, F
 
 
 def _pivot(R, tolerance, damping, threshold):

@@ -1,6 +1,5 @@
 """Contacts and tasks over their forces, each against an algorithm that shares no code with it."""
 
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -54,8 +53,7 @@ def test_base_rows_hold_exactly_where_forward_dynamics_does():
 @pytest.mark.parametrize("faces", [4, 8])
 def test_what_friction_rows_allow_is_in_the_cone_and_their_edges_touch_it(faces):
     contact = CONTACTS["left_hand"]
-    task = tasks.Friction(Contacts(ROBOT, [contact]), faces)
-    rows, lower, _ = task.fixed
+    rows, lower, _ = tasks.Friction(Contacts(ROBOT, [contact]), faces).fixed
     normal = np.array(contact.normal) / np.linalg.norm(contact.normal)
     rng, allowed = np.random.default_rng(7), []
     for _ in range(2000):
@@ -128,26 +126,16 @@ def test_an_open_contact_has_no_force_and_is_free_to_move(faces):
         assert not rows.any()
 
 
-def load_row(contacts, carried=None, **settings):
-    """A function of time: the sides of the row that has all the normal force of the right sole."""
-    task, state = tasks.Friction(contacts, **settings), State.at(ROBOT, ROBOT.rest)
-    rows = Rows.empty(41, 60)
-    write = task.writer(state, "torque", rows)
-    state.carried = None if carried is None else np.array([300.0, carried])
-
-    def at(t):
-        state.move(t, state.q, state.v)
-        write()
-        return rows[1][40], rows[2][40]
-
-    return at
-
-
 @pytest.mark.parametrize("largest", [100.0, 1e5, np.inf])
 def test_the_load_of_a_sole_falls_in_its_ramp_from_what_it_carried(largest):
-    at = load_row(opening(), 92.0, largest=largest)
-    assert [at(t) for t in (0.5, 0.79, 0.9, 0.99, 1.5)] == [
-        (-np.inf, pytest.approx(up)) for up in (np.inf, np.inf, 46.0, 4.6, np.inf)]
+    """The last row has all of its normal force."""
+    state, rows = State.at(ROBOT, ROBOT.rest), Rows.empty(41, 60)
+    write = tasks.Friction(opening(), largest=largest).writer(state, "torque", rows)
+    state.carried = np.array([300.0, 92.0])
+    for t, up in ((0.5, np.inf), (0.79, np.inf), (0.9, 46.0), (0.99, 4.6), (1.5, np.inf)):
+        state.move(t, state.q, state.v)
+        write()
+        assert (rows[1][40], rows[2][40]) == (-np.inf, pytest.approx(up))
 
 
 def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_open():
@@ -177,8 +165,7 @@ def test_contact_force_rows_are_the_sum_over_the_points(target, name):
     normal = np.array(contact.normal) / np.linalg.norm(contact.normal)
     expected = [forces.sum(axis=0) @ normal] if len(target) == 1 else wrench[:len(target)]
     np.testing.assert_allclose(A @ x, expected, atol=1e-12)
-    np.testing.assert_array_equal(lower, target)
-    np.testing.assert_array_equal(upper, target)
+    np.testing.assert_array_equal([lower, upper], [target] * 2)
     assert len(task.row_names) == task.dimension
 
 

@@ -178,10 +178,10 @@ D = [0, 0, 0.4, 0, 0.39, 0, 0.078]
 ALPHA = np.deg2rad([90, -90, -90, 90, 90, -90, 0])
 
 
-def from_dh_table(q, joints=7):
-    """Placement after so many joints, by multiplying the letter's Denavit-Hartenberg matrices."""
+def from_dh_table(q):
+    """Placement of the hand, by multiplying the letter's Denavit-Hartenberg matrices."""
     T = np.eye(4)
-    for angle, d, alpha in list(zip(q, D, ALPHA, strict=True))[:joints]:
+    for angle, d, alpha in zip(q, D, ALPHA, strict=True):
         c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
         T = T @ [[c, -s * ca, s * sa, 0], [s, c * ca, -c * sa, 0], [0, sa, ca, d], [0, 0, 0, 1]]
     return T
@@ -226,20 +226,14 @@ def bar(rigid=False):
     return four_bar(rigid, TILT, pin.JointModelSpherical())
 
 
-CLOSED = bar()
-
-
-def start(robot=CLOSED):
-    return Mechanism(robot).closed(robot.configuration({"crank": -0.8, "finger": 0.3}),
-                                   ["crank", "finger"])
-
-
 @pytest.mark.parametrize("rigid", [False, True])
 def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
     robot, h, rng = bar(rigid), 1e-6, np.random.default_rng(2)
     (task,) = model_rows(robot)
     assert task.dimension == (7 if rigid else 4)
-    q = robot.integrate(start(), 0.05 * rng.normal(size=robot.n))
+    there = {"crank": -0.8, "finger": 0.3}
+    start = Mechanism(bar()).closed(robot.configuration(there), there)
+    q = robot.integrate(start, 0.05 * rng.normal(size=robot.n))
     v = rng.normal(size=robot.n)
 
     def at(step):

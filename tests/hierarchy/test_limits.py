@@ -114,8 +114,7 @@ def viable_starts(rng, limits, T, level):
     low, high = np.where(low > high, lower, low), np.where(low > high, upper, high)
     low = np.where(np.isfinite(low), low, np.where(np.isfinite(high), high - 3.0, -1.0))
     high = np.where(np.isfinite(high), high, low + 3.0)
-    share = np.clip(rng.uniform(-0.25, 1.25, len(T)), 0.0, 1.0)
-    return low + share * (high - low), v
+    return low + np.clip(rng.uniform(-0.25, 1.25, len(T)), 0.0, 1.0) * (high - low), v
 
 
 def adversary(rng, joints, ticks):
@@ -285,8 +284,7 @@ def test_torque_rows_hold_exactly_where_inverse_dynamics_does():
     task, rng = TorqueLimits(ROBOT, fraction=0.5), np.random.default_rng(11)
     data, held = ROBOT.model.createData(), []
     for q, v in states(200):
-        state = state_at(q, v)
-        A, lower, upper = written(task, state, "acceleration", 7)
+        A, lower, upper = written(task, state_at(q, v), "acceleration", 7)
         a = rng.normal(0, 30, 7)
         torque = pin.rnea(ROBOT.model, data, q, v, a)
         np.testing.assert_allclose(A @ a - lower, torque + ROBOT.effort_limit / 2, atol=1e-11)

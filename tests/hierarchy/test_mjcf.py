@@ -221,8 +221,7 @@ def test_couplings_are_polynomials_of_positions(written):
         link("a", 'ref="20"', link("b", 'ref="-30"', link("c"))),
         '<equality><joint joint1="a_joint" joint2="b_joint" polycoef=".1 .2 .3 .4 .5"/>'
         '<joint joint1="c_joint" polycoef=".2 0 0 0 0"/></equality>'))
-    robot = Robot.load(path)
-    one, other = robot.coupled
+    one, other = Robot.load(path).coupled
     assert (one.joint, one.other, other.joint, other.other) == ("a_joint", "b_joint", "c_joint", "")
     for b in (-1.0, 0.3, 0.9):
         q = [np.polyval(one.coefficients[::-1], b), b, other.coefficients[0]]
@@ -239,8 +238,7 @@ def test_tendons_that_keep_their_length_couple_their_joints(written):
         f'<tendon>{tie.format("ab", "a_joint", "b_joint")}{tie.format("cd", "c_joint", "d_joint")}'
         '</tendon><equality><tendon tendon1="ab" polycoef=".1 0 0 0 0"/>'
         '<tendon tendon1="d_joint" polycoef=".3 0 0 0 0"/></equality>'))
-    robot = Robot.load(path)
-    one, other = robot.coupled
+    one, other = Robot.load(path).coupled
     assert (one.joint, one.other, other.joint, other.other) == ("b_joint", "a_joint", "d_joint", "")
     for a in (-1.0, 0.4):
         q = [a, np.polyval(one.coefficients[::-1], a), 0.2, other.coefficients[0]]

@@ -29,17 +29,7 @@ SHAPES = [
 STATES = states(20, seed=6)
 
 
-def sensor_of(obstacles):
-    return ExactDistances(ROBOT, Obstacles(obstacles), BODY, TIP, pairs=True)
-
-
-SENSOR = sensor_of(SHAPES)
-
-
-def seen_at(q, v, t=0.7, differences=None):
-    state = State.at(ROBOT, q, v, t, differences)
-    SENSOR.measure(state)
-    return state
+SENSOR = ExactDistances(ROBOT, Obstacles(SHAPES), BODY, TIP, pairs=True)
 
 
 def distances(q, t):
@@ -56,11 +46,11 @@ def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
         for t in (-h, 0.0, h):
             d.append(distances(q + v * t + a * t * t / 2, 0.7 + t))
             facing.append(SENSOR.measurement.pairs.straight.reshape(54, 3).copy())
-        state = seen_at(q, v)
+        state = State.at(ROBOT, q, v, 0.7)
+        SENSOR.measure(state)
         A, lower, _ = task.rows(state, "acceleration")
         second, speed = (d[2] - 2 * d[1] + d[0]) / h**2, (d[2] - d[0]) / (2 * h)
-        toward = np.minimum(-0.5 * rate * d[1], slow)
-        found = A @ a - lower + 2.0 * rate * (toward - speed)
+        found = A @ a - lower + 2.0 * rate * (np.minimum(-0.5 * rate * d[1], slow) - speed)
         same = (facing[0] == facing[2]).all(axis=1)  # no point passed from a side to an end
         np.testing.assert_allclose(found[same], second[same], atol=3e-5)
         checked += same.sum()

@@ -48,8 +48,7 @@ def traced(obstacle, pinhole, u, v):
     ray = deproject(pinhole, (u, v, 1.0)) - pinhole.position
     share = 0.0
     for _ in range(2000):
-        point = pinhole.position + share * ray
-        off, _ = distance(obstacle, point)
+        off, _ = distance(obstacle, pinhole.position + share * ray)
         if off < 1e-9:
             return share
         share += off / np.linalg.norm(ray)
@@ -101,15 +100,13 @@ def test_pixels_are_missing_at_random_and_more_so_at_edges():
     assert (depths(wall(errors=errors)) == 0).mean() == pytest.approx(0.1, abs=0.02)
     scene = camera(Obstacle("sphere", (0.0, 0.0, 2.0), (0.5,)), backdrop=4.0, errors=errors)
     missing = np.mean([scene.image(i, STATE)[0] == 0 for i in range(40)], axis=0)
-    true = scene.scene.astype(float)
-    steps = np.abs(np.diff(true, axis=1)) > 0.05
+    steps = np.abs(np.diff(scene.scene.astype(float), axis=1)) > 0.05
     edge = np.pad(steps, ((0, 0), (1, 0))) | np.pad(steps, ((0, 0), (0, 1)))
     assert missing[edge].mean() == pytest.approx(0.5, abs=0.05)
 
 
 def test_outliers_are_nearer_and_come_in_their_share_of_frames():
-    errors = EXACT | {"outliers": 0.3}
-    scene = wall(errors=errors)
+    scene = wall(errors=EXACT | {"outliers": 0.3})
     seen = [scene.image(i, STATE)[0].copy() for i in range(200)]
     sizes = [np.count_nonzero(reading != 2.0) for reading in seen]
     assert np.mean(np.array(sizes) > 0) == pytest.approx(0.3, abs=0.1)

@@ -104,8 +104,7 @@ def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
                             policy="hold"))
     found = measure(run)
     assert (found["ticks_hold"].value, found["ticks_brake"].value) == (10, LASTS - 10)
-    loaded = load_run(save(run, tmp_path / "run"))
-    assert loaded.events == run.events
+    assert load_run(save(run, tmp_path / "run")).events == run.events
     events = json.loads((tmp_path / "run" / "metrics.json").read_text())["events"]
     assert events == [
         {"kind": "not_finite", "action": "hold", "ticks": 10, "first_tick": AT,

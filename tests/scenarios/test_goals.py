@@ -101,8 +101,7 @@ def test_what_a_scenario_asks_is_in_its_words(name, asked):
 
 
 def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
-    run = simulate(load("strictness", ["control.duration=0.3"]))
-    position, posture = given_up(run)
+    position, posture = given_up(simulate(load("strictness", ["control.duration=0.3"])))
     assert (position.level, posture.level) == ("position", "posture")
     assert 0.5 < position.share <= 1.0
     assert position.seconds == pytest.approx(position.share * 0.3)
@@ -136,8 +135,7 @@ def test_the_p_value_is_that_of_all_signs_with_and_without_ties(seed):
 
 def test_pairs_are_counted_by_their_direction():
     first = np.array([1.0, 2.0, 3.0, 4.0, np.nan, 6.0])
-    second = np.array([1.0, 1.0, 5.0, 4.0 * (1 + 1e-4), 5.0, np.inf])
-    found = paired(first, second)
+    found = paired(first, np.array([1.0, 1.0, 5.0, 4.0 * (1 + 1e-4), 5.0, np.inf]))
     assert (found.count, found.same, found.lower, found.higher) == (4, 2, 1, 1)
     assert [replace(found, p=p).distinguishable for p in (0.0499, 0.05)] == [True, False]
     assert str(found) == "not distinguishable"

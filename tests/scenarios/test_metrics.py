@@ -27,8 +27,7 @@ def test_position_error_is_the_norm_over_axes_and_the_start_can_be_left_out():
 
 def test_cone_violation_is_an_angle_beyond_the_cone_and_a_share_of_ticks():
     angles = np.radians([50.0, 60.0, 60.001, 61.0, 63.0])  # the cone is 60 degrees
-    error = np.cos(np.radians(60.0)) - np.cos(angles)
-    found = measure(recording(pointing_error=error))
+    found = measure(recording(pointing_error=np.cos(np.radians(60.0)) - np.cos(angles)))
     assert found["cone_violation_max"].value == pytest.approx(3.0)
     assert found["cone_violation_share"].value == pytest.approx(2 / 5)  # 0.001 degrees is on it
 
@@ -129,8 +128,7 @@ def test_steps_of_the_command_and_of_the_joints_are_told_apart():
     assert found["command_step_max"].value == pytest.approx(0.04)
     slow = load("ellipse-velocity")
     command = np.array([[1.0], [1.5], [1.25], [1.25], [1.25]])
-    changed = measure(recording(slow, q=command, command=command))
-    assert changed["command_step_max"].value == 0.5
+    assert measure(recording(slow, q=command, command=command))["command_step_max"].value == 0.5
     labels = {found[name].label for name in ("velocity_step_max", "command_step_max",
                                              "velocity_step_max_measured")}
     assert len(labels) == 3

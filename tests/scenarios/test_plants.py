@@ -112,8 +112,7 @@ def test_a_filtered_velocity_lags_by_the_time_of_its_filter():
 @pytest.mark.parametrize("changes", [[*SHORT, *NOISY], [*PHYSICS, *NOISY]],
                          ids=["kinematic", "mujoco"])
 def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
-    scenario = load("ellipse", changes)
-    run = simulate(scenario)
+    run = simulate(load("ellipse", changes))
     assert np.std(run["q"] - run["true_q"]) == pytest.approx(1e-4, rel=0.1)
     assert np.std(run["v"] - run["true_v"]) == pytest.approx(1e-2, rel=0.1)
     controller = Controller(load("ellipse", SHORT))  # a plant of its own that nobody moves

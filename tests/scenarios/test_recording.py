@@ -143,5 +143,4 @@ def test_a_metric_and_a_figure_of_a_plugin_are_in_the_table_and_on_the_page(run,
     ours = Run(run.scenario, "own", "own", run)
     assert ours.metrics["strain_max"].shown_unit == "Pa"
     assert {row.name for row in table([ours])} >= {"strain_max", "speed_max"}
-    found = motions([ours])
-    assert "own: First" in multiples("dual-arm", found, looks([ours.label]))
+    assert "own: First" in multiples("dual-arm", motions([ours]), looks([ours.label]))

@@ -173,8 +173,7 @@ def test_the_errors_of_listed_tasks_are_drawn_with_a_line_for_each():
 def test_a_run_far_beyond_the_others_is_cut_and_says_so():
     quiet = recording(v=np.eye(5, 7))
     wild = recording(v=1000.0 * np.eye(5, 7))
-    velocities = panels.PANELS[0]
-    drawn = beside(velocities, {"a": quiet, "b": quiet, "c": wild})
+    drawn = beside(panels.PANELS[0], {"a": quiet, "b": quiet, "c": wild})
     texts = [text.get_text() for text in drawn["c"].axes[0].texts]
     assert any("cut" in text for text in texts)
     assert drawn["a"].axes[0].get_ylim()[1] < 10.0

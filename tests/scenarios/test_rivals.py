@@ -35,8 +35,7 @@ def test_rows_ask_nothing_inside_a_set_and_no_worse_at_its_bound():
     for controller in near_obstacles("ellipse-set-based", "avoidance.distance=0.1"):
         h, d = controller.hierarchy, distances(controller.cell)
         np.testing.assert_array_equal(h.lower[:27], np.where(d <= 0.1, 0.0, -np.inf))
-        outside = controller.cone_error >= 0.0
-        assert h.lower[-1] == (0.0 if outside else -np.inf)
+        assert h.lower[-1] == (0.0 if controller.cone_error >= 0.0 else -np.inf)
         assert np.isinf(h.upper[[*range(27), -1]]).all()
         inside |= set((d <= 0.1).tolist())
     assert inside == {True, False}  # rows of both kinds were compared

@@ -169,15 +169,13 @@ def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path,
     with store.opened():
         for job in jobs[:2]:
             store.add(job, Outcome(job.key, 20, None, 0.1, (speed,)))
-        whole = store.file.read_bytes()
-        os.truncate(store.file, len(whole) - 20)
+        os.truncate(store.file, len(store.file.read_bytes()) - 20)
         assert store.outcomes() == {"a": Outcome("a", 20, None, 0.1, (speed,))}
         store.add(jobs[2], Outcome("c", 20, None, 0.1, (speed,)))
         store.add(jobs[1], Outcome("b", 0, "broke,\nfor once", 0.1))
         assert {key: one.reason for key, one in store.outcomes().items()} == {
             "a": None, "c": None, "b": "broke,\nfor once"}
-        full = OSError(28, os.strerror(28))
-        monkeypatch.setattr(os, "fsync", mock.Mock(side_effect=full))
+        monkeypatch.setattr(os, "fsync", mock.Mock(side_effect=OSError(28, os.strerror(28))))
         with pytest.raises(FullError, match=r"out/runs/all\.csv cannot be written: No space"):
             store.add(jobs[0], Outcome("d", 20, None, 0.1))
 
@@ -224,5 +222,4 @@ def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_sa
     for metric, run in found.found["ellipse"].worst()[:3]:
         name = next(file for file in (folder / "worst").iterdir() if run.key[:6] in file.name)
         assert f"worst/{name.name}" in page
-        again = metrics.measure(simulate(load(name)))
-        assert again[metric.name].value == metric.value
+        assert metrics.measure(simulate(load(name)))[metric.name].value == metric.value

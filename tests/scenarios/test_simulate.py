@@ -49,8 +49,7 @@ def test_row_0_is_the_start_and_the_stack_is_recorded_as_the_measurements_ask(ru
 
 def test_a_scenario_may_have_any_of_its_tasks():
     base = load("ellipse", SHORT)
-    only = base.model_copy(update={"avoidance": None, "pointing": None})
-    run = simulate(only)
+    run = simulate(base.model_copy(update={"avoidance": None, "pointing": None}))
     assert run.orders == ("position",)
     assert "ee_distance" not in run
     assert np.abs(run["position_error"][2500:]).max() < 1e-4

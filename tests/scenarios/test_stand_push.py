@@ -61,8 +61,7 @@ def test_a_run_records_torques_plans_and_what_the_floor_does_and_has_their_metri
     weight = 9.81 * robot.masses.sum()
     assert short["planned_force"][0, :, 2].sum() == pytest.approx(weight, rel=1e-6)
     assert short["floor_force"][-1, :, 2].sum() == pytest.approx(weight, rel=0.3)
-    pushed = np.flatnonzero(short["push"].any(axis=1))
-    np.testing.assert_array_equal(pushed, np.arange(5, 15))
+    np.testing.assert_array_equal(np.flatnonzero(short["push"].any(axis=1)), np.arange(5, 15))
     np.testing.assert_allclose(short["push"][5], [120.0, 0.0, 0.0])
     found = measure(short)
     assert found["slip_max"].value == short["slip"].max()
@@ -82,8 +81,7 @@ def test_no_torque_changes_by_more_than_its_step(resolver):
     """Under a resolver without rows for it the torques are cut off."""
     run = simulate(SHORT.with_resolver(resolver).with_changes({
         "limits.torque_step": 0.3, "control.duration": 0.05}))
-    steps = np.abs(np.diff(run["command"], axis=0))
-    assert steps.max() == pytest.approx(0.3, abs=1e-9)
+    assert np.abs(np.diff(run["command"], axis=0)).max() == pytest.approx(0.3, abs=1e-9)
     free = simulate(SHORT.with_resolver(resolver).with_changes({"control.duration": 0.05}))
     assert np.abs(np.diff(free["command"], axis=0)).max() > 0.5
 

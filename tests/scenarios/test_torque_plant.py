@@ -190,8 +190,7 @@ def test_a_joint_that_passes_its_stop_ends_the_run_with_a_fault():
     assert "beyond its stop at" in run.fault
     assert run.ticks < 300
     column = ROBOT.coordinate(name)
-    upper = ROBOT.upper[column]
-    assert (run["q"][:, column] < upper + 0.1).all()
+    assert (run["q"][:, column] < ROBOT.upper[column] + 0.1).all()
 
 
 def test_a_base_that_tilts_has_fallen():

@@ -210,8 +210,7 @@ def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, c
     hand, posture = frame_task(configuration), posture_task(Q + 0.3)
     stack = Stack([PinkTask(hand, configuration, DT), PinkTask(posture, configuration, DT, "rest")],
                   "velocity")
-    moved = State.at(robot, Q + 0.1)
-    h = stack.hierarchy(moved)
+    h = stack.hierarchy(State.at(robot, Q + 0.1))
     np.testing.assert_array_equal(configuration.q, Q + 0.1)
     assert h.names == ("FrameTask of end_effector", "rest")
     expected = pink_hierarchy(configuration, [hand, posture], DT, limits=[])

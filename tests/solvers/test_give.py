@@ -32,8 +32,7 @@ def test_a_level_gives_up_to_what_it_may_and_those_below_gain(resolver, seed):
     assert before.witnesses is None
     assert certify(soft, res.x, 1e-6, witnesses=res.witnesses).certified
     rows = slice(2, 5)
-    least = np.abs(strict.slacks(before.x)[rows])
-    allowed = least + np.array([0.3, 0.1, 0.2])
+    allowed = np.abs(strict.slacks(before.x)[rows]) + np.array([0.3, 0.1, 0.2])
     assert (np.abs(soft.slacks(res.x)[rows]) <= allowed + 1e-7).all()
     assert np.abs(np.abs(soft.slacks(res.x)[rows]) - allowed).min() < 1e-7  # and a row uses it
     np.testing.assert_allclose(soft.violations(res.x)[0], strict.violations(before.x)[0], atol=1e-8)
@@ -201,8 +200,7 @@ def test_inequalities_are_resolved_in_a_metric(resolver):
         assert res.status is Status.SOLVED
         assert certify(h, exact.x).certified
         np.testing.assert_allclose(res.x, exact.x, atol=1e-6)
-        warm = resolver.solve(h, res.memory)
-        np.testing.assert_allclose(warm.x, exact.x, atol=1e-6)
+        np.testing.assert_allclose(resolver.solve(h, res.memory).x, exact.x, atol=1e-6)
 
 
 @pytest.mark.parametrize("resolver", BOUNDS, ids=lambda r: r.label)

@@ -36,13 +36,11 @@ def follow(tasks, ticks, **settings):
 
 def test_limits_of_the_robot_hold_whatever_is_asked():
     far = Posture(tuple(ROBOT.upper + 1.0), gain=50.0)
-    step = solve_ik(ROBOT, Q, [far])
-    assert (np.abs(step.v) <= ROBOT.velocity_limit + 1e-12).all()
+    assert (np.abs(solve_ik(ROBOT, Q, [far]).v) <= ROBOT.velocity_limit + 1e-12).all()
     q, _ = follow([far], 300)
     assert (q <= ROBOT.upper + 1e-9).all()
     np.testing.assert_allclose(q, ROBOT.upper, atol=1e-9)
-    free = solve_ik(ROBOT, Q, [far], limits=False)
-    assert (np.abs(free.v) > ROBOT.velocity_limit).any()
+    assert (np.abs(solve_ik(ROBOT, Q, [far], limits=False).v) > ROBOT.velocity_limit).any()
 
 
 @pytest.mark.parametrize(("call", "said"), [
@@ -153,8 +151,7 @@ def assert_physical(h, x, state, contacts, fraction=1.0):
     """Newton and Euler hold, the feet rest, torques and forces are within their limits."""
     assert h.violations(x)[:2].max() < 1e-7
     forces = contacts.forces(x)
-    data = HUMANOID.model.createData()
-    com = pin.centerOfMass(HUMANOID.model, data, state.q)
+    com = pin.centerOfMass(HUMANOID.model, HUMANOID.model.createData(), state.q)
     arms = np.concatenate([[state.position(c.frame) + state.rotation(c.frame) @ np.array(point)
                             for point in c.points] for c in contacts.contacts]) - com
     A, dA = state.momentum
@@ -169,8 +166,7 @@ def assert_physical(h, x, state, contacts, fraction=1.0):
 @pytest.mark.parametrize("faces", [4, 8])
 @pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), *OUT_OF_REACH])
 def test_hcod_is_certified_and_agrees_with_a_cascade_of_programs(shift, faces):
-    stack = standing_stack(STANDING, CONTACTS, shift, faces=faces)
-    h, res = solved(stack, STANDING)
+    h, res = solved(standing_stack(STANDING, CONTACTS, shift, faces=faces), STANDING)
     assert_physical(h, res.x, STANDING, CONTACTS)
     other = make("hqp", backend="clarabel").solve(h)  # the one that solves all of them
     assert other.status is Status.SOLVED
@@ -183,8 +179,7 @@ def test_torques_that_cannot_hold_the_weight_stay_within_limits_and_the_knees_ar
     stack = standing_stack(STANDING, CONTACTS, fraction=weak)
     h, res = solved(stack, STANDING)
     assert_physical(h, res.x, STANDING, CONTACTS, weak)
-    sinking = (STANDING.momentum.A @ CONTACTS.accelerations(res.x))[2]
-    assert sinking < -1.0
+    assert (STANDING.momentum.A @ CONTACTS.accelerations(res.x))[2] < -1.0
     said = explain(h, res, rows=stack.row_names()).splitlines()[2]
     assert said.startswith("centre of mass is missed by")
     assert "torque limits left_knee at its" in said

@@ -110,8 +110,7 @@ def test_a_stack_of_safety_levels_alone_is_refused():
 
 
 def test_scales_divide_the_weight_of_their_level():
-    rows = [([[1.0]], [1.0]), ([[1.0]], [0.0])]
-    h = Hierarchy.from_levels(rows, names=["hand", "posture"])
+    h = Hierarchy.from_levels([([[1.0]], [1.0]), ([[1.0]], [0.0])], names=["hand", "posture"])
     x = solved(make("merged", ratio=2.0, scales={"hand": 2.0}, strict_levels=0, cap=0.0), h).x
     np.testing.assert_allclose(x, [0.5], atol=1e-5)
 
@@ -120,8 +119,7 @@ def test_weights_below_strict_levels_are_one_level_of_weighted_rows():
     h, w = with_targets(arm(4), targets(4)), np.repeat([1.0, 1.0, 9.0, 4.0, 0.5], [1, N, 2, 3, N])
     by_hand = h.changed(A=h.A * w[:, None], lower=h.lower * w, upper=h.upper * w,
                         sizes=[1, N, 11], names=("physics", "limits", "tasks"))
-    resolver = make("weighted", strict_levels=2, weights=[1.0, 1.0, 9.0, 4.0, 0.5])
-    found = solved(resolver, h)
+    found = solved(make("weighted", strict_levels=2, weights=[1.0, 1.0, 9.0, 4.0, 0.5]), h)
     np.testing.assert_allclose(found.x, make("hcod").solve(by_hand).x, atol=1e-10)
     assert (found.carried == 0.0).all(), "weights have no memory"
 
