@@ -53,12 +53,6 @@ def equalities(tmp_path_factory):
     return file
 
 
-def run_entrant(entrant, file, limit=10.0):
-    with Field([entrant], QUESTIONS) as field:
-        assert not field.missing, field.missing
-        return asked(field, file, limit)[entrant.label]
-
-
 def fake(name, **options):
     return Entrant(name, OWN, f"{HELPERS / 'fake_entrants.py'}:{name}", options)
 
@@ -102,7 +96,8 @@ def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path
         out = shared(SOLVE / "library.c", tmp_path / f"{resolver}.so",
                      f"-DSOLVE=th_solve_{resolver}", f"-I{folder / 'include'}",
                      folder / "lib" / "libtask_hierarchy.a", "-lm")
-        rows[resolver] = run_entrant(compiled([out], ["ours"])[0], tmp_path / "simple.npz")
+        with Field(compiled([out], ["ours"]), QUESTIONS) as field:
+            rows[resolver] = asked(field, tmp_path / "simple.npz")["ours"]
     assert {row["refused"] for row in rows["tpm"]} == {"not for this solver"}
     found = judge(rows["hcod"], {made.digest: made})
     assert [row["verdict"] for row in found] == [judging.SOLVED] * 3

@@ -1,8 +1,7 @@
 """The examples run, and print what they promise: strict levels beside how it is done otherwise."""
 
-import importlib.util
-import sys
 from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -23,7 +22,7 @@ PROMISES = {
 @pytest.mark.parametrize("name", PROMISES)
 def test_an_example_keeps_what_it_promises_where_the_other_way_does_not(name, capsys):
     duration, most, least = PROMISES[name]
-    strict, other = loaded(name).main(duration)
+    strict, other = run_path(str(EXAMPLES / f"{name}.py"))["main"](duration)
     assert strict <= most
     assert other >= least
     assert len(capsys.readouterr().out.splitlines()) == 1
@@ -48,11 +47,3 @@ def test_two_hands_hold_their_tray_and_with_equal_weights_do_not():
     apart = [np.linalg.norm(run["task_error_grip"][:, :3], axis=1).max() for run in (strict, equal)]
     assert apart[0] < 0.002
     assert apart[1] > 0.05
-
-
-def loaded(name):
-    """The module of an example."""
-    spec = importlib.util.spec_from_file_location(f"example_{name}", EXAMPLES / f"{name}.py")
-    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

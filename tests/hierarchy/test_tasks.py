@@ -1,5 +1,6 @@
 """Tasks: rows, errors and their derivatives, by differences; stacks of them."""
 
+import re
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -122,9 +123,8 @@ def test_rates_of_a_frame_that_follows_a_path_are_the_derivatives_of_its_error(a
     ("error", np.array([np.nan]), "task 'elbow', row 0: lower is nan")])
 def test_a_wrong_task_is_named(method, value, said, monkeypatch):
     monkeypatch.setattr(Elbow, method, lambda self, state: value)
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         Elbow().writer(State.at(ROBOT, *STATES[0]), "velocity", Rows.empty(1, 7))()
-    assert said in str(error.value)
 
 
 MADE = [*TASKS.values(), tasks.JointLimits(ROBOT, 10.0, 1e-3), tasks.TorqueLimits(ROBOT),
@@ -232,9 +232,8 @@ def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
     (lambda s: Stack(level="effort"), "level must be"),
     (lambda s: Stack([tasks.JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot ha")])
 def test_bad_edits_are_named(edit, said):
-    with pytest.raises(HierarchyError) as error:
+    with pytest.raises(HierarchyError, match=re.escape(said)):
         edit(stack())
-    assert said in str(error.value)
 
 
 def test_an_empty_stack_is_an_error_and_an_empty_order_is_not():

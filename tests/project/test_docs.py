@@ -230,7 +230,8 @@ def check_hierarchy(command, arguments):
     asked = found.make_context(command, list(arguments)).params
     named = [*asked.get("scenarios", ()), asked.get("scenario"), asked.get("file")]
     specs = [asked.get("resolver"), *(asked.get("resolvers") or "").split(",")]
-    for name in members(filter(is_name, named)):
+    for name in members(text for text in named if text and not set("./:") & set(text)
+                        and not text.isupper()):  # shipped: no path, robot or placeholder FILE
         if command == "sweep":
             load_sweep(name)
             continue
@@ -238,11 +239,6 @@ def check_hierarchy(command, arguments):
         for spec in specs:
             if spec and not spec.isupper():
                 scenario.with_resolver(spec)
-
-
-def is_name(text):
-    """Whether it names something shipped: no path, no robot of a package, no placeholder FILE."""
-    return bool(text) and not set("./:") & set(text) and not text.isupper()
 
 
 @pytest.mark.parametrize("document", FOLLOWED)

@@ -127,8 +127,7 @@ def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
-INTERRUPTED_AFTER_THE_FIRST_RUN = """
-import os, signal, sys
+INTERRUPTED_AFTER_THE_FIRST_RUN = """import sys
 from scenarios.results import comparing
 
 if sys.argv.pop() == "broken":
@@ -141,17 +140,14 @@ def add_and_interrupt(written, i, run):
     os.kill(os.getpid(), signal.SIGTERM)
 
 comparing._Written.add = add_and_interrupt
-from scenarios.cli.start import main
-main()
 """
 
 
 @pytest.mark.parametrize("page", ["whole", "broken"])
 def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(page,
                                                                                      tmp_path):
-    command = [sys.executable, "-c", INTERRUPTED_AFTER_THE_FIRST_RUN, "compare", "ellipse",
-               "--resolvers", "tpm,hcod", "--workers", "2", *SHORT, "--out", "b", page]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = ended(INTERRUPTED_AFTER_THE_FIRST_RUN, tmp_path, "compare", "ellipse", "--resolvers",
+                 "tpm,hcod", "--workers", "2", *SHORT, "--out", "b", page)
     assert done.returncode == 130
     assert "the runs made so far are in b\n" in done.stderr
     assert list((tmp_path / "b").rglob("run.npz"))
@@ -193,8 +189,7 @@ def test_a_command_that_is_interrupted_or_refused_ends_without_a_traceback(
     assert capsys.readouterr().err == said
 
 
-COMMAND = [sys.executable, "-c", "from scenarios.cli.start import main; main()"]
-RUN = [*COMMAND, "run", "ellipse", "--duration", "0.02", "--out", "a"]
+RUN = [sys.executable, "-m", "scenarios.cli.start", "run", "ellipse", *SHORT, "--out", "a"]
 
 
 def test_a_terminal_that_cannot_show_a_character_gets_a_replacement(tmp_path):
@@ -227,15 +222,14 @@ def test_names_of_settings_that_differ_late_give_different_folders():
 
 
 def test_an_interruption_that_breaks_the_compiler_is_still_an_interruption(tmp_path):
-    code = ("import os, signal; from scenarios.cli import doctor, start\n"
-            "def broken(_):\n"
-            "    try:\n"
-            "        os.kill(os.getpid(), signal.SIGTERM)\n"
-            "    except KeyboardInterrupt:\n"
-            "        raise RuntimeError('no compiled object yet') from None\n"
-            "doctor.doctor_command = broken; start.main()")
-    done = subprocess.run([sys.executable, "-c", code, "doctor"], cwd=tmp_path, text=True,
-                          capture_output=True, check=False)
+    done = ended("""from scenarios.cli import doctor
+def broken(_):
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+    except KeyboardInterrupt:
+        raise RuntimeError('no compiled object yet') from None
+doctor.doctor_command = broken
+""", tmp_path, "doctor")
     assert (done.returncode, done.stderr) == (130, "hierarchy: interrupted\n")
 
 

@@ -39,11 +39,11 @@ def space_of(pinhole, points, capsules, region, mean_within=(inf, inf), pairs=Fa
     return DepthSpace(section, pinhole, points, capsules, Asked(region, mean_within), pairs)
 
 
-def seen_in(image, *places, pinhole=FACING, region=0.4, support=1, thin=inf, **settings):
+def seen_in(image, *places, thin=inf, **settings):
     """Measure points in an image (h, w) without a robot in it."""
-    space = space_of(pinhole, at(*places), (), region, support=support,
+    space = space_of(FACING, at(*places), (), 0.4, support=1,
                      thin=None if thin == inf else thin, **settings)
-    obstacles = ObstacleImage.empty(pinhole.height, pinhole.width)
+    obstacles = ObstacleImage.empty(FACING.height, FACING.width)
     space.find_obstacles(np.asarray(image, np.float32), STATE.placements, obstacles)
     return space.measure(obstacles, STATE.placements)
 
@@ -116,12 +116,11 @@ def test_the_arm_does_not_avoid_itself():
         assert np.isinf(space.measure(obstacles, state.placements).distance).all()
 
 
-def sensor_of(source, stale_after=0.2, region=0.4, least_readings=0.1, **settings):
+def sensor_of(source):
     """A sensor, and a function that gives a state at a time."""
-    points = ExactDistances(ROBOT, Obstacles()).points
-    space = space_of(source.pinhole, points, CAPSULES, region, **settings)
-    section = ImageSection(kind="camera", stale_after=stale_after, least_readings=least_readings)
-    return (DepthSensor(section, source, space), lambda t, q=STATE.q: State.at(ROBOT, q, t=t))
+    space = space_of(source.pinhole, ExactDistances(ROBOT, Obstacles()).points, CAPSULES, 0.4)
+    section = ImageSection(kind="camera", stale_after=0.2, least_readings=0.1)
+    return DepthSensor(section, source, space), lambda t: State.at(ROBOT, STATE.q, t=t)
 
 
 def test_frames_are_used_from_their_latency_on_until_the_next_or_a_clock_is_set_back():

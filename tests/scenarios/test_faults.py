@@ -34,17 +34,11 @@ FAULTS = {
 LIMITED = ["limits.acceleration=10.0", "control.resolver=hcod"]
 
 
-def faults(*kinds_and_settings, at=AT, lasts=LASTS):
-    tables = [", ".join(part for part in (f"kind='{kind}', at={at * 1e-3}, "
-                                          f"duration={lasts * 1e-3}", settings) if part)
-              for kind, settings in kinds_and_settings]
-    return f"faults=[{', '.join('{' + table + '}' for table in tables)}]"
-
-
-def scenario(name, fault, *changes, kind=None, policy="brake", ticks=END):
-    chosen = [f"control.policy.{kind}={policy}"] if kind else []
-    return load(name, [f"control.duration={ticks * 1e-3}", "control.policy.deadline=30.0", *chosen,
-                       *([fault] if fault else []), *changes])
+def scenario(name, put, settings, *changes, kind, policy):
+    fault = ", ".join(filter(None, (f"kind='{put}', at={AT * 1e-3}, duration={LASTS * 1e-3}",
+                                    settings)))
+    return load(name, [f"control.duration={END * 1e-3}", "control.policy.deadline=30.0",
+                       f"control.policy.{kind}={policy}", f"faults=[{{{fault}}}]", *changes])
 
 
 def true_motion(run):
@@ -72,8 +66,8 @@ def assert_within_limits(run):
     for i, fault in enumerate(FAULTS) for j, policy in enumerate(("brake", "hold", "stop"))])
 def test_every_fault_under_every_policy(fault, policy, name, limited):
     put, settings, kind, later = FAULTS[fault]
-    run = simulate(scenario(name, faults((put, settings)), *(LIMITED if limited else []),
-                            kind=kind, policy=policy))
+    run = simulate(scenario(name, put, settings, *(LIMITED if limited else []), kind=kind,
+                            policy=policy))
     assert np.isfinite(run["command"]).all()
     assert np.isfinite(run["q"]).all()
     np.testing.assert_allclose(run["q"], true_motion(run)[0], rtol=0, atol=1e-9)
@@ -100,8 +94,7 @@ def test_every_fault_under_every_policy(fault, policy, name, limited):
 
 
 def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
-    run = simulate(scenario("ellipse", faults(("nan_position", "")), kind="not_finite",
-                            policy="hold"))
+    run = simulate(scenario("ellipse", "nan_position", "", kind="not_finite", policy="hold"))
     found = measure(run)
     assert (found["ticks_hold"].value, found["ticks_brake"].value) == (10, LASTS - 10)
     assert load_run(save(run, tmp_path / "run")).events == run.events

@@ -13,8 +13,8 @@ from solvers import certify
 SHORT = "control.duration=1.5"
 
 
-def names_of(*changes, scenario="ellipse-hqp"):
-    return build(load(scenario, changes)).order(None, 0.0).order
+def names_of(*changes):
+    return build(load("ellipse-hqp", changes)).order(None, 0.0).order
 
 
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])

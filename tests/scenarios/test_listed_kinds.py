@@ -32,10 +32,6 @@ def scenario_of(tmp_path, *tasks, **sections):
     return load(file)
 
 
-def at_level(level):
-    return {**BASE["control"], "level": level, "period": 0.005, "duration": 3.0}
-
-
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize(("task", "metric"), [
     (COUPLING, "task_coupling_end"), (FRAME, "task_frame_end"), (LOOK, "task_look-at_end"),
@@ -43,7 +39,8 @@ def at_level(level):
     (RELATIVE | {"position": None, "name": "hold"}, "task_hold_end")])
 def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path):
     task = {key: value for key, value in task.items() if value is not None}
-    run = simulate(scenario_of(tmp_path, task, control=at_level(level)))
+    control = {**BASE["control"], "level": level, "period": 0.005, "duration": 3.0}
+    run = simulate(scenario_of(tmp_path, task, control=control))
     assert run.fault is None
     assert measure(run)[metric].value < (0.1 if "look" in metric else 1e-3)  # deg, or m and rad
 

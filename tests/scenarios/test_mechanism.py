@@ -92,14 +92,6 @@ def ankle(rod):
       </body></worldbody><equality>{connects}</equality></mujoco>"""
 
 
-def ankle_at(folder, rod):
-    """The file of an ankle in a folder, and its robot."""
-    pytest.importorskip("mujoco")
-    path = folder / "ankle.xml"
-    path.write_text(ankle(rod))
-    return path, Robot.load(path)
-
-
 BALL = '<joint name="rod_{0}" type="ball"/>'
 CROSS = '<joint name="rod_{0}_1" axis="0 1 0"/><joint name="rod_{0}_2" axis="1 0 0"/>'
 
@@ -121,7 +113,10 @@ def largest_residual(path, q):
 @pytest.mark.parametrize(("level", "rod"), [
     ("velocity", BALL), ("acceleration", CROSS), ("torque", CROSS)])
 def test_an_ankle_with_two_pushrods_stays_closed(level, rod, tmp_path):
-    path, robot = ankle_at(tmp_path, rod)
+    pytest.importorskip("mujoco")
+    path = tmp_path / "ankle.xml"
+    path.write_text(ankle(rod))
+    robot = Robot.load(path)
     asked = {"pitch": -0.35, "roll": 0.15}
     goal = Mechanism(robot).closed(robot.configuration(asked), asked)
     joints = {name: np.atleast_1d(value).tolist() for name, value in robot.values(goal).items()}

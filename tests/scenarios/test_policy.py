@@ -144,9 +144,9 @@ A, B, C = Key(("position",)), Key(("position", "pointing")), Key(("pointing", "p
 TIME, TICK = 0.1, 0.001
 
 
-def visited(keys, blend=None):
+def visited(keys):
     """Weights (ticks, 3) of A, B, C over ticks in which these keys are in force."""
-    blend = blend or Blend(TIME)
+    blend = Blend(TIME)
     found = [blend.weights(k * TICK, key) for k, key in enumerate(keys)]
     return np.array([[weights.get(key, 0.0) for key in (A, B, C)] for weights in found])
 
