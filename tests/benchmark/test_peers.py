@@ -54,7 +54,6 @@ def answered(entrant, questions, *calls):
 
 
 # -- known answers ---------------------------------------------------------------------------------
-
 def each(entrants):
     every = pytest.mark.parametrize("entrant", entrants, ids=[one.label for one in entrants])
     return lambda test: pytest.mark.filterwarnings("ignore")(every(test))  # of packages
@@ -146,7 +145,6 @@ def test_every_package_has_an_adapter_that_is_tested():
 
 
 # -- the scenes and their judges -------------------------------------------------------------------
-
 def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
     found = run([fake("posture"), fake("lost"), fake("ends"), NOBODY], ticks=1100)
     good, lost = found.rows["peers"]

@@ -92,7 +92,6 @@ def test_the_active_point_is_the_nearest_one_without_the_end_effector():
 
 
 # Algorithm 1.
-
 AREAS = SurveillanceAreas(near=0.05, far=0.15, end_effector=0.1)
 A, P, C = "avoidance", "position", "pointing"
 

@@ -23,7 +23,6 @@ POSITION, SPEED, ACCELERATION = 1e-12, 1e-12, 1e-9
 
 
 # ---- a plant that remembers what it has seen --------------------------------------------------
-
 def spread(values, *shape):
     """An array of its own of this shape: kernels are compiled once for all that are alike."""
     return np.array(np.broadcast_to(values, shape), dtype=float, order="C")
@@ -126,7 +125,6 @@ def adversary(rng, joints, ticks):
 
 
 # ---- from a viable start ----------------------------------------------------------------------
-
 @LEVELS
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("ticks", [0, 1.5, 50])
@@ -169,8 +167,6 @@ def test_one_who_always_pushes_up_comes_to_rest_on_the_limit_without_bouncing(le
 
 
 # ---- with a horizon ------------------------------------------------------------------------------
-
-
 def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():
     rng, H = np.random.default_rng(1), 0.05
     q, v = rng.uniform(-1.0, 1.0, 2000), rng.uniform(-3.0, 3.0, 2000)
@@ -188,7 +184,6 @@ def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():
 
 
 # ---- from outside -----------------------------------------------------------------------------
-
 def wide(joints, T, velocity=np.inf):
     return np.array([np.full(joints, -50.0), np.full(joints, 1.0), np.full(joints, velocity),
                      np.full(joints, 10.0)]), np.full(joints, T)
@@ -235,7 +230,6 @@ def test_a_joint_outside_returns_without_turning_and_in_finite_time(level, perio
 
 
 # ---- the guard --------------------------------------------------------------------------------
-
 @LEVELS
 def test_the_clamp_answers_anything_with_a_command_of_the_box(level):
     rng = np.random.default_rng(10)
@@ -253,7 +247,6 @@ def test_the_clamp_answers_anything_with_a_command_of_the_box(level):
 
 
 # ---- the tasks --------------------------------------------------------------------------------
-
 @LEVELS
 def test_the_rows_are_the_identity_and_the_box(level):
     task = JointLimits(ROBOT, 10.0, 1e-3, margin=0.02)

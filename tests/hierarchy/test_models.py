@@ -151,7 +151,6 @@ def test_arms_of_example_robot_data_are_read_with_their_meshes(name, joints, end
 
 # What is wrong in a file is named before pinocchio reads it, which would end the process or say
 # "not a valid URDF model".
-
 PLAIN = {"link": "", "kind": "revolute", "parent": "base", "axis": "0 0 1", "mimic": "", "more": "",
          "limit": '<limit lower="-2" upper="2" velocity="1" effort="10"/>'}
 LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"/></joint>'

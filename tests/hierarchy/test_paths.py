@@ -75,7 +75,6 @@ def test_a_wrong_csv_file_is_named_with_its_line(text, said, tmp_path):
 
 
 # BVH files.
-
 TEXT = (FilePath(__file__).parents[1] / "data" / "motion.bvh").read_text()
 
 

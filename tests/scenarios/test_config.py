@@ -153,7 +153,6 @@ def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_p
 
 
 # Where strict resolvers part: the tick, and what was different before it.
-
 LETTER = "tpm-published"
 
 

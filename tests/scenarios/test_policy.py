@@ -178,7 +178,6 @@ def test_however_often_it_changes_weights_are_convex_with_continuous_derivatives
 
 
 # One scene: the end effector on its path, the axis to the cone, a posture for the rest.
-
 HAND, AXIS, ELBOW = (scene.TASKS[name] for name in ("position", "pointing", "avoidance 1-D"))
 
 

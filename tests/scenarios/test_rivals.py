@@ -110,7 +110,6 @@ def test_the_smooth_stack_refuses_a_resolver_without_activations():
 
 
 # The avoidance of the letter's references [5] and [10].
-
 NEAR = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])  # the start of `ellipse`
 
 

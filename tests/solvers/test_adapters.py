@@ -21,7 +21,6 @@ POSE = np.array([0.3, 0.4, 0.5, -0.2])
 
 
 # --- pink ---------------------------------------------------------------------------------------
-
 @pytest.fixture
 def robot():
     pytest.importorskip("pink")
@@ -221,7 +220,6 @@ def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, c
 
 
 # --- MuJoCo and mink ----------------------------------------------------------------------------
-
 @pytest.fixture
 def arm():
     mujoco = pytest.importorskip("mujoco")
@@ -272,7 +270,6 @@ def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
 
 
 # --- qpsolvers ----------------------------------------------------------------------------------
-
 def made_hierarchy(seed):
     """Seven joints in their box, then equalities, inequalities that contradict each other, more."""
     rng = np.random.default_rng(seed)

@@ -250,7 +250,6 @@ def test_a_metric_is_refused():
 
 
 # A second proof for equalities: rational arithmetic.
-
 def exact(h):
     """Return x (n,) of a hierarchy of equalities without rounding, except the conversion to floats.
 

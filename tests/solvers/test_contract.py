@@ -215,7 +215,6 @@ def test_bounds_of_a_first_level_are_kept_and_change_nothing_where_they_are_far(
 
 
 # -- memory ----------------------------------------------------------------------------------------
-
 ODD = [np.nan, np.inf, -np.inf, 1e300, -1.0, 0.0, 1.0, 2.0, 3.0, 0.5, 1e18, -7.0]
 
 

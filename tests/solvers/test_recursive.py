@@ -90,7 +90,6 @@ def test_switched_off_each_method_is_the_recursion_at_every_rank(case):
 
 
 # Reverse priority.
-
 def by_pseudoinverses(h):
     """The recursion as printed, every pseudoinverse by numpy's SVD; no rows of unequal scale."""
     x = np.zeros(h.n)

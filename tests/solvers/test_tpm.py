@@ -47,7 +47,6 @@ def test_the_matrix_of_an_inequality_is_refused():
 
 
 # -- the published form, as printed: not to be mended ---------------------------------------------
-
 # A row dependent on those above takes a column of Q that nothing determines, and later levels need
 # it; or absolute tolerances see another rank in rows of unequal scale.
 # For each case, the number of levels down to the one that loses rank: these are still exact.
@@ -74,7 +73,6 @@ def test_where_its_equations_leave_a_choice_it_is_exact_down_to_the_level_that_l
 
 
 # -- near the edge of a rank -----------------------------------------------------------------------
-
 @pytest.mark.parametrize("resolver", [STAIRCASE, make("recursive")], ids=lambda r: r.label)
 def test_the_rank_tolerance_decides_what_counts_as_parallel(resolver):
     A = np.array([[1.0, 0.0], [1.0, 1e-5]])
@@ -85,8 +83,6 @@ def test_the_rank_tolerance_decides_what_counts_as_parallel(resolver):
 
 
 # -- limits: bounds always kept, and everything else as well as they allow -------------------------
-
-
 def test_scaling_is_one_where_a_level_is_met_and_the_share_of_the_target_where_it_is_not():
     bounds = (np.eye(2), [-1.0, -1.0], [1.0, 1.0])
     h = Hierarchy.from_levels([bounds, ([[1.0, 0.0]], [0.5]), ([[0.0, 1.0]], [-4.0]),
