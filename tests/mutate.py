@@ -46,6 +46,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 
 ROOT = Path(__file__).parents[1]
 SAMPLED = ("hierarchy", "solvers", "scenarios")
+FILES = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.py"))
 MAP = ROOT / "build" / "tests-of-lines"
 MOST = 40  # tests of a mutant
 COMPILED = ("compiled", "unlocked", "inlined", "measured")
@@ -96,8 +97,7 @@ def parsed(module: str) -> ast.Module:
 
 def modules() -> list[str]:
     """Return every module that is sampled, relative to the root."""
-    files = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.py"))
-    names = [file.relative_to(ROOT).as_posix() for file in files]
+    names = [file.relative_to(ROOT).as_posix() for file in FILES]
     left_out = OF_KERNELS if find_spec("jax") else (*OF_KERNELS, "solvers/batch/on_jax.py")
     return [name for name in names if not name.startswith(left_out)]
 
@@ -140,9 +140,7 @@ def is_kernel(node: ast.AST) -> bool:
 @cache
 def read_by_kernels() -> frozenset[str]:
     """Return every name that a kernel of the packages reads."""
-    files = [file for folder in ("hierarchy", "solvers", "scenarios")
-             for file in (ROOT / folder).rglob("*.py")]
-    kernels = [node for file in files for node in ast.parse(file.read_text()).body
+    kernels = [node for file in FILES for node in ast.parse(file.read_text()).body
                if is_kernel(node)]
     return frozenset(node.id for kernel in kernels for node in ast.walk(kernel)
                      if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load))
@@ -188,20 +186,21 @@ class Contexts:
     def __init__(self, coverage: Any) -> None:
         self.coverage = coverage
 
-    @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        self.coverage.switch_context(item.nodeid)
+    def within(self, context: str) -> Iterator[None]:
+        self.coverage.switch_context(context)
         result = yield
         self.coverage.switch_context("")
         return result
 
     @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        return (yield from self.within(item.nodeid))
+
+    @pytest.hookimpl(wrapper=True)
     def pytest_make_collect_report(self, collector: pytest.Collector) -> Iterator[None]:
         """What a file of tests runs as it is imported, all of its tests depend on."""
-        self.coverage.switch_context(collector.nodeid if isinstance(collector, pytest.File) else "")
-        result = yield
-        self.coverage.switch_context("")
-        return result
+        of = collector.nodeid if isinstance(collector, pytest.File) else ""
+        return (yield from self.within(of))
 
 
 def write_map(tests: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""A page in headless Chromium, through the DevTools protocol; skipped where there is none."""
+"""Pages: their elements, and how they are in headless Chromium, skipped where there is none."""
 
 import base64
 import json
@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 import time
 from contextlib import contextmanager
+from html.parser import HTMLParser
 from pathlib import Path
 from urllib.request import Request, urlopen
 
@@ -19,12 +20,31 @@ _FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshad
 _PATIENCE = 180.0  # [s], which only a browser that hangs takes, on a loaded machine too
 
 
+class Balanced(HTMLParser):
+    """Fails unless the elements of a text are closed in order; its texts are the `cells`."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.cells = [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in ("meta", "br"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, text):
+        self.cells.append(text)
+
+
 class Page:
     """One page: run script in it, press its buttons, look at it."""
 
     def __init__(self, socket):
         self._socket, self._number = socket, 0
-        self.address = ""
         self.complaints = []  # errors and warnings of the console, exceptions
 
     def call(self, method, **parameters):
@@ -49,7 +69,6 @@ class Page:
 
     def look_at(self, address, width=1400, height=900, dark=False):
         """Open an address in a window of this size."""
-        self.address = address
         for domain in ("Page", "Runtime", "Log"):
             self.call(f"{domain}.enable")
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
@@ -73,26 +92,21 @@ class Page:
             assert time.monotonic() < end, f"{condition} does not come to hold"
             time.sleep(0.05)
 
-    def painted(self):
-        """Wait until what was asked for is on the screen."""
-        self.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
     def screenshot(self):
-        """The window as PNG."""
-        self.painted()
+        """The window as PNG, once what was asked for is on the screen."""
+        self.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
 
-    def press(self, key, code=None):
+    def press(self, key, code):
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=code or key,
-                      text=key if len(key) == 1 and kind == "keyDown" else "")
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=code,
+                      text=key * (kind == "keyDown"))
 
-    def mouse(self, *steps, **parameters):
+    def mouse(self, *steps):
         """Send mouse events (kind, x, y)."""
         for kind, x, y in steps:
-            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y,
-                      **{"button": "left", "buttons": int(kind != "mouseReleased"),
-                         "clickCount": 1, **parameters})
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left",
+                      buttons=int(kind != "mouseReleased"), clickCount=1)
 
 
 @contextmanager

@@ -100,3 +100,10 @@ def distance(obstacle, point):
     pairs = Pairs(1, 1)
     measure_pairs(pairs, np.array([point]), Obstacles([obstacle]))
     return pairs.distance[0, 0], pairs.direction[0, 0]
+
+
+def deproject(pinhole, pixels):
+    """World points (..., 3) [m] of u, v [px] and depth [m] (..., 3)."""
+    u, v, depth = np.moveaxis(np.asarray(pixels, dtype=float), -1, 0)
+    seen = [(u - pinhole.cx) / pinhole.fx * depth, (v - pinhole.cy) / pinhole.fy * depth, depth]
+    return np.stack(seen, axis=-1) @ np.asarray(pinhole.rotation).T + np.asarray(pinhole.position)

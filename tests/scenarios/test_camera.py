@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from scene import distance
+from scene import deproject, distance
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
 from scenarios.config.sensor import CameraSection, DepthErrors
-from tests.helpers.camera_by_hand import bound, deproject
 
 STATE = State.at(Robot.named("kuka_lwr"), [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
 SMALL = {"width": 80, "height": 60, "fx": 70.0, "fy": 65.0}
@@ -41,6 +40,14 @@ def wall(depth=2.0, **settings):
 
 def depths(taken):
     return taken.image(0, STATE)[0].astype(float)
+
+
+def bound(errors, depth):
+    """Largest error [m] of a reading at a depth [m] that is not an outlier."""
+    noise = 3.5 * (errors.noise_floor + errors.noise_growth * (depth - errors.noise_from) ** 2)
+    if errors.rounding == "step":
+        return noise + errors.step / 2
+    return (depth + noise) / (1.0 - (depth + noise) * errors.step / 2) - depth
 
 
 def traced(obstacle, pinhole, u, v):

@@ -6,6 +6,7 @@ from runpy import run_path
 
 import numpy as np
 import pytest
+from scene import deproject
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles
@@ -18,7 +19,6 @@ from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
 from scenarios.config import ScenarioError
 from scenarios.config.sensor import CameraSection, ImageSection
-from tests.helpers.camera_by_hand import deproject
 
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)

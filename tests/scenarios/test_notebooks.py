@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from balanced import Balanced
+from headless import Balanced
 
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.notebook import html_table

@@ -7,9 +7,8 @@ import shlex
 
 import numpy as np
 import pytest
-from balanced import Balanced
 from hand_made import asked, recording
-from headless import chromium
+from headless import Balanced, chromium
 
 from hierarchy import HierarchyError
 from scenarios.config import load

@@ -4,8 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from rank_cases import boxed, family, rng
-from sequences import moved
+from rank_cases import boxed, family, moved, rng
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, make

@@ -10,8 +10,7 @@ import tracemalloc
 import numpy as np
 import oracle
 import pytest
-from rank_cases import CASES, boxed, build, family, gap, random_levels, rng
-from sequences import moved
+from rank_cases import CASES, boxed, build, family, gap, moved, random_levels, rng
 
 from hierarchy import Hierarchy, HierarchyError
 from scenarios.problems import reference as families

@@ -5,7 +5,7 @@ import sys
 import c_library as c
 import numpy as np
 import pytest
-from sequences import sequence
+from rank_cases import sequence
 
 from hierarchy import Hierarchy
 from scenarios.problems.reference import FAMILIES, family

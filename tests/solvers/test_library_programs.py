@@ -13,7 +13,7 @@ from pathlib import Path
 import c_library as c
 import numpy as np
 import pytest
-from sequences import sequence
+from rank_cases import sequence
 
 from benchmark.studies import recorded
 from benchmark.studies.recorded import record_sequence
