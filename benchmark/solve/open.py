@@ -1,10 +1,13 @@
 """The open benchmark: every solver on every family, public and fresh; continued if interrupted."""
 
+import gzip
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import final
 
 import numpy as np
 
@@ -14,11 +17,11 @@ from benchmark.report import Report
 from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
-from benchmark.store import Store
 from benchmark.tables import Row
 from benchmark.timing import machine
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
+from scenarios.files import make_folder, named, slug, write_json, written
 from scenarios.problems.answers import export, file_of, save
 from scenarios.problems.families import FAMILIES, Family
 from solvers.problems.files import Collection, read
@@ -33,6 +36,58 @@ CHECKED = ("EQ7", "EQ7sing", "INEQ7", "tied_box", "contacts", "mixed_units", "on
 _CHECKS = 4  # problems of each of them
 _ALIKE = 7   # digits of x / (1 + |x|) in which candidates for a proof count as one
 _BREAKS = {RAISED: "raises", CRASHED: "ends its process", HUNG: "takes longer than --limit"}
+
+
+class StoreError(HierarchyError):
+    """A file of rows that cannot be read."""
+
+
+@final
+@dataclass(frozen=True)
+class Store:
+    """The folder of a benchmark: `problems/`, `rows/`, and what is known of the entrants."""
+
+    folder: Path
+
+    @property
+    def problems(self) -> Path:
+        """The folder of the files of problems."""
+        return self.folder / "problems"
+
+    def file_of(self, entrant: str, problems: Path) -> Path:
+        """Return where the rows of an entrant on a file of problems belong."""
+        return self.folder / "rows" / f"{slug(entrant)}--{problems.stem}.jsonl.gz"
+
+    def add(self, rows: Iterable[Row], file: Path) -> None:
+        """Write the rows of one entrant on one file of problems, whole or not; see OutputError."""
+        make_folder(file.parent)
+        with named(file), written(file) as partial, gzip.open(partial, "wt") as lines:
+            lines.writelines(json.dumps(row) + "\n" for row in rows)
+
+    def rows(self) -> list[Row]:
+        """Return all rows; raises StoreError for a file that is damaged."""
+        return [row for file in sorted((self.folder / "rows").glob("[!.]*.jsonl.gz"))
+                for row in _read(file)]
+
+    def notes(self, name: str) -> dict[str, str]:
+        """Return what NAME.json says, {} if there is none yet."""
+        file = self.folder / f"{name}.json"
+        found: dict[str, str] = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+        return found
+
+    def note(self, name: str, content: dict[str, str]) -> None:
+        """Write NAME.json."""
+        make_folder(self.folder)
+        write_json(self.folder / f"{name}.json", content)
+
+
+def _read(file: Path) -> list[Row]:
+    try:
+        with gzip.open(file, "rt") as lines:
+            return [json.loads(line) for line in lines]
+    except (OSError, EOFError, ValueError) as error:
+        raise StoreError(f"{file} cannot be read ({error}); remove it to run its entrant again"
+                         ) from error
 
 
 def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],

@@ -79,12 +79,6 @@ def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
 CC = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 
 
-def shared(source, out, *flags):
-    subprocess.run([CC, "-O2", "-fPIC", "-shared", f"-I{SOLVE}", source, *flags, "-o", out],
-                   check=True)
-    return out
-
-
 @pytest.mark.skipif(CC is None, reason="no compiler of C")
 @pytest.mark.skipif(sys.platform != "linux", reason="the C library is made on Linux")
 def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path):
@@ -93,9 +87,10 @@ def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path
     made.save(tmp_path / "simple.npz")
     rows = {}
     for resolver in ("hcod", "tpm"):
-        out = shared(SOLVE / "library.c", tmp_path / f"{resolver}.so",
-                     f"-DSOLVE=th_solve_{resolver}", f"-I{folder / 'include'}",
-                     folder / "lib" / "libtask_hierarchy.a", "-lm")
+        out = tmp_path / f"{resolver}.so"
+        subprocess.run([CC, "-O2", "-fPIC", "-shared", f"-I{SOLVE}", SOLVE / "library.c",
+                        f"-DSOLVE=th_solve_{resolver}", f"-I{folder / 'include'}",
+                        folder / "lib" / "libtask_hierarchy.a", "-lm", "-o", out], check=True)
         with Field(compiled([out], ["ours"]), QUESTIONS) as field:
             rows[resolver] = asked(field, tmp_path / "simple.npz")["ours"]
     assert {row["refused"] for row in rows["tpm"]} == {"not for this solver"}

@@ -32,15 +32,6 @@ def fake(name, **options):
     return Entrant(name, Package("numpy", "numpy"), f"fake_peers:{name}", options)
 
 
-@pytest.fixture
-def alone(tmp_path, monkeypatch):
-    """Only what the tests bring."""
-    monkeypatch.setattr("benchmark.packages.folder_of",
-                        lambda package: tmp_path / "cache" / package.name)
-    monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests' / 'helpers'}:{ROOT}")
-    monkeypatch.setenv("COLUMNS", "80")
-
-
 def answered(entrant, questions, *calls):
     """The answers of an entrant, in a process of its own only where it needs another Python."""
     try:
@@ -57,16 +48,6 @@ def answered(entrant, questions, *calls):
 def each(entrants):
     every = pytest.mark.parametrize("entrant", entrants, ids=[one.label for one in entrants])
     return lambda test: pytest.mark.filterwarnings("ignore")(every(test))  # of packages
-
-
-@pytest.fixture(scope="module")
-def near(tmp_path_factory):
-    """A scene with a goal 1 cm and a posture 0.1 rad away, which no limit keeps back."""
-    folder = tmp_path_factory.mktemp("near")
-    scene, here = make_scenes(folder)["step"], State.at(Robot.named("kuka_lwr"), START)
-    goal = np.add(here.position(here.robot.frame("end_effector")), [0.006, -0.008, 0.0])
-    posture = np.add(START, [0.1, -0.1, 0.1, 0.1, -0.1, 0.1, -0.1])
-    return replace(scene, centre=tuple(goal.tolist()), posture=tuple(posture.tolist()))
 
 
 def wanted(scene, weight, rows=3):
@@ -86,7 +67,12 @@ def wanted(scene, weight, rows=3):
 
 
 @each(ENTRANTS)
-def test_an_adapter_of_the_arm_gives_the_known_velocity(entrant, near):
+def test_an_adapter_of_the_arm_gives_the_known_velocity(entrant, tmp_path):
+    """With a goal 1 cm and a posture 0.1 rad away, which no limit keeps back."""
+    scene, here = make_scenes(tmp_path)["step"], State.at(Robot.named("kuka_lwr"), START)
+    goal = np.add(here.position(here.robot.frame("end_effector")), [0.006, -0.008, 0.0])
+    posture = np.add(START, [0.1, -0.1, 0.1, 0.1, -0.1, 0.1, -0.1])
+    near = replace(scene, centre=tuple(goal.tolist()), posture=tuple(posture.tolist()))
     *_, reply = answered(entrant, QUESTIONS, ("open", asdict(near)), ("turn", 1, 0))
     log = joined([reply])
     assert not log["failed"][0], reply["why"]
@@ -145,7 +131,11 @@ def test_every_package_has_an_adapter_that_is_tested():
 
 
 # -- the scenes and their judges -------------------------------------------------------------------
-def test_everybody_is_judged_or_named_with_the_reason(alone, tmp_path):
+def test_everybody_is_judged_or_named_with_the_reason(tmp_path, monkeypatch):
+    """Of those that the tests bring alone."""
+    monkeypatch.setattr("benchmark.packages.folder_of",
+                        lambda package: tmp_path / "cache" / package.name)
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'tests' / 'helpers'}:{ROOT}")
     found = run([fake("posture"), fake("lost"), fake("ends"), NOBODY], ticks=1100)
     good, lost = found.rows["peers"]
     assert (good["entrant"], lost["entrant"]) == ("posture", "lost")

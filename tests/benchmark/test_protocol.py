@@ -137,11 +137,6 @@ def test_every_output_that_is_stored_stands_in_a_page_or_is_linked():
     assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == shown | linked
 
 
-def test_an_unknown_block_is_named(tmp_path):
-    with pytest.raises(HierarchyError, match=r"page\.md: block 'other'"):
-        pages.filled("<!-- reproduce: other -->\n<!-- end -->", tmp_path, "page.md", STORED)
-
-
 BENCH = """\
 EQ7
             median  p95
@@ -170,6 +165,7 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
     head = "            median  p95"
     assert fill(page(mark)) == page(mark, f"```\n{head}\n\n{head}\nplain numpy   55.3 83.4\n```\n")
     for text, says in ((page("python b.py"), r"page\.md: no output of 'python b\.py' is stored"),
-                       (page("python a.py | EQ8 .. EQ9"), "has no line that starts with 'EQ8'")):
+                       (page("python a.py | EQ8 .. EQ9"), "has no line that starts with 'EQ8'"),
+                       ("<!-- reproduce: other -->\n<!-- end -->", r"page\.md: block 'other'")):
         with pytest.raises(HierarchyError, match=says):
             fill(text)

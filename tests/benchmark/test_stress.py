@@ -90,8 +90,7 @@ def test_each_way_to_fail_is_told_from_the_others_and_shrunk_to_its_core(way):
 
     assert fails(problem())
     smallest = stress.shrunk(problem(), fails)
-    assert smallest.sizes.tolist() == [1]
-    assert smallest.n == 3
+    assert (smallest.sizes.tolist(), smallest.n) == ([1], 3)
     assert not smallest.reference.any()
 
 
@@ -124,13 +123,9 @@ FEW = ("EQ7", "INEQ7")
 EQUALITIES = {NUMPY, "augmented", "recursive", "reverse", "sns", "tpm", "tpm-published"}
 
 
-@pytest.fixture
-def few(monkeypatch):
+def test_a_row_for_everybody_in_every_family_asked(tmp_path, capsys, monkeypatch):
     """Only one problem a family, since one cascade takes 40 ms for one of them."""
     monkeypatch.setattr(resolvers.reference, "family", lambda name: family(name)[:1])
-
-
-def test_a_row_for_everybody_in_every_family_asked(few, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     found = resolvers.run(seconds=0.001, families=FEW)
     rows = found.rows["resolvers"]

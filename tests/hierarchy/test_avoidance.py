@@ -69,8 +69,7 @@ def test_magnitude_reaches_its_maximum_at_contact_and_vanishes_at_the_reach():
     """Equation (24), which the letter's (23) as printed contradicts."""
     law = Repulsion(maximum=2.0, reach=0.15, shape=20.0)
     assert law(0.0) == pytest.approx(2.0, rel=1e-8)
-    assert law(0.15) == pytest.approx(0.0, abs=1e-8)
-    assert law(0.075) == pytest.approx(1.0)
+    assert (law(0.15), law(0.075)) == (pytest.approx(0.0, abs=1e-8), pytest.approx(1.0))
     assert (np.diff([law(D) for D in np.linspace(0, 1, 50)]) <= 0).all()
     assert law(1e6) == 0.0
 
@@ -148,20 +147,17 @@ def task(limits=LIMITS, **settings):
     return DangerBounds(limits, SENSOR.points, **({"reach": REACH, "shape": SHAPE} | settings))
 
 
-def columns(q, v):
-    """r^T J_c (K, n) of all points, by central differences of where they are."""
-    seen, step = state_at(q, v).measurement, 1e-6
+def velocity_sides(q, v):
+    """What the greatest danger leaves of each joint's velocities, from the definition.
+
+    r^T J_c (K, n) of all points is by central differences of where they are.
+    """
+    step = 1e-6
     there = [[state_at(q + sign * step * e, v).measurement.points.copy() for sign in (1, -1)]
              for e in np.eye(7)]
     J = np.array([(plus - minus) / (2 * step) for plus, minus in there])  # (n, K, 3)
-    state_at(q, v)
-    return np.einsum("nki,ki->kn", J, seen.direction)
-
-
-def velocity_sides(q, v):
-    """What the greatest danger leaves of each joint's velocities, from the definition."""
     seen = state_at(q, v).measurement
-    near, toward = np.exp(-SHAPE), columns(q, v)  # so that the danger is 1 at contact
+    toward, near = np.einsum("nki,ki->kn", J, seen.direction), np.exp(-SHAPE)  # danger 1 at contact
     f = (1.0 + near) / (1.0 + near * np.exp(2.0 * np.maximum(seen.distance, 0.0) / REACH * SHAPE))
     forward = np.max(np.where(toward < -1e-8, f[:, None], 0.0), axis=0)
     backward = np.max(np.where(toward > 1e-8, f[:, None], 0.0), axis=0)

@@ -103,8 +103,7 @@ def opening(ramp=0.2):
     (2.0, 0.2, 0.0), (2.05, 0.2, 0.25), (2.5, 0.2, 1.0), (0.99, 0.0, 1.0), (1.5, 0.0, 0.0)])
 def test_the_load_of_a_contact_ramps_around_the_time_in_which_it_is_open(t, ramp, load):
     left, right = opening(ramp).contacts
-    assert right.load(t) == pytest.approx(load)
-    assert left.load(t) == 1.0
+    assert (right.load(t), left.load(t)) == (pytest.approx(load), 1.0)
 
 
 @pytest.mark.parametrize("faces", [4, 8])

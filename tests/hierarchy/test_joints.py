@@ -178,20 +178,15 @@ D = [0, 0, 0.4, 0, 0.39, 0, 0.078]
 ALPHA = np.deg2rad([90, -90, -90, 90, 90, -90, 0])
 
 
-def from_dh_table(q):
-    """Placement of the hand, by multiplying the letter's Denavit-Hartenberg matrices."""
-    T = np.eye(4)
-    for angle, d, alpha in zip(q, D, ALPHA, strict=True):
-        c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
-        T = T @ [[c, -s * ca, s * sa, 0], [s, c * ca, -c * sa, 0], [0, sa, ca, d], [0, 0, 0, 1]]
-    return T
-
-
 def test_kinematics_equal_the_table_multiplied_out():
+    """The letter's Denavit-Hartenberg matrices."""
     robot = Robot.named("kuka_lwr")
     frame = robot.frame("end_effector")
     for q in np.random.default_rng(0).uniform(-3, 3, (50, 7)):
-        state, T = State.at(robot, q), from_dh_table(q)
+        state, T = State.at(robot, q), np.eye(4)
+        for angle, d, alpha in zip(q, D, ALPHA, strict=True):
+            c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
+            T = T @ [[c, -s * ca, s * sa, 0], [s, c * ca, -c * sa, 0], [0, sa, ca, d], [0, 0, 0, 1]]
         np.testing.assert_allclose(state.position(frame), T[:3, 3], atol=1e-14)
         np.testing.assert_allclose(state.rotation(frame), T[:3, :3], atol=1e-14)
 

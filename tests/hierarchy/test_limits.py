@@ -184,11 +184,6 @@ def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():
 
 
 # ---- from outside -----------------------------------------------------------------------------
-def wide(joints, T, velocity=np.inf):
-    return np.array([np.full(joints, -50.0), np.full(joints, 1.0), np.full(joints, velocity),
-                     np.full(joints, 10.0)]), np.full(joints, T)
-
-
 @LEVELS
 @pytest.mark.parametrize(("seed", "ticks"), [(6, 0), (7, 0), (6, 10)])
 def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, seed, ticks):
@@ -213,7 +208,7 @@ def test_from_any_start_the_box_is_not_empty_and_the_acceleration_holds(level, s
 def test_a_joint_outside_returns_without_turning_and_in_finite_time(level, period, velocity, side):
     """Whoever returns as slowly as the box allows needs the time of a bang-bang motion."""
     rng = np.random.default_rng(9)
-    limits, T = wide(30, period, velocity)
+    limits, T = np.tile([[-50.0], [1.0], [velocity], [10.0]], 30), np.full(30, period)
     e = 10 ** rng.uniform(-9, 0, 30)
     q, v = 1.0 + e, -rng.uniform(0, 1, 30) * np.minimum(np.sqrt(5 * e), velocity)
     if side < 0:

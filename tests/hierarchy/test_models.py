@@ -29,20 +29,7 @@ def arm(tmp_path):
     return write
 
 
-def write_mesh(path, corners):
-    """A tetrahedron as text of the STL format."""
-    facets = ["facet normal 0 0 0\nouter loop\n{}\nendloop\nendfacet".format("\n".join(
-        "vertex {} {} {}".format(*corner) for corner in face)) for face in combinations(corners, 3)]
-    path.write_text("\n".join(["solid tetrahedron", *facets, "endsolid"]))
-
-
 TETRAHEDRON = [(0.0, 0.0, 0.0), (0.05, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 0.3)]
-
-
-def holds(capsule, point):
-    start, way = np.array(capsule.start), np.subtract(capsule.end, capsule.start)
-    share = np.clip((point - start) @ way / max(way @ way, 1e-300), 0.0, 1.0)
-    return np.linalg.norm(point - start - share * way) <= capsule.radius + 1e-9
 
 
 def test_a_tool_is_the_end_effector_and_primitives_are_capsules(arm):
@@ -59,12 +46,17 @@ def test_a_tool_is_the_end_effector_and_primitives_are_capsules(arm):
 def test_the_capsule_of_a_mesh_here_or_in_a_folder_above_holds_its_corners(arm, tmp_path, name):
     path = tmp_path / name.partition("://")[2] if ":" in name else tmp_path / name
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_mesh(path, TETRAHEDRON)
+    facets = ["facet normal 0 0 0\nouter loop\n{}\nendloop\nendfacet".format("\n".join(
+        "vertex {} {} {}".format(*corner) for corner in face))
+        for face in combinations(TETRAHEDRON, 3)]
+    path.write_text("\n".join(["solid tetrahedron", *facets, "endsolid"]))  # of the STL format
     robot = Robot.from_file(arm(f'<mesh filename="{name}"/>'))
     assert robot.missing == ()
     capsule = robot.capsules[2]
-    for corner in TETRAHEDRON:
-        assert holds(capsule, np.add(corner, (0, 0, 0.15)))
+    start, way = np.array(capsule.start), np.subtract(capsule.end, capsule.start)
+    for off in np.add(TETRAHEDRON, (0, 0, 0.15)) - start:
+        along = np.clip(off @ way / (way @ way), 0.0, 1.0) * way
+        assert np.linalg.norm(off - along) <= capsule.radius + 1e-9
     assert capsule.radius < 0.06, "along the mesh, not across it"
     path.unlink()
     robot = Robot.from_file(arm(f'<mesh filename="{name}"/>'))

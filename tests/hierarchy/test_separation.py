@@ -84,19 +84,6 @@ TASKS = {"arm": SelfSeparation(link_capsules(TABLES["kuka_lwr"], foot=0.3105), A
 IDENTITY = np.r_[np.eye(3).ravel(), np.zeros(3)][None]
 
 
-def measured(a, b):
-    """Distance, direction and shares of two capsules given by start, end and radius, at rest."""
-    joints, table = pack_capsules([Capsule("a", 0, *a), Capsule("b", 0, *b)])
-    return measure_capsules(IDENTITY, joints, table, np.array([[0, 1]]))[0]
-
-
-def by_least_squares(a, b):
-    """Least distance of two segments: that of the best shares of both, between 0 and 1."""
-    (p, q), (r, s) = np.array(a, dtype=float), np.array(b, dtype=float)
-    found = lsq_linear(np.c_[q - p, r - s], r - p, (0.0, 1.0), "bvls", tol=1e-15)
-    return np.sqrt(2.0 * found.cost)
-
-
 def segments():
     rng = np.random.default_rng(0)
     for _ in range(300):
@@ -114,10 +101,13 @@ def segments():
 
 
 def test_distance_of_segments_is_the_least_there_is():
+    """That of the best shares of both, between 0 and 1; of capsules without radius, at rest."""
     for a, b in segments():
-        a, b = np.round(a, 12).tolist(), np.round(b, 12).tolist()
-        seen = measured((*a, 0.0), (*b, 0.0))
-        assert seen[0] == pytest.approx(by_least_squares(a, b), abs=2e-8)
+        (p, q), (r, s) = a, b = np.round(a, 12), np.round(b, 12)
+        joints, table = pack_capsules([Capsule("a", 0, *a, 0.0), Capsule("b", 0, *b, 0.0)])
+        seen = measure_capsules(IDENTITY, joints, table, np.array([[0, 1]]))[0]
+        best = lsq_linear(np.c_[q - p, r - s], r - p, (0.0, 1.0), "bvls", tol=1e-15)
+        assert seen[0] == pytest.approx(np.sqrt(2.0 * best.cost), abs=2e-8)
         assert 0.0 <= seen[4:].min() <= seen[4:].max() <= 1.0
         on_a, on_b = [np.add(p, share * np.subtract(q, p))
                       for (p, q), share in zip((a, b), seen[4:], strict=True)]

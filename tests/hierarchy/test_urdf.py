@@ -38,15 +38,12 @@ def placement(robot, q, name):
 
 
 @pytest.mark.parametrize("base", [None, "floating"])
-def test_a_floating_first_joint_is_the_free_base(load, base):
+def test_a_floating_first_joint_is_the_free_base_or_fixed_at_its_place(load, base):
     robot = load(*two_joints("floating"), base=base)
     assert (robot.base, robot.n, robot.joint_names) == ("floating", 7, ("first", "second"))
     p, R = placement(robot, robot.rest, "base")
     np.testing.assert_allclose(p, ORIGIN[0])
     np.testing.assert_allclose(R, ORIGIN[1].as_matrix(), atol=1e-12)
-
-
-def test_a_floating_first_joint_is_fixed_at_its_place(load):
     robot = load(*two_joints("floating"), base="fixed")
     assert (robot.base, robot.joint_names) == ("fixed", ("second",))
     p, R = placement(robot, [0.0], "arm")

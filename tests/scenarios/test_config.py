@@ -80,12 +80,9 @@ def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_besid
     assert np.median(away) == pytest.approx(0.1 * 0.5 ** (1.0 / 3.0), rel=0.05)  # of a ball
 
 
-def test_every_key_has_a_meaning():
+def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them(monkeypatch):
     assert not [f"{place} {section.__name__}.{key.name}" for place, section in sections()
                 for key in keys_of(section) if not key.meaning]
-
-
-def test_the_page_of_keys_is_as_the_program_has_them(monkeypatch):
     monkeypatch.setattr(sys, "path", [str(Path(__file__).parents[2] / "docs" / "_ext"), *sys.path])
     import scenario_keys
 
@@ -171,8 +168,7 @@ def away_from(tick, by=1e-3):
 def test_runs_that_are_one_motion_are_as_far_apart_as_the_farthest_of_them():
     (one,) = motions([run_of("recursive"), run_of("hqp", away_from(1, 5e-6)),
                       run_of("hcod", away_from(1, 2e-6))])
-    assert one.labels == ("recursive", "hqp", "hcod")
-    assert one.apart == 5e-6
+    assert (one.labels, one.apart) == (("recursive", "hqp", "hcod"), 5e-6)
 
 
 NOT_SOLVED = 3 * np.eye(5, dtype=int)  # at tick 0, 1, ...

@@ -160,16 +160,10 @@ def test_a_section_that_does_not_fit_is_refused_when_it_is_built(changes, said):
         build(load("human", changes))
 
 
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
+def test_frames_that_cannot_be_used_are_refused_by_name(tmp_path):
     run = simulate(load("human", [*QUICK, "control.duration=0.3"]))
     example = Path(__file__).parents[2] / "examples" / "record_frames.py"
-    write, folder = run_path(str(example))["write"], tmp_path_factory.mktemp("frames") / "some"
-    return write(folder, run, frames=6), run
-
-
-def test_frames_that_cannot_be_used_are_refused_by_name(written, tmp_path):
-    folder, _ = written
+    folder = run_path(str(example))["write"](tmp_path / "some", run, frames=6)
     with pytest.raises(HierarchyError, match="has no frames"):
         RecordedFrames(tmp_path, ROBOT)
     text = (folder / "frames.toml").read_text()

@@ -37,10 +37,6 @@ def joint(values):
     return {"q": np.outer(values, np.eye(7)[0])}  # limits are -2 and 2
 
 
-def cone(degrees):
-    return {"pointing_error": np.cos(np.radians(60.0)) - np.cos(np.radians(degrees))}
-
-
 def test_median_worst_and_share_count_from_when_the_target_was_first_reached():
     one = goal("position", **at([90, 0, 0.5, 4, 3]))
     assert (one.reached, one.first) == (1.0, 3.0)
@@ -58,7 +54,8 @@ def test_median_worst_and_share_count_from_when_the_target_was_first_reached():
     (joint([2.5, 1.9, 2.1, 1.9, 1.9]), "joint limits", "broken", 0.1, "rad"),      # and out again
     (joint([2.5, 2.4, 2.4, 2.4, 2.4]), "joint limits", "never kept", 0.5, "rad"),  # stayed
     (joint([0.0, 2.3, -2.1, 0.0, 0.0]), "joint limits", "broken", 0.3, "rad"),
-    (cone([60.0, 58.0, 76.0, 60.0, 60.0]), "pointing", "broken", 16.0, "deg"),
+    ({"pointing_error": 0.5 - np.cos(np.radians([60.0, 58.0, 76.0, 60.0, 60.0]))}, "pointing",
+     "broken", 16.0, "deg"),
     ({"v": np.diag([0, 0, 4.0, 0, 0, 0, 0])[:5], "velocity_limit": np.full(7, 3.0)},
      "speed limits", "broken", 1.0, "rad/s"),
     ({"v": np.diag([0, 0, 3.0005, 0, 0, 0, 0])[:5], "velocity_limit": np.full(7, 3.0)},
@@ -133,12 +130,15 @@ def test_the_p_value_is_that_of_all_signs_with_and_without_ties(seed):
     assert paired(np.zeros(11), second).p == pytest.approx(enumerated(second[second != 0.0]))
 
 
-def test_pairs_are_counted_by_their_direction():
+def test_pairs_are_counted_by_their_direction_and_too_few_tell_nothing():
     first = np.array([1.0, 2.0, 3.0, 4.0, np.nan, 6.0])
     found = paired(first, np.array([1.0, 1.0, 5.0, 4.0 * (1 + 1e-4), 5.0, np.inf]))
     assert (found.count, found.same, found.lower, found.higher) == (4, 2, 1, 1)
     assert [replace(found, p=p).distinguishable for p in (0.0499, 0.05)] == [True, False]
     assert str(found) == "not distinguishable"
+    assert not paired(np.zeros(5), np.ones(5)).distinguishable
+    assert paired(np.zeros(6), np.arange(1.0, 7.0)).distinguishable
+    assert str(paired(np.full(3, np.nan), np.ones(3))) == "no pair"
 
 
 RISING = np.arange(1.0, 17.0)
@@ -150,12 +150,6 @@ RISING = np.arange(1.0, 17.0)
 def test_a_shift_of_pairs_is_told_beside_those_that_do_not_differ(shift, said):
     found = paired(RISING, RISING - shift)
     assert (found.distinguishable, str(found)) == (True, said)
-
-
-def test_too_few_pairs_tell_nothing():
-    assert not paired(np.zeros(5), np.ones(5)).distinguishable
-    assert paired(np.zeros(6), np.arange(1.0, 7.0)).distinguishable
-    assert str(paired(np.full(3, np.nan), np.ones(3))) == "no pair"
 
 
 LOW, NORMAL = np.linspace(1.0, 1.5, 16), np.random.default_rng(2).normal(size=(2, 16))
@@ -243,18 +237,12 @@ def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
     assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return save(simulate(load("ellipse-hqp").with_changes({"control.duration": 0.05})),
-                tmp_path_factory.mktemp("why") / "run")
-
-
-def test_the_command_names_the_largest_changes_of_a_run(folder, capsys):
+def test_the_command_names_the_largest_changes_of_a_run(tmp_path, capsys):
+    folder = save(simulate(load("ellipse-hqp", ["control.duration=0.05"])), tmp_path / "run")
     assert run_command(["why", str(folder), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["jumps"]
     sizes = [one["size"] for one in found]
-    assert len(found) == 3
-    assert sizes == sorted(sizes, reverse=True)
+    assert (len(found), sizes) == (3, sorted(sizes, reverse=True))
     assert run_command(["why", str(folder), "--tick", str(found[0]["tick"])]) == 0
     assert f"tick {found[0]['tick']} (t = " in capsys.readouterr().out
     assert run_command(["why", str(folder), "--tick", "999"]) == 2

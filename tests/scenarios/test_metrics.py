@@ -96,8 +96,7 @@ def test_a_scenario_without_a_task_has_no_metric_of_it():
 def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_as_one():
     data = as_plain_data(recording(a=np.full((5, 2), np.nan), fault="diverged at tick 5"))
     assert data["metrics"]["acceleration_max"]["value"] is None
-    assert data["fault"] == "diverged at tick 5"
-    assert data["ticks"] == 5
+    assert (data["fault"], data["ticks"]) == ("diverged at tick 5", 5)
 
 
 def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
@@ -106,8 +105,7 @@ def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
                               ee_distance=[1, 1, 1, 0.02, 1],
                               true_minimal_distance=[1, 0.4, 0.3, 1, 1],
                               true_ee_distance=[1, 1, 0.35, 1, 1]))
-    assert found["body_distance_min"].value == 0.3
-    assert found["ee_distance_min"].value == 0.35
+    assert (found["body_distance_min"].value, found["ee_distance_min"].value) == (0.3, 0.35)
     measured = found["body_distance_min_measured"], found["ee_distance_min_measured"]
     assert [metric.value for metric in measured] == [0.05, 0.02]
     assert all(metric.detail and metric.lower_is_better is None for metric in measured)

@@ -4,7 +4,6 @@ import copy
 import pickle
 import re
 import sys
-from importlib.metadata import distributions
 from pathlib import Path
 
 import numpy as np
@@ -80,18 +79,6 @@ def said(arguments, capsys):
     return code, found.out + found.err
 
 
-def install(folder, group, line):
-    """Put a distribution with an entry point on the path, as pip would."""
-    info = folder / "mine-1.0.dist-info"
-    info.mkdir(exist_ok=True)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
-    with (info / "entry_points.txt").open("a") as file:
-        file.write(f"[task_hierarchy.{group}]\n{line}\n")
-    sys.path.insert(0, str(folder))
-    plugins._points.cache_clear()
-    assert any(one.metadata["Name"] == "mine" for one in distributions())
-
-
 @pytest.mark.parametrize("command", [["check"], ["run"], ["compare"]])
 def test_a_file_alone_loads_no_code(command, capsys, folder):
     (folder / "doors_of_mine.py").write_text("raise SystemExit('this was run')")
@@ -159,7 +146,12 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
         "from dataclasses import replace\nfrom hierarchy.robots import TABLES\n"
         "from solvers import Resolver\nclass Third(Resolver):\n    name, solve = 'third', None\n"
         "TABLE = replace(TABLES['kuka_lwr'], name='arm_of_mine')\n")
-    install(folder, group, line)
+    info = folder / "mine-1.0.dist-info"  # as pip would
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[task_hierarchy.{group}]\n{line}\n")
+    sys.path.insert(0, str(folder))
+    plugins._points.cache_clear()
     assert "entry_of_mine" not in sys.modules
     assert use() == line.partition(" ")[0]
     sys.modules.pop("entry_of_mine")

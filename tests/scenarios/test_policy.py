@@ -151,14 +151,6 @@ def visited(keys):
     return np.array([[weights.get(key, 0.0) for key in (A, B, C)] for weights in found])
 
 
-def wandering(ticks, seed, longest):
-    """Keys of random stays of up to `longest` ticks."""
-    rng, keys = np.random.default_rng(seed), []
-    while len(keys) < ticks:
-        keys += [(A, B, C)[rng.integers(3)]] * rng.integers(1, longest + 1)
-    return keys[:ticks]
-
-
 def test_after_one_change_the_weight_rises_as_the_smoothstep():
     weights = visited([A] * 10 + [B] * 150)
     s = np.clip((np.arange(160) - 10) * TICK / TIME, 0.0, 1.0)
@@ -168,7 +160,10 @@ def test_after_one_change_the_weight_rises_as_the_smoothstep():
 
 @pytest.mark.parametrize("longest", [1, 7, 60, 300])
 def test_however_often_it_changes_weights_are_convex_with_continuous_derivatives(longest):
-    weights = visited(wandering(2000, longest, longest))
+    rng, keys = np.random.default_rng(longest), []
+    while len(keys) < 2000:  # stays of up to `longest` ticks
+        keys += [(A, B, C)[rng.integers(3)]] * rng.integers(1, longest + 1)
+    weights = visited(keys)
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-12)
     assert (weights > -1e-12).all()
     # What the kernel 6 s (1 - s) / TIME makes of anything between 0 and 1.

@@ -103,14 +103,9 @@ def runs():
     return {name: simulate(load(name, ["control.duration=1.5"])) for name in NAMES}
 
 
-@pytest.fixture(scope="module")
-def ellipse(runs):
-    return scene(runs["ellipse"])
-
-
-def test_frames_placements_and_distances_are_those_recorded(runs, ellipse):
-    assert ellipse.ticks[0] == 0
-    assert ellipse.ticks[-1] == runs["ellipse"].ticks - 1
+def test_frames_placements_and_distances_are_those_recorded(runs):
+    ellipse = scene(runs["ellipse"])
+    assert (ellipse.ticks[0], ellipse.ticks[-1]) == (0, runs["ellipse"].ticks - 1)
     assert np.abs(np.diff(ellipse.t)[:-1] - 1 / 30).max() < 1.1e-3
     assert np.array_equal(ellipse.t, runs["ellipse"]["t"][ellipse.ticks])
     robot = Robot.named("kuka_lwr")

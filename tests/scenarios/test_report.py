@@ -43,10 +43,6 @@ def best(row):
     return {i for i, cell in enumerate(row.cells) if cell.kind == "best"}
 
 
-def row(runs, label):
-    return next(row for row in table(runs) if row.label.startswith(label))
-
-
 ONES = np.ones((5, 7))
 
 
@@ -59,7 +55,7 @@ ONES = np.ones((5, 7))
       made("recursive", a=2.0 * ONES)], "Joint acceleration", {1}),
 ], ids=["more is better", "less is better", "equal within a percent", "stopped early"])
 def test_the_best_of_each_row_is_marked(runs, label, marked):
-    assert best(row(runs, label)) == marked
+    assert best(next(row for row in table(runs) if row.label.startswith(label))) == marked
 
 
 @pytest.mark.parametrize("runs", [
@@ -146,8 +142,7 @@ def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
     assert list(looks) == ["tpm-published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"]
     assert looks["tpm"] == (palette.COLOURS["tpm"], palette.SOLID)
     assert looks["tpm-published"].colour == looks["tpm"].colour
-    assert looks["hqp proxqp"].dash == palette.SOLID
-    assert len(set(looks.values())) == 5
+    assert (looks["hqp proxqp"].dash, len(set(looks.values()))) == (palette.SOLID, 5)
 
 
 @pytest.mark.parametrize("panel", panels.PANELS, ids=lambda panel: panel.name)
@@ -178,13 +173,8 @@ def test_a_run_far_beyond_the_others_is_cut_and_says_so():
     assert drawn["a"].axes[0].get_ylim()[1] < 10.0
 
 
-@pytest.fixture(scope="module")
-def run_folder(tmp_path_factory):
-    short = load("ellipse", ["control.duration=0.3"])
-    return save(simulate(short), tmp_path_factory.mktemp("runs") / "run")
-
-
-def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(run_folder, monkeypatch):
+def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, monkeypatch):
+    run_folder = save(recording(), tmp_path / "run")
     for text in ("old", "new"):
         monkeypatch.setattr(letter, "write_all",
                             lambda recording, folder, text=text: [

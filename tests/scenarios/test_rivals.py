@@ -123,8 +123,7 @@ def test_in_the_null_space_avoidance_is_never_in_the_stack():
     cell, _ = at_the_start(load("ellipse-nullspace"))
     assert set(cell.order.possible) == {("position",), ("position", "pointing")}
     assert isinstance(cell.stack.reference, CumulatedRepulsion)
-    assert len(cell.stack.reference.points) == 8
-    assert cell.stack.reference.within == 0.15
+    assert (len(cell.stack.reference.points), cell.stack.reference.within) == (8, 0.15)
 
 
 def test_danger_closes_the_box_of_joints_and_pushes_nothing():

@@ -45,12 +45,8 @@ def test_what_the_robot_does_not_have_is_named(keys, said):
         build(STANDING.with_changes(keys))
 
 
-@pytest.fixture(scope="module")
-def short():
-    return simulate(SHORT, certified=True)
-
-
-def test_a_run_records_torques_plans_and_what_the_floor_does_and_has_their_metrics(short):
+def test_a_run_records_torques_plans_and_what_the_floor_does_and_has_their_metrics():
+    short = simulate(SHORT, certified=True)
     assert short.fault is None
     assert short["certified"].all()
     robot = build(SHORT).robot

@@ -29,14 +29,8 @@ def ticks(live, count):
         live.tick()
 
 
-@pytest.fixture(scope="module")
-def recording():
-    return simulate(LIMITED)
-
-
-def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_its_settings(
-        recording):
-    live = Live(LIMITED)
+def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_its_settings():
+    live, recording = Live(LIMITED), simulate(LIMITED)
     ticks(live, 700)
     assert live.over
     assert live.recording().fault is None

@@ -86,10 +86,8 @@ def test_sections_of_another_kind_are_replaced_by_a_file_that_extends_and_by_key
                     'obstacles = [[1.0, 1.0, 1.0]]\n'
                     '[control]\nstack = "hierarchical"\nresolver = "hcod"\noptions = {}\n')
     found = load(path)
-    assert found.sensor.kind == "exact"
-    assert found.plant.measurement.velocity_noise == 0.0
-    assert found.avoidance.distance == 0.03
-    assert list(found.variation) == ["start.q"]
+    assert (found.sensor.kind, found.plant.measurement.velocity_noise) == ("exact", 0.0)
+    assert (found.avoidance.distance, list(found.variation)) == (0.03, ["start.q"])
     for changes in (["position.path.kind=waypoints", *WAYPOINTS],
                     [*WAYPOINTS, "position.path.kind=waypoints"]):
         assert load("ellipse", changes).position.path.times == (0.0, 1.0)

@@ -43,8 +43,7 @@ def bounded(seed, half):
 def assert_same(answer, alone):
     for p, res in enumerate(alone):
         np.testing.assert_array_equal(answer.x[p], res.x)
-        assert answer.status[p] == res.status
-        assert answer.iterations[p] == res.iterations
+        assert (answer.status[p], answer.iterations[p]) == (res.status, res.iterations)
         if res.memory is not None:
             np.testing.assert_array_equal(answer.memory[p], res.memory)
         elif answer.memory is not None:

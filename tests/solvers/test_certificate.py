@@ -188,8 +188,7 @@ def test_a_level_may_be_as_far_from_optimal_as_a_turn_of_its_rows_explains(turn,
 def test_a_residual_may_be_the_tolerance_and_no_more(stationarity, nearest, verdict):
     found = certificate.Certificate(np.zeros(2), np.array([0.0, stationarity]), nearest, 1e-6,
                                     ("hand", "posture"))
-    assert str(found) == verdict
-    assert found.certified == verdict.startswith("certified")
+    assert (str(found), found.certified) == (verdict, verdict.startswith("certified"))
     assert found.optimal == (not verdict.startswith("not optimal"))
 
 
@@ -213,7 +212,7 @@ def test_stored_answers_lead_to_proofs_that_agree_with_them(name):
         np.testing.assert_allclose(found.least, one.norms, atol=1e-9)
 
 
-def test_a_wrong_candidate_proves_nothing():
+def test_a_wrong_candidate_proves_nothing_and_a_metric_is_refused():
     h = Hierarchy.from_levels([(np.eye(2), [-1.0, -1.0], [1.0, 1.0]), ([[1.0, 1.0]], [3.0])])
     wrong = prove(h, [[1.0, 0.0]])
     assert not wrong.complete
@@ -223,6 +222,8 @@ def test_a_wrong_candidate_proves_nothing():
     assert right.complete
     np.testing.assert_array_equal(right.x, [1.0, 1.0])
     np.testing.assert_array_equal(right.least, [0.0, 1.0])
+    with pytest.raises(HierarchyError, match="metric"):
+        prove(h.changed(metric=np.diag([1.0, 2.0])), [[1.0, 0.0]])
 
 
 def test_optimal_but_not_nearest_to_the_reference_is_not_the_answer():
@@ -241,12 +242,6 @@ def test_rows_at_a_tiny_angle_make_the_levels_below_ill_posed():
     found = prove(clear, [[1.0, 0.0]])
     assert (found.posed, found.complete, found.turn) == (3, True, 0.0)
     np.testing.assert_array_equal(found.least, [0.0, 5.0])
-
-
-def test_a_metric_is_refused():
-    h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0])], metric=np.diag([1.0, 2.0]))
-    with pytest.raises(HierarchyError, match="metric"):
-        prove(h, [[1.0, 0.0]])
 
 
 # A second proof for equalities: rational arithmetic.

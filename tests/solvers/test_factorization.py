@@ -9,8 +9,6 @@ from solvers import Status, certify, make, problems
 from solvers.factorization import Factorization
 from solvers.resolvers.tpm import task_priority_matrix
 
-TPM = make("tpm")
-
 
 def new_rows(size, factored, rng):
     """A new level (size, n): rows at random, of those that are there, sums of these, or zero."""
@@ -35,30 +33,20 @@ def edit(factored, rng, number):
         factored.insert(f"new {number}", A, int(rng.integers(count + 1)))
 
 
-def agrees(factored, rng, settings=TPM):
+def agrees(factored, rng):
     """Hold the present order against `tpm` from its rows, with targets that conflict.
 
     1e-12 where condition numbers are moderate. An ill-conditioned stack is known to no better than
     rounding times its condition number by anybody.
     """
     b, q0 = rng.normal(size=factored.m), rng.normal(size=factored.n) * rng.integers(2)
-    res, expected = factored.solve(b, q0), settings.solve(factored.hierarchy(b, q0))
+    res, expected = factored.solve(b, q0), make("tpm").solve(factored.hierarchy(b, q0))
     assert res.status is expected.status is Status.SOLVED
     gap = np.abs(res.x - expected.x).max() / (1.0 + np.abs(expected.x).max())
-    assert gap < 1e-12 * max(1.0, 1e-3 * condition(factored))
+    # Of J and of its map G from targets to x.
+    norms = np.linalg.norm(factored.rows) * np.linalg.norm(factored.G) if factored.m else 1.0
+    assert gap < 1e-12 * max(1.0, 1e-3 * norms)
     return gap
-
-
-def condition(factored):
-    """Product of the norms of J and of its map G from targets to x."""
-    if factored.m == 0:
-        return 1.0
-    return np.linalg.norm(factored.rows) * np.linalg.norm(factored.G)
-
-
-def orthogonality(factored):
-    Q = factored.basis
-    return np.abs(Q.T @ Q - np.eye(Q.shape[1])).max(initial=0.0)
 
 
 def test_after_random_edits_the_answers_are_those_of_tpm():
@@ -74,7 +62,8 @@ def test_after_random_edits_the_answers_are_those_of_tpm():
             if rng.random() < 0.5:
                 gaps.append(agrees(factored, rng))
         gaps.append(agrees(factored, rng))
-        assert orthogonality(factored) < 1e-14
+        Q = factored.basis
+        assert np.abs(Q.T @ Q - np.eye(Q.shape[1])).max(initial=0.0) < 1e-14
     assert len(gaps) > 1_000
     assert np.percentile(gaps, 99.9) < 1e-12
 

@@ -80,8 +80,7 @@ def test_a_copy_and_a_pickle_pass_the_gate_too(again):
         np.testing.assert_array_equal(getattr(h, name), getattr(other, name))
         if again is not copy.copy and name != "sizes":
             assert not np.shares_memory(getattr(h, name), getattr(other, name))
-    assert other.names == h.names
-    assert make("hcod").solve(other).status.name == "SOLVED"
+    assert (other.names, make("hcod").solve(other).status.name) == (h.names, "SOLVED")
 
 
 def test_a_violation_is_the_distance_to_the_rows_interval():

@@ -41,26 +41,23 @@ def test_a_level_gives_up_to_what_it_may_and_those_below_gain(resolver, seed):
     assert lower[first] < were[first] - 1e-3
 
 
-def hand_and_posture(reach):
-    """Two tasks that give, of which the second is met while the first leaves it room."""
-    rng = np.random.default_rng(4)
-    A, B = rng.normal(size=(2, 6)), rng.normal(size=(2, 6))
-    return Hierarchy.from_levels(
-        [(np.eye(6), np.full(6, -1.0), np.full(6, 1.0)), (A, np.full(2, reach)),
-         (B, np.full(2, 0.1)), (np.eye(6), np.full(6, 0.2))], give=[0.0, 0.1, 0.1, 0.0])
-
-
 @pytest.mark.parametrize(("reach", "met"), [(0.3, True), (8.0, False)])
 def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, met):
-    """Levels that are met share a witness, others have their own."""
-    h, hcod = hand_and_posture(reach), make("hcod")
+    """Levels that are met share a witness, others have their own.
+
+    Of two tasks that give, the second is met while the first leaves it room.
+    """
+    A, B = np.random.default_rng(4).normal(size=(2, 2, 6))
+    h, hcod = Hierarchy.from_levels(
+        [(np.eye(6), np.full(6, -1.0), np.full(6, 1.0)), (A, np.full(2, reach)),
+         (B, np.full(2, 0.1)), (np.eye(6), np.full(6, 0.2))],
+        give=[0.0, 0.1, 0.1, 0.0]), make("hcod")
     cold = hcod.solve(h)
     warm = hcod.solve(h, cold.memory)
     np.testing.assert_allclose(warm.x, cold.x, atol=1e-12)
     assert warm.iterations <= cold.iterations
     assert certify(h, warm.x, witnesses=warm.witnesses).certified
-    assert warm.active.shape == (h.m,)
-    assert np.array_equal(*cold.witnesses) == met
+    assert (warm.active.shape, np.array_equal(*cold.witnesses)) == ((h.m,), met)
     short = make("hcod", max_iterations=1).solve(h)
     assert (short.status, short.memory) == (Status.ITERATION_LIMIT, None)
     for memory in (np.zeros(0), np.full(7, np.nan), hcod.solve(h.changed(give=None)).memory):

@@ -11,19 +11,13 @@ from solvers.problems import structured
 HCOD = make("hcod")
 
 
-def two_joints(limit=1.0):
-    """Limits on two joints, a hand that asks for too much of the first, a posture."""
-    return Hierarchy.from_levels(
-        [(np.eye(2), [-limit, -limit], [limit, limit]), ([[1.0, 0.5]], [3.0]),
-         (np.eye(2), [0.0, 0.25])], names=["limits", "hand", "posture"])
-
-
 def test_an_answer_found_by_hand():
-    res = HCOD.solve(two_joints())
+    """Limits on two joints, a hand that asks for too much of the first, a posture."""
+    res = HCOD.solve(Hierarchy.from_levels([(np.eye(2), [-1.0, -1.0], [1.0, 1.0]),
+                                            ([[1.0, 0.5]], [3.0]), (np.eye(2), [0.0, 0.25])]))
     np.testing.assert_allclose(res.x, [1, 1])
     assert res.status is Status.SOLVED
-    assert res.active.tolist() == [1, 1, 2, 2, 2]
-    assert res.holds_back[:2].tolist() == [1, 1]
+    assert (res.active.tolist(), res.holds_back[:2].tolist()) == ([1, 1, 2, 2, 2], [1, 1])
     assert res.multipliers[:2] == pytest.approx([1.5, 0.75])
 
 

@@ -87,16 +87,10 @@ def test_the_examples_of_one_call_compile_without_a_warning_and_run(folder, tmp_
     assert said(once) == "status 0, x = 0.9 0.1\n"
 
 
-@pytest.fixture(scope="module")
-def replay(folder, tmp_path_factory):
-    if COMPILER is None:
-        pytest.skip("no compiler of C")
-    return built(tmp_path_factory.mktemp("replay") / "replay", EXAMPLES / "replay.c", folder,
-                 "-std=c99", *STRICT)
-
-
-def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(replay, tmp_path):
+@needs_c
+def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(folder, tmp_path):
     pytest.importorskip("mujoco")
+    replay = built(tmp_path / "replay", EXAMPLES / "replay.c", folder, "-std=c99", *STRICT)
     recorded.main("stand-push", tmp_path / "ticks", 15)
     assert said(replay, tmp_path / "ticks").startswith(
         "15 ticks of 60 unknowns and 181 rows: 15 with the bits of Python, others within 0e+00, "
@@ -173,6 +167,8 @@ def test_check_compares_the_kernels(folder, tmp_path, capsys):
     code.write_bytes(code.read_bytes().replace(digest.encode(), b"0" * 16))
     assert run_command(["library", "--check", "--out", str(other)]) == 1
     assert f"those installed have {digest}" in capsys.readouterr().err
+    with pytest.raises(HierarchyError, match=r"task_hierarchy\.h is missing"):
+        differs(tmp_path)
 
 
 def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and_for_arm(
@@ -205,8 +201,3 @@ def test_a_wrong_name_is_an_error_that_names_it(tmp_path, capsys, options, words
     assert run_command(["library", "--out", str(tmp_path / "lib"), *options]) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "lib").exists()
-
-
-def test_a_folder_without_a_library_is_an_error(tmp_path):
-    with pytest.raises(HierarchyError, match=r"task_hierarchy\.h is missing"):
-        differs(tmp_path)

@@ -93,7 +93,7 @@ def test_at_rest_upper_levels_are_met_as_under_strict_priorities():
     np.testing.assert_allclose(found.x, strict, atol=1e-8)
 
 
-def test_levels_stay_strict_down_to_the_first_run_of_inequalities():
+def test_levels_stay_strict_down_to_the_first_run_of_inequalities_and_one_is_to_remain():
     h = Hierarchy.from_levels([
         ([[1.0, 0.0]], [1.0]), ([[1.0, 0.0]], [-5.0], [0.5]), ([[0.0, 1.0]], [-1.0], [1.0]),
         ([[0.0, 1.0]], [2.0]), ([[0.0, 1.0]], [-9.0], [0.0])])
@@ -101,9 +101,6 @@ def test_levels_stay_strict_down_to_the_first_run_of_inequalities():
     np.testing.assert_allclose(x, [1.0, 1.0], atol=1e-6)  # strict 2 and 3; level 4 outweighs 5
     one = solved(make("merged", cap=0.0, ratio=1.0, strict_levels=0), h).x
     np.testing.assert_allclose(one, [0.75, 1.0], atol=1e-5)
-
-
-def test_a_stack_of_safety_levels_alone_is_refused():
     h = Hierarchy.from_levels([([[1.0]], [0.0], [1.0])], names=["limits"])
     with pytest.raises(HierarchyError, match=r"all levels stay strict \(limits\)"):
         make("merged").solve(h)

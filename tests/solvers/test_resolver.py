@@ -96,23 +96,20 @@ KERNELS = [make("tpm"), make("sns"), make("tpm-published"), make("recursive"), m
            make("tpm-published", damping=0.1)]
 
 
-def levels(n, inequalities, seed=0):
-    rng = np.random.default_rng(seed)
+def levels(n, inequalities):
+    rng = np.random.default_rng(0)
     A, b = rng.normal(size=(4, n // 3, n)), rng.normal(size=(4, n // 3))
     return Hierarchy.from_levels(
         [(A[k], b[k], b[k] + 1.0) if inequalities and k % 2 else (A[k], b[k]) for k in range(4)])
 
 
-def repeating(h):
-    """The hierarchy with the first row of its first level in its first and second level twice."""
+def problems(resolver, n):
+    """Levels at random; the first row of all in the first and second level twice."""
+    yield levels(n, False)
+    h = levels(n, False)
     for row in (1, h.sizes[0]):
         h.A[row], h.lower[row], h.upper[row] = h.A[0], h.lower[0], h.upper[0]
-    return h
-
-
-def problems(resolver, n):
-    yield levels(n, False)
-    yield repeating(levels(n, False))
+    yield h
     if resolver.handles == "inequalities" and not resolver.damping:
         yield levels(n, True)
 

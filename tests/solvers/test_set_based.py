@@ -48,13 +48,6 @@ def by_the_paper(sets, tasks, n):
     raise AssertionError("the last mode has no condition")
 
 
-def as_rows(sets, tasks):
-    """The same problem as a Hierarchy: one level of tangent cones, then the equalities."""
-    sides = [(0.0, INF) if sign > 0.0 else (-INF, 0.0) for _, sign in sets]
-    rows = np.vstack([J for J, _ in sets])
-    return Hierarchy.from_levels([(rows, *np.array(sides).T), *tasks])
-
-
 def problems(count):
     """Random arms with joint limits, a wall for the tip, and a rate asked of the tip."""
     rng = np.random.default_rng(7)
@@ -70,7 +63,9 @@ def test_with_every_task_at_its_bound_the_mode_and_the_answer_are_those_of_the_p
     counts = set()
     for sets, tasks, n in problems(60):
         x, frozen = by_the_paper(sets, tasks, n)
-        found = SET_BASED.solve(as_rows(sets, tasks))
+        sides = [(0.0, INF) if sign > 0.0 else (-INF, 0.0) for _, sign in sets]  # tangent cones
+        cones = np.vstack([J for J, _ in sets]), *np.array(sides).T
+        found = SET_BASED.solve(Hierarchy.from_levels([cones, *tasks]))
         assert found.status is Status.SOLVED
         assert tuple(np.flatnonzero(np.abs(found.active[:3]) == 1)) == frozen
         np.testing.assert_allclose(found.x, x, atol=1e-8 * (1 + np.abs(x).max()))
@@ -87,13 +82,6 @@ def test_after_the_most_modes_everything_at_a_bound_is_frozen():
     short = SetBased(inner=make("recursive"), most=5).solve(h)
     np.testing.assert_allclose(short.x, np.zeros(6), atol=1e-12)
     assert short.iterations == 6
-
-
-def test_a_row_with_two_sides_is_refused_with_its_level_and_sides():
-    h = Hierarchy.from_levels([([[1.0, 0.0], [0.0, 1.0]], [0.0, -1.0], [INF, 2.0])],
-                              names=["walls"])
-    with pytest.raises(HierarchyError, match=r"walls, row 1: two sides, -1 <= a x <= 2"):
-        SET_BASED.solve(h)
 
 
 PERIOD = 0.1
@@ -208,6 +196,9 @@ def test_the_activation_is_one_at_the_bound_zero_beyond_the_buffer_and_has_no_ki
 
 
 def test_what_has_no_answer_is_refused_or_has_a_status():
+    two = Hierarchy.from_levels([(np.eye(2), [0.0, -1.0], [INF, 2.0])], names=["walls"])
+    with pytest.raises(HierarchyError, match=r"walls, row 1: two sides, -1 <= a x <= 2"):
+        SET_BASED.solve(two)
     h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [INF])], names=["walls"])
     with pytest.raises(HierarchyError, match=r"walls, row 0: an inequality.*activation"):
         SMOOTH.solve(h)
