@@ -18,7 +18,6 @@ settings.register_profile("any machine", deadline=None,
                           suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
 
-
 SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text().split())
 
 

@@ -110,9 +110,6 @@ class Library:
         library.engine = engine  # which owns the code
         return library
 
-    def text(self, name):
-        return ctypes.CFUNCTYPE(ctypes.c_char_p)(self.address(name))().decode()
-
     def memory(self, h, missing=0, missing_values=0):
         """Memory for a hierarchy, less so many numbers of work space and record."""
         sizes = h.n, h.m, len(h.sizes)
@@ -128,15 +125,11 @@ class Library:
                  "record": ctypes.addressof(memory.record), "x": memory.x.ctypes.data,
                  "work": memory.work.ctypes.data, **changed}
         solve = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 5, ctypes.c_int64)
-        return solve(self.address(f"th_solve_{name}"))(*given.values(), len(memory.work) - 1)
+        return solve(self.address(f"th_{name}"))(*given.values(), len(memory.work) - 1)
 
     def verify(self, h, memory):
         """Status of th_verify on the x and the record in a memory."""
-        call = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 5, ctypes.c_int64)
-        problem = problem_of(h)
-        return call(self.address("th_verify"))(
-            ctypes.addressof(problem), None, ctypes.addressof(memory.record),
-            memory.x.ctypes.data, memory.work.ctypes.data, len(memory.work) - 1)
+        return self.call("verify", problem_of(h), memory)
 
     def violations(self, problem, x, count):
         """Status and norms of th_violations; a canary behind the norms stays."""
@@ -150,7 +143,7 @@ class Library:
     def solve(self, name, h, settings=None, memory=None):
         """Solve a hierarchy; return the status and what the caller then has."""
         memory = memory or self.memory(h)
-        status = self.call(name, problem_of(h), memory, settings)
+        status = self.call(f"solve_{name}", problem_of(h), memory, settings)
         assert memory.untouched, "a number past the end of an array was written"
         return status, memory
 

@@ -174,7 +174,6 @@ def test_joint_limits_cover_a_floating_base_where_it_has_limits():
         JointLimits(ROBOT, 5.0, T, base_acceleration=(1.0, 1.0))
 
 
-D = [0, 0, 0.4, 0, 0.39, 0, 0.078]
 ALPHA = np.deg2rad([90, -90, -90, 90, 90, -90, 0])
 
 
@@ -184,7 +183,7 @@ def test_kinematics_equal_the_table_multiplied_out():
     frame = robot.frame("end_effector")
     for q in np.random.default_rng(0).uniform(-3, 3, (50, 7)):
         state, T = State.at(robot, q), np.eye(4)
-        for angle, d, alpha in zip(q, D, ALPHA, strict=True):
+        for angle, d, alpha in zip(q, [0, 0, 0.4, 0, 0.39, 0, 0.078], ALPHA, strict=True):
             c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
             T = T @ [[c, -s * ca, s * sa, 0], [s, c * ca, -c * sa, 0], [0, sa, ca, d], [0, 0, 0, 1]]
         np.testing.assert_allclose(state.position(frame), T[:3, 3], atol=1e-14)

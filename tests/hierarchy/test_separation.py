@@ -32,10 +32,6 @@ STATES = states(20, seed=6)
 SENSOR = ExactDistances(ROBOT, Obstacles(SHAPES), BODY, TIP, pairs=True)
 
 
-def distances(q, t):
-    return SENSOR.measure(State.at(ROBOT, q, t=t)).pairs.distance.ravel().copy()
-
-
 def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
     """The least d2h/dt2 is 2 rate (w - dh/dt), with w = min(-rate h / 2, slow), exactly."""
     rate, slow = 10.0, 0.2
@@ -44,7 +40,8 @@ def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
     for q, v in STATES:
         a, d, facing = rng.normal(size=7), [], []
         for t in (-h, 0.0, h):
-            d.append(distances(q + v * t + a * t * t / 2, 0.7 + t))
+            seen = SENSOR.measure(State.at(ROBOT, q + v * t + a * t * t / 2, t=0.7 + t)).pairs
+            d.append(seen.distance.ravel().copy())
             facing.append(SENSOR.measurement.pairs.straight.reshape(54, 3).copy())
         state = State.at(ROBOT, q, v, 0.7)
         SENSOR.measure(state)

@@ -131,9 +131,7 @@ def test_every_scenario_is_in_the_gallery_with_a_picture(name):
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"(?<!`)`((?:hierarchy |make |python -m |python docs/)[^`]+)`(?!`)")
 TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
-         for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md",
-                      *sorted(path for path in (ROOT / "docs").rglob("*.md")
-                              if "_build" not in path.parts)]}
+         for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]}
 FENCE = re.compile(r"^(\s*)```(.*)$", re.MULTILINE)
 CHECKED = {"", "python", "toml", "sh", "console", "bash", "c"}  # c: test_library_programs.py
 FOLLOWED = "docs/tutorial.md", "docs/urdf-to-standing.md"  # whose commands are run, not only read

@@ -46,8 +46,7 @@ def test_every_dependency_has_a_pinned_version_and_the_version_is_one():
     pinned = {line.partition("==")[0].lower().replace("_", "-") for line in lines}
     extras = project["optional-dependencies"].values()
     asked = [*project["dependencies"], *(one for extra in extras for one in extra)]
-    named = {re.split(r"[<>=\[ ]", one)[0].lower() for one in asked}
-    assert named - {project["name"]} <= pinned
+    assert {re.split(r"[<>=\[ ]", one)[0].lower() for one in asked} - {project["name"]} <= pinned
     assert f"\nversion: {project['version']}\n" in (ROOT / "CITATION.cff").read_text()
 
 
@@ -168,9 +167,6 @@ def test_functions_and_texts_of_classes_are_short_and_arguments_few():
     assert lengths[len(lengths) * 9 // 10] <= 20
 
 
-PACKAGES = (hierarchy, solvers, scenarios.measure)
-
-
 def records(package):
     """Every dataclass that is defined in a package whose modules can be imported here."""
     for module in walk_packages(package.__path__, f"{package.__name__}."):
@@ -182,7 +178,8 @@ def records(package):
                     and one.__module__ == module.name)
 
 
-@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
+@pytest.mark.parametrize("package", [hierarchy, solvers, scenarios.measure],
+                         ids=lambda package: package.__name__)
 def test_records_are_frozen_and_what_they_compute_is_neither_shown_nor_compared(package):
     assert [one for one in records(package) if not one.__dataclass_params__.frozen] == []
     computed = [(f"{one.__qualname__}.{field.name}", field) for one in records(package)

@@ -29,20 +29,16 @@ SIDE = Pinhole(320, 240, 262.0, 262.0, position=(0.3, 2.2, 0.8),
                rotation=looking_at((0.3, 2.2, 0.8), (0.0, 0.3, 0.1)))
 
 
-def at(*places):
-    """Points that no joint moves, the last of which is the end effector."""
-    return [ControlPoint("point", 0, np.array(place, dtype=float)) for place in places]
-
-
 def space_of(pinhole, points, capsules, region, mean_within=(inf, inf), pairs=False, **settings):
     section = ImageSection(kind="camera", region=region, **settings)
     return DepthSpace(section, pinhole, points, capsules, Asked(region, mean_within), pairs)
 
 
 def seen_in(image, *places, thin=inf, **settings):
-    """Measure points in an image (h, w) without a robot in it."""
-    space = space_of(FACING, at(*places), (), 0.4, support=1,
-                     thin=None if thin == inf else thin, **settings)
+    """Measure points in an image (h, w) without a robot in it, the end effector last."""
+    points = [ControlPoint("point", 0, np.array(place, dtype=float)) for place in places]
+    space = space_of(FACING, points, (), 0.4, support=1, thin=None if thin == inf else thin,
+                     **settings)
     obstacles = ObstacleImage.empty(FACING.height, FACING.width)
     space.find_obstacles(np.asarray(image, np.float32), STATE.placements, obstacles)
     return space.measure(obstacles, STATE.placements)
@@ -133,8 +129,7 @@ def test_frames_are_used_from_their_latency_on_until_the_next_or_a_clock_is_set_
 
 @pytest.mark.parametrize("how", ["stopped", "covered"])
 def test_a_camera_that_stops_or_is_covered_is_blind_after_its_time_and_sees_again(how):
-    ball = Obstacle("sphere", (0.4, 0.7, 0.2), (0.1,))
-    sensor, state_at = sensor_of(camera_of(ball, rate=20.0))
+    sensor, state_at = sensor_of(camera_of(Obstacle("sphere", (0.4, 0.7, 0.2), (0.1,)), rate=20.0))
     blind, distances = [], set()
     for k in range(100):
         setattr(sensor, how, 0.295 < 0.01 * k < 0.695)
@@ -145,9 +140,9 @@ def test_a_camera_that_stops_or_is_covered_is_blind_after_its_time_and_sees_agai
     assert len(distances) == 1  # the last image is kept
 
 
-VIEW = "kind='camera', position=[0.3, 2.2, 0.8], look_at=[0.0, 0.3, 0.1]"
-QUICK = [f"sensor={{{VIEW}, width=160, height=120, fx=131.0, fy=131.0}}",
-         "control.duration=0.6", "plant={}", "control.resolver=hqp", "control.options={}"]
+QUICK = ["sensor={kind='camera', position=[0.3, 2.2, 0.8], look_at=[0.0, 0.3, 0.1], width=160, "
+         "height=120, fx=131.0, fy=131.0}", "control.duration=0.6", "plant={}",
+         "control.resolver=hqp", "control.options={}"]
 
 
 @pytest.mark.parametrize(("changes", "said"), [

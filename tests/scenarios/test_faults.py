@@ -31,7 +31,6 @@ FAULTS = {
     "overrun": ("overrun", "takes=60.0", "overrun", 0),
     "obstacle": ("obstacle", INSIDE, "inside", 0),
 }
-LIMITED = ["limits.acceleration=10.0", "control.resolver=hcod"]
 
 
 def scenario(name, put, settings, *changes, kind, policy):
@@ -58,8 +57,8 @@ def true_motion(run):
     for i, fault in enumerate(FAULTS) for j, policy in enumerate(("brake", "hold", "stop"))])
 def test_every_fault_under_every_policy(fault, policy, name, limited):
     put, settings, kind, later = FAULTS[fault]
-    run = simulate(scenario(name, put, settings, *(LIMITED if limited else []), kind=kind,
-                            policy=policy))
+    limits = ["limits.acceleration=10.0", "control.resolver=hcod"] * limited
+    run = simulate(scenario(name, put, settings, *limits, kind=kind, policy=policy))
     assert np.isfinite(run["command"]).all()
     assert np.isfinite(run["q"]).all()
     np.testing.assert_allclose(run["q"], true_motion(run)[0], rtol=0, atol=1e-9)

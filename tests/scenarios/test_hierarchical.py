@@ -25,8 +25,7 @@ def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
     run = simulate(scenario, certified=certified)
     assert run.fault is None
     assert (run["status"] == 0).all()
-    excess = np.maximum(run["q"] - run["joint_upper"], run["joint_lower"] - run["q"])
-    assert excess.max() <= 1e-9
+    assert np.maximum(run["q"] - run["joint_upper"], run["joint_lower"] - run["q"]).max() <= 1e-9
     assert (np.abs(run["v"]) - run["velocity_limit"]).max() <= 1e-9
     assert np.abs(run["a"]).max() <= 10.0 * (1.0 + 1e-6)
     assert run["minimal_distance"].min() >= scenario.avoidance.distance - 1e-4

@@ -49,8 +49,7 @@ def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path)
     COUPLING, FRAME, LOOK, RELATIVE, {"kind": "manipulability", "frame": "end_effector",
                                       "least": 0.05}], ids=lambda task: task["kind"])
 def test_a_task_is_made_of_its_keys(task, tmp_path):
-    made = build(scenario_of(tmp_path, {**task, "damping": 3.0})).stack[task["kind"]]
-    assert made.damping == 3.0
+    assert build(scenario_of(tmp_path, {**task, "damping": 3.0})).stack[task["kind"]].damping == 3.0
 
 
 def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):

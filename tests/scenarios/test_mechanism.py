@@ -92,7 +92,6 @@ def ankle(rod):
       </body></worldbody><equality>{connects}</equality></mujoco>"""
 
 
-BALL = '<joint name="rod_{0}" type="ball"/>'
 CROSS = '<joint name="rod_{0}_1" axis="0 1 0"/><joint name="rod_{0}_2" axis="1 0 0"/>'
 
 
@@ -111,7 +110,8 @@ def largest_residual(path, q):
 
 
 @pytest.mark.parametrize(("level", "rod"), [
-    ("velocity", BALL), ("acceleration", CROSS), ("torque", CROSS)])
+    ("velocity", '<joint name="rod_{0}" type="ball"/>'), ("acceleration", CROSS),
+    ("torque", CROSS)])
 def test_an_ankle_with_two_pushrods_stays_closed(level, rod, tmp_path):
     pytest.importorskip("mujoco")
     path = tmp_path / "ankle.xml"

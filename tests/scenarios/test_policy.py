@@ -18,8 +18,8 @@ PERIOD = 0.001
 V = np.array([0.5, -1.0, 0.0])
 X = np.array([3.0, 1.0, -2.0])
 BRAKE, BAD = -10.0 * V, np.array([0.0, np.nan, 0.0])
-STATUSES = [status for status in Status if status is not Status.SOLVED]
-KINDS = [*(status.name.lower() for status in STATUSES), "not_finite", "stale", "overrun", "inside"]
+KINDS = [*(status.name.lower() for status in Status if status is not Status.SOLVED), "not_finite",
+         "stale", "overrun", "inside"]
 
 
 def policy(level="acceleration", clamp=None, period=PERIOD, **section):

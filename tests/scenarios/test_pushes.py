@@ -122,8 +122,7 @@ def test_frames_placements_and_distances_are_those_recorded(runs):
     assert np.allclose(ellipse.traced, recording["ee_position"][ticks], atol=1e-12)
     assert np.allclose(ellipse.distance[:, :-1], recording["control_point_distance"][ticks])
     assert np.allclose(ellipse.distance[:, -1], recording["ee_distance"][ticks])
-    away = np.linalg.norm(ellipse.points - ellipse.nearest, axis=2)
-    assert np.allclose(away, ellipse.distance)
+    assert np.allclose(np.linalg.norm(ellipse.points - ellipse.nearest, axis=2), ellipse.distance)
 
 
 @pytest.mark.parametrize("name", NAMES)

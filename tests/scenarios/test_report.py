@@ -26,8 +26,6 @@ from scenarios.results.sections import side_by_side
 
 LETTER = "tpm-published"
 
-SOFTLY = {"contact_depth": np.zeros(5), "contact_force": np.zeros(5)}
-
 
 def made(spec="tpm-published", fault=None, error=None, scenario=None, **signals):
     scenario = (scenario or asked()).with_resolver(spec)
@@ -88,7 +86,8 @@ def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
 
 
 def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
-    run = made(LETTER, contacts=[0, 1, 0, 0, 0], **SOFTLY)
+    run = made(LETTER, contacts=[0, 1, 0, 0, 0], contact_depth=np.zeros(5),
+               contact_force=np.zeros(5))
     run = dataclasses.replace(run, recording=dataclasses.replace(
         run.recording, events=(Event(3, "not_finite", "hold"),)))
     text = page(comparison(run, made("hqp")))

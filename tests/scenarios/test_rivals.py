@@ -110,12 +110,9 @@ def test_the_smooth_stack_refuses_a_resolver_without_activations():
 
 
 # The avoidance of the letter's references [5] and [10].
-NEAR = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])  # the start of `ellipse`
-
-
 def at_the_start(scenario):
     cell = build(scenario)
-    cell.state.move(0.3, NEAR, np.linspace(-0.3, 0.3, 7))
+    cell.state.move(0.3, cell.start[0], np.linspace(-0.3, 0.3, 7))
     return cell, cell.sensor.measure(cell.state)
 
 

@@ -114,12 +114,11 @@ def test_exact_derivatives_command_nearly_the_same_from_every_recorded_state(nam
     assert np.median(found) < 1e-3
 
 
-REPEATED = {"ellipse": ["control.duration=0.2"],
-        "ellipse-hqp": ["control.duration=0.05"],
-        "ellipse-noisy": ["control.duration=0.1", "plant.measurement.position_noise=0.001",
-                          "plant.measurement.seed=3"],
-        "humanoid": ["control.duration=0.1"],
-        "human": ["control.duration=0.1", "sensor.seed=4"]}
+REPEATED = {
+    "ellipse": ["control.duration=0.2"], "ellipse-hqp": ["control.duration=0.05"],
+    "ellipse-noisy": ["control.duration=0.1", "plant.measurement.position_noise=0.001",
+                      "plant.measurement.seed=3"],
+    "humanoid": ["control.duration=0.1"], "human": ["control.duration=0.1", "sensor.seed=4"]}
 
 
 def run_of(name, changes=()):

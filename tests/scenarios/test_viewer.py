@@ -168,10 +168,8 @@ def test_the_server_of_a_page_rejects_them():
 
     with served(0, lambda: "<p>page</p>", answer) as address:
         assert address.startswith("http://127.0.0.1:")
-        assert status("GET") == 200
-        assert status("POST", "/now", '{"a": 1}') == 200
-        assert status("GET", "/elsewhere") == 404
-        assert status("POST", "/now", "[") == 400
+        assert (status("GET"), status("POST", "/now", '{"a": 1}')) == (200, 200)
+        assert (status("GET", "/elsewhere"), status("POST", "/now", "[")) == (404, 400)
         for others in ({"Host": "rebound.example"}, {"Origin": "http://elsewhere.example"}):
             assert status("GET", **others) == status("POST", "/now", '{"b": 2}', **others) == 403
         assert status("POST", "/now", "x" * 200_000) == 403
@@ -217,8 +215,7 @@ def test_the_document_refers_to_nothing_outside_itself(document):
 def test_a_label_cannot_end_the_data(runs):
     name = "</script><script>alert(1)</script>"
     text = html({name: runs["recursive"]}, "x")
-    assert text.count("</script>") == 2
-    assert data_of(text)["runs"][0]["label"] == name
+    assert (text.count("</script>"), data_of(text)["runs"][0]["label"]) == (2, name)
 
 
 def test_the_data_are_those_of_the_recording(runs, document):

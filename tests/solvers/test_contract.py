@@ -27,7 +27,6 @@ INEQUALITIES = [r for r in STRICT if r.handles == "inequalities"]
 EQUALITIES_ONLY = [r for r in RESOLVERS if r.handles == "equalities"]
 BOUNDS = [r for r in RESOLVERS if r.handles == "bounds"]
 PROBLEMS = 3 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 50
-NEARLY_PARALLEL = 1e-8  # what DEGEN7 is good for: which of its rows, parallel to 1e-9, is taken
 SLOW = 6  # problems of a family for a cascade: the rest is in the benchmark
 
 
@@ -70,7 +69,7 @@ def test_strict_resolvers_solve_the_equality_families(resolver, name):
 @pytest.mark.parametrize("name", families.INEQUALITIES)
 def test_resolvers_of_inequalities_are_right_at_every_level(resolver, name):
     """Those that call somebody else's solver may say that they are not."""
-    close = max(NEARLY_PARALLEL if name == "DEGEN7" else 0.0, resolver.accuracy)
+    close = max(1e-8 if name == "DEGEN7" else 0.0, resolver.accuracy)  # of rows parallel to 1e-9
     for h, x, norms in some(resolver, name):
         res = resolver.solve(h)
         shown = res.status is Status.SOLVED

@@ -10,8 +10,6 @@ from solvers import Status, certify, explain, make, names
 from solvers.batch import Batch
 from solvers.problems import generate
 
-STRICT = [make("hcod"), *(make("hqp", backend=name) for name in ("proxqp", "daqp"))]
-
 
 def problem(seed, give, n=6, half=0.5):
     """Levels that cannot all be met: two equalities, a conflict with them, a box, a posture."""
@@ -23,7 +21,8 @@ def problem(seed, give, n=6, half=0.5):
          (np.eye(n), rng.normal(size=n))], give=[0.0, give, 0.0, 0.0])
 
 
-@pytest.mark.parametrize("resolver", STRICT, ids=lambda one: one.label)
+@pytest.mark.parametrize("resolver", [make("hcod"), make("hqp", backend="proxqp"),
+                                      make("hqp", backend="daqp")], ids=lambda one: one.label)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_level_gives_up_to_what_it_may_and_those_below_gain(resolver, seed):
     strict, soft = problem(seed, 0.0), problem(seed, [0.3, 0.1, 0.2])
@@ -83,8 +82,7 @@ def test_the_certificate_rejects_another_x_and_a_witness_that_misses_more(wrong)
     x, witnesses = res.x.copy(), res.witnesses.copy()
     (x if wrong == "x" else witnesses[0])[:] += 1e-3
     assert not certify(h, x, witnesses=witnesses).certified
-    strict = make("hcod").solve(problem(3, 0.0)).x
-    assert not certify(h, strict, witnesses=res.witnesses).certified
+    assert not certify(h, make("hcod").solve(problem(3, 0.0)).x, witnesses=res.witnesses).certified
     with pytest.raises(HierarchyError, match=r"1 levels give, so witnesses must be \(1, 6\)"):
         certify(h, res.x)
 
@@ -150,13 +148,6 @@ def metric(rng, n):
     return (Q * np.geomspace(0.01, 100.0, n)) @ Q.T
 
 
-def three_levels(rng):
-    """Levels of which one repeats a row of the first, with another target."""
-    A = [rng.normal(size=(m, 7)) for m in (2, 2, 1)]
-    A[1][0] = A[0][1]
-    return [(rows, rng.normal(size=len(rows))) for rows in A]
-
-
 def closed_form(levels, reference, W):
     """Level by level with weighted pseudoinverses, by another route than a change of variables.
 
@@ -175,7 +166,10 @@ def closed_form(levels, reference, W):
 def test_the_answer_is_the_nearest_in_the_metric(resolver):
     rng = np.random.default_rng(1)
     for _ in range(5):
-        levels, W, reference = three_levels(rng), metric(rng, 7), rng.normal(size=7)
+        A = [rng.normal(size=(m, 7)) for m in (2, 2, 1)]
+        A[1][0] = A[0][1]  # with another target
+        levels = [(rows, rng.normal(size=len(rows))) for rows in A]
+        W, reference = metric(rng, 7), rng.normal(size=7)
         h = Hierarchy.from_levels(levels, reference, metric=W)
         res = resolver.solve(h)
         assert res.status is Status.SOLVED

@@ -37,15 +37,13 @@ def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
         assert h.names[k] in explain(h, res)
 
 
-BOX = Hierarchy.from_levels([(np.eye(3), np.full(3, -1.0), np.ones(3)),
-                             ([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]], [5.0, 0.5])])
-
-
 def test_a_solved_answer_is_verified_from_its_active_rows_and_no_other_is():
     for seed in range(700, 740):
         h = structured(seed)
         res = HCOD.solve(h)
         assert res.verified(h) == (res.status is Status.SOLVED)
+    BOX = Hierarchy.from_levels([(np.eye(3), np.full(3, -1.0), np.ones(3)),
+                                 ([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]], [5.0, 0.5])])
     res = HCOD.solve(BOX)
     none = res.memory.copy()
     none[:BOX.m] = 0.0

@@ -158,8 +158,7 @@ def assert_physical(h, x, state, contacts, fraction=1.0):
     rate = A @ contacts.accelerations(x) + dA @ state.v
     np.testing.assert_allclose(rate[:3], forces.sum(axis=0) - [0.0, 0.0, WEIGHT], atol=1e-6)
     np.testing.assert_allclose(rate[3:], np.cross(arms, forces).sum(axis=0), atol=1e-6)
-    tau = contacts.torques(state, x)
-    assert (np.abs(tau) <= fraction * HUMANOID.effort_limit[6:] + 1e-7).all()
+    assert (np.abs(contacts.torques(state, x)) <= fraction * HUMANOID.effort_limit[6:] + 1e-7).all()
     assert (np.linalg.norm(forces[:, :2], axis=1) <= 0.7 * forces[:, 2] + 1e-7).all()
 
 

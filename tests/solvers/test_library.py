@@ -128,7 +128,7 @@ def test_sizes_that_do_not_add_up_are_invalid(library, wrong):
         wrong = {"sizes": (c.ctypes.c_int64 * 3)(*wrong["sizes"])}
     for name in c.NAMES:
         memory = library.memory(h)
-        assert library.call(name, c.problem_of(h, **wrong), memory) == c.INVALID
+        assert library.call(f"solve_{name}", c.problem_of(h, **wrong), memory) == c.INVALID
         assert memory.untouched
         assert (np.r_[memory.work, memory.values] == c.CANARY).all()
         assert (memory.answer == (c.CANARY if "n" in wrong else 0.0)).all()
@@ -140,9 +140,9 @@ def test_sizes_that_do_not_add_up_are_invalid(library, wrong):
 @pytest.mark.parametrize("pointer", ["problem", "record", "x", "work"])
 def test_a_missing_pointer_is_invalid(library, pointer):
     h, memory = box(), library.memory(box())
-    assert library.call("hcod", c.problem_of(h), memory, **{pointer: None}) == c.INVALID
+    assert library.call("solve_hcod", c.problem_of(h), memory, **{pointer: None}) == c.INVALID
     memory.record.values = None
-    assert library.call("hcod", c.problem_of(h), memory) == c.INVALID
+    assert library.call("solve_hcod", c.problem_of(h), memory) == c.INVALID
     assert memory.untouched
     assert library.violations(c.problem_of(h), None, 3)[0] == c.INVALID
 
@@ -181,8 +181,8 @@ def test_settings_without_a_value_are_those_of_python_and_out_of_range_are_inval
                   {"optimal": 2}, {"miss": -1}, {"method": 4}):
         assert library.solve("hcod", box(), c.settings_of(**wrong))[0] == c.INVALID, wrong
     one, other = library.memory(h), library.memory(h)
-    library.call("hcod", c.problem_of(h), one)
-    library.call("hcod", c.problem_of(h, reference=None), other)  # it is zero
+    library.call("solve_hcod", c.problem_of(h), one)
+    library.call("solve_hcod", c.problem_of(h, reference=None), other)  # it is zero
     assert h.reference.any() or one.answer.tobytes() == other.answer.tobytes()
 
 

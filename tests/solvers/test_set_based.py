@@ -16,13 +16,6 @@ SET_BASED = SetBased(inner=make("recursive"))
 INF = np.inf
 
 
-def jacobian(q):
-    """Jacobian (2, n) of the tip of a planar arm of links of length 1."""
-    angles = np.cumsum(q)
-    return np.array([[-np.sin(angles[j:]).sum() for j in range(len(q))],
-                     [np.cos(angles[j:]).sum() for j in range(len(q))]])
-
-
 def pseudoinverse(M):
     """The pseudoinverse, singular values of rounding errors being zero; rows have size one."""
     U, s, V = np.linalg.svd(M, full_matrices=False)
@@ -49,11 +42,12 @@ def by_the_paper(sets, tasks, n):
 
 
 def problems(count):
-    """Random arms with joint limits, a wall for the tip, and a rate asked of the tip."""
+    """Random planar arms with joint limits, a wall for the tip, and a rate asked of the tip."""
     rng = np.random.default_rng(7)
     for _ in range(count):
         n = int(rng.integers(4, 7))
-        J = jacobian(rng.uniform(-2.0, 2.0, n))
+        angles = np.cumsum(rng.uniform(-2.0, 2.0, n))  # of links of length 1
+        J = np.array([[-np.sin(angles[j:]).sum(), np.cos(angles[j:]).sum()] for j in range(n)]).T
         rows = [np.eye(n)[[j]] for j in rng.permutation(n)[:2]] + [J[:1]]
         sets = list(zip(rows, rng.choice([-1.0, 1.0], 3), strict=True))
         yield sets, [(J, rng.normal(size=2)), (np.eye(n)[-1:], rng.normal(size=1))], n
