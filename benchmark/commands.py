@@ -150,8 +150,7 @@ def open_(family: Family = None,
               "--library", metavar="FILE.so", help="Also a solver in a shared library that has the "
               "functions of benchmark/solve/solver.h. May be repeated.")] = None,
           name: Annotated[list[str] | None, typer.Option(
-              "--name", metavar="NAME", help="Its name in tables, one for each --library.")
-              ] = None,
+              metavar="NAME", help="Its name in tables, one for each --library.")] = None,
           fresh: Annotated[list[int] | None, typer.Option(
               "--fresh", metavar="SEED", min=1, help="Seed of fresh problems. May be repeated. "
               "Default: 1.")] = None,
@@ -162,15 +161,13 @@ def open_(family: Family = None,
               "--public", min=1, metavar="N", help="Problems of the public set. Default: that of "
               "--count.")] = None,
           limit: Annotated[float, typer.Option(
-              "--limit", min=0.1, metavar="S",
-              help="Processor time for a problem, also with --check.")] = 10.0,
+              min=0.1, metavar="S", help="Processor time for a problem, also with "
+              "--check.")] = 10.0,
           python: Annotated[str, typer.Option(
-              "--python", metavar="PATH", help="Interpreter that has your entrant's package.")
-              ] = "",
+              metavar="PATH", help="Interpreter that has your entrant's package.")] = "",
           borders: Annotated[bool, typer.Option(
               "--borders", help="Also prove answers for other rank tolerances, 1e-12 to 1e-5; "
-              "takes several times as long.")
-              ] = False,
+              "takes several times as long.")] = False,
           check: Annotated[bool, typer.Option(
               "--check", help="Try the entrants, or the libraries alone, on a few problems of each "
               "kind, in a minute, and store nothing.")] = False,
@@ -207,14 +204,12 @@ def open_(family: Family = None,
 
 
 @bench.command()
-def stress(count: Annotated[int, typer.Option("--count", min=1, metavar="N",
-                                              help="Number of problems.")] = 1_000_000,
-           resolver: Annotated[str, typer.Option("--resolver", metavar="NAME",
-                                                 help="Resolver to test.")] = "hcod",
-           kind: Annotated[str, typer.Option("--kind", metavar="KIND",
-                                             help="Kind of problems.")] = "all",
-           first: Annotated[int, typer.Option("--first", min=0, metavar="SEED",
-                                              help="First seed.")] = 0,
+def stress(count: Annotated[int, typer.Option(
+               min=1, metavar="N", help="Number of problems.")] = 1_000_000,
+           resolver: Annotated[str, typer.Option(
+               metavar="NAME", help="Resolver to test.")] = "hcod",
+           kind: Annotated[str, typer.Option(metavar="KIND", help="Kind of problems.")] = "all",
+           first: Annotated[int, typer.Option(min=0, metavar="SEED", help="First seed.")] = 0,
            processes: Annotated[int | None, typer.Option(
                "--processes", min=1, metavar="N", help="Default: one for each core.")] = None,
            out: Annotated[Path, output("Where failing problems are saved.")
@@ -239,8 +234,7 @@ def reproduce(names: Annotated[list[str] | None, typer.Argument(
                   "it. Default: all.")] = None,
               out: Annotated[Path, output("Where the runs are stored.")] = Path("runs/reproduce"),
               quick: Annotated[bool, typer.Option(
-                  "--quick", help="The first seed only; leave the documents as they are.")
-                  ] = False,
+                  "--quick", help="The first seed only; leave the documents as they are.")] = False,
               fill: Annotated[bool, typer.Option(
                   "--fill", help="Run nothing; write the pages from what docs/results has.")
                   ] = False,

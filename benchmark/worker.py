@@ -47,7 +47,8 @@ def main() -> None:
     for line in sys.stdin:
         method, *arguments = json.loads(line)
         answer = getattr(asked, method)(*arguments)
-        print(json.dumps(answer, default=_plain), file=pipe, flush=True)
+        plain = json.dumps(answer, default=lambda value: value.tolist())  # of numpy
+        print(plain, file=pipe, flush=True)
 
 
 def load(place: str) -> Any:
@@ -79,10 +80,6 @@ def timed(call: Callable[[], Any], repeats: Repeats = Repeats()  # noqa: B008
 def reason(error: Exception) -> str:
     """Return the kind of an exception and its first line."""
     return f"{type(error).__name__}: {error}".partition("\n")[0]
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist()  # of numpy
 
 
 if __name__ == "__main__":

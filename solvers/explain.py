@@ -1,7 +1,5 @@
 """Which constraint blocks which task, in words."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ It is here, above the resolvers and below scenarios, because it joins a stack of
 resolver and needs nothing else. Like the adapters it meets pinocchio only through `hierarchy`.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from typing import NamedTuple, overload

@@ -1,7 +1,5 @@
 """The configuration that serves tasks best, with restarts, and a verdict where none meets them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final

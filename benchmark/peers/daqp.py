@@ -8,8 +8,6 @@ import pinocchio as pin
 
 from benchmark.peers.scenes import Arm, Array, RefusedError
 
-_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-
 
 def arm(scene: Arm, posture: bool) -> tuple[Any, Any]:
     """Velocity limits as simple bounds, position and posture as levels of DAQP."""
@@ -24,7 +22,7 @@ def arm(scene: Arm, posture: bool) -> tuple[Any, Any]:
     def velocity(t: float, q: Array, v: Array, goal: Array, rate: Array) -> Array:
         pin.computeJointJacobians(model, data, q)
         p = pin.updateFramePlacement(model, data, frame).translation
-        A[:3] = pin.getFrameJacobian(model, data, frame, _AXES)[:3]
+        A[:3] = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)[:3]
         lower[n:n + 3] = upper[n:n + 3] = scene.wanted(p, goal, rate)
         if posture:
             lower[n + 3:] = upper[n + 3:] = scene.still(q)

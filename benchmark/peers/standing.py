@@ -33,7 +33,6 @@ _HAND = 0.05          # [m]
 _RATE = 2 * np.pi     # [rad/s]
 _SOLE = 0.055         # [m] from the foot's frame forward to the middle of the sole
 _NOISE = 1e-4, 1e-3   # standard deviation of q [rad, m] and v [rad/s, m/s], as from sensors
-_SEED = 16
 _WEIGHTS = "2 levels, weights"
 
 ENTRANTS = (
@@ -114,7 +113,7 @@ def followed(scene: Stand, ticks: int) -> dict[str, Array]:
              for name, path in zip(scene.hands, hands, strict=True)]
     stack = Stack([Together(feet, "feet"), CentreOfMass(robot, com), *tasks,
                    Posture(tuple(scene.posture))], "velocity")
-    noise = np.random.default_rng(_SEED).normal(size=(2, ticks, robot.n))
+    noise = np.random.default_rng(16).normal(size=(2, ticks, robot.n))
     kept: dict[str, list[Array]] = {"t": [], "q": [], "v": []}
     for k in range(ticks):
         v = resolver.solve(stack.hierarchy(state)).x

@@ -16,7 +16,6 @@ from scenarios.files import make_folder, reason, write_json, write_text
 from scenarios.results.sampled import Workers
 
 NAME, TUNED = "protocol", "fronts"  # of the runs
-PICTURE = "docs/images/fronts.png"
 
 
 def fill() -> int:
@@ -74,7 +73,7 @@ def _made(asked: Sequence[str], out: Path, quick: bool, workers: Workers) -> Ite
         if TUNED in asked:
             points = fronts.run(out / TUNED, workers, progress)
             write_json(root / POINTS, [asdict(one) for one in points])
-            fronts.figure(points).savefig(root / PICTURE, dpi=120)
+            fronts.figure(points).savefig(root / "docs/images/fronts.png", dpi=120)
             yield None
     found = dict.fromkeys(command for page in asked if page not in (NAME, TUNED)
                           for command in pages.commands((root / page).read_text(encoding="utf-8")))

@@ -30,12 +30,10 @@ DOCUMENTS = {
               "figure-10-errors-and-distances": "human-errors"}}
 """For each scenario the pictures in `docs/images`, by the figure that they are."""
 
-_DPI = 130
 _COLOURS = 255  # of the palette: enough for flat drawings, and half the bytes
 _NUMBERS = ("position_error_rms_settled", "cone_violation_max", "body_distance_min",
             "ee_distance_min", "joint_limit_excess", "speed_max", "acceleration_max",
             "stack_changes", "ticks_not_solved")
-_OF_TASKS = "_max_settled"
 
 
 def main(scenarios: Annotated[list[str] | None, typer.Argument()] = None, out: Path = FOLDER,
@@ -44,7 +42,7 @@ def main(scenarios: Annotated[list[str] | None, typer.Argument()] = None, out: P
     for name in () if documents else scenarios or shipped():
         recording, drawn = simulate(load(name)), io.BytesIO()
         with matplotlib.rc_context(drawing.style()):
-            picture({name: recording}).savefig(drawn, format="png", dpi=_DPI, facecolor="white")
+            picture({name: recording}).savefig(drawn, format="png", dpi=130, facecolor="white")
         _write(drawn, make_folder(out) / f"{name}.png")
         print(f"{name}: {'; '.join(_main_numbers(recording))}", flush=True)
     for name, pictures in DOCUMENTS.items() if documents else ():
@@ -67,7 +65,7 @@ def _main_numbers(recording: Recording) -> list[str]:
     """Return the most important metrics of a run, as text with units."""
     return [f"{metric.label} {metric.shown()} {metric.shown_unit}".strip()
             for name, metric in measure(recording).items() if metric.value is not None
-            and (name in _NUMBERS or (name.startswith("task_") and name.endswith(_OF_TASKS)))]
+            and (name in _NUMBERS or (name.startswith("task_") and name.endswith("_max_settled")))]
 
 
 if __name__ == "__main__":

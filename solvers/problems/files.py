@@ -5,8 +5,6 @@ reads it; examples/problems has readers in C++ and Octave. The problems of a fil
 different sizes, so each array holds those of all problems, one after the other.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -5,8 +5,6 @@ rest or a foot in a corner does all three at once. Each kind is one short functi
 generator to levels; `structured` draws one kind.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

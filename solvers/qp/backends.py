@@ -1,7 +1,5 @@
 """The quadratic programming solvers that `hqp` calls through qpsolvers, and their accuracy."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """All levels merged into one, for comparison."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar, final
 

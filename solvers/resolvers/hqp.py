@@ -1,7 +1,5 @@
 """A cascade of quadratic programs, one per level, through any backend of qpsolvers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar, final
 

@@ -1,7 +1,5 @@
 """Strict levels for what must hold, one weighted level with a memory for all that follows."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

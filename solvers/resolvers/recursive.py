@@ -1,7 +1,5 @@
 """The standard recursion with null-space projections."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, final

@@ -1,7 +1,5 @@
 """Reverse priority: from the lowest level to the highest."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, final

@@ -1,7 +1,5 @@
 """Set-based tasks: one-sided rows that are ignored, or frozen as equalities."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain, combinations, islice

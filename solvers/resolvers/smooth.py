@@ -15,8 +15,6 @@ the answer is rho after the last level, starting from rho = 0 and Q = I:
 The last level is the identity. docs/theory/smooth.md has V and P.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, final

@@ -1,7 +1,5 @@
 """Saturation in the null space: hard bounds on single unknowns, tasks scaled to fit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar, final
 

@@ -1,7 +1,5 @@
 """The Task Priority Matrix: all priorities in one matrix F, x = J^# F b."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
