@@ -19,6 +19,8 @@ from hierarchy.tasks import (
     TorqueLimits,
 )
 
+# Drives of `plant.kind = "torque"` without what the controller does not know.
+IDEAL = {"joint_friction": 0.0, "joint_damping": 0.0, "armature": 0.0}
 ROBOT = Robot.named("humanoid")
 GRAVITY = 9.81
 WEIGHT = GRAVITY * ROBOT.masses.sum()

@@ -35,6 +35,7 @@ from hierarchy.tasks import (
     SelfSeparation,
     Separation,
     TorqueLimits,
+    TorqueStep,
 )
 from scenarios.config.kinds import (
     ListedCentreOfMass,
@@ -169,7 +170,7 @@ def test_a_wrong_task_is_named(method, value, said, monkeypatch):
 
 
 MADE = [*TASKS.values(), JointLimits(ROBOT, 10.0, 1e-3), TorqueLimits(ROBOT),
-        DangerBounds(JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
+        TorqueStep(ROBOT, 1.0), DangerBounds(JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
         Separation(ROBOT.control_points, Barrier(0.05)),
         SelfSeparation(link_capsules(ROBOT_TABLES["kuka_lwr"], foot=0.3), Barrier(0.05))]
 

@@ -1,5 +1,7 @@
 """Wrong values given to robots, states, paths, tasks and stacks: each with what it says."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scene import Elbow
@@ -27,6 +29,7 @@ from hierarchy.tasks import (
     SelfSeparation,
     Separation,
     TorqueLimits,
+    TorqueStep,
 )
 
 NAN, INF = float("nan"), float("inf")
@@ -113,7 +116,11 @@ def limits(**settings):
     (lambda: Posture({"arm": 0.0}).dimension, "give Posture(..., robot=robot)"),
     (lambda: DangerBounds(LIMITS, ()), "needs at least one control point"),
     (lambda: DangerBounds(LIMITS, POINTS).box(STATE, "velocity"), "carries no measurement"),
-    (lambda: TorqueLimits(HUMANOID), "contact forces"),
+    *((lambda make=make: make(HUMANOID), "contact forces")
+      for make in (TorqueLimits, partial(TorqueStep, step=1.0))),
+    (lambda: TorqueStep(ROBOT, 0.0), "step 0.0 must be positive"),
+    (lambda: Stack([TorqueStep(ROBOT, 1.0)], "acceleration").hierarchy(STATE),
+     "steps of torques need the level torque, not 'acceleration'"),
     (lambda: DangerBounds(JointLimits(HUMANOID, 5.0, 0.01), HUMANOID.control_points),
      "floating base"),
     (lambda: Activation(None, (), {"wall": 0.0}), "must be positive and finite"),
