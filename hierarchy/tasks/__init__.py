@@ -5,7 +5,7 @@ from hierarchy.tasks.avoidance import Avoidance, CumulatedRepulsion, DangerBound
 from hierarchy.tasks.com import CentreOfMass, Momentum
 from hierarchy.tasks.contact_motion import ContactMotion
 from hierarchy.tasks.coupling import JointCoupling
-from hierarchy.tasks.forces import BaseDynamics, ContactForce, LeastForce, TorqueLimits
+from hierarchy.tasks.forces import BaseDynamics, ContactForce, LeastForce, TorqueLimits, TorqueStep
 from hierarchy.tasks.friction import CentreOfPressure, Friction
 from hierarchy.tasks.joint_limits import JointLimits
 from hierarchy.tasks.manipulability import Manipulability
@@ -29,6 +29,7 @@ TASKS: dict[str, type[Task]] = {
     "momentum": Momentum, "pointing": Pointing, "pose": Pose, "position": Position,
     "posture": Posture, "relative pose": RelativePose, "self-separation": SelfSeparation,
     "separation": Separation, "together": Together, "torque limits": TorqueLimits,
+    "torque step": TorqueStep,
 }
 
 __all__ = ["TASKS", "Along", "Avoidance", "BaseDynamics", "CentreOfMass", "CentreOfPressure",
@@ -36,4 +37,4 @@ __all__ = ["TASKS", "Along", "Avoidance", "BaseDynamics", "CentreOfMass", "Centr
            "Friction", "JointCoupling", "JointDamping", "JointLimits", "LeastForce", "LookAt",
            "Manipulability", "Mechanism", "Momentum", "Pointing", "Pose", "Position", "Posture",
            "RelativePose", "SelfSeparation", "Separation", "Together", "TorqueLimits",
-           "model_rows"]
+           "TorqueStep", "model_rows"]

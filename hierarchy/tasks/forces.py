@@ -154,67 +154,114 @@ class LeastForce(FixedRows):
         return np.eye(count), np.zeros(count), np.zeros(count)
 
 
-@dataclass(frozen=True)
-class TorqueLimits(JointRows):
-    """Keep every joint torque within its limits: -limit <= M(q) a + h(q, v) - J_c^T f <= limit.
+class TorqueRows(JointRows):
+    """Rows of the joint torques, M(q) a + h(q, v) - J_c^T f, one per actuated joint. Abstract.
 
-    One row per actuated joint, n in number below, at acceleration level without contacts and at
-    level "torque" with those of the stack. The limit is `fraction`, more than 0 and at most 1, of
-    the robot's `effort_limit` [N m or N]; rows of joints without one have infinite bounds. At level
-    "torque" no torque differs by more than `step` [N m or N] from that in `State.commanded`; one
-    beyond its limit comes back by `step`. The torques are those of the robot's model: rigid bodies,
-    no friction, no payload.
-
-    Raises HierarchyError for another fraction, a step that is not positive, or a floating base
-    without contacts.
+    At level "torque" the contacts are those of the stack, else there are none. The torques are
+    those of the robot's model: rigid bodies, no friction, no payload.
     """
 
-    robot: Robot
-    fraction: float = 1.0
-    name: str = "torque limits"
-    contacts: Contacts | None = None
-    step: float = inf
+    contacts: Contacts | None
     kind = "inequality"
     of_forces: ClassVar[bool] = True
     straight = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(not 0.0 < self.fraction <= 1.0, f"fraction {self.fraction} is not more than 0 "
-                    "and at most 1")
-        self.refuse(not self.step > 0.0, f"step {self.step} must be positive")
         self.refuse(self.robot.base == "floating" and self.contacts is None,
                     f"robot {self.robot.name!r} has a floating base; its torques depend on "
                     "contact forces, so give the contacts")
+
+    def error(self, state: State) -> Array:
+        """Distance of the torque with x = 0 from its bounds (n,) [N m or N]."""
+        h = state.bias_effort()[self.robot.actuated:]
+        return np.asarray(np.clip(h, *self.bounds(state)) - h)
+
+    @abstractmethod
+    def bounds(self, state: State) -> tuple[Array, Array]:
+        """The bounds of the torques (n,), (n,) [N m or N]."""
+
+    def write_within(self, limit: Array, state: State, rows: Rows) -> Writer:
+        """Return what writes rows of torques from -limit to limit (n,) [N m or N]."""
+        M, h = state.dynamics
+        contacts = Contacts(self.robot) if self.contacts is None else self.contacts
+        parameters = M, h, state.kinematics, contacts.points, self.robot.actuated
+        return bind(write_torques, parameters, limit, *rows)
+
+
+@dataclass(frozen=True)
+class TorqueLimits(TorqueRows):
+    """Keep every joint torque within its limits: -limit <= M(q) a + h(q, v) - J_c^T f <= limit.
+
+    One row per actuated joint, n in number below, at acceleration level without contacts and at
+    level "torque" with those of the stack. The limit is `fraction`, more than 0 and at most 1, of
+    the robot's `effort_limit` [N m or N]; rows of joints without one have infinite bounds.
+
+    Raises HierarchyError for another fraction, or a floating base without contacts.
+    """
+
+    robot: Robot
+    fraction: float = 1.0
+    name: str = "torque limits"
+    contacts: Contacts | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.refuse(not 0.0 < self.fraction <= 1.0, f"fraction {self.fraction} is not more than 0 "
+                    "and at most 1")
 
     @property
     def limit(self) -> Array:
         """The largest torque of each row (n,) [N m or N]."""
         return self.fraction * self.robot.effort_limit[self.robot.actuated:]
 
-    def error(self, state: State) -> Array:
-        """Distance of the torque with x = 0 from the limits (n,) [N m or N]."""
-        h = state.bias_effort()[self.robot.actuated:]
-        return np.asarray(np.clip(h, -self.limit, self.limit) - h)
+    def bounds(self, state: State) -> tuple[Array, Array]:
+        """The limits, at any state."""
+        return -self.limit, self.limit
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; HierarchyError at velocity level."""
         self.refuse(level == "velocity", "torque limits need the acceleration level, not "
                     f"{level!r}")
-        M, h = state.dynamics
-        contacts = Contacts(self.robot) if self.contacts is None else self.contacts
-        parameters = M, h, state.kinematics, contacts.points, self.robot.actuated
-        write_rows = bind(write_torques, parameters, self.limit, *rows)
-        if level != "torque" or self.step == inf:
-            return write_rows
-        efforts = h[self.robot.actuated:]
+        return self.write_within(self.limit, state, rows)
+
+
+@dataclass(frozen=True)
+class TorqueStep(TorqueRows):
+    """Keep every joint torque within `step` [N m or N] of that in `State.commanded`.
+
+    A level for torques that a motor can follow, at level "torque": below the limits of torques and
+    friction, which come first where both cannot hold. Without commanded torques its bounds are
+    infinite. Raises HierarchyError for a step that is not positive, or a floating base without
+    contacts.
+    """
+
+    robot: Robot
+    step: float
+    name: str = "torque step"
+    contacts: Contacts | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.refuse(not self.step > 0.0, f"step {self.step} must be positive")
+
+    def bounds(self, state: State) -> tuple[Array, Array]:
+        """The commanded torques less and plus the step."""
+        if (last := state.commanded) is None:
+            unbounded = np.full(self.dimension, inf)
+            return -unbounded, unbounded
+        return last - self.step, last + self.step
+
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
+        """See `Task.writer`; HierarchyError at another level."""
+        self.refuse(level != "torque", f"steps of torques need the level torque, not {level!r}")
+        write_rows = self.write_within(np.full(self.dimension, inf), state, rows)
+        efforts = state.dynamics[1][self.robot.actuated:]
 
         def write() -> None:
             write_rows()
-            if state.commanded is not None:
-                here = state.commanded - efforts
-                for side in rows[1:]:
-                    np.clip(side, here - self.step, here + self.step, out=side)
+            for side, bound in zip(rows[1:], self.bounds(state), strict=True):
+                np.subtract(bound, efforts, out=side)
 
         return write
 

@@ -159,23 +159,27 @@ def _physics(scenario: Scenario, contacts: Contacts) -> list[Task]:
     """Return the levels at the top of a stack at level "torque".
 
     "physics" has the equations of motion of a floating base and the contacts at rest, "limits" the
-    torque limits and the forces that contacts can transmit. One that would be empty is left out.
+    torque limits and the forces that contacts can transmit, the last the largest change of a
+    torque. One that would be empty is left out.
     """
     with naming("forces"):
         motion = [kinds.ContactMotion(contacts, damping=scenario.forces.damping)] \
             if contacts.contacts else []
         dynamics = [kinds.BaseDynamics(contacts)] if contacts.robot.base == "floating" else []
         limits = _force_limits(scenario, contacts) if scenario.forces_in_stack else []
-    return [kinds.Together(tasks, name) for tasks, name in (
+    levels: list[Task] = [kinds.Together(tasks, name) for tasks, name in (
         ([*dynamics, *motion], "physics"), (limits, "limits")) if tasks]
+    if scenario.forces_in_stack and scenario.limits and scenario.limits.torque_step:
+        levels.append(kinds.TorqueStep(contacts.robot, scenario.limits.torque_step,
+                                       contacts=contacts))
+    return levels
 
 
 def _force_limits(scenario: Scenario, contacts: Contacts) -> list[Task]:
     limits, forces = scenario.limits, scenario.forces
     found: list[Task] = []
-    if limits and (limits.torque or limits.torque_step):
-        found.append(kinds.TorqueLimits(contacts.robot, limits.torque or 1.0, contacts=contacts,
-                                  step=limits.torque_step or inf))
+    if limits and limits.torque:
+        found.append(kinds.TorqueLimits(contacts.robot, limits.torque, contacts=contacts))
     if contacts.contacts:
         found.append(kinds.Friction(contacts, forces.faces, forces.least, forces.largest or inf))
     if forces.edge is not None:

@@ -137,9 +137,13 @@ class TorqueSection(AnyPlant):
     height: keys.Coordinate = 0.0  #: Height of the floor.
     friction: keys.Positive = 0.7  #: Coefficient of friction of the floor.
     softness: keys.Span = 0.005  #: Time constant of a contact.
-    joint_friction: Friction = 0.0  #: Coulomb friction of every joint.
-    armature: Inertia = 0.0  #: Additional inertia of every joint's drive.
-    joint_damping: Damping = 0.0  #: Viscous friction of every joint.
+    joint_friction: Friction | None = None
+    """Coulomb friction of every joint, by default 0.5 % of its effort limit."""
+    joint_damping: Damping | None = None
+    """Viscous friction of every joint, by default 0.2 % of its effort limit per rad/s."""
+    armature: Inertia | None = None
+    """Additional inertia of every joint's drive, by default 0.01 % of its effort limit per rad/s^2.
+    """
     delay: keys.Time = 0.0  #: Delay of torques, a whole number of periods.
     bandwidth: keys.Frequency | None = None  #: Bandwidth of motor torques, by default infinite.
     stops: keys.Flag = True  #: Whether joints have a stop at their position limit.

@@ -222,7 +222,8 @@ class LimitsSection(keys.Section):
     torque: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = None
     """Usable share of the effort limits; by default torques are unlimited."""
     torque_step: Annotated[keys.Positive, keys.Unit("N m")] | None = None
-    """Largest change of a torque in a tick, at level "torque"."""
+    """Largest change of a torque in a tick, at level "torque": a level below torque limits and
+    friction, and above the joint limits."""
     base_speed: tuple[keys.Positive, keys.Positive] | None = None
     """Linear [m/s] and angular [rad/s] speed of a floating base; by default 2 and 3, at level
     "torque" unlimited."""

@@ -117,7 +117,7 @@ def policy_of(cell: Cell, control: ControlSection) -> Policy:
         return Policy(control.policy, control.level, control.period, clamp)
     limits, limit = cell.scenario.limits, cell.torque_limit
     speed = cell.robot.velocity_limit[cell.robot.actuated:]
-    step = (limits and limits.torque_step) or inf
+    step = (limits and not cell.scenario.forces_in_stack and limits.torque_step) or inf
     return Policy(control.policy, control.level, control.period,
                   partial(_clamped, cell.state, limit, step),
                   np.where(np.isfinite(limit), limit, 0.0) / speed)

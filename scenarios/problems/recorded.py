@@ -37,7 +37,8 @@ def sequences(seed: int) -> Iterator[list[tuple[Hierarchy, Array]]]:
     or two.
     """
     base, run = load(SCENARIO).with_changes(
-        {"limits.horizon": 0.0, "plant.stops": False}), 0  # as the set was recorded
+        {"limits.horizon": 0.0, "plant.stops": False, "plant.joint_friction": 0.0,
+         "plant.joint_damping": 0.0, "plant.armature": 0.0}), 0  # as the set was recorded
     while True:
         values = drawn(base, base.variation, seed, run)
         chance = np.random.default_rng([seed, run])

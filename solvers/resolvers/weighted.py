@@ -40,9 +40,11 @@ class Weighted(Resolver):
     docs/theory/weighted.md describes the settings and the status.
 
     ratio : weight of a level over that of the level below; the lowest level has weight 1.
-    weights : weight of each level, in place of `ratio`; ignored for a hard or strict level.
-    strict_levels : number of top levels that keep strict priority; those below become one level of
-        weighted rows, and `hcod` resolves this. What follows is then unused.
+    weights : weight of each level, in place of `ratio`; ignored for a hard or strict level. Strict
+        levels at the top need none.
+    strict_levels : number of top levels that keep strict priority, -1 for the first run of
+        inequalities and all above; those below become one level of weighted rows, and `hcod`
+        resolves this. What follows is then unused.
     regularisation : mu; pink and mink call mu^2 damping, 1e-12 by default.
     hard_levels : largest number of top levels that are constraints (inequalities only).
     backend : after the guesses: "own", an active-set method, or a backend of qpsolvers.
@@ -56,7 +58,7 @@ class Weighted(Resolver):
     damps_with_bounds: ClassVar[str] = damps
     ratio: float = number(100.0, 1.0)
     weights: Sequence[float] | None = None
-    strict_levels: int = whole_number(0, 0)
+    strict_levels: int = whole_number(0, -1)
     regularisation: float = number(1e-6, open_below=True)
     hard_levels: int = whole_number(1, 0)
     backend: str = one_of(OWN, *BACKENDS)
@@ -77,7 +79,8 @@ class Weighted(Resolver):
         ratio = "" if self.ratio == 100.0 else f" {self.ratio:g}"
         if self.weights is not None:
             ratio = " " + "/".join(f"{w:g}" for w in self.weights)
-        strict = f" below {self.strict_levels} strict" if self.strict_levels else ""
+        count = "" if self.strict_levels < 0 else f" {self.strict_levels}"
+        strict = f" below{count} strict" if self.strict_levels else ""
         return self.name + ratio + strict + (f" {self.backend}" if self.backend != OWN else "")
 
     @cached_property
@@ -108,7 +111,8 @@ class Weighted(Resolver):
         return cache(lambda names: Merged(
             ratio=1.0, cap=0.0, regularisation=0.0, rank_tolerance=self.rank_tolerance,
             scales=dict(zip(names, (1.0 / self._weights(len(names))).tolist(), strict=True)),
-            strict_levels=max(0, min(self.strict_levels, len(names) - 1)),
+            strict_levels=None if self.strict_levels < 0 else min(
+                self.strict_levels, len(names) - 1),
             damping=self.damping, threshold=self.threshold))
 
     def _weights(self, levels: int) -> Array:
@@ -117,9 +121,10 @@ class Weighted(Resolver):
             with np.errstate(over="ignore"):
                 powers = self.ratio ** np.arange(levels - 1, -1, -1.0)
             return np.minimum(powers, np.finfo(float).max)
-        if len(self.weights) != levels:
+        missing = levels - len(self.weights)
+        if not 0 <= missing <= (levels if self.strict_levels < 0 else self.strict_levels):
             raise HierarchyError(f"weighted: {len(self.weights)} weights for {levels} levels")
-        return np.array(self.weights)
+        return np.array([*[1.0] * missing, *self.weights])
 
     def _continued(self, h: Hierarchy, settings: Array, record: Array) -> Resolution:
         """Continue after the guesses, from an x within the constraints or from a backend's x."""

@@ -8,6 +8,8 @@ from hierarchy.contacts import Contact, Contacts
 from hierarchy.paths import Still
 from hierarchy.task import Rows
 
+# Drives of `plant.kind = "torque"` without what the controller does not know.
+IDEAL = {"joint_friction": 0.0, "joint_damping": 0.0, "armature": 0.0}
 ROBOT = Robot.named("humanoid")
 WEIGHT = 9.81 * ROBOT.masses.sum()  # [N]
 

@@ -128,6 +128,7 @@ def test_a_wrong_task_is_named(method, value, said, monkeypatch):
 
 
 MADE = [*TASKS.values(), tasks.JointLimits(ROBOT, 10.0, 1e-3), tasks.TorqueLimits(ROBOT),
+        tasks.TorqueStep(ROBOT, 1.0),
         tasks.DangerBounds(tasks.JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
         tasks.Separation(ROBOT.control_points, Barrier(0.05)),
         tasks.SelfSeparation(link_capsules(ROBOT_TABLES["kuka_lwr"], foot=0.3), Barrier(0.05))]

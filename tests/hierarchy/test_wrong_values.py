@@ -1,5 +1,7 @@
 """Wrong values given to robots, states, paths, tasks and stacks: each with what it says."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scene import Elbow
@@ -98,7 +100,11 @@ def limits(**settings):
     (lambda: tasks.Posture({"arm": 0.0}).dimension, "give Posture(..., robot=robot)"),
     (lambda: tasks.DangerBounds(LIMITS, ()), "needs at least one control point"),
     (lambda: tasks.DangerBounds(LIMITS, POINTS).box(STATE, "velocity"), "carries no measurement"),
-    (lambda: tasks.TorqueLimits(HUMANOID), "contact forces"),
+    *((lambda make=make: make(HUMANOID), "contact forces")
+      for make in (tasks.TorqueLimits, partial(tasks.TorqueStep, step=1.0))),
+    (lambda: tasks.TorqueStep(ROBOT, 0.0), "step 0.0 must be positive"),
+    (lambda: Stack([tasks.TorqueStep(ROBOT, 1.0)], "acceleration").hierarchy(STATE),
+     "steps of torques need the level torque, not 'acceleration'"),
     (lambda: tasks.DangerBounds(tasks.JointLimits(HUMANOID, 5.0, 0.01), HUMANOID.control_points),
      "floating base"),
     (lambda: Activation(None, (), {"wall": 0.0}), "must be positive and finite"),

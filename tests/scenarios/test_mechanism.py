@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from mechanisms import four_bar
-from standing import accelerations
+from standing import IDEAL, accelerations
 from urdf_text import joint, link, urdf
 
 from hierarchy import Robot, State, plugins
@@ -37,12 +37,12 @@ def posture(joints):
 
 
 def scenario(level="velocity", resolver="hcod", stack="hierarchical", **more):
-    plant = "torque" if level == "torque" else "kinematic"
+    plant = {"kind": "torque", **IDEAL} if level == "torque" else {"kind": "kinematic"}
     asks = {"position": {"offset": [0.05, 0.0, 0.05]}} if stack == "switched" else {
         "tasks": [posture({"crank": -0.3, "finger": 0.5})]}
     return Scenario.model_validate({
         "name": "bar", "robot": {"model": "four_bar"}, "damping": {"value": 5.0},
-        "start": {"joints": {"crank": -0.8, "finger": 0.3}}, "plant": {"kind": plant},
+        "start": {"joints": {"crank": -0.8, "finger": 0.3}}, "plant": plant,
         "control": {"level": level, "stack": stack, "resolver": resolver, "duration": 0.5,
                     "period": 0.002}} | asks | more)
 

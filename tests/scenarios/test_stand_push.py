@@ -80,6 +80,9 @@ def test_no_torque_changes_by_more_than_its_step(resolver):
     assert np.abs(np.diff(run["command"], axis=0)).max() == pytest.approx(0.3, abs=1e-9)
     free = simulate(SHORT.with_resolver(resolver).with_changes({"control.duration": 0.05}))
     assert np.abs(np.diff(free["command"], axis=0)).max() > 0.5
+    levels = ["physics", "limits", "torque step", "joint limits"]
+    assert [name for name in run.task_names if name in levels] == (
+        levels if resolver == "hcod" else ["physics"])
 
 
 class Failing:

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
-from standing import ROBOT, accelerations, feet
+from standing import IDEAL, ROBOT, accelerations, feet
 
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
@@ -40,7 +40,8 @@ def test_without_contact_it_accelerates_as_the_robots_model(seed):
     q, v, torques = in_the_air(seed)
     expected = pin.aba(ROBOT.model, ROBOT.model.createData(), q, v,
                        np.concatenate([np.zeros(6), torques]))
-    found = accelerations(TorqueRobot(ROBOT, CONTACTS, q, v), torques)
+    plant = TorqueRobot(ROBOT, CONTACTS, q, v, section=plant_with(**IDEAL))
+    found = accelerations(plant, torques)
     assert np.abs(found - expected).max() < 1e-3 * np.abs(expected).max()
 
 

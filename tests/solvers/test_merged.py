@@ -116,9 +116,12 @@ def test_weights_below_strict_levels_are_one_level_of_weighted_rows():
     h, w = with_targets(arm(4), targets(4)), np.repeat([1.0, 1.0, 9.0, 4.0, 0.5], [1, N, 2, 3, N])
     by_hand = h.changed(A=h.A * w[:, None], lower=h.lower * w, upper=h.upper * w,
                         sizes=[1, N, 11], names=("physics", "limits", "tasks"))
-    found = solved(make("weighted", strict_levels=2, weights=[1.0, 1.0, 9.0, 4.0, 0.5]), h)
-    np.testing.assert_allclose(found.x, make("hcod").solve(by_hand).x, atol=1e-10)
-    assert (found.carried == 0.0).all(), "weights have no memory"
+    for strict, weights in ((2, [1.0, 1.0, 9.0, 4.0, 0.5]), (-1, [9.0, 4.0, 0.5])):
+        found = solved(make("weighted", strict_levels=strict, weights=weights), h)
+        np.testing.assert_allclose(found.x, make("hcod").solve(by_hand).x, atol=1e-10)
+        assert (found.carried == 0.0).all(), "weights have no memory"
+    with pytest.raises(HierarchyError, match="2 weights for 5 levels"):
+        make("weighted", strict_levels=2, weights=[4.0, 0.5]).solve(h)
 
 
 def test_a_task_whose_rows_are_strict_too_drowns_no_light_rows():

@@ -26,6 +26,8 @@ _SOFTNESS = 0.02   # [s] time constant of a contact: a few mm of penetration at 
 _FRICTION = (0.5, 0.005, 0.0001)  # of a contact: sliding, turning [m], rolling [m]
 _LEAST = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
 _SKIN = 0.3             # friction of a link on another
+# Of a joint's effort limit, as gears and motors grow with it; plausible, not identified.
+_DRIVE = {"joint_friction": 0.005, "joint_damping": 0.002, "armature": 0.0001}
 _THICKNESS = 0.01    # [m] half of that of a sole
 _SLIDING = 0.15      # [s] time constant of the friction of what slides
 BALL = 0.001         # [m] radius of a point that touches
@@ -174,6 +176,7 @@ def _capsules(elements: list[Element], contact: Element, robot: Robot, q: Array)
 
 def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> list[Element]:
     of_joint, own, elements = _axes(robot), robot.model.armature, [world]
+    friction, damping, armature = (_of_drives(robot, key, getattr(floor, key)) for key in _DRIVE)
     for i, body in enumerate(robot.bodies()):
         element = add_body(elements[body.parent], body, _LEAST)
         elements.append(element)
@@ -186,9 +189,16 @@ def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> lis
         range_ = min(robot.lower[k], q[k]), max(robot.upper[k], q[k])
         stop = {"limited": "true", "range": range_} if (
             floor.stops and np.isfinite(range_).all()) else {}
-        add(element, "joint", name=body.name, type=kind, axis=axis, damping=floor.joint_damping,
-            armature=own[v] + floor.armature, frictionloss=floor.joint_friction, **stop)
+        add(element, "joint", name=body.name, type=kind, axis=axis, damping=damping[v],
+            armature=own[v] + armature[v], frictionloss=friction[v], **stop)
     return elements
+
+
+def _of_drives(robot: Robot, key: str, value: float | None) -> Array:
+    """Return a property (n,) of the drives: one value, or by their effort limits where these are."""
+    effort = robot.effort_limit
+    return np.where(np.isfinite(effort), _DRIVE[key] * effort, 0.0) if value is None else \
+        np.full(robot.n, value)
 
 
 def _shape(contact: Contact) -> dict[str, Any]:
