@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from importlib.metadata import distribution, version
 from importlib.resources import files
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 
@@ -90,40 +90,49 @@ def check(resolvers: Sequence[str], target: str) -> None:
 def digest() -> str:
     """Return the digest of the kernels' sources as they are installed."""
     from hierarchy.jit.sources import source_digest
-    from solvers.library.entries import solve_hcod
+    from solvers.library.entries import can_open
 
-    return source_digest(solve_hcod)[:16]
+    return source_digest(can_open)[:16]
 
 
 def emit(resolvers: Sequence[str], target: str) -> Emitted:
     """Return the object file for what this process compiles for, see `emitted`."""
     import llvmlite.binding as llvm
 
-    from hierarchy.jit import announce_compilation
-    from hierarchy.jit.exporting import compiles, lowered, machine, object_code
+    from hierarchy.jit.exporting import compiles, object_code
     from hierarchy.jit.linking import hide
-    from solvers.library import entries
+    from solvers.library.entries import FUNCTIONS
 
     if not compiles():
         raise HierarchyError("kernels are not compiled: NUMBA_DISABLE_JIT is set")
-    announce_compilation()
-    functions = {f"th_solve_{name}": entries.RESOLVERS[name] for name in resolvers}
-    functions |= entries.ALWAYS
-    module, found = lowered(functions), digest()
+    others = {f"th_solve_{name}" for name in set(RESOLVERS).difference(resolvers)}
+    functions = {name: FUNCTIONS[name] for name in FUNCTIONS if name not in others}
+    (module, machine), found = _code(functions, target), digest()
     texts = {"th_version": version(_PACKAGE), "th_digest": found}
     module.link_in(llvm.parse_assembly(_texts(texts)))
     symbols = (*functions, *texts)
     hide(module, set(symbols))
-    here = machine()
-    if target == "native":
-        triple, processor, features = here.triple, here.processor, here.features
-    else:
-        triple, processor, features = _TRIPLES[target], "generic", ""
     try:
-        code = object_code(module, triple, processor, features)
+        code = object_code(module, machine)
     except RuntimeError as error:
-        raise HierarchyError(f"this llvmlite has no back end for {triple}: {error}") from error
-    return Emitted(code, symbols, f"{triple}, {processor}", found)
+        raise HierarchyError(f"this llvmlite has no back end for {machine.triple}: {error}"
+                             ) from error
+    return Emitted(code, symbols, f"{machine.triple}, {machine.processor}", found)
+
+
+def _code(functions: dict[str, Any], target: str) -> tuple[Any, Any]:
+    """Return an LLVM module with functions, made ahead or now, and the machine that it is for."""
+    from hierarchy.jit import announce_compilation
+    from hierarchy.jit.caching import FOLDER, PROCESSOR, parts
+    from hierarchy.jit.exporting import Machine, lowered, machine, stored
+
+    # Python runs its object files, and so native is their processor, where there are any.
+    ahead = stored(FOLDER / "solvers.bc", functions) if target != "native" or parts() else None
+    here = machine() if target == "native" else Machine(_TRIPLES[target], "generic", "")
+    if ahead is None:
+        announce_compilation()
+        return lowered(functions), here
+    return ahead, Machine(here.triple, PROCESSOR, "") if target == "native" else here
 
 
 def _texts(texts: dict[str, str]) -> str:
