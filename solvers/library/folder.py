@@ -1,16 +1,12 @@
 """The folder of the C library: static and shared library, headers, and what build tools read.
 
-The functions become an object file through LLVM; no compiler is needed. Kernels are compiled as
-they are for Python: by numba, for the processor that LLVM detects. For another one numba is told so
-by its environment when a process starts, so `emitted` starts one. Code for another kind of
-processor is the code without extensions for this one, whose vectors have the same width, translated
-by the back end of the other.
+The functions become an object file through LLVM; no compiler is needed. Their LLVM code was made
+with the kernels of Python when the package was built; if not, numba makes it now. Another target
+gets the same code through its own back end, which splits vectors that are too wide for it.
 """
 
 from __future__ import annotations
 
-import os
-import pickle
 import re
 import shutil
 import struct
@@ -28,8 +24,6 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 TARGETS = ("native", "x86_64", "aarch64")
 RESOLVERS = ("hcod", "tpm", "recursive", "sns", "merged")
 _TRIPLES = {"x86_64": "x86_64-unknown-linux-gnu", "aarch64": "aarch64-unknown-linux-gnu"}
-_WORKER = ("import pickle, sys; from solvers.library.folder import emit; "
-           "pickle.dump(emit(sys.argv[2:], sys.argv[1]), sys.stdout.buffer)")
 _PACKAGE = "task-hierarchy"
 _PLACES = {"task_hierarchy.h": "include", "task_hierarchy.hpp": "include",
            "task_hierarchyConfig.cmake": "lib/cmake/task_hierarchy",
@@ -62,41 +56,6 @@ def emitted(resolvers: Sequence[str], target: str) -> Emitted:
     this LLVM or this machine cannot make code for the target.
     """
     check(resolvers, target)
-    if target == "native":
-        return emit(resolvers, target)
-    done = subprocess.run([sys.executable, "-c", _WORKER, target, *resolvers],
-                          env={**os.environ, "NUMBA_CPU_NAME": "generic"}, check=False,
-                          capture_output=True)
-    if done.returncode != 0:
-        lines = done.stderr.decode().strip().splitlines()
-        raise HierarchyError(f"no code for {target}: {lines[-1] if lines else 'no reason'}")
-    made: Emitted = pickle.loads(done.stdout)
-    return made
-
-
-def check(resolvers: Sequence[str], target: str) -> None:
-    """Raise a HierarchyError for an unknown name, or for a machine that has no objects in ELF."""
-    if target not in TARGETS:
-        raise UnknownNameError("target", target, TARGETS)
-    for name in resolvers:
-        if name not in RESOLVERS:
-            raise UnknownNameError("resolver of the C library", name, RESOLVERS)
-    if not resolvers:
-        raise HierarchyError("a C library needs at least one resolver")
-    if not sys.platform.startswith("linux"):
-        raise HierarchyError(f"the C library is made on Linux, not on {sys.platform}")
-
-
-def digest() -> str:
-    """Return the digest of the kernels' sources as they are installed."""
-    from hierarchy.jit.sources import source_digest
-    from solvers.library.entries import can_open
-
-    return source_digest(can_open)[:16]
-
-
-def emit(resolvers: Sequence[str], target: str) -> Emitted:
-    """Return the object file for what this process compiles for, see `emitted`."""
     import llvmlite.binding as llvm
 
     from hierarchy.jit.exporting import compiles, object_code
@@ -118,6 +77,27 @@ def emit(resolvers: Sequence[str], target: str) -> Emitted:
         raise HierarchyError(f"this llvmlite has no back end for {machine.triple}: {error}"
                              ) from error
     return Emitted(code, symbols, f"{machine.triple}, {machine.processor}", found)
+
+
+def check(resolvers: Sequence[str], target: str) -> None:
+    """Raise a HierarchyError for an unknown name, or for a machine that has no objects in ELF."""
+    if target not in TARGETS:
+        raise UnknownNameError("target", target, TARGETS)
+    for name in resolvers:
+        if name not in RESOLVERS:
+            raise UnknownNameError("resolver of the C library", name, RESOLVERS)
+    if not resolvers:
+        raise HierarchyError("a C library needs at least one resolver")
+    if not sys.platform.startswith("linux"):
+        raise HierarchyError(f"the C library is made on Linux, not on {sys.platform}")
+
+
+def digest() -> str:
+    """Return the digest of the kernels' sources as they are installed."""
+    from hierarchy.jit.sources import source_digest
+    from solvers.library.entries import can_open
+
+    return source_digest(can_open)[:16]
 
 
 def _code(functions: dict[str, Any], target: str) -> tuple[Any, Any]:
