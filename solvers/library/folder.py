@@ -106,13 +106,14 @@ def _code(functions: dict[str, Any], target: str) -> tuple[Any, Any]:
     from hierarchy.jit.caching import FOLDER, PROCESSOR, parts
     from hierarchy.jit.exporting import Machine, lowered, machine, stored
 
-    # Python runs its object files, and so native is their processor, where there are any.
-    ahead = stored(FOLDER / "solvers.bc", functions) if target != "native" or parts() else None
-    here = machine() if target == "native" else Machine(_TRIPLES[target], "generic", "")
-    if ahead is None:
+    module = stored(FOLDER / "solvers.bc", functions)
+    if module is None:
         announce_compilation()
-        return lowered(functions), here
-    return ahead, Machine(here.triple, PROCESSOR, "") if target == "native" else here
+        module = lowered(functions)
+    if target != "native":
+        return module, Machine(_TRIPLES[target], "generic", "")
+    here = machine()
+    return module, Machine(here.triple, PROCESSOR, "") if parts() else here  # as Python runs it
 
 
 def _texts(texts: dict[str, str]) -> str:
