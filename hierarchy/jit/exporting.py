@@ -175,8 +175,27 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
     functions : of C; LLVM code of them, optimised with that of the calls, is for `stored`.
     """
     Library.running = Cached.kept = False
-    libraries: list[Any] = [_library(functions)] if functions else []
+    entries, libraries = _compiled(calls, say)
+    if functions:
+        libraries.append(_library(functions))
+    names = {name for entry in entries.values() for name in (entry.wrapper, entry.environment)}
+    whole = linked(libraries, {*names, *functions})
+    apart = whole.clone()
+    hide(whole, names)
+    code = object_code(whole, machine())
+    externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)
+                       if one.is_declaration and not one.name.startswith("llvm."))
+    Part(file, of, entries, tuple(externals)).write(code)
+    if functions:
+        hide(apart, set(functions))
+        file.with_suffix(".bc").write_bytes(_digest(functions) + stripped(apart).as_bitcode())
+
+
+def _compiled(calls: Sequence[str], say: Callable[[int], None]
+              ) -> tuple[dict[str, Code], list[Any]]:
+    """Return how to find each call in an object file, and numba's libraries with their code."""
     entries: dict[str, Code] = {}
+    libraries: list[Any] = []
     for count, call in enumerate(calls):
         say(count)
         name, _, text = call.removesuffix(")").partition("(")
@@ -186,17 +205,7 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
         if (entry := _entry(made, source_digest(kernel))) is not None:
             libraries.append(made.library)
             entries[call] = entry
-    names = {name for entry in entries.values() for name in (entry.wrapper, entry.environment)}
-    whole = linked(libraries, {*names, *functions})
-    if functions:
-        own = whole.clone()
-        hide(own, set(functions))
-        file.with_suffix(".bc").write_bytes(_digest(functions) + stripped(own).as_bitcode())
-        hide(whole, names)
-    code = object_code(whole, machine())
-    externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)
-                       if one.is_declaration and not one.name.startswith("llvm."))
-    Part(file, of, entries, tuple(externals)).write(code)
+    return entries, libraries
 
 
 def is_current(file: Path, of: str) -> bool:
