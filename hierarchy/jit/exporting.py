@@ -9,6 +9,7 @@ process starts; only the machine code is made once, of all of them together.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
@@ -21,7 +22,7 @@ from numba.np import arrayobj
 from hierarchy.jit.caching import PROCESSOR, Code, Part
 from hierarchy.jit.compiling import Cached
 from hierarchy.jit.inside import cgutils, compiler, global_compiler_lock, llvm, registry, types
-from hierarchy.jit.linking import Library, found, linked, naming
+from hierarchy.jit.linking import Library, found, hide, linked, naming, stripped
 from hierarchy.jit.sources import Kernel, kinds_in, source_digest
 
 INTEGER, STATUS = types.int64, types.int32  # of arguments and results; a pointer is an INTEGER too
@@ -68,16 +69,35 @@ def compiles() -> bool:
 @global_compiler_lock  # type: ignore[untyped-decorator]
 def lowered(entries: Mapping[str, Entry]) -> Any:
     """Return one optimised LLVM module in which only the entries are visible, under their names."""
+    return linked([_library(entries)], set(entries))
+
+
+def stored(file: Path, entries: Mapping[str, Entry]) -> Any:
+    """Return the module of these and other entries that `build` wrote; None if it does not suit."""
+    digest = _digest(entries)
+    with suppress(OSError, RuntimeError):  # missing, or of a newer LLVM
+        content = file.read_bytes()
+        if digest and content.startswith(digest):
+            return llvm.parse_bitcode(content[len(digest):])
+    return None
+
+
+def _digest(entries: Mapping[str, Entry]) -> bytes:
+    return source_digest(*(entry.function for entry in entries.values())).encode()
+
+
+def _library(entries: Mapping[str, Entry]) -> Any:
+    """Return a library of numba's with these entries, for which there is no machine code here."""
     library = registry.cpu_target.target_context.codegen().create_library("entries")
-    library.runs = False  # here
+    library.runs = False
     with naming():
         for name, entry in entries.items():
             _add(library, name, entry)
-    return linked([library], set(entries))
+    return library
 
 
-def object_code(module: Any, triple: str, processor: str, features: str) -> bytes:
-    """Return the object file of a module, with code that can be loaded anywhere in memory.
+def object_code(module: Any, machine: Machine) -> bytes:
+    """Return the object file of a module for a machine; it can be loaded anywhere in memory.
 
     Raises
     ------
@@ -85,9 +105,9 @@ def object_code(module: Any, triple: str, processor: str, features: str) -> byte
     """
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
-    target = llvm.Target.from_triple(triple).create_target_machine(
-        cpu=processor, features=features, opt=3, reloc="pic", codemodel="default")
-    module.triple, module.data_layout = triple, str(target.target_data)
+    target = llvm.Target.from_triple(machine.triple).create_target_machine(
+        cpu=machine.processor, features=machine.features, opt=3, reloc="pic", codemodel="default")
+    module.triple, module.data_layout = machine.triple, str(target.target_data)
     return bytes(target.emit_object(module))
 
 
@@ -147,14 +167,35 @@ ENVIRONMENT = {"NUMBA_CPU_NAME": PROCESSOR, "NUMBA_CPU_FEATURES": "",
 
 
 @global_compiler_lock  # type: ignore[untyped-decorator]
-def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None]) -> None:
+def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
+          functions: Mapping[str, Entry]) -> None:
     """Write an object file with these calls, whose list has the digest `of`.
 
     calls : each `name(types)`, as `described` writes types. say : takes the number compiled.
+    functions : of C; LLVM code of them, optimised with that of the calls, is for `stored`.
     """
     Library.running = Cached.kept = False
-    libraries: list[Any] = []
+    entries, libraries = _compiled(calls, say)
+    if functions:
+        libraries.append(_library(functions))
+    names = {name for entry in entries.values() for name in (entry.wrapper, entry.environment)}
+    whole = linked(libraries, {*names, *functions})
+    apart = whole.clone()
+    hide(whole, names)
+    code = object_code(whole, machine())
+    externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)
+                       if one.is_declaration and not one.name.startswith("llvm."))
+    Part(file, of, entries, tuple(externals)).write(code)
+    if functions:
+        hide(apart, set(functions))
+        file.with_suffix(".bc").write_bytes(_digest(functions) + stripped(apart).as_bitcode())
+
+
+def _compiled(calls: Sequence[str], say: Callable[[int], None]
+              ) -> tuple[dict[str, Code], list[Any]]:
+    """Return how to find each call in an object file, and numba's libraries with their code."""
     entries: dict[str, Code] = {}
+    libraries: list[Any] = []
     for count, call in enumerate(calls):
         say(count)
         name, _, text = call.removesuffix(")").partition("(")
@@ -164,13 +205,7 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None])
         if (entry := _entry(made, source_digest(kernel))) is not None:
             libraries.append(made.library)
             entries[call] = entry
-    whole = linked(libraries, {name for entry in entries.values()
-                               for name in (entry.wrapper, entry.environment)})
-    here = machine()
-    code = object_code(whole, here.triple, here.processor, here.features)
-    externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)
-                       if one.is_declaration and not one.name.startswith("llvm."))
-    Part(file, of, entries, tuple(externals)).write(code)
+    return entries, libraries
 
 
 def is_current(file: Path, of: str) -> bool:

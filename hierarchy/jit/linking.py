@@ -140,6 +140,16 @@ def hide(module: Any, visible: set[str]) -> None:
     manager.run(module, _passes()[1])
 
 
+def stripped(module: Any) -> Any:
+    """Return a module without names but those of functions: they are half of its size."""
+    names, manager = [one.name for one in module.functions], llvm.create_new_module_pass_manager()
+    manager.add_strip_symbols_pass()
+    manager.run(module, _passes()[1])
+    for one, name in zip(module.functions, names, strict=True):
+        one.name = name
+    return module
+
+
 def _passes() -> Any:
     """Return numba's passes over a module, and what runs them."""
     return registry.cpu_target.target_context.codegen()._module_pass_manager()

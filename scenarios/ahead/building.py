@@ -1,5 +1,6 @@
 """Compile kernels ahead: `python -m scenarios.ahead` writes the object files of the package.
 
+With `solvers.o` it writes the LLVM code from which `hierarchy library` makes the C library.
 With the name of a part it writes that one; `solvers` needs nothing but numba and scipy.
 
 `calls.txt` says what Python calls. `python -m scenarios.ahead record` writes it anew, of what JOBS
@@ -56,7 +57,9 @@ def is_current(part: str) -> bool:
     from hierarchy.jit import exporting
     from hierarchy.jit.caching import FOLDER
 
-    return exporting.is_current(FOLDER / f"{part}.o", _listed())
+    file, functions = FOLDER / f"{part}.o", _functions(part)
+    return exporting.is_current(file, _listed()) and (
+        not functions or exporting.stored(file.with_suffix(".bc"), functions) is not None)
 
 
 def record(job: str) -> list[str]:
@@ -75,7 +78,7 @@ def compile_part(part: tuple[Path, Sequence[str]]) -> int:
 
     file, calls = part
     build(file, _listed(), calls, lambda count: None if count % 20 else _say(
-        f"{file.stem}: {count} of {len(calls)}"))
+        f"{file.stem}: {count} of {len(calls)}"), _functions(file.stem))
     return file.stat().st_size
 
 
@@ -87,6 +90,13 @@ def _recorded() -> list[str]:
             raise SystemExit(f"task-hierarchy: the job {job} ended its process")
         calls.update(found)
     return sorted(calls)
+
+
+def _functions(part: str) -> dict[str, Any]:
+    """Return the functions of C that are compiled with a part."""
+    from solvers.library.entries import FUNCTIONS
+
+    return FUNCTIONS if part == "solvers" else {}
 
 
 def _listed() -> str:

@@ -376,10 +376,10 @@ def size_of_record(n, m, levels):
     return record_size(n, m, levels) if in_range(n, m, levels) else -1
 
 
-RESOLVERS = {"hcod": entry(solve_hcod), "tpm": entry(solve_tpm),
-             "recursive": entry(solve_recursive), "sns": entry(solve_sns),
-             "merged": entry(solve_merged)}
-ALWAYS = {"th_work_size": Entry(size_of_work, 3, INTEGER, -1),
-          "th_record_size": Entry(size_of_record, 3, INTEGER, -1),
-          "th_verify": Entry(verify_x, 6, STATUS, NUMERICAL_FAILURE),
-          "th_violations": Entry(violations_at, 3, STATUS, NUMERICAL_FAILURE)}
+FUNCTIONS = {"th_solve_hcod": entry(solve_hcod), "th_solve_tpm": entry(solve_tpm),
+             "th_solve_recursive": entry(solve_recursive), "th_solve_sns": entry(solve_sns),
+             "th_solve_merged": entry(solve_merged),
+             "th_work_size": Entry(size_of_work, 3, INTEGER, -1),
+             "th_record_size": Entry(size_of_record, 3, INTEGER, -1),
+             "th_verify": Entry(verify_x, 6, STATUS, NUMERICAL_FAILURE),
+             "th_violations": Entry(violations_at, 3, STATUS, NUMERICAL_FAILURE)}

@@ -1,16 +1,12 @@
 """The folder of the C library: static and shared library, headers, and what build tools read.
 
-The functions become an object file through LLVM; no compiler is needed. Kernels are compiled as
-they are for Python: by numba, for the processor that LLVM detects. For another one numba is told so
-by its environment when a process starts, so `emitted` starts one. Code for another kind of
-processor is the code without extensions for this one, whose vectors have the same width, translated
-by the back end of the other.
+The functions become an object file through LLVM; no compiler is needed. Their LLVM code was made
+with the kernels of Python when the package was built; if not, numba makes it now. Another target
+gets the same code through its own back end, which splits vectors that are too wide for it.
 """
 
 from __future__ import annotations
 
-import os
-import pickle
 import re
 import shutil
 import struct
@@ -21,15 +17,13 @@ from dataclasses import dataclass
 from importlib.metadata import distribution, version
 from importlib.resources import files
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 from hierarchy.errors import HierarchyError, UnknownNameError
 
 TARGETS = ("native", "x86_64", "aarch64")
 RESOLVERS = ("hcod", "tpm", "recursive", "sns", "merged")
 _TRIPLES = {"x86_64": "x86_64-unknown-linux-gnu", "aarch64": "aarch64-unknown-linux-gnu"}
-_WORKER = ("import pickle, sys; from solvers.library.folder import emit; "
-           "pickle.dump(emit(sys.argv[2:], sys.argv[1]), sys.stdout.buffer)")
 _PACKAGE = "task-hierarchy"
 _PLACES = {"task_hierarchy.h": "include", "task_hierarchy.hpp": "include",
            "task_hierarchyConfig.cmake": "lib/cmake/task_hierarchy",
@@ -62,16 +56,27 @@ def emitted(resolvers: Sequence[str], target: str) -> Emitted:
     this LLVM or this machine cannot make code for the target.
     """
     check(resolvers, target)
-    if target == "native":
-        return emit(resolvers, target)
-    done = subprocess.run([sys.executable, "-c", _WORKER, target, *resolvers],
-                          env={**os.environ, "NUMBA_CPU_NAME": "generic"}, check=False,
-                          capture_output=True)
-    if done.returncode != 0:
-        lines = done.stderr.decode().strip().splitlines()
-        raise HierarchyError(f"no code for {target}: {lines[-1] if lines else 'no reason'}")
-    made: Emitted = pickle.loads(done.stdout)
-    return made
+    import llvmlite.binding as llvm
+
+    from hierarchy.jit.exporting import compiles, object_code
+    from hierarchy.jit.linking import hide
+    from solvers.library.entries import FUNCTIONS
+
+    if not compiles():
+        raise HierarchyError("kernels are not compiled: NUMBA_DISABLE_JIT is set")
+    others = {f"th_solve_{name}" for name in set(RESOLVERS).difference(resolvers)}
+    functions = {name: FUNCTIONS[name] for name in FUNCTIONS if name not in others}
+    (module, machine), found = _code(functions, target), digest()
+    texts = {"th_version": version(_PACKAGE), "th_digest": found}
+    module.link_in(llvm.parse_assembly(_texts(texts)))
+    symbols = (*functions, *texts)
+    hide(module, set(symbols))
+    try:
+        code = object_code(module, machine)
+    except RuntimeError as error:
+        raise HierarchyError(f"this llvmlite has no back end for {machine.triple}: {error}"
+                             ) from error
+    return Emitted(code, symbols, f"{machine.triple}, {machine.processor}", found)
 
 
 def check(resolvers: Sequence[str], target: str) -> None:
@@ -90,40 +95,25 @@ def check(resolvers: Sequence[str], target: str) -> None:
 def digest() -> str:
     """Return the digest of the kernels' sources as they are installed."""
     from hierarchy.jit.sources import source_digest
-    from solvers.library.entries import solve_hcod
+    from solvers.library.entries import can_open
 
-    return source_digest(solve_hcod)[:16]
+    return source_digest(can_open)[:16]
 
 
-def emit(resolvers: Sequence[str], target: str) -> Emitted:
-    """Return the object file for what this process compiles for, see `emitted`."""
-    import llvmlite.binding as llvm
-
+def _code(functions: dict[str, Any], target: str) -> tuple[Any, Any]:
+    """Return an LLVM module with functions, made ahead or now, and the machine that it is for."""
     from hierarchy.jit import announce_compilation
-    from hierarchy.jit.exporting import compiles, lowered, machine, object_code
-    from hierarchy.jit.linking import hide
-    from solvers.library import entries
+    from hierarchy.jit.caching import FOLDER, PROCESSOR, parts
+    from hierarchy.jit.exporting import Machine, lowered, machine, stored
 
-    if not compiles():
-        raise HierarchyError("kernels are not compiled: NUMBA_DISABLE_JIT is set")
-    announce_compilation()
-    functions = {f"th_solve_{name}": entries.RESOLVERS[name] for name in resolvers}
-    functions |= entries.ALWAYS
-    module, found = lowered(functions), digest()
-    texts = {"th_version": version(_PACKAGE), "th_digest": found}
-    module.link_in(llvm.parse_assembly(_texts(texts)))
-    symbols = (*functions, *texts)
-    hide(module, set(symbols))
+    module = stored(FOLDER / "solvers.bc", functions)
+    if module is None:
+        announce_compilation()
+        module = lowered(functions)
+    if target != "native":
+        return module, Machine(_TRIPLES[target], "generic", "")
     here = machine()
-    if target == "native":
-        triple, processor, features = here.triple, here.processor, here.features
-    else:
-        triple, processor, features = _TRIPLES[target], "generic", ""
-    try:
-        code = object_code(module, triple, processor, features)
-    except RuntimeError as error:
-        raise HierarchyError(f"this llvmlite has no back end for {triple}: {error}") from error
-    return Emitted(code, symbols, f"{triple}, {processor}", found)
+    return module, Machine(here.triple, PROCESSOR, "") if parts() else here  # as Python runs it
 
 
 def _texts(texts: dict[str, str]) -> str:

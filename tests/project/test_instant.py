@@ -43,6 +43,7 @@ def test_the_program_of_the_readme_compiles_nothing(tmp_path):
 COMMANDS = [
     "run ellipse --resolver recursive --set pointing.alpha_d=35 --duration 0.1",
     "run ellipse --duration 0.1", "run human --duration 0.1", "run reach-torque --duration 0.01",
+    "library --resolvers recursive",
     "compare ellipse ellipse-velocity --resolvers tpm,recursive,hqp,weighted --workers 1 --set "
     "control.duration=0.02"]
 

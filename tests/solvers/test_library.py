@@ -8,8 +8,12 @@ import pytest
 from rank_cases import sequence
 
 from hierarchy import Hierarchy
+from hierarchy.jit import caching
+from hierarchy.jit.sources import source_digest
 from scenarios.problems.reference import FAMILIES, family
 from solvers import make, problems
+from solvers.library import write
+from solvers.library.entries import can_open
 from solvers.library.folder import _link
 
 if not sys.platform.startswith("linux"):
@@ -82,6 +86,15 @@ def test_the_object_loaded_without_a_linker_gives_the_same_bits(folder):
     library = c.Library.unlinked(folder / "lib" / "libtask_hierarchy.a")
     for h in hierarchies(5):
         c.check_same(library, RESOLVERS[0], h)
+
+
+def test_without_code_made_ahead_it_is_compiled_to_the_same_bits(tmp_path, monkeypatch):
+    """As where a newer LLVM wrote it."""
+    monkeypatch.setattr(caching, "FOLDER", tmp_path)
+    (tmp_path / "solvers.bc").write_bytes(source_digest(can_open).encode() + b"of another LLVM")
+    write(tmp_path, ("recursive",))
+    for h in hierarchies(5):
+        c.check_same(c.Library.of(tmp_path), ("recursive", {}, {}), h)
 
 
 every_resolver = pytest.mark.parametrize("name", c.NAMES)
