@@ -195,10 +195,10 @@ def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> lis
 
 
 def _of_drives(robot: Robot, key: str, value: float | None) -> Array:
-    """Return a property (n,) of the drives: one value, or by their effort limits where these are."""
-    effort = robot.effort_limit
-    return np.where(np.isfinite(effort), _DRIVE[key] * effort, 0.0) if value is None else \
-        np.full(robot.n, value)
+    """Return a property (n,) of the drives: one value, or a share of their effort limits."""
+    if value is not None:
+        return np.full(robot.n, value)
+    return np.where(np.isfinite(robot.effort_limit), _DRIVE[key] * robot.effort_limit, 0.0)
 
 
 def _shape(contact: Contact) -> dict[str, Any]:
