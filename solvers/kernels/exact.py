@@ -24,7 +24,7 @@ from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import assign, matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import LARGER, MET, PASS_STEPS, SOLVE_STEPS
+from solvers.kernels.tolerances import LARGER, MET, NEAR, PASS_STEPS, SOLVE_STEPS
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     FINISHED,
@@ -184,14 +184,13 @@ def answer(s, record, settings, work):
     (m, n), levels, x = s.A.shape, s.multiplier.shape[0] - 1, s.x
     current, at = matrix(work, ZERO, levels + 1, m)
     saved, at = vector(work, at, n)
-    most, code, steps = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO
+    most, code, steps, blocks = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO, ZERO
     limit = min(most, SOLVE_STEPS * (m + 1))
     warm, level, s.count[FINISHED] = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1, 0
     if warm:
         level = _resumed_at(record[3 * m + 2], levels)
     if warm and level < 0:
-        code, steps = pivot_in_blocks(s, limit, NO)
-    blocks = steps
+        code, blocks, steps = _pivot_near(s, current, saved, limit)
     if code == UNPROVED and level < 0:
         t, _ = carve_tableau(s, work, at)
         code, level = pass_through_levels(t, settings[TOLERANCE],
@@ -201,7 +200,7 @@ def answer(s, record, settings, work):
         code = _verified(s, code, NO)
         restore(s)
         if code != SOLVED and steps < limit:
-            code, tries = pivot_in_blocks(s, limit - steps, YES)
+            code, tries = pivot_in_blocks(s, limit - steps, NO)
             steps, blocks = steps + tries, blocks + tries
     if code in (UNPROVED, INACCURATE) and steps < limit:
         restore(s)
@@ -224,6 +223,20 @@ def answer(s, record, settings, work):
 
 
 @inlined
+def _pivot_near(s, current, saved, limit):
+    """Search near the working set of an earlier solve; return the code, blocks, all tries."""
+    code, blocks = pivot_in_blocks(s, limit, YES)
+    steps, few = blocks, min(limit - blocks, NEAR)
+    if code == UNPROVED and few > 0:
+        restore(s)
+        code, tries, _ = pivot_one_by_one(s, current, saved, few,
+                                          ZERO + s.multiplier.shape[0] - 2)
+        steps += tries
+        code = ZERO + (SOLVED if _verified(s, code, YES) == SOLVED else UNPROVED)
+    return code, blocks, steps
+
+
+@inlined
 def _solve_with_light_rows(s, current, saved, limit):
     """Go on with the rows that were neglected; return SOLVED if they make no answer large.
 
@@ -234,7 +247,7 @@ def _solve_with_light_rows(s, current, saved, limit):
     s.count[FINISHED] = s.multiplier.shape[0]  # nothing else is saved
     restore(s)
     take_up(s)
-    code, tries = pivot_in_blocks(s, limit, YES)
+    code, tries = pivot_in_blocks(s, limit, NO)
     if code != SOLVED and tries < limit:
         restore(s)
         code, steps, _ = pivot_one_by_one(s, current, saved, limit - tries, ZERO)
