@@ -22,11 +22,18 @@ class _Workspace(threading.local):
     """One array per thread."""
 
     def __init__(self) -> None:
-        self.array: Array = np.empty(4096)  # 32 kB: enough for a humanoid's stack
+        self.array = _aligned(4096)  # 32 kB: enough for a humanoid's stack
 
     def double(self) -> None:
         """Make room for twice as many numbers."""
-        self.array = np.empty(2 * self.array.size)
+        self.array = _aligned(2 * self.array.size)
+
+
+def _aligned(size: int) -> Array:
+    """Return an array that begins with a line of the cache."""
+    array = np.empty(size + 7)
+    first = -array.ctypes.data // 8 % 8
+    return array[first:first + size]
 
 
 WORKSPACE = _Workspace()

@@ -24,7 +24,7 @@ from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import assign, matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import LARGER, MET, PASS_STEPS, SOLVE_STEPS
+from solvers.kernels.tolerances import LARGER, MET, NEAR, PASS_STEPS, SOLVE_STEPS
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     FINISHED,
@@ -174,30 +174,33 @@ def _keep_staircase(lower, upper, record):
 @compiled
 def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     """Like `solve_hierarchy`, for any rows without damping."""
-    m, n = A.shape
-    s, code, at = _open(A, lower, upper, sizes, x, record, settings, work)
-    if code != SOLVED:
-        return finish(x, code)
-    current, at = matrix(work, at, sizes.size + 1, m)
+    s, code, at = open_working_set(A, lower, upper, sizes, x, record, settings, work)
+    return answer(s, record, settings, work[at:]) if code == SOLVED else finish(x, code)
+
+
+@compiled
+def answer(s, record, settings, work):
+    """Find the working set of the answer, beginning with the rows that act; see `solve_exactly`."""
+    (m, n), levels, x = s.A.shape, s.multiplier.shape[0] - 1, s.x
+    current, at = matrix(work, ZERO, levels + 1, m)
     saved, at = vector(work, at, n)
-    most, code, steps = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO
+    most, code, steps, blocks = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO, ZERO
     limit = min(most, SOLVE_STEPS * (m + 1))
     warm, level, s.count[FINISHED] = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1, 0
     if warm:
-        level = _resumed_at(record[3 * m + 2], sizes.size)
+        level = _resumed_at(record[3 * m + 2], levels)
     if warm and level < 0:
-        code, steps = pivot_in_blocks(s, limit, NO)
-    blocks = steps
+        code, blocks, steps = _pivot_near(s, current, saved, limit)
     if code == UNPROVED and level < 0:
         t, _ = carve_tableau(s, work, at)
         code, level = pass_through_levels(t, settings[TOLERANCE],
                                           min(limit - steps, PASS_STEPS * (m + 1)))
         steps += t.count[STEPS]
-        save(s, saved, sizes.size if code == SOLVED else level)
+        save(s, saved, levels if code == SOLVED else level)
         code = _verified(s, code, NO)
         restore(s)
         if code != SOLVED and steps < limit:
-            code, tries = pivot_in_blocks(s, limit - steps, YES)
+            code, tries = pivot_in_blocks(s, limit - steps, NO)
             steps, blocks = steps + tries, blocks + tries
     if code in (UNPROVED, INACCURATE) and steps < limit:
         restore(s)
@@ -209,7 +212,7 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
         steps, blocks = steps + tries + more, blocks + tries
     elif code not in (SOLVED, NUMERICAL_FAILURE):
         finished = s.count[FINISHED]
-        if finished == sizes.size or (code == UNPROVED and finished > 0):
+        if finished == levels or (code == UNPROVED and finished > 0):
             assign(x, saved)
         code = ZERO + (ITERATION_LIMIT if steps >= most else INACCURATE)
     _keep(s, record, blocks, steps - blocks)
@@ -217,6 +220,20 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     if code == ITERATION_LIMIT:
         record[3 * m + 2] = _resume(s, level)
     return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
+
+
+@inlined
+def _pivot_near(s, current, saved, limit):
+    """Search near the working set of an earlier solve; return the code, blocks, all tries."""
+    code, blocks = pivot_in_blocks(s, limit, YES)
+    steps, few = blocks, min(limit - blocks, NEAR)
+    if code == UNPROVED and few > 0:
+        restore(s)
+        code, tries, _ = pivot_one_by_one(s, current, saved, few,
+                                          ZERO + s.multiplier.shape[0] - 2)
+        steps += tries
+        code = ZERO + (SOLVED if _verified(s, code, YES) == SOLVED else UNPROVED)
+    return code, blocks, steps
 
 
 @inlined
@@ -230,7 +247,7 @@ def _solve_with_light_rows(s, current, saved, limit):
     s.count[FINISHED] = s.multiplier.shape[0]  # nothing else is saved
     restore(s)
     take_up(s)
-    code, tries = pivot_in_blocks(s, limit, YES)
+    code, tries = pivot_in_blocks(s, limit, NO)
     if code != SOLVED and tries < limit:
         restore(s)
         code, steps, _ = pivot_one_by_one(s, current, saved, limit - tries, ZERO)
@@ -253,7 +270,7 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
         return ZERO + TOO_SMALL
     found, at = vector(work, ZERO, n)
     assign(found, x[n:])
-    s, code, _ = _open(A, lower, upper, sizes, found, record, settings, work[at:])
+    s, code, _ = open_working_set(A, lower, upper, sizes, found, record, settings, work[at:])
     for reading in range(1 + (s.count[NEGLECTED] > 0) if code == SOLVED else 0):
         if not proved:
             if reading == 1:
@@ -267,7 +284,7 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
 
 
 @inlined
-def _open(A, lower, upper, sizes, x, record, settings, work):
+def open_working_set(A, lower, upper, sizes, x, record, settings, work):
     """Return a WorkingSet with the data, rescaled if need be; a code; where it ends."""
     m, n = A.shape
     multiplier, at = matrix(work, ZERO, sizes.size + 1, m)

@@ -1,6 +1,7 @@
 """Rows that give: their sides, moved by what an x misses and by what they give; the exact solve.
 
-`solvers.give` has the method, for any resolver; `solve_giving` is the same around the exact kernel.
+`solvers.give` has the method, for any resolver; `solve_giving` is the same with one working set of
+the exact kernel: rows are loaded once, and levels in which the same rows act are factored once.
 """
 
 from __future__ import annotations
@@ -8,9 +9,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hierarchy.jit import as_matrix, compiled, inlined, inner_product
-from solvers.kernels.exact import DAMPING, solve, work_size
-from solvers.kernels.rows import ZERO, length_of
-from solvers.kernels.space import View, assign, fill, vector
+from solvers.kernels.exact import answer, exact_size, open_working_set
+from solvers.kernels.rows import ZERO, finish, length_of
+from solvers.kernels.space import View, assign, fill
+from solvers.kernels.working_set import (
+    FACTORED,
+    FIRST,
+    LOWER,
+    SCALE,
+    UPPER,
+    WorkingSet,
+    restore,
+    start_from,
+)
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 _ROUNDING = 1e-10  # of a violation, relative to 1 + |a| |x|
@@ -43,13 +54,11 @@ def relax(A, lower, upper, give, x, first, last):
 
 
 class Giving(NamedTuple):
-    """A hierarchy, its sides (m,) a copy that moves; what rows give (m,); room for K witnesses."""
+    """Rows (m, n) and sides (m,) as they are; what rows give (m,); room for K witnesses (K, n)."""
 
     A: View
     lower: View
     upper: View
-    sizes: View
-    reference: View
     give: View
     witnesses: View
 
@@ -61,65 +70,74 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
     x (n + m + K n,): the reference, what the rows give, in K levels, and anything; on return the
     answer and, behind what rows give, the witnesses that were found. record: for each witness that
     of the levels down to the last that gives, zeros where none had to be looked for; then that of
-    all levels. settings, work, and the codes: as of `solve_hierarchy`.
+    all levels. settings, work, and the codes: as of `solve_exactly`.
     """
-    (m, n), levels, whole = A.shape, sizes.size, record.size - 3 * A.shape[0] - 3
-    if 2 * m + n + work_size(n, m, levels, settings[DAMPING] > 0.0) > work.size:
+    (m, n), whole = A.shape, record.size - 3 * A.shape[0] - 3
+    if exact_size(n, m, sizes.size) > work.size:
         return ZERO + TOO_SMALL
-    low, at = vector(work, ZERO, m)
-    up, at = vector(work, at, m)
-    reference, at = vector(work, at, n)
-    assign(low, lower)
-    assign(up, upper)
-    assign(reference, x)
-    witnesses = as_matrix(x[n + m:], (x.size - n - m) // n, n)
-    g = Giving(A, low, up, sizes, reference, x[n:n + m], witnesses)
-    code, last = _find_witnesses(g, x[:n], record[:whole], settings, work[at:])
+    s, code, at = open_working_set(A, lower, upper, sizes, x[:n], record[whole:], settings, work)
+    if code != SOLVED:
+        return finish(x[:n], code)
+    g = Giving(A, lower, upper, x[n:n + m], as_matrix(x[n + m:], (x.size - n - m) // n, n))
+    code, last = _find_witnesses(s, g, record[:whole], settings, work[at:])
     if code not in (SOLVED, INACCURATE):
         assign(record[record.size - 3:], record[last:])
         return code
-    found = _solve(g, levels, x[:n], record[whole:], settings, work[at:])
+    _begin(s, record[whole:])
+    found = answer(s, record[whole:], settings, work[at:])
     return code if found == SOLVED else found
 
 
 @inlined
-def _find_witnesses(g, x, record, settings, work):
+def _find_witnesses(s, g, record, settings, work):
     """Write the witnesses and move the sides; return a code, and where the last record ends."""
-    code, first, count, found, at = ZERO + SOLVED, ZERO, ZERO, ZERO, ZERO
-    for k in range(g.sizes.size):
-        first += g.sizes[k]
-        count = ZERO + k + 1 if _gives(g.give, first - g.sizes[k], first) else count
-    size, first, accurate = record.size // g.witnesses.shape[0], ZERO, True
+    code, count, found, at, accurate = ZERO + SOLVED, ZERO, ZERO, ZERO, True
+    for k in range(s.multiplier.shape[0] - 1):
+        count = ZERO + k + 1 if _gives(s, g, k) else count
+    part, size = _first_levels(s, count), record.size // g.witnesses.shape[0]
     for k in range(count):
-        last = first + g.sizes[k]
-        if code in (SOLVED, INACCURATE) and _gives(g.give, first, last):
-            if at == 0 or misses(g.A, g.lower, g.upper, x, first, last):
-                code = _solve(g, count, x, record[at:at + size], settings, work)
+        first, last = s.index[FIRST, k], s.index[FIRST, k + 1]
+        if code in (SOLVED, INACCURATE) and _gives(s, g, k):
+            if at == 0 or misses(g.A, g.lower, g.upper, s.x, first, last):
+                _begin(part, record[at:at + size])
+                code = answer(part, record[at:at + size], settings, work)
                 accurate, at = accurate and code == SOLVED, at + size
             if code in (SOLVED, INACCURATE):
-                assign(g.witnesses[found], x)
-                relax(g.A, g.lower, g.upper, g.give, x, first, last)
+                assign(g.witnesses[found], s.x)
+                _relax(s, g, k)
                 found += 1
-        first = last
     fill(record[at:], 0.0)
     return INACCURATE if code == SOLVED and not accurate else code, at - 3
 
 
 @inlined
-def _gives(give, first, last):
-    """Whether one of these rows gives."""
+def _gives(s, g, k):
+    """Whether one of the rows of a level gives."""
     gives = False
-    for i in range(first, last):
-        gives |= give[i] > 0.0
+    for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
+        gives |= g.give[i] > 0.0
     return gives
 
 
 @inlined
-def _solve(g, count, x, record, settings, work):
-    """Solve the first levels, from the reference."""
-    rows = ZERO
-    for k in range(count):
-        rows += g.sizes[k]
-    assign(x, g.reference)
-    return solve(g.A[:rows], g.lower[:rows], g.upper[:rows], g.sizes[:count], x, record, settings,
-                 work)
+def _first_levels(s, count):
+    """Return the working set of the first levels, in the same memory."""
+    return WorkingSet(s.A[:s.index[FIRST, count]], s.x, s.number, s.index, s.count, s.scalar,
+                      s.multiplier[:count + 1], s.W, s.basis, s.T, s.C)
+
+
+@inlined
+def _begin(s, record):
+    """Begin with the rows that act in a record, as they were before any was cut."""
+    restore(s)
+    start_from(s, record)
+
+
+@inlined
+def _relax(s, g, k):
+    """Move the sides of level k, which is then factored anew."""
+    for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
+        room = s.scalar[SCALE] * (_miss(g.A[i], g.lower[i], g.upper[i], s.x) + g.give[i])
+        s.number[LOWER, i] -= room
+        s.number[UPPER, i] += room
+    s.count[FACTORED] = min(s.count[FACTORED], k)

@@ -70,6 +70,7 @@ from solvers.kernels.tolerances import (
 )
 from solvers.kernels.working_set import (
     ENTRY,
+    FACTORED,
     FIRST,
     LOWER,
     NORM,
@@ -133,7 +134,7 @@ def pass_through_levels(t, tolerance, limit):
 def _start(t):
     """Start at x = 0 with an empty working set."""
     s = t.of
-    s.count[WHOLE], s.scalar[PIVOT], s.scalar[SECOND] = -1, 1.0, 1.0
+    s.count[WHOLE], s.count[FACTORED], s.scalar[PIVOT], s.scalar[SECOND] = -1, 0, 1.0, 1.0
     for i in range(s.A.shape[0]):
         s.index[KIND, i], s.number[VALUE, i] = 0, 0.0
         if s.index[STATE, i] != EQUAL:

@@ -228,7 +228,7 @@ def _share(s, begin, end, above, rank):
     force = s.number[FORCE]
     for q in range(begin, end):
         force[q] = 0.0
-    T, _ = matrix(s.T, above * s.A.shape[0], rank - above, end - begin)
+    T, _ = matrix(s.T, above * s.W.shape[0], rank - above, end - begin)
     for k in range(rank - above):
         pull, unsure = s.number[GRADIENT, above + k], s.number[NOISE, above + k]
         for r in range(k):

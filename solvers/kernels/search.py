@@ -19,6 +19,7 @@ from solvers.kernels.multipliers import INWARD, UNDECIDED, write_multipliers
 from solvers.kernels.rows import YES, ZERO, length_of
 from solvers.kernels.space import View, assign
 from solvers.kernels.tolerances import (
+    FEW,
     MET,
     PATIENCE,
     RECURRENCES,
@@ -108,13 +109,15 @@ def _points_inward(s):
 
 
 @compiled
-def pivot_in_blocks(s, limit, keep):
+def pivot_in_blocks(s, limit, near):
     """Change all wrong rows at once while their number falls; return the code and the tries.
 
     SOLVED is verified; INACCURATE: nothing is wrong, but that is not verified; UNPROVED: the number
-    does not fall. With `keep` the working set is then the one that it began with.
+    does not fall, and the working set is the one that it began with. near: it is believed to be
+    near the answer, so few wrong rows are left to a search row by row, without patience.
     """
-    levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, PATIENCE, ZERO
+    levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, ZERO, ZERO
+    patience, few = (ZERO, ZERO + FEW) if near else (ZERO + PATIENCE, ZERO)
     _copy_states(s, STATE, SEED)
     while tries < limit:
         tries += 1
@@ -125,16 +128,15 @@ def pivot_in_blocks(s, limit, keep):
         found = judge(s, levels, ZERO - 1)
         if found.wrong == 0:
             return ZERO + INACCURATE, tries
-        left = PATIENCE if found.wrong < best else left - 1
+        left = patience if found.wrong < best else left - 1
         best = min(best, found.wrong)
-        if left < 0:
+        if left < 0 or found.wrong <= few:
             break
         for i in range(s.A.shape[0]):
             change = s.index[CHANGE, i]
             if change != 0:
                 s.index[STATE, i] = FREE if change == LEAVES else change
-    if keep:
-        _copy_states(s, SEED, STATE)
+    _copy_states(s, SEED, STATE)
     return ZERO + UNPROVED, tries
 
 

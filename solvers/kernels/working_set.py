@@ -28,23 +28,24 @@ from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 # it. By place in the list: the square at which a row counts as dependent, its
 # residual side - a x. Per unknown or column of Q: reference, y, the goal of the free columns, a
 # gradient and what of it may be rounding, scratch; the diagonal of a level with more
-# rows than rank.
+# rows than rank. Per level: SIZE, PIVOT and SECOND of `scalar` before it.
 (NORM, ENTRY, LOWER, UPPER, CUT, REFERENCE, ZEROED, MISS, Y, GOAL, GRADIENT, NOISE, SCRATCH,
- DIAGONAL) = range(14)
-NUMBERS = 16  # one more than these: `levels.py` keeps its own behind REFERENCE
+ DIAGONAL, SIZES, PIVOTS, SECONDS) = range(17)
+NUMBERS = 17  # `levels.py` keeps its own behind REFERENCE
 # Rows of `index`. Per row of A: its unknown (-1 for several entries), the side at which it acts,
 # the change that the search asks for, how often it entered,
 # the side before a search and at its last checkpoint. By place in the list: the row, the sign
 # of its multipliers. The unknown of each column, the column of each unknown. Per level: its first
 # row, its first place in the list, its first column, whether W lacks the columns above it.
+# Per row of A: the side at which it acted when its level was factored.
 (UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, SEEN, LIST, SIGN, ORDER, PLACE, BEGIN,
- RANK, SHORT) = range(14)
-INDICES = 14
+ RANK, SHORT, ACTED) = range(15)
+INDICES = 15
 # In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
 # cut since the rows were those of A, the number of rows that are negligible beside those of other
 # levels alone, the number of levels that the saved x meets, the number of levels in the search at
-# its last checkpoint.
-PICKED, WHOLE, DIRTY, NEGLECTED, FINISHED, SEEN_LAST = range(6)
+# its last checkpoint, the number of levels whose factors stand for the rows and sides that acted.
+PICKED, WHOLE, DIRTY, NEGLECTED, FINISHED, SEEN_LAST, FACTORED = range(7)
 # In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm
 # and the next one, the factor by which the data are those of the caller.
 TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
@@ -84,7 +85,7 @@ class WorkingSet(NamedTuple):
 @inlined
 def working_set_size(n, m, levels):
     """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 11 + 3 * m * n + n * n
+    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 15 + 3 * m * n + n * n
 
 
 @inlined
@@ -94,9 +95,9 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
     w = max(m, n, sizes.size + 1)
     number, at = matrix(work, at, NUMBERS, w)
     numbers, at = integers(work, at, INDICES * w)
-    count, at = integers(work, at, 6)
+    count, at = integers(work, at, 7)
     scalar, at = vector(work, at, 5)
-    W, at = matrix(work, at, m, n)
+    W, at = matrix(work, at + (-at & 3), m, n)  # of 32 bytes: 8 % of the time of a humanoid's solve
     basis, at = matrix(work, at, n, n)
     T, at = vector(work, at, n * m)
     C, at = matrix(work, at, m, n)
@@ -114,7 +115,8 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
     negative norm, takes no part, and `neglects` says whether x meets it all the same.
     """
     number, index, first, sane, most = s.number, s.index, ZERO, True, 0.0
-    s.scalar[TOLERANCE], s.count[DIRTY], s.count[NEGLECTED] = rank_tolerance, 0, 0
+    s.scalar[TOLERANCE] = rank_tolerance
+    s.count[DIRTY] = s.count[NEGLECTED] = s.count[FACTORED] = s.count[PICKED] = 0
     for c in range(s.x.size):
         sane &= np.isfinite(s.x[c])
         number[REFERENCE, c] = s.x[c]
@@ -127,8 +129,6 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
             norm = np.sqrt(square) if square > LEAST_SQUARE else _small_length(s.A[i])
             number[NORM, i], number[LOWER, i], number[UPPER, i] = norm, low, up
             largest = max(largest, norm)
-            above, below = record[i] == 1.0 and up < np.inf, record[i] == -1.0 and low > -np.inf
-            index[STATE, i] = EQUAL if low == up else ZERO + above - below
         for i in range(first, first + sizes[k]):
             if number[NORM, i] <= NEGLIGIBLE * largest:
                 number[NORM, i] = 0.0
@@ -137,10 +137,21 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
     for i in range(first):
         if 0.0 < number[NORM, i] <= NEGLIGIBLE * most:
             number[NORM, i], s.count[NEGLECTED] = -number[NORM, i], s.count[NEGLECTED] + 1
+    start_from(s, record)
     if not sane:
         return ZERO + NUMERICAL_FAILURE
     in_range = most == 0.0 or LEAST_SQUARE < most * most < 1.0 / LEAST_SQUARE
     return ZERO + (SOLVED if in_range else UNPROVED)
+
+
+@inlined
+def start_from(s, record):
+    """Let the rows act at the sides of a record, as far as a row has that side."""
+    state, lower, upper = s.index[STATE], s.number[LOWER], s.number[UPPER]
+    for i in range(s.A.shape[0]):
+        above = record[i] == 1.0 and upper[i] < np.inf
+        below = record[i] == -1.0 and lower[i] > -np.inf
+        state[i] = EQUAL if lower[i] == upper[i] else ZERO + above - below
 
 
 @inlined
@@ -198,16 +209,17 @@ def _measure(s, i):
 @compiled
 def restore(s):
     """Give all rows back what was cut from them."""
-    s.count[DIRTY] = 0
-    for i in range(s.A.shape[0]):
-        if s.number[CUT, i] > 0.0:
-            _measure(s, i)
+    if s.count[DIRTY] == 1:
+        s.count[DIRTY] = s.count[FACTORED] = 0
+        for i in range(s.A.shape[0]):
+            if s.number[CUT, i] > 0.0:
+                _measure(s, i)
 
 
 @compiled
 def take_up(s):
     """Give the rows that are negligible beside those of other levels their norms."""
-    s.count[NEGLECTED] = 0
+    s.count[NEGLECTED] = s.count[FACTORED] = 0
     for i in range(s.A.shape[0]):
         s.number[NORM, i] = abs(s.number[NORM, i])
 
@@ -239,15 +251,15 @@ def side_at(s, i):
 
 @compiled
 def meet(s, last):
-    """Factor the rows that act in the first `last` levels, and write the x that meets them."""
-    index, levels, rank, rows = s.index, s.multiplier.shape[0] - 1, ZERO, ZERO
-    for c in range(s.x.size):
-        index[ORDER, c] = index[PLACE, c] = c
-        s.number[GOAL, c] = s.number[REFERENCE, c]
-    s.count[PICKED], s.count[WHOLE], s.scalar[SIZE] = 0, -1, 0.0
-    s.scalar[PIVOT] = s.scalar[SECOND] = 1.0
-    for k in range(levels):
-        begin, index[BEGIN, k], index[RANK, k], index[SHORT, k] = rows, rows, rank, 0
+    """Factor the rows that act in the first `last` levels, and write the x that meets them.
+
+    Levels above the first in which other rows act than when they were factored keep their factors.
+    """
+    index, levels, first = s.index, s.multiplier.shape[0] - 1, _keep_factors(s, last)
+    rank, rows = index[RANK, first], index[BEGIN, first]
+    for k in range(first, levels):
+        begin = rows
+        _note_factors(s, k, rows, rank)
         if k >= last or s.count[WHOLE] >= 0:
             continue
         if gives_all(s, k, s.number[GRADIENT], s.number[SCRATCH]):
@@ -255,7 +267,9 @@ def meet(s, last):
                 s.number[GOAL, c] = s.number[GRADIENT, c]
             s.count[WHOLE] = k
             continue
+        s.count[FACTORED] = k + 1
         for i in range(index[FIRST, k], index[FIRST, k + 1]):
+            index[ACTED, i] = index[STATE, i]
             if index[STATE, i] != FREE and s.number[NORM, i] > 0.0:
                 index[LIST, rows] = i
                 rows += 1
@@ -263,9 +277,38 @@ def meet(s, last):
             index[SHORT, k] = _is_short(s, begin, rows, rank)
             above, rank = rank, _factor(s, begin, rows, rank, index[SHORT, k] == 1)
             _solve(s, begin, rows, above, rank, index[SHORT, k] == 1)
-    index[BEGIN, levels], index[RANK, levels] = rows, rank
+    _note_factors(s, levels, rows, rank)
     _keep_goal(s, rank)
     _write_x(s, rank)
+
+
+@inlined
+def _keep_factors(s, last):
+    """Return how many levels keep their factors, and go back to where they end."""
+    index, number, scalar, kept, same = s.index, s.number, s.scalar, ZERO, True
+    while same and kept < min(last, s.count[FACTORED]):
+        for i in range(index[FIRST, kept], index[FIRST, kept + 1]):
+            same = same and index[STATE, i] == index[ACTED, i]
+        kept += same
+    if kept == 0:
+        number[SIZES, 0], number[PIVOTS, 0], number[SECONDS, 0] = 0.0, 1.0, 1.0
+        index[BEGIN, 0] = index[RANK, 0] = 0
+    for c in range(s.x.size):
+        number[GOAL, c] = number[REFERENCE, c]
+        if kept == 0:
+            index[ORDER, c] = index[PLACE, c] = c
+    scalar[SIZE], scalar[PIVOT] = number[SIZES, kept], number[PIVOTS, kept]
+    scalar[SECOND], s.count[WHOLE], s.count[FACTORED] = number[SECONDS, kept], -1, kept
+    s.count[PICKED] = min(s.count[PICKED], index[RANK, kept])
+    return kept
+
+
+@inlined
+def _note_factors(s, k, rows, rank):
+    """Note where the factors of level k begin, and what was found of those above."""
+    s.index[BEGIN, k], s.index[RANK, k], s.index[SHORT, k] = rows, rank, 0
+    s.number[SIZES, k], s.number[PIVOTS, k] = s.scalar[SIZE], s.scalar[PIVOT]
+    s.number[SECONDS, k] = s.scalar[SECOND]
 
 
 @inlined
@@ -347,7 +390,7 @@ def add_row(s, i, factor, w):
 def _see_in_columns(s, begin, end, rank):
     """Replace rows by their products with the columns of Q from `rank` on, and zeros before."""
     n, w = s.x.size, s.number[SCRATCH]
-    Z, _ = matrix(s.T, rank * s.A.shape[0], n - rank, n)
+    Z, _ = matrix(s.T, rank * s.W.shape[0], n - rank, n)
     for j in range(n - rank):
         for c in range(n):
             Z[j, c] = 1.0 if c == rank + j else 0.0
@@ -463,7 +506,7 @@ def _compromise(s, begin, end):
 @inlined
 def _triangle(s, begin, end, above, rank):
     """Make the columns of a level upper triangular; return them and where they end."""
-    T, at = matrix(s.T, above * s.A.shape[0], rank - above, end - begin)
+    T, at = matrix(s.T, above * s.W.shape[0], rank - above, end - begin)
     for k in range(T.shape[0]):
         for i in range(T.shape[1]):
             T[k, i] = s.W[begin + i, above + k] if k <= i else 0.0

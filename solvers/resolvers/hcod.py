@@ -104,7 +104,7 @@ class Hcod(Resolver):
 
         The memory is that of all solves; there is none where one of the witnesses was not found.
         """
-        if h.metric is not None:
+        if h.metric is not None or self.damping > 0.0:
             return super()._solve_giving(h, memory)
         levels, n, m = h.giving, h.n, h.m
         count, size = len(levels), 3 * m + 3

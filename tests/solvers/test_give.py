@@ -8,6 +8,7 @@ from hierarchy.paths import Still
 from hierarchy.tasks import Position, Posture
 from solvers import Status, certify, explain, make, names
 from solvers.batch import Batch
+from solvers.give import giving
 from solvers.problems import generate
 
 
@@ -61,6 +62,18 @@ def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, me
     assert (short.status, short.memory) == (Status.ITERATION_LIMIT, None)
     for memory in (np.zeros(0), np.full(7, np.nan), hcod.solve(h.changed(give=None)).memory):
         np.testing.assert_allclose(hcod.solve(h, memory).x, cold.x, atol=1e-9)
+
+
+def test_solves_that_share_a_working_set_answer_as_separate_ones():
+    hcod, memory, h = make("hcod"), None, problem(5, [0.3, 0.1, 0.2])
+    h.give = np.where(np.arange(h.m) < 8, h.give + 0.1, 0.0)  # three levels
+    for step in np.random.default_rng(5).normal(scale=0.3, size=(20, h.m)):
+        moved = h.changed(lower=h.lower + step, upper=h.upper + step)
+        res, apart = hcod.solve(moved, memory), giving(hcod.solve, moved, moved.giving, None)
+        assert (res.status, apart.status) == (Status.SOLVED, Status.SOLVED)
+        np.testing.assert_allclose(res.x, apart.x, atol=1e-10)
+        np.testing.assert_allclose(res.witnesses, apart.witnesses, atol=1e-10)
+        memory = res.memory
 
 
 def test_generated_hierarchies_that_give_are_certified_by_hcod():
