@@ -209,11 +209,11 @@ def _measure(s, i):
 @compiled
 def restore(s):
     """Give all rows back what was cut from them."""
-    if s.count[DIRTY] == 1:
-        s.count[DIRTY] = s.count[FACTORED] = 0
-        for i in range(s.A.shape[0]):
-            if s.number[CUT, i] > 0.0:
-                _measure(s, i)
+    s.count[DIRTY] = 0
+    for i in range(s.A.shape[0]):
+        if s.number[CUT, i] > 0.0:
+            s.count[FACTORED] = 0
+            _measure(s, i)
 
 
 @compiled
