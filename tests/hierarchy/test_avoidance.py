@@ -83,7 +83,8 @@ def test_the_active_point_is_the_nearest_one_without_the_end_effector():
             each = [distance(o, seen.points[k])[0] for o in OBSTACLES.obstacles]
             assert seen.distance[k] == pytest.approx(min(each))
             assert seen.nearest[k] == int(np.argmin(each))
-            assert seen.magnitude[k] == pytest.approx(TIP if k == 8 else BODY(max(min(each), 0)))
+            law = TIP if k == 8 else BODY
+            assert seen.magnitude[k] == pytest.approx(law(max(min(each), 0.0)))
         assert seen.active == int(np.argmin(seen.distance[:8]))
         assert seen.minimal_distance == seen.distance[:8].min()
         assert seen.end_effector_distance == seen.distance[8]
