@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from standing import IDEAL, drift_of
+from standing import drift_of
 
 from hierarchy import Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
@@ -14,7 +14,6 @@ from scenarios.cell.plants.torque import inside
 from scenarios.config import ScenarioError
 from scenarios.measure.metrics import measure
 
-IDEAL_DRIVES = {f"plant.{key}": value for key, value in IDEAL.items()}
 ARM = Robot.named("kuka_lwr")
 TIP = ARM.frame("end_effector")
 Q = np.array([0.0, -0.5, 0.0, 1.5, 0.0, -1.14, 0.0])
@@ -71,7 +70,7 @@ def test_it_presses_and_wipes_on_a_table_of_unknown_height(height):
     """Friction known: within 1 N of 20 N most of the time, and a few mm of its circle."""
     pytest.importorskip("mujoco")
     run = simulate(load("wipe").with_changes({
-        "plant.height": height, "control.duration": 3.0, **IDEAL_DRIVES}))
+        "plant.height": height, "control.duration": 3.0}))
     assert run.fault is None
     after = run["t"] > 1.0
     assert np.median(np.abs(run["floor_force"][after, 0, 2] - 20.0)) < 2.0
@@ -90,8 +89,7 @@ FIRST, LIFT, TOUCH = 3, 0.75, 1.15  # the first foot of `crawl` that steps, and 
 def test_a_foot_steps_with_the_weight_over_the_other_three():
     pytest.importorskip("mujoco")
     first_step = simulate(load("crawl").with_changes({
-        "control.duration": 1.4, "plant.pushes.0.at": 0.3, "plant.pushes.0.force": 20.0,
-        **IDEAL_DRIVES}))
+        "control.duration": 1.4, "plant.pushes.0.at": 0.3, "plant.pushes.0.force": 20.0}))
     assert first_step.fault is None
     t, force = first_step["t"], first_step["floor_force"]
     air = (t > LIFT + 0.01) & (t < TOUCH - 0.01)
