@@ -5,11 +5,14 @@ import sys
 from importlib import import_module
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from scenarios.cli.options import AsJson, Out, Workers, output
+
+if TYPE_CHECKING:
+    from benchmark.packages import Package
 from scenarios.cli.terminal import shown
 
 _USUAL = ("solve.resolvers", "tick", "solve.accuracy", "solve.growth", "strictness", "start")
@@ -54,10 +57,10 @@ def _run(out: Path | None, *names: str, **options: Any) -> int:
     return int(failed)
 
 
-def _installed(*names: str) -> int:
-    from benchmark import packages
+def _installed(packages: "tuple[Package, ...]") -> int:
+    from benchmark.packages import install
 
-    said = packages.install([getattr(packages, name) for name in names] or packages.PACKAGES)
+    said = install(packages)
     print(*(f"{name}: {why or 'installed'}" for name, why in said.items()), sep="\n")
     return int(any(said.values()))
 
@@ -126,7 +129,8 @@ def peers(install: Install = False,
     """
     _known("scene", scene, _SCENES)
     if install:
-        return _installed()
+        from benchmark.packages import PACKAGES
+        return _installed(PACKAGES)
     if scene is not None:
         return _run(out, _SCENES[scene])
     _run(out, *_SCENES.values())
@@ -178,13 +182,14 @@ def open_(family: Family = None,
 
     Run the same command again to resume an interrupted one.
     """
+    from benchmark.packages import EMBODIK, HIGHS
     from benchmark.solve import open as opened
     from benchmark.solve.entrants import chosen, compiled
     from scenarios.problems.families import available, unavailable
     from scenarios.problems.families import family as named
 
     if install:
-        return _installed("EMBODIK", "HIGHS")
+        return _installed((EMBODIK, HIGHS))
     more = compiled(library or [], name or [])
     table = more if check and more and not entrants else chosen(entrants or [], python, more)
     if check:
