@@ -25,7 +25,7 @@ from solvers.kernels.space import View, fill, integers, matrix, vector
 from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
 
 NOTHING = -1     # code: every level is strict
-BY_RULE = -1.0   # of strict levels: see `_strict_levels`
+BY_RULE = -1.0   # of strict levels: see `count_strict`
 EXACT = 5        # settings of `Hcod` at the start; then those of `Merged`
 OWN = 8          # settings before the weights
 
@@ -80,7 +80,7 @@ def merged(A, lower, upper, sizes, x, record, settings, work):
     """
     (m, n), levels = A.shape, sizes.size
     s, at = _carve(settings, work, m, n, levels)
-    strict = _strict_levels(lower, upper, sizes, s.strict)
+    strict = count_strict(lower, upper, sizes, s.strict)
     if strict >= levels > 0:
         return ZERO + NOTHING
     if merged_size(n, m, levels, settings[DAMPING] > 0.0) > work.size:
@@ -100,7 +100,7 @@ def merged(A, lower, upper, sizes, x, record, settings, work):
 
 
 @compiled
-def _strict_levels(lower, upper, sizes, given):
+def count_strict(lower, upper, sizes, given):
     """Return how many levels stay strict: those that are set, or by the rule of `Merged`.
 
     The rule: the first run of levels with inequalities and all levels above it; none if no level

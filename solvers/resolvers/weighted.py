@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
+from solvers.kernels.merged import BY_RULE, count_strict
 from solvers.kernels.weighted import weighted, weighted_steps
 from solvers.qp.backends import BACKENDS, backend_of
 from solvers.qp.programs import slack_program
@@ -94,7 +95,7 @@ class Weighted(Resolver):
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h, starting from the row states of an earlier resolution if given."""
         if self.strict_levels:
-            return self._below(h.names).solve(h, memory)
+            return self._below(h).solve(h, memory)
         x = h.start()
         record = warm_record(memory, 2 * h.m + 1)
         settings = self._settings_for(len(h.names))
@@ -106,23 +107,34 @@ class Weighted(Resolver):
         return _reported(x, code, record)
 
     @cached_property
-    def _below(self) -> Callable[[tuple[str, ...]], Merged]:
-        """What resolves levels below `strict_levels`, without a memory, by their names."""
-        return cache(lambda names: Merged(
-            ratio=1.0, cap=0.0, regularisation=0.0, rank_tolerance=self.rank_tolerance,
-            scales=dict(zip(names, (1.0 / self._weights(len(names))).tolist(), strict=True)),
-            strict_levels=None if self.strict_levels < 0 else min(
-                self.strict_levels, len(names) - 1),
-            damping=self.damping, threshold=self.threshold))
+    def _known(self) -> dict[tuple[str, ...], Merged]:
+        """Cache of `_below`."""
+        return {}
 
-    def _weights(self, levels: int) -> Array:
-        """Return weights (L,), 1 for the lowest; where they overflow, the status reports it."""
+    def _below(self, h: Hierarchy) -> Merged:
+        """Return what resolves the levels of h below the strict ones, without a memory."""
+        if h.names not in self._known:
+            by_rule, levels = self.strict_levels < 0, len(h.names)
+            strict = count_strict(*h.rows[1:], BY_RULE) if by_rule else self.strict_levels
+            scales = (1.0 / self._weights(levels, strict)).tolist()
+            self._known[h.names] = Merged(
+                ratio=1.0, cap=0.0, regularisation=0.0, rank_tolerance=self.rank_tolerance,
+                scales=dict(zip(h.names, scales, strict=True)),
+                strict_levels=None if by_rule else min(strict, levels - 1),
+                damping=self.damping, threshold=self.threshold)
+        return self._known[h.names]
+
+    def _weights(self, levels: int, strict: int = 0) -> Array:
+        """Return weights (L,), 1 for the lowest; where they overflow, the status reports it.
+
+        Of the levels at the top, so many are strict: weights may begin below them.
+        """
         if self.weights is None:
             with np.errstate(over="ignore"):
                 powers = self.ratio ** np.arange(levels - 1, -1, -1.0)
             return np.minimum(powers, np.finfo(float).max)
         missing = levels - len(self.weights)
-        if not 0 <= missing <= (levels if self.strict_levels < 0 else self.strict_levels):
+        if not 0 <= missing <= strict:
             raise HierarchyError(f"weighted: {len(self.weights)} weights for {levels} levels")
         return np.array([*[1.0] * missing, *self.weights])
 

@@ -120,8 +120,8 @@ def test_weights_below_strict_levels_are_one_level_of_weighted_rows():
         found = solved(make("weighted", strict_levels=strict, weights=weights), h)
         np.testing.assert_allclose(found.x, make("hcod").solve(by_hand).x, atol=1e-10)
         assert (found.carried == 0.0).all(), "weights have no memory"
-    with pytest.raises(HierarchyError, match="2 weights for 5 levels"):
-        make("weighted", strict_levels=2, weights=[4.0, 0.5]).solve(h)
+        with pytest.raises(HierarchyError, match="2 weights for 5 levels"):
+            make("weighted", strict_levels=strict, weights=[4.0, 0.5]).solve(h)
 
 
 def test_a_task_whose_rows_are_strict_too_drowns_no_light_rows():
