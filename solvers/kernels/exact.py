@@ -24,7 +24,7 @@ from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import assign, matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import LARGER, MET, NEAR, PASS_STEPS, SOLVE_STEPS
+from solvers.kernels.tolerances import LARGER, MET, PASS_STEPS, PATIENCE, SOLVE_STEPS
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     FINISHED,
@@ -190,8 +190,9 @@ def answer(s, record, settings, work):
     if warm:
         level = _resumed_at(record[3 * m + 2], levels)
     if warm and level < 0:
-        code, blocks, steps = _pivot_near(s, current, saved, limit)
-    if code == UNPROVED and level < 0:
+        code, blocks = pivot_in_blocks(s, limit, ZERO)
+        steps = blocks
+    if code in (UNPROVED, INACCURATE) and level < 0:
         t, _ = carve_tableau(s, work, at)
         code, level = pass_through_levels(t, settings[TOLERANCE],
                                           min(limit - steps, PASS_STEPS * (m + 1)))
@@ -200,7 +201,7 @@ def answer(s, record, settings, work):
         code = _verified(s, code, NO)
         restore(s)
         if code != SOLVED and steps < limit:
-            code, tries = pivot_in_blocks(s, limit - steps, NO)
+            code, tries = pivot_in_blocks(s, limit - steps, ZERO + PATIENCE)
             steps, blocks = steps + tries, blocks + tries
     if code in (UNPROVED, INACCURATE) and steps < limit:
         restore(s)
@@ -223,20 +224,6 @@ def answer(s, record, settings, work):
 
 
 @inlined
-def _pivot_near(s, current, saved, limit):
-    """Search near the working set of an earlier solve; return the code, blocks, all tries."""
-    code, blocks = pivot_in_blocks(s, limit, YES)
-    steps, few = blocks, min(limit - blocks, NEAR)
-    if code == UNPROVED and few > 0:
-        restore(s)
-        code, tries, _ = pivot_one_by_one(s, current, saved, few,
-                                          ZERO + s.multiplier.shape[0] - 2)
-        steps += tries
-        code = ZERO + (SOLVED if _verified(s, code, YES) == SOLVED else UNPROVED)
-    return code, blocks, steps
-
-
-@inlined
 def _solve_with_light_rows(s, current, saved, limit):
     """Go on with the rows that were neglected; return SOLVED if they make no answer large.
 
@@ -247,7 +234,7 @@ def _solve_with_light_rows(s, current, saved, limit):
     s.count[FINISHED] = s.multiplier.shape[0]  # nothing else is saved
     restore(s)
     take_up(s)
-    code, tries = pivot_in_blocks(s, limit, NO)
+    code, tries = pivot_in_blocks(s, limit, ZERO + PATIENCE)
     if code != SOLVED and tries < limit:
         restore(s)
         code, steps, _ = pivot_one_by_one(s, current, saved, limit - tries, ZERO)

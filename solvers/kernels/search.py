@@ -19,7 +19,6 @@ from solvers.kernels.multipliers import INWARD, UNDECIDED, write_multipliers
 from solvers.kernels.rows import YES, ZERO, length_of
 from solvers.kernels.space import View, assign
 from solvers.kernels.tolerances import (
-    FEW,
     MET,
     PATIENCE,
     RECURRENCES,
@@ -28,7 +27,7 @@ from solvers.kernels.tolerances import (
     SHADOW,
     VIOLATED,
 )
-from solvers.kernels.verification import verify
+from solvers.kernels.verification import REFUTED, verify
 from solvers.kernels.working_set import (
     BEGIN,
     CHANGE,
@@ -108,29 +107,42 @@ def _points_inward(s):
     return inward
 
 
+@inlined
+def _heed(s):
+    """Let the multipliers whose sign verification refutes point inward; return whether any does."""
+    refuted = False
+    for q in range(s.index[BEGIN, s.multiplier.shape[0] - 1]):
+        if s.index[CHANGE, s.index[LIST, q]] == REFUTED:
+            s.index[SIGN, q], refuted = INWARD, True
+    return refuted
+
+
 @compiled
-def pivot_in_blocks(s, limit, near):
+def pivot_in_blocks(s, limit, patience):
     """Change all wrong rows at once while their number falls; return the code and the tries.
 
-    SOLVED is verified; INACCURATE: nothing is wrong, but that is not verified; UNPROVED: the number
-    does not fall, and the working set is the one that it began with. near: it is believed to be
-    near the answer, so few wrong rows are left to a search row by row, without patience.
+    Where nothing else is wrong, the rows leave whose signs the verification refutes. SOLVED is
+    verified; INACCURATE: nothing is wrong, but that is not verified; UNPROVED: the number does not
+    fall, and the working set is the one that it began with. patience: tries that may not reduce it.
     """
-    levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, ZERO, ZERO
-    patience, few = (ZERO, ZERO + FEW) if near else (ZERO + PATIENCE, ZERO)
+    levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, patience, ZERO
+    refuted = False
     _copy_states(s, STATE, SEED)
     while tries < limit:
         tries += 1
         meet(s, levels)
         write_multipliers(s, MET)
-        if not _points_inward(s) and verify(s, YES):
-            return ZERO + SOLVED, tries
+        if not _points_inward(s):
+            if verify(s, YES):
+                return ZERO + SOLVED, tries
+            if _heed(s) and not refuted:
+                left, refuted = ZERO + PATIENCE, True
         found = judge(s, levels, ZERO - 1)
         if found.wrong == 0:
             return ZERO + INACCURATE, tries
-        left = patience if found.wrong < best else left - 1
+        left = max(left, patience) if found.wrong < best else left - 1
         best = min(best, found.wrong)
-        if left < 0 or found.wrong <= few:
+        if left < 0:
             break
         for i in range(s.A.shape[0]):
             change = s.index[CHANGE, i]

@@ -48,8 +48,6 @@ LONGEST = 1e150      # x of `weighted`: squares of longer ones overflow
 
 # Limits. The pass, and the whole solve, end after their number times rows + 1.
 PASS_STEPS = 2
-NEAR = 12            # tries row by row near the working set of an earlier solve
-FEW = 2              # wrong rows that are not changed at once near such a set
 SOLVE_STEPS = 4
 SPARED = 3           # rows over columns that are left to them: fewer are reflected one by one
 PATIENCE = 2         # block pivots that may not reduce the number of wrong rows

@@ -60,15 +60,17 @@ from solvers.kernels.working_set import (
 )
 from solvers.status import EQUAL, FREE
 
-# What is known of an inequality that acts: nothing, a weak multiplier decided, decided.
-OPEN, WEAKLY, DECIDED = range(3)
+# What is known of an inequality that acts: nothing, a weak multiplier decided, decided, or that the
+# level that fails points it inward.
+OPEN, WEAKLY, DECIDED, REFUTED = range(4)
 
 
 @compiled
 def verify(s, factored):
     """Whether the claims of a working set prove its x.
 
-    factored: whether `meet` has factored this set, so that its multipliers can be refined.
+    factored: whether `meet` has factored this set, so that its multipliers can be refined. CHANGE is
+    REFUTED for rows whose multipliers have the wrong sign.
     """
     levels, whole = s.multiplier.shape[0] - 1, s.count[WHOLE]
     reach = 1.0 + length_of(s.x)
@@ -229,7 +231,8 @@ def _signs_hold(s, level, unsure, reach, allowed):
         if mu[i] * s.index[STATE, i] < 0.0 and not (
                 _is_rounding(s, level, i, reach) and pull <= allowed):
             decided = s.index[CHANGE, i]
-            holds = holds and decided != OPEN and (pull <= unsure or decided == DECIDED)
+            if decided == OPEN or (decided == WEAKLY and pull > unsure):
+                s.index[CHANGE, i], holds = REFUTED, False
     return holds
 
 
