@@ -129,6 +129,16 @@ def linked(libraries: Iterable[Any], visible: set[str]) -> Any:
     return whole
 
 
+def merge(module: Any, name: str) -> None:
+    """Make one function of the one with this name and all that it calls in a module."""
+    for one in module.functions:
+        if not one.is_declaration and one.name != name:
+            one.add_function_attribute("alwaysinline")
+    manager, builder = _passes()
+    manager.run(module, builder)
+    hide(module, {name})
+
+
 def hide(module: Any, visible: set[str]) -> None:
     """Keep the functions of these names visible in a module, and drop what none of them uses."""
     for one in (*module.functions, *module.global_variables):

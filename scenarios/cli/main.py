@@ -100,6 +100,9 @@ def library(out: Annotated[Path, opt.output("Folder of the library: new or empty
             target: Annotated[str, typer.Option(
                 "--target", metavar="TARGET", help="native, x86_64 (any) or aarch64 (any).")
                 ] = "native",
+            fix: Annotated[tuple[int, int, int] | None, typer.Option(
+                "--fix", metavar="N M LEVELS", help="Unknowns, rows and levels of equalities for "
+                "which hcod gets faster code; takes some 10 s to compile.")] = None,
             check: Annotated[bool, typer.Option(
                 "--check", help="Write nothing: compare the kernels of the library in the folder "
                                 "with those installed.")] = False,
@@ -124,7 +127,7 @@ def library(out: Annotated[Path, opt.output("Folder of the library: new or empty
         return int(bool(difference))
     folder = claim(out)
     with whole(folder) as partial:
-        made = write(partial, opt.listed_in(resolvers), target)
+        made = write(partial, opt.listed_in(resolvers), target, fix or ())
     if as_json:
         print_json({"folder": shown(folder), **asdict(made)})
         return 0

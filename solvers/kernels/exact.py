@@ -88,7 +88,7 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
         assign(reference, x)
         code = solve_by_staircase(A, lower, upper, sizes, x, settings, work[at:])
         if code != INACCURATE:
-            _keep_staircase(lower, upper, record)
+            keep_staircase(lower, upper, record)
             return code
         assign(x, reference)
     return solve_exactly(A, lower, upper, sizes, x, record, settings, work[at:])
@@ -114,7 +114,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
     met, staircase = open_damped(d, A, lower, upper, sizes, x, settings, work[at:])
     if met or staircase == NUMERICAL_FAILURE:
         assign(x, d.free)
-        _keep_staircase(lower, upper, record)
+        keep_staircase(lower, upper, record)
         return finish(x, staircase)
     whole = last >= 0 and d.factor[last] > 0.0
     for k in range(sizes.size + (not whole)):
@@ -162,7 +162,7 @@ def _add_record(record, inner, lower, upper, d, rows, end, k):
 
 
 @inlined
-def _keep_staircase(lower, upper, record):
+def keep_staircase(lower, upper, record):
     """Write the record of an answer in which no inequality acts."""
     m = lower.size
     for i in range(m):

@@ -69,8 +69,8 @@ OPEN, WEAKLY, DECIDED, REFUTED = range(4)
 def verify(s, factored):
     """Whether the claims of a working set prove its x.
 
-    factored: whether `meet` has factored this set, so that its multipliers can be refined. CHANGE is
-    REFUTED for rows whose multipliers have the wrong sign.
+    factored: whether `meet` has factored this set, so that its multipliers can be refined. Rows
+    whose multipliers have the wrong sign are then REFUTED in CHANGE.
     """
     levels, whole = s.multiplier.shape[0] - 1, s.count[WHOLE]
     reach = 1.0 + length_of(s.x)

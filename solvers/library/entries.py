@@ -16,14 +16,15 @@ import numpy as np
 from hierarchy.jit import as_matrix, compiled, inlined
 from hierarchy.jit.exporting import INTEGER, STATUS, Entry, integers_at, numbers_at
 from solvers.kernels.bounds import solve_within_bounds
-from solvers.kernels.exact import solve, verify_answer
+from solvers.kernels.exact import keep_staircase, solve, verify_answer
 from solvers.kernels.exact import work_size as exact_size
 from solvers.kernels.merged import BY_RULE, OWN, merged, merged_size, write_levels
 from solvers.kernels.merged import record_size as merged_record
 from solvers.kernels.recursion import recursion
-from solvers.kernels.rows import ZERO
+from solvers.kernels.rows import ZERO, all_equal
 from solvers.kernels.sns import sns
 from solvers.kernels.space import View, fill
+from solvers.kernels.staircase import solve_by_staircase
 from solvers.resolvers.hcod import Hcod
 from solvers.resolvers.merged import Merged
 from solvers.status import (
@@ -39,6 +40,7 @@ MOST = 1 << 20  # unknowns, rows or levels: with more the sizes could overflow
 SETTINGS = 6    # of a kernel
 REFUSED = 11  # a row of a kind that the resolver does not handle
 INVALID = 12  # sizes that do not add up, a missing pointer, a setting out of range
+OTHER = -1    # a problem for which `fixed` has no code
 
 # Fields of th_problem and th_record.
 N, M, LEVELS, A, LOWER, UPPER, SIZES, REFERENCE, PROBLEM = range(9)
@@ -164,11 +166,10 @@ def given(settings):
 
 
 @inlined
-def opened(problem, record, x, work, size):
+def opened(problem, record, x, work, size, n, m, levels):
     """Return the Call of addresses that were judged."""
     words, state = integers_at(problem, PROBLEM), integers_at(record, RECORD)
     room, reference = numbers_at(work, size), words[REFERENCE]
-    n, m, levels = words[N], words[M], words[LEVELS]
     return Call(as_matrix(numbers_at(words[A], m * n), m, n), numbers_at(words[LOWER], m),
                 numbers_at(words[UPPER], m), integers_at(words[SIZES], levels),
                 numbers_at(reference, n if reference != 0 else ZERO), numbers_at(x, n),
@@ -180,11 +181,22 @@ def opened(problem, record, x, work, size):
 def begun(call, size):
     """Write x = reference, and the record of `size` numbers from which a solve starts."""
     state, warm = call.state, call.state[WARM] == 1 and call.state[USED] == size
-    for c in range(call.x.size):
-        call.x[c] = call.reference[c] if call.reference.size > 0 else 0.0
+    _copy_reference(call)
     if not warm or call.settings[0] > 0.0:
         fill(call.values[:size], 0.0)
+    begin(state, size)
+
+
+@inlined
+def begin(state, size):
+    """Write the state of a record with `size` numbers that no solve has changed."""
     state[USED], state[WARM], state[ITERATIONS], state[ROW] = size, 0, 1, -1
+
+
+@inlined
+def _copy_reference(call):
+    for c in range(call.x.size):
+        call.x[c] = call.reference[c] if call.reference.size > 0 else 0.0
 
 
 @inlined
@@ -230,9 +242,34 @@ def entry(solve: Callable[..., int]) -> Entry:
         if code != SOLVED:
             reset(problem, record, x)
             return np.int32(code)
-        call, s = opened(problem, record, x, work, size), given(settings)
+        words, s = integers_at(problem, PROBLEM), given(settings)
+        call = opened(problem, record, x, work, size, words[N], words[M], words[LEVELS])
         write_exact(call.settings, s)
         return closed(call, solve(call, s))
+
+    return Entry(entered, 6, STATUS, NUMERICAL_FAILURE)
+
+
+def fixed(n: int, m: int, levels: int) -> Entry:
+    """Return `th_solve_hcod` for clear equalities of these sizes, without damping; else OTHER."""
+    def entered(problem, settings, record, x, work, size):
+        words, s = integers_at(problem, PROBLEM), given(settings)
+        if (can_open(problem, settings, record, x, work, size) != SOLVED or words[N] != n
+                or words[M] != m or words[LEVELS] != levels or s.damping > 0.0):
+            return np.int32(OTHER)
+        call = opened(problem, record, x, work, size, n, m, levels)
+        write_exact(call.settings, s)
+        _copy_reference(call)
+        if not all_equal(call.lower, call.upper):
+            return np.int32(OTHER)
+        code = solve_by_staircase(call.A, call.lower, call.upper, call.sizes, call.x,
+                                  call.settings, call.work)
+        if code == INACCURATE:
+            return np.int32(OTHER)
+        begin(call.state, 3 * m + 3)
+        keep_staircase(call.lower, call.upper, call.values[:3 * m + 3])
+        call.state[WARM] = 1
+        return closed(call, code)
 
     return Entry(entered, 6, STATUS, NUMERICAL_FAILURE)
 
@@ -351,7 +388,8 @@ def verify_x(problem, settings, record, x, work, size):
     code = can_open(problem, settings, record, x, work, size)
     if code != SOLVED:
         return np.int32(code)
-    call, s = opened(problem, record, x, work, size), given(settings)
+    words, s = integers_at(problem, PROBLEM), given(settings)
+    call = opened(problem, record, x, work, size, words[N], words[M], words[LEVELS])
     (m, n), used = call.A.shape, call.state[USED]
     write_exact(call.settings, s)
     both = call.work[:2 * n]

@@ -32,6 +32,7 @@ _PLACES = {"task_hierarchy.h": "include", "task_hierarchy.hpp": "include",
 _ARCHIVE, _SHARED = "lib/libtask_hierarchy.a", "lib/libtask_hierarchy.so"
 _HEADER = "include/task_hierarchy.h"
 _COMPILERS = ("cc", "gcc", "clang")
+_MOST_FIXED = 100
 _MAGIC = b"!<arch>\n"  # of a static library
 
 
@@ -49,13 +50,15 @@ class Emitted:
     digest: str
 
 
-def emitted(resolvers: Sequence[str], target: str) -> Emitted:
+def emitted(resolvers: Sequence[str], target: str, fix: Sequence[int] = ()) -> Emitted:
     """Return the object file of these resolvers for a target.
+
+    fix : sizes (n, m, levels) for which `hcod` has code of its own, see `fixed`.
 
     Raises HierarchyError: an unknown or missing resolver or target, kernels are not compiled, or
     this LLVM or this machine cannot make code for the target.
     """
-    check(resolvers, target)
+    check(resolvers, target, fix)
     import llvmlite.binding as llvm
 
     from hierarchy.jit.exporting import compiles, object_code
@@ -67,6 +70,8 @@ def emitted(resolvers: Sequence[str], target: str) -> Emitted:
     others = {f"th_solve_{name}" for name in set(RESOLVERS).difference(resolvers)}
     functions = {name: FUNCTIONS[name] for name in FUNCTIONS if name not in others}
     (module, machine), found = _code(functions, target), digest()
+    if fix:
+        _fix(module, fix)
     texts = {"th_version": version(_PACKAGE), "th_digest": found}
     module.link_in(llvm.parse_assembly(_texts(texts)))
     symbols = (*functions, *texts)
@@ -79,8 +84,8 @@ def emitted(resolvers: Sequence[str], target: str) -> Emitted:
     return Emitted(code, symbols, f"{machine.triple}, {machine.processor}", found)
 
 
-def check(resolvers: Sequence[str], target: str) -> None:
-    """Raise a HierarchyError for an unknown name, or for a machine that has no objects in ELF."""
+def check(resolvers: Sequence[str], target: str, fix: Sequence[int] = ()) -> None:
+    """Raise a HierarchyError for a wrong name or size, or a machine without objects in ELF."""
     if target not in TARGETS:
         raise UnknownNameError("target", target, TARGETS)
     for name in resolvers:
@@ -88,6 +93,10 @@ def check(resolvers: Sequence[str], target: str) -> None:
             raise UnknownNameError("resolver of the C library", name, RESOLVERS)
     if not resolvers:
         raise HierarchyError("a C library needs at least one resolver")
+    if fix and ("hcod" not in resolvers or len(fix) != 3 or not 1 <= fix[0] <= _MOST_FIXED
+                or not 1 <= fix[2] <= fix[1] <= _MOST_FIXED):
+        raise HierarchyError(f"{' '.join(map(str, fix))}: sizes to fix are unknowns, rows and "
+                             f"levels of hcod, 1 to {_MOST_FIXED}, not more levels than rows")
     if not sys.platform.startswith("linux"):
         raise HierarchyError(f"the C library is made on Linux, not on {sys.platform}")
 
@@ -114,6 +123,30 @@ def _code(functions: dict[str, Any], target: str) -> tuple[Any, Any]:
         return module, Machine(_TRIPLES[target], "generic", "")
     here = machine()
     return module, Machine(here.triple, PROCESSOR, "") if parts() else here  # as Python runs it
+
+
+def _fix(module: Any, sizes: Sequence[int]) -> None:
+    """Let `th_solve_hcod` try the code for these sizes first."""
+    import llvmlite.binding as llvm
+    from llvmlite import ir
+
+    from hierarchy.jit.exporting import lowered
+    from hierarchy.jit.linking import merge
+    from solvers.library.entries import OTHER, fixed
+
+    own, name = lowered({"th_fixed": fixed(*sizes)}), "th_solve_hcod"
+    merge(own, "th_fixed")
+    module.link_in(own)
+    module.get_function(name).name = "th_any"
+    chosen, number = ir.Module("fixed"), ir.IntType(32)
+    kind = ir.FunctionType(number, [ir.IntType(64)] * 6)
+    first, second, both = (ir.Function(chosen, kind, one) for one in ("th_fixed", "th_any", name))
+    builder = ir.IRBuilder(both.append_basic_block())
+    code = builder.call(first, both.args)
+    with builder.if_then(builder.icmp_signed("==", code, ir.Constant(number, OTHER))):
+        builder.ret(builder.call(second, both.args))
+    builder.ret(code)
+    module.link_in(llvm.parse_assembly(str(chosen)))
 
 
 def _texts(texts: dict[str, str]) -> str:
@@ -146,9 +179,10 @@ class Written:
     shared: str
 
 
-def write(folder: Path, resolvers: Sequence[str] = RESOLVERS, target: str = "native") -> Written:
+def write(folder: Path, resolvers: Sequence[str] = RESOLVERS, target: str = "native",
+          fix: Sequence[int] = ()) -> Written:
     """Write the library into a folder that exists; see `emitted` for what is raised."""
-    made = emitted(resolvers, target)
+    made = emitted(resolvers, target, fix)
     texts = {f"{place}/{name}": _filled(name, made, resolvers) for name, place in _PLACES.items()}
     licence = distribution(_PACKAGE).read_text("licenses/LICENSE")  # None in a checkout
     texts["share/doc/task_hierarchy/LICENSE"] = licence or (

@@ -8,6 +8,7 @@ import pytest
 from rank_cases import sequence
 
 from hierarchy import Hierarchy
+from hierarchy.errors import HierarchyError
 from hierarchy.jit import caching
 from hierarchy.jit.sources import source_digest
 from scenarios.problems.reference import FAMILIES, family
@@ -95,6 +96,24 @@ def test_without_code_made_ahead_it_is_compiled_to_the_same_bits(tmp_path, monke
     write(tmp_path, ("recursive",))
     for h in hierarchies(5):
         c.check_same(c.Library.of(tmp_path), ("recursive", {}, {}), h)
+
+
+def test_code_for_fixed_sizes_gives_the_same_bits(tmp_path):
+    write(tmp_path, ("hcod",), fix=(7, 5, 3))
+    library, resolver = c.Library.of(tmp_path), RESOLVERS[0]
+    equal, others = family("EQ7"), [*family("EQ7sing"), *family("INEQ7")[:5]]
+    assert equal[0].h.sizes.tolist() == [3, 1, 1]
+    memory, before = library.memory(equal[0].h), None
+    for h in [problem.h for problem in (*equal, *others)]:
+        c.check_same(library, resolver, h)
+    for h in (problem.h for problem in equal[:5]):
+        before = c.check_same(library, resolver, h, memory, before).memory
+    singular = Hierarchy.from_levels([(np.ones((3, 7)), np.ones(3)), (np.ones((1, 7)), [2.0]),
+                                      (np.eye(7)[:1], [3.0])])
+    c.check_same(library, resolver, singular)
+    for wrong in ((7, 0, 1), (7, 5), (7, 2, 3)):
+        with pytest.raises(HierarchyError):
+            write(tmp_path, ("hcod",), fix=wrong)
 
 
 every_resolver = pytest.mark.parametrize("name", c.NAMES)
