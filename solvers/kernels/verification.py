@@ -26,6 +26,7 @@ from solvers.kernels.rows import length_of
 from solvers.kernels.tolerances import (
     BAND,
     CANCELLED,
+    CLEAR_MISS,
     CUT_BALANCE,
     CUT_OVER_PIVOT,
     EPSILON,
@@ -162,11 +163,16 @@ def _balances(s, p, reach, factored):
     holds = (not outside and rest <= allowed
              and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     left = length_of(s.number[GRADIENT, :s.x.size])
-    unsure = SIGN_MARGIN * (left + rounding + turned) / s.scalar[PIVOT]
-    holds = holds and _signs_hold(s, level, unsure, reach, allowed)
-    if holds:
-        _decide(s, level, unsure, reach)
-    return holds or met
+    error = SIGN_MARGIN * (left + rounding) / s.scalar[PIVOT]
+    cut = SIGN_MARGIN * turned / s.scalar[PIVOT]
+    if holds and _signs_hold(s, level, error + cut, reach, allowed):
+        if level.missed > CLEAR_MISS * s.scalar[TOLERANCE] * reach:
+            # What is cut from a row lies beyond the columns of those that act. So it changes no
+            # multiplier, unless the level sees the row by less than its own rows may turn.
+            cut = min(cut, s.scalar[TOLERANCE] * source)
+        _decide(s, level, error + cut, reach)
+        return True
+    return met
 
 
 @inlined
