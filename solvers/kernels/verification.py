@@ -167,9 +167,9 @@ def _balances(s, p, reach, factored):
     cut = SIGN_MARGIN * turned / s.scalar[PIVOT]
     if holds and _signs_hold(s, level, error + cut, reach, allowed):
         if level.missed > CLEAR_MISS * s.scalar[TOLERANCE] * reach:
-            # What is cut from a row lies beyond the columns of those that act. So it changes no
-            # multiplier, unless the level sees the row by less than its own rows may turn.
-            cut = min(cut, s.scalar[TOLERANCE] * source)
+            # What is cut from a row lies beyond the columns of those that act: no pivot there
+            # makes it larger.
+            cut = min(cut, SIGN_MARGIN * turned)
         _decide(s, level, error + cut, reach)
         return True
     return met

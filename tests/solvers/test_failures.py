@@ -33,7 +33,7 @@ UNKNOWN = ["hcod_nested_2004163_shift"]  # near-ties of 1e-9: any answer that sa
 # Found by `hierarchy bench stress` (seeds from 50,000,000 on), reduced: an answer was
 # called solved and wrong, the certificate rejected a right one (CERTAIN), or steps cycled.
 # Or of the exact engine: levels missed by a fiftieth, 169 steps for 10 rows (certain but IN_DOUBT);
-# tick 474 of stand-talos, on a heel edge, was INACCURATE.
+# tick 390 of stand-talos, on a heel edge, was INACCURATE.
 STORED = sorted([*(FOLDER.parent / "stress").glob("*.npz"),
                  *(FOLDER.parent / "exact").glob("*.npz")])
 # The nearly-* have rows that are dependent up to 1e-8 rad: x was far off on the way, and levels
