@@ -45,6 +45,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 ROOT = Path(__file__).parents[1]
+sys.path[0] = str(ROOT)  # beside this file are folders of tests with the names of the packages
 SAMPLED = ("hierarchy", "solvers", "scenarios")
 FILES = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.py"))
 MAP = ROOT / "build" / "tests-of-lines"

@@ -28,8 +28,8 @@ def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
     files, constants, ahead, seen = set(), set(), list(functions), set()
     while ahead:
         function = ahead.pop()
-        files.add(function.__code__.co_filename)
         known = function.__globals__
+        files.add(known.get("__file__", function.__code__.co_filename))  # bundled code has no path
         if id(known) in seen:
             continue
         seen.add(id(known))

@@ -1,13 +1,14 @@
-"""pinocchio as everything here imports it: missing, or too old, it is named in one line."""
+"""pinocchio and its coal as everything here imports them: missing or old, named in one line."""
 
 from hierarchy.errors import RobotError, missing
 
 try:
+    import coal
     import pinocchio as pin
 except ModuleNotFoundError as error:
     raise missing(error, "robots") from None
 
-__all__ = ["pin"]
+__all__ = ["coal", "pin"]
 
 _OLDEST = 4  # as pyproject.toml asks
 

@@ -3,9 +3,13 @@
 import os
 import subprocess
 import sys
+from types import FunctionType
 
 import numba
 import pytest
+
+from hierarchy.jit.sources import source_digest
+from solvers.kernels.exact import solve_hierarchy
 
 NUMBERS, HELPER = "ONE = 1.0\n", """
 from hierarchy.jit import compiled
@@ -53,6 +57,12 @@ def cache(ask, tmp_path):
 
 def files(folder):
     return [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in str(path)]
+
+
+def test_the_files_of_a_kernel_are_found_though_its_code_names_them_relative_to_a_bundle():
+    function = solve_hierarchy.py_func
+    bundled = FunctionType(function.__code__.replace(co_filename="exact.py"), function.__globals__)
+    assert source_digest(bundled) == source_digest(solve_hierarchy) != ""
 
 
 @pytest.mark.parametrize(("file", "old", "new"), [

@@ -122,6 +122,16 @@ def test_an_older_pinocchio_that_comes_first_is_named_in_one_line(tmp_path):
     assert f"pinocchio 3.9.0 in {tmp_path / 'pinocchio.py'} is older" in done.stderr
 
 
+@pytest.mark.parametrize(("name", "size", "without"), [
+    ("Robot", "robots", ["pinocchio", "coal"]), ("simulate", "scenarios", ["pydantic"])])
+def test_a_name_of_a_larger_size_says_the_line_that_installs_it(name, size, without, tmp_path):
+    code = (f"import sys; sys.modules |= dict.fromkeys({without})\n"
+            f"import task_hierarchy; task_hierarchy.{name}")
+    done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True, check=False,
+                          cwd=tmp_path)
+    assert f"pip install 'task-hierarchy[{size}]'" in done.stderr.splitlines()[-1]
+
+
 def test_every_test_in_the_list_of_slow_ones_exists():
     for line in (ROOT / "tests" / "slow.txt").read_text(encoding="utf-8").split():
         file, _, name = line.partition("::")

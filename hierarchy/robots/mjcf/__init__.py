@@ -8,11 +8,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import coal
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.robots.found import Found, neutral_within_limits, proposed_end_effector
+from hierarchy.robots.library import coal
 from hierarchy.robots.mjcf import constraints
 from hierarchy.robots.mjcf.model import Built, build, compare, configuration, pose
 from hierarchy.robots.mjcf.part import compiled, part_of
