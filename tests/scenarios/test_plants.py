@@ -136,6 +136,7 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
 @pytest.mark.parametrize(("changes", "said"), [
     ([*SHORT, "plant.measurement.delay=0.0025"],
      "delay = 0.0025 s is not a whole number of periods"),
+    ([*SHORT, "plant.measurement.delay=1e30"], "delay = 1e\\+30 s is more than 1000000 periods"),
     *((["plant.kind=mujoco", f"plant.{setting}=[1.0, 2.0]"], f"plant.{setting} has 2 entries")
       for setting in ("servo.bandwidth", "joints.friction", "joints.armature"))])
 def test_a_setting_that_does_not_fit_is_named(mujoco, changes, said):

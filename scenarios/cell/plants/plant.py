@@ -22,6 +22,7 @@ from scenarios.config import Scenario, ScenarioError
 from scenarios.config.plant import MeasurementSection
 
 _WHOLE = 1e-6  # of a period: tolerance of a delay in whole periods
+_MOST = 1_000_000  # periods of a delay: what is on its way is kept in memory
 
 
 class Plant(Protocol):
@@ -112,8 +113,10 @@ class Apart:
 
 
 def whole_periods(delay: float, period: float, key: str) -> int:
-    """Return a delay [s] in periods; ScenarioError, naming its key, if it is not a whole number."""
+    """Return a delay [s] in periods; ScenarioError, naming its key, if too many or not whole."""
     behind = delay / period
+    if behind > _MOST:
+        raise ScenarioError(f"{key} = {delay:g} s is more than {_MOST} periods of {period:g} s")
     if abs(behind - round(behind)) > _WHOLE:
         raise ScenarioError(f"{key} = {delay:g} s is not a whole number of periods of {period:g} s")
     return round(behind)
