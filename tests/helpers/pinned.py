@@ -18,9 +18,8 @@ from solvers.problems import ANY, FAMILIES, KINDS, bounded, family, generate, st
 FOLDER = Path(__file__).parents[1] / "data" / "pinned"
 
 
-def robot_facts(name):
+def robot_facts(robot):
     """Limits, rest, masses, and where all that is fixed to a body is in one posture, as lists."""
-    robot = Robot.named(name)
     model, data = robot.model, robot.model.createData()
     q = pin.integrate(model, robot.rest, np.sin(1.0 + np.arange(robot.n)))
     pin.forwardKinematics(model, data, q)
@@ -80,7 +79,7 @@ def leaves(value, path=""):
 
 def main():
     """Write both files, one line for each robot and kind of problem."""
-    robots = {name: robot_facts(name) for name in TABLES}
+    robots = {name: robot_facts(Robot.named(name)) for name in TABLES}
     for name, content in (("robots", robots), ("problems", problem_sums())):
         lines = ",\n".join(f"{json.dumps(key)}: {json.dumps(one)}" for key, one in content.items())
         (FOLDER / f"{name}.json").write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")

@@ -207,7 +207,7 @@ def test_an_entry_that_is_not_finite_is_named_by_its_own_joint(robot, what, entr
 
 @pytest.mark.parametrize("name", TABLES)
 def test_a_shipped_robot_is_the_one_that_recorded_runs_were_made_with(name):
-    found, expected = leaves(robot_facts(name)), leaves(read("robots")[name])
+    found, expected = leaves(robot_facts(Robot.named(name))), leaves(read("robots")[name])
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 

@@ -1,0 +1,135 @@
+"""What a user sees of short runs: signals, metrics, figures, pages, exports; and of robot files.
+
+    PYTHONPATH=.:tests/helpers python tests/helpers/seen.py     writes tests/data/pinned/seen.json
+
+Only after a change that is meant. Texts stand without their numbers, many numbers as a sum.
+"""
+
+import dataclasses
+import json
+import re
+from functools import partial
+from unittest.mock import patch
+
+import numpy as np
+from matplotlib.colors import to_hex
+from pinned import FOLDER, robot_facts
+
+from hierarchy import Robot
+from scenarios import load, simulate
+from scenarios.draw.figures import letter
+from scenarios.export import mcap
+from scenarios.measure.comparison import Comparison
+from scenarios.measure.metrics import measure
+from scenarios.measure.runs import Run
+from scenarios.results import page, sections
+from scenarios.scene.drawn import scene
+
+ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
+          *sorted((FOLDER.parents[2] / "examples" / "robots").iterdir())]
+# By scenario: seconds that are simulated.
+RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "wipe": 0.05,
+        "reach-torque-smooth": 0.02}
+PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "page")  # need no MuJoCo
+
+
+def seen_of_run(name):
+    """Of one run: {what: lines or sums}."""
+    run = _run(name)
+    return {
+        "signals": {key: condensed(values) for key, values in run.signals.items()},
+        "metrics": {key: [one.label, one.unit, one.value] for key, one in measure(run).items()},
+        "figures": {key: figure_facts(fig) for key, fig in letter.figures([run])},
+        "scene": condensed(dataclasses.asdict(scene(run, 30.0))),
+        "exported": condensed([*mcap._entries(run, mcap.grouped(run))]),
+        "layout": condensed(mcap.layout(run))}
+
+
+def seen_of_page(name):
+    """Of the page that compares two resolvers: its text, and its figures."""
+    runs = [Run(run.scenario, label, label, run, None)
+            for label in ("tpm", "recursive") for run in [_run(name, label)]]
+    drawn = {}
+
+    def svg(fig, title):
+        drawn[title] = figure_facts(fig)
+        return title
+
+    with patch.object(page, "svg", svg), patch.object(sections, "svg", svg):
+        text = page.comparison_page(Comparison(runs, "hierarchy compare", {"python": "3"}))
+    text = re.sub(r"<(style|script|iframe)\b.*?</\1>", "", text, flags=re.DOTALL)
+    return {"text": [masked(line) for line in text.splitlines() if line.strip()], "figures": drawn}
+
+
+def seen_of_robots():
+    """Of each robot file of tests and examples: its numbers, by name, and what is said of it."""
+    found = {file.name: Robot.from_file(file) for file in ROBOTS}
+    return {name: [{key: condensed(value) for key, value in robot_facts(robot).items()},
+                   [masked(text) for text in robot.missing]] for name, robot in found.items()}
+
+
+def figure_facts(fig):
+    """Of each axes: what stands beside it, and of what is drawn in it look and numbers."""
+    return [[ax.get_title(loc="left"), ax.get_xlabel(), ax.get_ylabel(), ax.get_xscale(),
+             ax.get_yscale(), [masked(text.get_text()) for text in ax.texts],
+             [[line.get_label(), to_hex(line.get_color()), line.get_linewidth(),
+               str(line.get_linestyle()), line.get_zorder(), condensed(line.get_xydata())]
+              for line in ax.lines],
+             [[type(one).__name__, condensed(one.get_alpha() or 1.0), [
+                 to_hex(colour) for colour in np.atleast_2d(one.get_facecolor())][:3],
+               condensed([path.vertices for path in one.get_paths()] if hasattr(one, "get_paths")
+                         else one.get_path().vertices)] for one in (*ax.patches, *ax.collections)]]
+            for ax in fig.axes]
+
+
+def condensed(value):
+    """One number for all numbers in nested things, beside the texts without their numbers."""
+    numbers, texts = [], []
+    _collect(value, numbers, texts)
+    values = np.array([number if np.isfinite(number) else 7e7 for number in numbers])
+    weights = 1.0 + np.modf(0.618 * np.arange(len(values)))[0]
+    total = float(f"{np.arcsinh(1e3 * values) @ weights:.9g}") if numbers else 0.0
+    return [total, len(values), *sorted(set(texts))] if texts else [total, len(values)]
+
+
+def _collect(value, numbers, texts):
+    if isinstance(value, dict):
+        for key, one in value.items():
+            texts.append(str(key))
+            _collect(one, numbers, texts)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+        numbers += value.astype(float).ravel().tolist()
+    elif isinstance(value, (list, tuple, np.ndarray)):
+        for one in value:
+            _collect(one, numbers, texts)
+    elif isinstance(value, (int, float, np.number)):
+        numbers.append(float(value))
+    elif value is not None:
+        texts.append(masked(value) if isinstance(value, str) else type(value).__name__)
+
+
+def masked(text):
+    """A text without its numbers, which may differ in the last digit."""
+    return re.sub(r"-?\d[\d.,]*(e-?\d+)?", "#", text)
+
+
+def _run(name, resolver=""):
+    scenario = load(name, [f"control.duration={RUNS[name]}"])
+    run = simulate(scenario.with_resolver(resolver) if resolver else scenario)
+    taken = 1e-4 + 1e-6 * np.arange(run.ticks)  # [s]; the true ones are others each time
+    return dataclasses.replace(run, signals={
+        key: taken if key.startswith("time_") else values for key, values in run.signals.items()})
+
+
+PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
+         "page": partial(seen_of_page, "ellipse"), "robots": seen_of_robots}
+
+
+def seen(part):
+    """One of the parts, as plain lists and dictionaries."""
+    return json.loads(json.dumps(PARTS[part](), default=np.ndarray.tolist))
+
+
+if __name__ == "__main__":
+    lines = ",\n".join(f"{json.dumps(part)}: {json.dumps(seen(part))}" for part in PARTS)
+    (FOLDER / "seen.json").write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
