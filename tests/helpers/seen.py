@@ -5,9 +5,13 @@
 Only after a change that is meant. Texts stand without their numbers, many numbers as a sum.
 """
 
+import contextlib
 import dataclasses
+import io
 import json
+import os
 import re
+import shlex
 from functools import partial
 from unittest.mock import patch
 
@@ -17,6 +21,7 @@ from pinned import FOLDER, robot_facts
 
 from hierarchy import Robot
 from scenarios import load, simulate
+from scenarios.cli.main import run_command
 from scenarios.draw.figures import letter
 from scenarios.export import mcap
 from scenarios.measure.comparison import Comparison
@@ -30,6 +35,9 @@ ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
 # By scenario: seconds that are simulated.
 RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "wipe": 0.05,
         "reach-torque-smooth": 0.02}
+COMMANDS = (  # none of which measures a time
+    "check ellipse-hqp", "check reach-torque-smooth", "check human", "check wipe",
+    *(f"check {file}" for file in ROBOTS), "problems list", "problems show HUM38")
 PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "page")  # need no MuJoCo
 
 
@@ -66,6 +74,20 @@ def seen_of_robots():
     found = {file.name: Robot.from_file(file) for file in ROBOTS}
     return {name: [{key: condensed(value) for key, value in robot_facts(robot).items()},
                    [masked(text) for text in robot.missing]] for name, robot in found.items()}
+
+
+def seen_of_commands():
+    """Of each command: its exit code and what it prints."""
+    found = {}
+    with patch.dict(os.environ, {"COLUMNS": "100"}):
+        for command in COMMANDS:
+            printed = io.StringIO()
+            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+                code = run_command(shlex.split(command))
+            text = printed.getvalue().replace(str(FOLDER.parents[2]), "")
+            found[command.split("/")[-1]] = [code, *(" ".join(masked(line).split())
+                                                     for line in text.splitlines())]
+    return found
 
 
 def figure_facts(fig):
@@ -122,7 +144,8 @@ def _run(name, resolver=""):
 
 
 PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
-         "page": partial(seen_of_page, "ellipse"), "robots": seen_of_robots}
+         "commands": seen_of_commands, "page": partial(seen_of_page, "ellipse"),
+         "robots": seen_of_robots}
 
 
 def seen(part):
