@@ -1,7 +1,8 @@
 """The exact solve: find a working set, verify it, and search on where that fails.
 
 Python, batches and the C library call this one kernel. The working set comes from the memory of an
-earlier solve, or from a pass level by level. It is factored anew and pivoted in blocks, then row by
+earlier solve, or from a pass level by level; where that leads to no proof, a second pass counts
+nearly dependent rows as independent. It is factored anew and pivoted in blocks, at the end row by
 row. After each of these the claims are verified, and nothing is SOLVED otherwise.
 """
 
@@ -24,23 +25,28 @@ from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import assign, matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import LARGER, MET, PASS_STEPS, PATIENCE, SOLVE_STEPS
+from solvers.kernels.tolerances import DEARER, INDEPENDENT, LARGER, MET, PASS_STEPS, PATIENCE, SOLVE_STEPS
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     FINISHED,
     FIRST,
+    LOWER,
     NEGLECTED,
     SCALE,
     STATE,
+    UPPER,
     Scaled,
     carve_working_set,
     load,
     meet,
+    product_with,
     rescale,
     restore,
+    row_times_x,
     take_up,
     working_set_size,
 )
+from solvers.kernels.working_set import TOLERANCE as RANK
 from solvers.status import (
     EQUAL,
     FREE,
@@ -192,17 +198,23 @@ def answer(s, record, settings, work):
     if warm and level < 0:
         code, blocks = pivot_in_blocks(s, limit, ZERO)
         steps = blocks
-    if code in (UNPROVED, INACCURATE) and level < 0:
+    declared, share = s.scalar[RANK], 1.0
+    while code in (UNPROVED, INACCURATE) and level < 0 and share > 0.0 and steps < limit:
+        restore(s)
         t, _ = carve_tableau(s, work, at)
+        s.scalar[RANK] = share * declared
         code, level = pass_through_levels(t, settings[TOLERANCE],
                                           min(limit - steps, PASS_STEPS * (m + 1)))
+        s.scalar[RANK] = declared
         steps += t.count[STEPS]
         save(s, saved, levels if code == SOLVED else level)
         code = _verified(s, code, NO)
-        restore(s)
         if code != SOLVED and steps < limit:
             code, tries = pivot_in_blocks(s, limit - steps, ZERO + PATIENCE)
             steps, blocks = steps + tries, blocks + tries
+        if share < 1.0 and code == SOLVED and _costs_more(s, saved):
+            code = ZERO + UNPROVED
+        share = INDEPENDENT if share == 1.0 else 0.0
     if code in (UNPROVED, INACCURATE) and steps < limit:
         restore(s)
         code, tries, level = pivot_one_by_one(s, current, saved, limit - steps, level)
@@ -221,6 +233,24 @@ def answer(s, record, settings, work):
     if code == ITERATION_LIMIT:
         record[3 * m + 2] = _resume(s, level)
     return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
+
+
+@compiled
+def _costs_more(s, other):
+    """Whether x violates a level by a share of more than DEARER more than another x does.
+
+    It then uses a nearly dependent row for a gain above that is within `rank_tolerance`.
+    """
+    for k in range(s.multiplier.shape[0] - 1):
+        square, square_of_other = 0.0, 0.0
+        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
+            value, value_of_other, low, up = (
+                row_times_x(s, i), product_with(s, i, other), s.number[LOWER, i], s.number[UPPER, i])
+            square += max(value - up, low - value, 0.0) ** 2
+            square_of_other += max(value_of_other - up, low - value_of_other, 0.0) ** 2
+        if square > (1.0 + DEARER) ** 2 * square_of_other + 1e-16:
+            return True
+    return False
 
 
 @inlined
