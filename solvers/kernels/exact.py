@@ -25,13 +25,23 @@ from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
 from solvers.kernels.space import assign, matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import DEARER, INDEPENDENT, LARGER, MET, PASS_STEPS, PATIENCE, SOLVE_STEPS
+from solvers.kernels.tolerances import (
+    BAND,
+    DEARER,
+    INDEPENDENT,
+    LARGER,
+    MET,
+    PASS_STEPS,
+    PATIENCE,
+    SOLVE_STEPS,
+)
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
     FINISHED,
     FIRST,
     LOWER,
     NEGLECTED,
+    NORM,
     SCALE,
     STATE,
     UPPER,
@@ -42,7 +52,6 @@ from solvers.kernels.working_set import (
     product_with,
     rescale,
     restore,
-    row_times_x,
     take_up,
     working_set_size,
 )
@@ -241,16 +250,23 @@ def _costs_more(s, other):
 
     It then uses a nearly dependent row for a gain above that is within `rank_tolerance`.
     """
+    least = (BAND * (1.0 + length_of(s.x))) ** 2
     for k in range(s.multiplier.shape[0] - 1):
-        square, square_of_other = 0.0, 0.0
+        square, square_of_other = 0.0, least
         for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
-            value, value_of_other, low, up = (
-                row_times_x(s, i), product_with(s, i, other), s.number[LOWER, i], s.number[UPPER, i])
-            square += max(value - up, low - value, 0.0) ** 2
-            square_of_other += max(value_of_other - up, low - value_of_other, 0.0) ** 2
-        if square > (1.0 + DEARER) ** 2 * square_of_other + 1e-16:
+            square += _violation(s, i, s.x) ** 2
+            square_of_other += _violation(s, i, other) ** 2
+        if square > (1.0 + DEARER) ** 2 * square_of_other:
             return True
     return False
+
+
+@inlined
+def _violation(s, i, x):
+    """Return by how much an x violates row i, over its norm; 0 if it takes no part."""
+    value, norm = product_with(s, i, x), s.number[NORM, i]
+    over = max(value - s.number[UPPER, i], s.number[LOWER, i] - value, 0.0)
+    return over / norm if norm > 0.0 else 0.0
 
 
 @inlined
