@@ -8,9 +8,9 @@ Each mutant is one change: a comparison, an arithmetic or boolean operator, a co
 value. Its module is replaced as it is imported, in the tests and in every program that they start;
 the checkout is not touched, so kernels come from the cache. The tests are those that run the
 changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
-once, and again when tests have changed), or --tests. A line that tests run only in other processes,
-or that runs as its module is imported, has the tests of its module. Of many tests MOST are taken: a
-case of each function first, those first that run few lines. Prints every survivor with its line,
+once, and again when tests have changed), or --tests. Processes that tests start count as theirs. A
+line that runs as its module is imported has the tests of its module. Of many tests MOST are taken:
+a case of each function first, those first that run few lines. Prints every survivor with its line,
 and the share of survivors. A mutant whose tests take more CPU time than --limit counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
@@ -67,6 +67,17 @@ def get_code(loader, name):
         return marshal.load(file)
 
 SourceFileLoader.get_code = get_code
+'''
+
+# The same while the map is made: notes what a test runs in another process.
+NOTED = '''
+import atexit, os
+from coverage import Coverage
+
+noted = Coverage(os.environ["MAP"], data_suffix=True, source=os.environ["MAPPED"].split(":"),
+                 context=os.environ["MAP_OF"])
+noted.start()
+atexit.register(lambda: (noted.stop(), noted.save()))
 '''
 
 SWAPS = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq,
@@ -189,6 +200,7 @@ class Contexts:
 
     def within(self, context: str) -> Iterator[None]:
         self.coverage.switch_context(context)
+        os.environ["MAP_OF"] = context
         result = yield
         self.coverage.switch_context("")
         return result
@@ -209,14 +221,22 @@ def write_map(tests: list[str]) -> None:
     from coverage import Coverage
 
     MAP.parent.mkdir(exist_ok=True)
-    coverage = Coverage(str(MAP), source=[str(ROOT / name) for name in SAMPLED])
+    source = [str(ROOT / name) for name in SAMPLED]
+    coverage = Coverage(str(MAP), source=source)
     coverage.start()
     for module in modules():  # what these run as they are imported, is of no test
         with contextlib.suppress(ImportError):
             if not module.endswith("__main__.py"):
                 import_module(name_of(module))
-    code = pytest.main(["-q", "-p", "no:cacheprovider", "-n", "0", *tests], [Contexts(coverage)])
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "sitecustomize.py").write_text(NOTED)
+        os.environ |= {"PYTHONPATH": os.pathsep.join((folder, str(ROOT))), "MAP": str(MAP),
+                       "MAPPED": ":".join(source), "MAP_OF": ""}
+        code = pytest.main(["-q", "-p", "no:cacheprovider", "-n", "0", *tests],
+                           [Contexts(coverage)])
     coverage.stop()
+    coverage.save()
+    coverage.combine([str(MAP.parent)])
     coverage.save()
     if code:
         sys.exit("the tests fail without any change")

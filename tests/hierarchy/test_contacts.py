@@ -129,7 +129,11 @@ def test_an_open_contact_has_no_force_and_is_free_to_move(faces):
 def test_the_load_of_a_sole_falls_in_its_ramp_from_what_it_carried(largest):
     """The last row has all of its normal force."""
     state, rows = State.at(ROBOT, ROBOT.rest), Rows.empty(41, 60)
-    write = tasks.Friction(opening(), largest=largest).writer(state, "torque", rows)
+    task = tasks.Friction(opening(), largest=largest)
+    assert task.row_names[::10] == ("left_foot point 1 face 1", "left_foot point 3 face 1",
+                                    "right_foot point 1 face 1", "right_foot point 3 face 1",
+                                    "right_foot load")
+    write = task.writer(state, "torque", rows)
     state.carried = np.array([300.0, 92.0])
     for t, up in ((0.5, np.inf), (0.79, np.inf), (0.9, 46.0), (0.99, 4.6), (1.5, np.inf)):
         state.move(t, state.q, state.v)

@@ -144,3 +144,10 @@ def test_jitter_delays_each_frame_by_less_than_its_most_and_by_the_seed():
 def test_what_cannot_be_is_refused_by_name(make, said):
     with pytest.raises(HierarchyError, match=said.replace("(", r"\(")):
         make()
+
+
+def test_a_camera_faces_what_it_looks_at_unless_it_is_there():
+    R = looking_at([0.0, 0.0, 1.0], [0.0, 1.0, 1.0])
+    np.testing.assert_allclose(R, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], atol=1e-15)
+    with pytest.raises(HierarchyError, match="position and look_at are both"):
+        looking_at([0.0, 0.0, 1.0], [0.0, 0.0, 1.0])

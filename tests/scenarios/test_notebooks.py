@@ -28,6 +28,7 @@ def test_a_table_escapes_every_value_marks_the_best_and_says_how_much_is_left_ou
     assert "a&amp;b" in text
     assert "<td>&lt;i&gt;</td>" in text
     assert "<td><b>2</b></td>" in text
+    assert "<b>" not in html_table("t", ("n",), [(1,)])
     assert "... and 70 more" in html_table("t", ("n",), [(i,) for i in range(100)])
 
 

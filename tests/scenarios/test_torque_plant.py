@@ -10,6 +10,7 @@ from standing import IDEAL, ROBOT, accelerations, feet
 
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
+from hierarchy.tasks import TorqueLimits
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot
@@ -207,3 +208,15 @@ def test_a_base_that_tilts_has_fallen():
             break
         plant.act(np.zeros(ROBOT.n - 6))
     assert plant.fault.startswith("the robot has fallen: its base has tilted by 0.5 rad (")
+
+
+def test_a_share_of_the_torques_limits_them_and_what_stays_the_same_is_kept():
+    scenario = load("reach-torque", ["limits.torque=0.5"])
+    cell = build(scenario)
+    half = 0.5 * cell.robot.effort_limit[6:]
+    np.testing.assert_array_equal(cell.torque_limit, half)
+    limits = TorqueLimits(cell.robot, 0.5, contacts=cell.contacts)
+    np.testing.assert_array_equal(limits.bounds(cell.state), [-half, half])
+    assert scenario.model_copy(update={"limits": None}).asks == "inequalities"
+    seen = build(load("ellipse"))
+    assert build(load("ellipse", ["position.gain=2.0"]), seen).sensor is seen.sensor

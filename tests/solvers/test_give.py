@@ -228,3 +228,22 @@ def test_a_metric_that_loses_definiteness_is_a_numerical_failure(name):
     assert res.status is Status.NUMERICAL_FAILURE
     assert not res.x.any()
     assert not certify(h, [1.0, 0.0]).certified
+
+
+@pytest.mark.parametrize("inaccurate", [None, 0, 1])
+def test_a_part_that_is_inaccurate_makes_the_whole_so_and_each_part_goes_on_from_its_memory(
+        inaccurate):
+    hcod, asked = make("hcod"), []
+
+    def solve(part, memory):
+        found = hcod.solve(part, memory)
+        asked.append(memory)
+        if len(asked) - 1 == inaccurate:
+            found.status = Status.INACCURATE
+        return found
+
+    first = giving(solve, problem(1, 0.1), [1], None)
+    assert first.status is (Status.SOLVED if inaccurate is None else Status.INACCURATE)
+    assert asked == [None, None]
+    giving(solve, problem(1, 0.1), [1], first.memory)
+    assert [memory.size for memory in asked[2:]] == first.memory[-2:].tolist()
