@@ -1,12 +1,13 @@
-"""What a user sees of short runs: signals, metrics, figures, pages, exports; and of robot files.
+"""What a user sees of short runs: signals, metrics, figures, pages, exports; of keys, of robots.
 
-    PYTHONPATH=.:tests/helpers python tests/helpers/seen.py     writes tests/data/pinned/seen.json
+    PYTHONPATH=.:tests/helpers python tests/helpers/seen.py     writes seen.json.gz
 
 Only after a change that is meant. Texts stand without their numbers, many numbers as a sum.
 """
 
 import contextlib
 import dataclasses
+import gzip
 import io
 import json
 import os
@@ -20,7 +21,7 @@ from matplotlib.colors import to_hex
 from pinned import FOLDER, robot_facts
 
 from hierarchy import Robot
-from scenarios import load, simulate
+from scenarios import Scenario, load, shipped, simulate
 from scenarios.cli.main import run_command
 from scenarios.draw.figures import letter
 from scenarios.export import mcap
@@ -29,6 +30,7 @@ from scenarios.measure.metrics import measure
 from scenarios.measure.runs import Run
 from scenarios.results import page, sections
 from scenarios.scene.drawn import scene
+from solvers import make, names
 
 ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
           *sorted((FOLDER.parents[2] / "examples" / "robots").iterdir())]
@@ -38,7 +40,7 @@ RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "
 COMMANDS = (  # none of which measures a time
     "check ellipse-hqp", "check reach-torque-smooth", "check human", "check wipe",
     *(f"check {file}" for file in ROBOTS), "problems list", "problems show HUM38")
-PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "page")  # need no MuJoCo
+PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "page", "keys")  # need no MuJoCo
 
 
 def seen_of_run(name):
@@ -51,6 +53,20 @@ def seen_of_run(name):
         "scene": condensed(dataclasses.asdict(scene(run, 30.0))),
         "exported": condensed([*mcap._entries(run, mcap.grouped(run))]),
         "layout": condensed(mcap.layout(run))}
+
+
+def seen_of_ticks(name):
+    """Of the first ticks of one run: signals and metrics."""
+    run = _run(name, ticks=8)
+    return {"signals": {key: condensed(values) for key, values in run.signals.items()},
+            "metrics": {key: one.value for key, one in measure(run).items()}}
+
+
+def seen_of_keys():
+    """Of the keys of scenario files and the settings of resolvers: types, bounds, defaults."""
+    keys = Scenario.model_json_schema()["$defs"]
+    return {"keys": {name: condensed(_undescribed(one)) for name, one in keys.items()},
+            "resolvers": {name: repr(make(name)) for name in names()}}
 
 
 def seen_of_page(name):
@@ -130,22 +146,37 @@ def _collect(value, numbers, texts):
         texts.append(masked(value) if isinstance(value, str) else type(value).__name__)
 
 
+def _undescribed(schema):
+    """A schema without its sentences."""
+    if isinstance(schema, list):
+        return [_undescribed(one) for one in schema]
+    said = ("description", "title")
+    return schema if not isinstance(schema, dict) else {
+        key: _undescribed(one) for key, one in schema.items() if key not in said}
+
+
 def masked(text):
     """A text without its numbers, which may differ in the last digit."""
     return re.sub(r"-?\d[\d.,]*(e-?\d+)?", "#", text)
 
 
-def _run(name, resolver=""):
-    scenario = load(name, [f"control.duration={RUNS[name]}"])
+def _run(name, resolver="", ticks=0):
+    scenario = load(name)
+    duration = ticks * scenario.control.period if ticks else RUNS[name]
+    scenario = load(name, [f"control.duration={duration:.6g}"])
     run = simulate(scenario.with_resolver(resolver) if resolver else scenario)
     taken = 1e-4 + 1e-6 * np.arange(run.ticks)  # [s]; the true ones are others each time
     return dataclasses.replace(run, signals={
         key: taken if key.startswith("time_") else values for key, values in run.signals.items()})
 
 
+OF_PACKAGES = ("panda-ellipse", "romeo", "stand-g1", "stand-g1-smooth", "stand-go2", "stand-talos",
+               "stand-talos-smooth")  # their robots
+OTHERS = sorted({*shipped()} - {*RUNS, *OF_PACKAGES})
 PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
-         "commands": seen_of_commands, "page": partial(seen_of_page, "ellipse"),
-         "robots": seen_of_robots}
+         **{f"ticks {name}": partial(seen_of_ticks, name) for name in OTHERS},
+         "commands": seen_of_commands, "keys": seen_of_keys,
+         "page": partial(seen_of_page, "ellipse"), "robots": seen_of_robots}
 
 
 def seen(part):
@@ -154,5 +185,5 @@ def seen(part):
 
 
 if __name__ == "__main__":
-    lines = ",\n".join(f"{json.dumps(part)}: {json.dumps(seen(part))}" for part in PARTS)
-    (FOLDER / "seen.json").write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
+    text = json.dumps({part: seen(part) for part in PARTS})
+    (FOLDER / "seen.json.gz").write_bytes(gzip.compress(text.encode(), mtime=0))
