@@ -20,17 +20,21 @@ import numpy as np
 from matplotlib.colors import to_hex
 from pinned import FOLDER, robot_facts
 
-from hierarchy import Robot
+from hierarchy import HierarchyError, Robot
 from scenarios import Scenario, load, shipped, simulate
 from scenarios.cli.main import run_command
 from scenarios.draw.figures import letter
+from scenarios.draw.replay import page as replay
+from scenarios.draw.viewer import live_page
+from scenarios.draw.viewer.live import Live
 from scenarios.export import mcap
 from scenarios.measure.comparison import Comparison
 from scenarios.measure.metrics import measure
 from scenarios.measure.runs import Run
 from scenarios.results import page, sections
 from scenarios.scene.drawn import scene
-from solvers import make, names
+from solvers import certify, explain, make, names
+from solvers.problems import ANY, generate, structured
 
 ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
           *sorted((FOLDER.parents[2] / "examples" / "robots").iterdir())]
@@ -67,6 +71,38 @@ def seen_of_keys():
     keys = Scenario.model_json_schema()["$defs"]
     return {"keys": {name: condensed(_undescribed(one)) for name, one in keys.items()},
             "resolvers": {name: repr(make(name)) for name in names()}}
+
+
+def seen_of_live_page(name):
+    """Of the page of a live run, after some requests: what its script reads."""
+    def plain(values, steps=False):
+        return [*np.nan_to_num(values).shape, steps, *np.nan_to_num(values).ravel().tolist()]
+
+    with patch.object(live_page, "packed", plain), patch.object(replay, "packed", plain):
+        shown = live_page.LivePage(Live(load(name)))
+        found = [condensed(shown.data())]
+        for asked in ({"resolver": "recursive"}, {"pointing.alpha_d": 20.0}, {"playing": False},
+                      {"nothing": 1}):
+            shown.answer(asked)
+            shown.step(0.02)
+            found.append(condensed(shown.data()))
+    return found
+
+
+def seen_of_answers():
+    """Of what each resolver but `hqp` says of generated problems: answers and explanations."""
+    problems = [generate(seed, ANY) for seed in range(12)] + [structured(s) for s in range(12)]
+    found = {}
+    for name in sorted({*names()} - {"hqp"}):
+        for damping in (0.0, 0.05):
+            resolver = make(name, damping=damping)
+            for k, h in enumerate(problems):
+                with contextlib.suppress(HierarchyError):  # of rows that it does not handle
+                    res = resolver.solve(h)
+                    found[f"{resolver.label} {damping} {k}"] = [
+                        res.status.name, condensed(res.x), masked(str(explain(h, res))),
+                        certify(h, res.x).certified]
+    return found
 
 
 def seen_of_page(name):
@@ -175,6 +211,7 @@ OF_PACKAGES = ("panda-ellipse", "romeo", "stand-g1", "stand-g1-smooth", "stand-g
 OTHERS = sorted({*shipped()} - {*RUNS, *OF_PACKAGES})
 PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
          **{f"ticks {name}": partial(seen_of_ticks, name) for name in OTHERS},
+         "answers": seen_of_answers, "live page": partial(seen_of_live_page, "ellipse"),
          "commands": seen_of_commands, "keys": seen_of_keys,
          "page": partial(seen_of_page, "ellipse"), "robots": seen_of_robots}
 
