@@ -110,11 +110,13 @@ def file_path(what: str, value: object) -> Path:
 
 
 def missing(error: ModuleNotFoundError, extra: str) -> ModuleNotFoundError:
-    """Return an error that also says which line installs a module that is not there."""
+    """Return an error that also says which line installs a module that is not there.
+
+    Of lines for what it was imported for, the last counts, which installs most.
+    """
     ours = str(error.name).partition(".")[0] in ("hierarchy", "solvers", "scenarios")
-    remedy = f": pip install 'task-hierarchy[{extra}]'"
-    return ModuleNotFoundError(f"{error}{'' if ours or 'pip install' in str(error) else remedy}",
-                               name=error.name)
+    remedy = "" if ours else f": pip install 'task-hierarchy[{extra}]'"
+    return ModuleNotFoundError(f"{str(error).partition(': pip')[0]}{remedy}", name=error.name)
 
 
 def brief(value: object) -> str:

@@ -123,7 +123,8 @@ def test_an_older_pinocchio_that_comes_first_is_named_in_one_line(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "size", "without"), [
-    ("Robot", "robots", ["pinocchio", "coal"]), ("simulate", "scenarios", ["pydantic"])])
+    ("Robot", "robots", ["pinocchio", "coal"]), ("simulate", "scenarios", ["pydantic"]),
+    ("simulate", "scenarios", ["pinocchio", "coal"])])
 def test_a_name_of_a_larger_size_says_the_line_that_installs_it(name, size, without, tmp_path):
     code = (f"import sys; sys.modules |= dict.fromkeys({without})\n"
             f"import task_hierarchy; task_hierarchy.{name}")
