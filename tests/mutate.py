@@ -9,9 +9,10 @@ value. Its module is replaced as it is imported, in the tests and in every progr
 the checkout is not touched, so kernels come from the cache. The tests are those that run the
 changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
 once, and again when tests have changed), or --tests. Processes that tests start count as theirs. A
-line that runs as its module is imported has the tests of its module. Of many tests MOST are taken:
-a case of each function first, those first that run few lines. Prints every survivor with its line,
-and the share of survivors. A mutant whose tests take more CPU time than --limit counts as killed.
+line that runs as its module is imported has the tests of its module. Of many tests those of SEEN
+and MOST others are taken: a case of each function first, those first that run few lines. Prints
+every survivor with its line, and the share of survivors. A mutant whose tests take more CPU time
+than --limit counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
 `strict=` of zip (a check that does not fire where shapes have been checked), what only a type
@@ -49,7 +50,8 @@ sys.path[0] = str(ROOT)  # beside this file are folders of tests with the names 
 SAMPLED = ("hierarchy", "solvers", "scenarios")
 FILES = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.py"))
 MAP = ROOT / "build" / "tests-of-lines"
-MOST = 40  # tests of a mutant
+MOST = 40  # tests of a mutant, beside those of SEEN
+SEEN = "tests/scenarios/test_seen.py"
 COMPILED = ("compiled", "unlocked", "inlined", "measured")
 # The folder of kernels, and the integer codes that kernels read.
 OF_KERNELS = ("solvers/kernels/", "solvers/status.py")
@@ -281,8 +283,9 @@ def tests_of(mutant: Mutant) -> tuple[str, ...]:
         function = test.partition("[")[0]
         order[test] = seen[function], footprints()[test]
         seen[function] += 1
-    chosen = sorted(order, key=order.__getitem__)[:MOST]
-    return ("field(" in line) * records + default * keys + tuple(chosen)
+    first = [test for test in order if test.startswith(SEEN)]  # much in little time
+    others = sorted(order.keys() - {*first}, key=order.__getitem__)[:MOST]
+    return ("field(" in line) * records + default * keys + (*first, *others)
 
 
 @dataclass(frozen=True)
