@@ -263,8 +263,8 @@ def footprints() -> Counter[str]:
 @cache
 def lines_of(module: str) -> dict[int, tuple[str, ...]]:
     """Return the tests of each line of a module; of line 0 those that run any line of it."""
-    lines = {line: tuple(test for test in tests if test)
-             for line, tests in known().get(str(ROOT / module), {}).items()}
+    lines = {line: tuple(tests) for line, tests in known().get(str(ROOT / module), {}).items()
+             if "" not in tests}  # those run as the module is imported
     return lines | {0: tuple(sorted({test for tests in lines.values() for test in tests}))}
 
 
