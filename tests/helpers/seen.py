@@ -70,7 +70,8 @@ def seen_of_keys():
     """Of the keys of scenario files and the settings of resolvers: types, bounds, defaults."""
     keys = Scenario.model_json_schema()["$defs"]
     return {"keys": {name: condensed(_undescribed(one)) for name, one in keys.items()},
-            "resolvers": {name: repr(make(name)) for name in names()}}
+            "resolvers": {name: repr(make(name)) for name in names()},
+            "labels": [make("weighted", strict_levels=count).label for count in (-1, 0, 2)]}
 
 
 def seen_of_live_page(name):
@@ -145,7 +146,8 @@ def seen_of_commands():
 def figure_facts(fig):
     """Of each axes: what stands beside it, and of what is drawn in it look and numbers."""
     return [[ax.get_title(loc="left"), ax.get_xlabel(), ax.get_ylabel(), ax.get_xscale(),
-             ax.get_yscale(), [masked(text.get_text()) for text in ax.texts],
+             ax.get_yscale(), condensed([ax.get_xlim(), ax.get_ylim()]),
+             [masked(text.get_text()) for text in ax.texts],
              [[line.get_label(), to_hex(line.get_color()), line.get_linewidth(),
                str(line.get_linestyle()), line.get_zorder(), condensed(line.get_xydata())]
               for line in ax.lines],
