@@ -20,7 +20,7 @@ import numpy as np
 from matplotlib.colors import to_hex
 from pinned import FOLDER, robot_facts
 
-from hierarchy import HierarchyError, Robot
+from hierarchy import HierarchyError, Robot, tasks
 from scenarios import Scenario, load, shipped, simulate
 from scenarios.cli.main import run_command
 from scenarios.draw.figures import letter
@@ -67,10 +67,13 @@ def seen_of_ticks(name):
 
 
 def seen_of_keys():
-    """Of the keys of scenario files and the settings of resolvers: types, bounds, defaults."""
+    """Of keys of scenario files, tasks and settings of resolvers: types, bounds, defaults."""
     keys = Scenario.model_json_schema()["$defs"]
     return {"keys": {name: condensed(_undescribed(one)) for name, one in keys.items()},
             "resolvers": {name: repr(make(name)) for name in names()},
+            "tasks": {name: {one.name: str(one.default) for one in dataclasses.fields(kind)
+                             if one.default is not dataclasses.MISSING}
+                      for name, kind in vars(tasks).items() if dataclasses.is_dataclass(kind)},
             "labels": [make("weighted", strict_levels=count).label for count in (-1, 0, 2)]}
 
 
