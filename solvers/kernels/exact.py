@@ -207,8 +207,10 @@ def answer(s, record, settings, work):
     if warm and level < 0:
         code, blocks = pivot_in_blocks(s, limit, ZERO)
         steps = blocks
-    declared, share = s.scalar[RANK], 1.0
-    while code in (UNPROVED, INACCURATE) and level < 0 and share > 0.0 and steps < limit:
+    declared = s.scalar[RANK]
+    for share in (1.0, INDEPENDENT):
+        if code not in (UNPROVED, INACCURATE) or level >= 0 or steps >= limit:
+            break
         restore(s)
         t, _ = carve_tableau(s, work, at)
         s.scalar[RANK] = share * declared
@@ -223,7 +225,6 @@ def answer(s, record, settings, work):
             steps, blocks = steps + tries, blocks + tries
         if share < 1.0 and code == SOLVED and _costs_more(s, saved):
             code = ZERO + UNPROVED
-        share = INDEPENDENT if share == 1.0 else 0.0
     if code in (UNPROVED, INACCURATE) and steps < limit:
         restore(s)
         code, tries, level = pivot_one_by_one(s, current, saved, limit - steps, level)
