@@ -1,9 +1,9 @@
 """The exact solve: find a working set, verify it, and search on where that fails.
 
 Python, batches and the C library call this one kernel. The working set comes from the memory of an
-earlier solve, or from a pass level by level; where that leads to no proof, a second pass counts
-nearly dependent rows as independent. It is factored anew and pivoted in blocks, at the end row by
-row. After each of these the claims are verified, and nothing is SOLVED otherwise.
+earlier solve, or from a pass level by level; where that is no proof and rows are nearly dependent,
+a second pass counts these as independent. It is factored anew and pivoted in blocks, at the end row
+by row. After each of these the claims are verified, and nothing is SOLVED otherwise.
 """
 
 from __future__ import annotations
@@ -37,11 +37,13 @@ from solvers.kernels.tolerances import (
 )
 from solvers.kernels.verification import neglects, verify
 from solvers.kernels.working_set import (
+    CUT,
     FINISHED,
     FIRST,
     LOWER,
     NEGLECTED,
     NORM,
+    REFERENCE,
     SCALE,
     STATE,
     UPPER,
@@ -207,9 +209,10 @@ def answer(s, record, settings, work):
     if warm and level < 0:
         code, blocks = pivot_in_blocks(s, limit, ZERO)
         steps = blocks
-    declared = s.scalar[RANK]
+    declared, resumed = s.scalar[RANK], level >= 0
     for share in (1.0, INDEPENDENT):
-        if code not in (UNPROVED, INACCURATE) or level >= 0 or steps >= limit:
+        if code not in (UNPROVED, INACCURATE) or level >= 0 or steps >= limit or (
+                share < 1.0 and not _is_unclear(s)):
             break
         restore(s)
         t, _ = carve_tableau(s, work, at)
@@ -220,11 +223,22 @@ def answer(s, record, settings, work):
         steps += t.count[STEPS]
         save(s, saved, levels if code == SOLVED else level)
         code = _verified(s, code, NO)
+        if share == 1.0:
+            for i in range(m):
+                current[0, i] = s.index[STATE, i]
+            continue
         if code != SOLVED and steps < limit:
             code, tries = pivot_in_blocks(s, limit - steps, ZERO + PATIENCE)
             steps, blocks = steps + tries, blocks + tries
-        if share < 1.0 and code == SOLVED and _costs_more(s, saved):
+        if code == SOLVED and _costs_more(s, saved):
             code = ZERO + UNPROVED
+        if code != SOLVED:  # go on from the first pass
+            for i in range(m):
+                s.index[STATE, i] = np.int64(current[0, i])
+            restore(s)
+    if code in (UNPROVED, INACCURATE) and steps < limit and not resumed:
+        code, tries = pivot_in_blocks(s, limit - steps, ZERO + PATIENCE)
+        steps, blocks = steps + tries, blocks + tries
     if code in (UNPROVED, INACCURATE) and steps < limit:
         restore(s)
         code, tries, level = pivot_one_by_one(s, current, saved, limit - steps, level)
@@ -245,18 +259,31 @@ def answer(s, record, settings, work):
     return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
 
 
+@inlined
+def _is_unclear(s):
+    """Whether a row counts as dependent by less than the factor INDEPENDENT."""
+    unclear = False
+    for i in range(s.A.shape[0]):
+        unclear |= s.number[CUT, i] > INDEPENDENT * s.scalar[RANK] * s.number[NORM, i]
+    return unclear
+
+
 @compiled
 def _costs_more(s, other):
     """Whether x violates a level by a share of more than DEARER more than another x does.
 
-    It then uses a nearly dependent row for a gain above that is within `rank_tolerance`.
+    Or is that much farther from the reference. It then uses a nearly dependent row for a gain above
+    that is within `rank_tolerance`.
     """
-    least = (BAND * (1.0 + length_of(s.x))) ** 2
-    for k in range(s.multiplier.shape[0] - 1):
+    least, last = (BAND * (1.0 + length_of(s.x))) ** 2, s.multiplier.shape[0] - 1
+    for k in range(last + 1):
         square, square_of_other = 0.0, least
-        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
+        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1] if k < last else s.index[FIRST, k]):
             square += _violation(s, i, s.x) ** 2
             square_of_other += _violation(s, i, other) ** 2
+        for c in range(s.x.size if k == last else 0):
+            square += (s.x[c] - s.number[REFERENCE, c]) ** 2
+            square_of_other += (other[c] - s.number[REFERENCE, c]) ** 2
         if square > (1.0 + DEARER) ** 2 * square_of_other:
             return True
     return False
