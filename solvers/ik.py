@@ -11,7 +11,7 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, brief, expect, number
+from hierarchy.errors import HierarchyError, brief, expect, expect_each, number
 from hierarchy.notebook import numbers
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Robot
@@ -92,7 +92,7 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     failure is a status, with a finite v.
     """
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
-    expect("solve_ik: tasks", tasks, Sequence, "give a list of tasks")
+    expect_each("solve_ik: tasks", tasks, Task, "give a list of tasks")
     if number("solve_ik: dt [s]", dt) <= 0.0:
         raise HierarchyError(f"solve_ik: dt = {dt} s must be positive and finite")
     if not isinstance(limits, bool | Task):

@@ -64,7 +64,7 @@ def whole_number(default: int | None, least: int) -> Any:
 def one_of(*allowed: str) -> Any:
     """Return a field: a setting that is one of these, the first by default."""
     def check(resolver: Resolver, name: str, value: Any) -> None:
-        if value not in allowed:
+        if str(value) not in allowed:
             raise UnknownNameError(f"{name} of {resolver.name}", value, allowed)
 
     return dataclasses.field(default=allowed[0], metadata={_CHECK: check, _CHOICES: allowed})

@@ -209,36 +209,16 @@ def answer(s, record, settings, work):
     if warm and level < 0:
         code, blocks = pivot_in_blocks(s, limit, ZERO)
         steps = blocks
-    declared, resumed = s.scalar[RANK], level >= 0
-    for share in (1.0, INDEPENDENT):
-        if code not in (UNPROVED, INACCURATE) or level >= 0 or steps >= limit or (
-                share < 1.0 and not _is_unclear(s)):
-            break
-        restore(s)
-        t, _ = carve_tableau(s, work, at)
-        s.scalar[RANK] = share * declared
-        code, level = pass_through_levels(t, settings[TOLERANCE],
-                                          min(limit - steps, PASS_STEPS * (m + 1)))
-        s.scalar[RANK] = declared
-        steps += t.count[STEPS]
-        save(s, saved, levels if code == SOLVED else level)
-        code = _verified(s, code, NO)
-        if share == 1.0:
-            for i in range(m):
-                current[0, i] = s.index[STATE, i]
-            continue
-        if code != SOLVED and steps < limit:
+    if code in (UNPROVED, INACCURATE) and level < 0 and steps < limit:
+        code, level, more = _pass(s, saved, settings, 1.0, limit - steps, work[at:])
+        steps += more
+        if code != SOLVED and steps < limit and _is_unclear(s):
+            code, level, more, tries = _second_pass(s, current, saved, settings, limit - steps,
+                                                    level, work[at:])
+            steps, blocks = steps + more + tries, blocks + tries
+        if code in (UNPROVED, INACCURATE) and steps < limit:
             code, tries = pivot_in_blocks(s, limit - steps, ZERO + PATIENCE)
             steps, blocks = steps + tries, blocks + tries
-        if code == SOLVED and _costs_more(s, saved):
-            code = ZERO + UNPROVED
-        if code != SOLVED:  # go on from the first pass
-            for i in range(m):
-                s.index[STATE, i] = np.int64(current[0, i])
-            restore(s)
-    if code in (UNPROVED, INACCURATE) and steps < limit and not resumed:
-        code, tries = pivot_in_blocks(s, limit - steps, ZERO + PATIENCE)
-        steps, blocks = steps + tries, blocks + tries
     if code in (UNPROVED, INACCURATE) and steps < limit:
         restore(s)
         code, tries, level = pivot_one_by_one(s, current, saved, limit - steps, level)
@@ -257,6 +237,48 @@ def answer(s, record, settings, work):
     if code == ITERATION_LIMIT:
         record[3 * m + 2] = _resume(s, level)
     return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
+
+
+@inlined
+def _pass(s, saved, settings, share, most, work):
+    """Pass through the levels, with rows as independent down to a share of `rank_tolerance`.
+
+    Returns the code of the verified working set, the level at which its steps ran out (-1: none),
+    and the steps.
+    """
+    declared, rows = s.scalar[RANK], s.A.shape[0] + 1
+    restore(s)
+    t, _ = carve_tableau(s, work, ZERO)
+    s.scalar[RANK] = share * declared
+    code, level = pass_through_levels(t, settings[TOLERANCE], min(most, PASS_STEPS * rows))
+    s.scalar[RANK] = declared
+    save(s, saved, s.multiplier.shape[0] - 1 if code == SOLVED else level)
+    return _verified(s, code, NO), level, t.count[STEPS]
+
+
+@compiled
+def _second_pass(s, current, saved, settings, most, level, work):
+    """Factor the working set of a pass anew, and pass again where that proves nothing.
+
+    Returns what `_pass` does, and the tries in blocks. Unless SOLVED, the working set is again that
+    of the first pass.
+    """
+    for i in range(s.A.shape[0]):
+        current[0, i] = s.index[STATE, i]
+    code, blocks = pivot_in_blocks(s, ZERO + 1, ZERO)
+    if code == SOLVED or level >= 0 or blocks >= most:
+        return code, level, ZERO, blocks
+    code, level, steps = _pass(s, saved, settings, INDEPENDENT, most - blocks, work)
+    if code != SOLVED and steps + blocks < most:
+        code, tries = pivot_in_blocks(s, most - steps - blocks, ZERO + PATIENCE)
+        blocks += tries
+    if code == SOLVED and _costs_more(s, saved):
+        code = ZERO + UNPROVED
+    for i in range(s.A.shape[0] if code != SOLVED else 0):
+        s.index[STATE, i] = np.int64(current[0, i])
+    if code != SOLVED:
+        restore(s)
+    return code, level, steps, blocks
 
 
 @inlined

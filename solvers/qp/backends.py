@@ -57,7 +57,7 @@ def backend_of(name: str) -> Backend:
     UnknownNameError : no such backend.
     HierarchyError : it is not installed; names the package or extra to install.
     """
-    if name not in BACKENDS:
+    if str(name) not in BACKENDS:
         raise UnknownNameError("backend of hqp", name, BACKENDS)
     backend = BACKENDS[name]
     if not installed(name):

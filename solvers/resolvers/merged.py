@@ -117,9 +117,11 @@ def refuse_safety_alone(h: Hierarchy) -> None:
 def _checked(scales: Mapping[str, float] | tuple[tuple[str, float], ...]
              ) -> tuple[tuple[str, float], ...]:
     """Return the scales as pairs, which a record can hold."""
-    if not isinstance(scales, (Mapping, tuple)):
-        raise HierarchyError(f"merged: scales = {scales!r}, expected numbers > 0 by a level's name")
-    pairs = dict(scales)
+    try:
+        pairs = dict(scales)
+    except (TypeError, ValueError) as error:
+        raise HierarchyError(f"merged: scales = {scales!r}, expected numbers > 0 by a level's name"
+                             ) from error
     for name, scale in pairs.items():
         number = isinstance(scale, (int, float)) and not isinstance(scale, bool)
         if not number or not 0.0 < scale < np.inf:
