@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, UnknownNameError, refuse
+from hierarchy.errors import HierarchyError, UnknownNameError, expect, expect_each, number, refuse
+from hierarchy.gate import array_of
 from hierarchy.jit import compiled
 from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
 from hierarchy.problem import Array
@@ -68,22 +69,23 @@ class Contact:
     sole: Array = field(init=False, repr=False, compare=False)  # the same in the frame, of `up`
 
     def __post_init__(self) -> None:
+        expect("contact: frame", self.frame, Frame, "give robot.frame(name)")
         set_frozen(self, name=self.name or self.frame.name)
-        points = np.array(self.points, dtype=float)
+        points = array_of(f"contact {self.name!r}: points", self.points)
         refuse(points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all(),
                f"contact {self.name!r}: points {self.points!r} are not (k, 3) numbers")
         refuse(len(points) != 1 and np.linalg.matrix_rank(points - points.mean(0), tol=1e-6) < 2,
                f"contact {self.name!r}: {len(points)} points on one line; a contact has one "
                "point, or at least three of a surface")
-        refuse(not 0.0 < self.friction < np.inf, f"contact {self.name!r}: friction "
-               f"{self.friction} must be positive and finite")
+        refuse(number(f"contact {self.name!r}: friction", self.friction) <= 0.0,
+               f"contact {self.name!r}: friction {self.friction} must be positive")
         axes, sole = (_axes(direction, f"contact {self.name!r}: {key}")
                       for key, direction in (("normal", self.normal), ("up", self.up)))
-        for start, end in self.open:
-            refuse(not start < end, f"contact {self.name!r}: it cannot be open from {start} s "
-                   f"until {end} s")
-        refuse(not 0.0 <= self.ramp < np.inf, f"contact {self.name!r}: ramp {self.ramp} s must "
-               "not be negative")
+        spans = array_of(f"contact {self.name!r}: open", self.open)
+        refuse(spans.size and (spans.shape[1:] != (2,) or not (spans[:, 0] < spans[:, 1]).all()),
+               f"contact {self.name!r}: open {self.open!r}, expected pairs of times [s], each from "
+               "a time until a later one")
+        number(f"contact {self.name!r}: ramp [s]", self.ramp, 0.0)
         refuse(self.slides and len(points) > 1, f"contact {self.name!r}: {len(points)} points "
                "that slide; only a contact of one point does")
         set_frozen(self, axes=axes, sole=sole)
@@ -122,6 +124,8 @@ class Contacts:
     points: Points = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        expect("contacts: robot", self.robot, Robot, "make one with Robot.load(name or file)")
+        expect_each("contacts", self.contacts, Contact, "give a list of contacts")
         contacts = tuple(self.contacts)
         set_frozen(self, contacts=contacts)
         refuse(not self.robot.masses.sum() > 0.0, f"robot {self.robot.name!r} has no masses, so "
@@ -233,7 +237,8 @@ def corners(x: tuple[float, float], y: tuple[float, float], up: Vector = (0.0, 0
 
 def _axes(normal: Vector, what: str) -> Array:
     """Return two tangents and the normal as rows (3, 3); x, y and z for normal z."""
-    refuse(np.shape(normal) != (3,) or not 0.0 < np.linalg.norm(normal) < np.inf,
+    given = array_of(what, normal)
+    refuse(given.shape != (3,) or not 0.0 < np.linalg.norm(given) < np.inf,
            f"{what} {normal!r} is no direction")
     n = np.array(normal, dtype=float) / np.linalg.norm(normal)
     x = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,14 +75,15 @@ def level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
     """
     if names is None:
         return tuple(f"level {k + 1}" for k in range(count))
-    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+    names = names if isinstance(names, str) or not isinstance(names, Iterable) else tuple(names)
+    if not isinstance(names, tuple) or not all(isinstance(name, str) for name in names):
         raise HierarchyError(f"names: expected a list of texts, got {brief(names)}")
     if len(names) != count:
         raise HierarchyError(f"{len(names)} names for {count} levels")
     for name, times in Counter(names).items():
         if times > 1:
             raise HierarchyError(f"{times} levels are named {name!r}; give each its own name")
-    return tuple(names)
+    return names
 
 
 def checked_sizes(sizes: ArrayLike, rows: int) -> Sizes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Sized
 from functools import lru_cache
 from itertools import pairwise
 from operator import attrgetter
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy import gate
-from hierarchy.errors import HierarchyError, brief
+from hierarchy.errors import HierarchyError, brief, expect
 from hierarchy.gate import Array as Array
 from hierarchy.gate import Sizes
 from hierarchy.notebook import html_table
@@ -249,7 +249,8 @@ class Hierarchy:
         |s_i| + give_i at either side, where s_i is its violation at the least norm of its level. x
         (n,) is optimal for the levels down to this one, which do not give any more.
         """
-        assert self._give is not None, "the hierarchy gives"
+        if self._give is None:
+            raise HierarchyError("relaxed: no level of the hierarchy gives")
         rows = slice(*self.offsets[level:level + 2])
         slack, lower, upper = self.slacks(x)[rows], self.lower.copy(), self.upper.copy()
         reach = np.linalg.norm(self.A[rows], axis=1) * float(np.linalg.norm(x))
@@ -291,6 +292,7 @@ class Hierarchy:
 
 
 def _checked_give(give: Sequence[ArrayLike], names: Sequence[str], sizes: list[int]) -> Array:
+    expect("give", give, Sized, "give a number, or one for each row, for every level")
     if len(give) != len(names):
         raise HierarchyError(f"give has {len(give)} entries for {len(names)} levels")
     return np.concatenate([np.empty(0), *map(gate.checked_give, names, give, sizes)])

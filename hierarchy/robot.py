@@ -173,7 +173,7 @@ class Robot:
         may download files. `locked` and `root` are those of `from_file`. Raises RobotError and
         UnknownNameError.
         """
-        if base not in (None, *get_args(Base)):
+        if base is not None and str(base) not in get_args(Base):
             raise RobotError(f"robot {str(model)!r}: base must be one of {get_args(Base)}, got "
                              f"{base!r}")
         model = str(model)
@@ -197,7 +197,7 @@ class Robot:
         model = pin.Model()
         try:
             model.loadFromString(text)
-        except (RuntimeError, MemoryError, ValueError) as error:
+        except (RuntimeError, MemoryError, ValueError, TypeError) as error:
             raise RobotError(f"robot {name!r}: its model cannot be read: {error}") from error
         return cls(model, name)
 
@@ -235,7 +235,7 @@ class Robot:
 
     def joint(self, name: str) -> int:
         """Index of the joint called `name`, as used by frames and control points."""
-        if name not in self.joint_names:
+        if str(name) not in self.joint_names:
             raise UnknownNameError("joint", name, self.joint_names)
         return self.joint_names.index(name) + 1
 
@@ -270,7 +270,7 @@ class Robot:
 
         Raises UnknownNameError if there is none, and RobotError if two places have that name.
         """
-        found = frames_called(self.model, name)
+        found = frames_called(self.model, str(name))
         if not found:
             raise UnknownNameError(what, name, self.frame_names)
         if len(found) > 1:

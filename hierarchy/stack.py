@@ -52,7 +52,7 @@ class Stack:
                  reference: Task | None = None, contacts: Contacts | None = None,
                  metric: ArrayLike | Literal["mass"] | None = None,
                  give: Mapping[str, ArrayLike] | None = None) -> None:
-        refuse(level not in get_args(Level), "level must be 'velocity', 'acceleration' or "
+        refuse(str(level) not in get_args(Level), "level must be 'velocity', 'acceleration' or "
                f"'torque', got {level!r}")
         if (level == "torque") != (contacts is not None):
             raise HierarchyError(
@@ -69,8 +69,10 @@ class Stack:
         expect("tasks of a stack", tasks, Iterable, "give a list of tasks")
         for task in tasks:
             self.insert(task)
+        give = {} if give is None else give
+        expect("give of a stack", give, Mapping, "give a number by the name of a task")
         self._give = {name: checked_give(f"task {name!r}", value, self[name].dimension)
-                      for name, value in (give or {}).items()}
+                      for name, value in give.items()}
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -226,7 +226,7 @@ def check_parts(task: Task) -> None:
     """
     refuse(not isinstance(task.name, str) or not task.name, f"{type(task).__name__}: name: "
            f"expected a text, got {brief(task.name)}")
-    refuse(task.kind not in get_args(Kind), f"task {task.name!r}: kind must be 'equality' or "
+    refuse(str(task.kind) not in get_args(Kind), f"task {task.name!r}: kind must be 'equality' or "
            f"'inequality', got {task.kind!r}")
     parts: tuple[Field[Any], ...] = fields(task) if is_dataclass(task) else ()
     for part in parts:

@@ -86,11 +86,11 @@ def circle(centre: Vector, radius: float, normal: Vector = (0.0, 0.0, 1.0), rate
     where the normal is along x. Raises HierarchyError for a radius < 0 or a normal of length zero.
     """
     finite_numbers("centre [m]", centre, 3)
-    z = np.array(normal, dtype=float)
+    number("circle: radius [m]", radius, 0.0)
+    number("circle: phase [rad]", phase)
+    z = finite_numbers("circle: normal", normal, 3)
     length = float(np.linalg.norm(z))
-    refuse(z.shape != (3,) or not 1e-9 < length < inf or not 0.0 <= radius < inf,
-           f"circle: radius {radius} and normal {list(normal)}, expected a number >= 0 and a "
-           "direction")
+    refuse(length <= 1e-9, f"circle: normal {brief(normal)} is no direction")
     z = z / length
     toward = np.eye(3)[1 if abs(z[0]) > 0.9 else 0]
     x = toward - (toward @ z) * z
@@ -231,8 +231,9 @@ class Blended(Path):
     def __post_init__(self) -> None:
         _check_points("blended waypoints", self.times, self.points)
         shortest = min(np.diff(self.times), default=inf)
-        refuse(not 0.0 < self.blend <= shortest, f"blended waypoints: blend {self.blend} s must "
-               f"be positive and at most {shortest:g} s, the shortest interval")
+        blend = number("blended waypoints: blend [s]", self.blend)
+        refuse(not 0.0 < blend <= shortest, f"blended waypoints: blend {blend} s must be positive "
+               f"and at most {shortest:g} s, the shortest interval")
         points = np.array(self.points, dtype=float)
         lines = np.diff(points, axis=0) / np.diff(self.times)[:, None]
         set_frozen(self, _velocities=np.vstack([np.zeros(3), lines, np.zeros(3)]))

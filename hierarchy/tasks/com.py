@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, finite_numbers
 from hierarchy.jit import compiled
 from hierarchy.kinematics import carried, moving_point, place, plus, row_times, times
 from hierarchy.measured import Measure, Measured, measured
@@ -128,10 +128,8 @@ class Momentum(NamedRows, Measured):
         super().__post_init__()
         self.refuse(not isinstance(self.part, str) or self.part not in _ROWS,
                     f"part {self.part!r} is not one of {', '.join(_ROWS)}")
-        if self.target is not None and (len(self.target) != self.dimension
-                                        or not np.isfinite(self.target).all()):
-            raise HierarchyError(f"task {self.name!r}: target {self.target!r} is not "
-                                 f"{self.dimension} finite numbers")
+        if self.target is not None:
+            finite_numbers(f"task {self.name!r}: target", self.target, self.dimension)
 
     @property
     def row_names(self) -> tuple[str, ...]:

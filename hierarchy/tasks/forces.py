@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from hierarchy.contacts import Contacts, Points, write_dynamics, zero_while_open
-from hierarchy.errors import HierarchyError, finite_numbers
+from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import less, place
 from hierarchy.problem import Array
@@ -207,8 +207,8 @@ class TorqueLimits(TorqueRows):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(not 0.0 < self.fraction <= 1.0, f"fraction {self.fraction} is not more than 0 "
-                    "and at most 1")
+        self.refuse(number(f"task {self.name!r}: fraction", self.fraction, 0.0, 1.0) == 0.0,
+                    "fraction must be more than 0")
 
     @property
     def limit(self) -> Array:
@@ -243,7 +243,8 @@ class TorqueStep(TorqueRows):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(not self.step > 0.0, f"step {self.step} must be positive")
+        self.refuse(number(f"task {self.name!r}: step", self.step) <= 0.0,
+                    f"step {self.step} must be positive")
 
     def bounds(self, state: State) -> tuple[Array, Array]:
         """The commanded torques less and plus the step."""

@@ -150,7 +150,7 @@ class JointDamping(JointTask):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(self.weight not in ("identity", "mass"), "weight must be 'identity' or "
+        self.refuse(str(self.weight) not in ("identity", "mass"), "weight must be 'identity' or "
                     f"'mass', got {self.weight!r}")
         expect(f"task {self.name!r}: joints", self.joints, int, "give robot.n")
 

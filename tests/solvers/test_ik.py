@@ -46,6 +46,7 @@ def test_limits_of_the_robot_hold_whatever_is_asked():
 @pytest.mark.parametrize(("call", "said"), [
     (lambda: solve_ik("kuka_lwr", Q, []), "solve_ik: robot: expected a Robot, got str 'kuka_lwr'"),
     (lambda: solve_ik(ROBOT, Q, hand([0, 0, 0])), "solve_ik: tasks: expected a Sequence"),
+    (lambda: solve_ik(ROBOT, Q, ["hand"]), "solve_ik: tasks[0]: expected a Task, got str 'hand'"),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], dt=0.0), "dt = 0.0 s must be positive"),
     (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], memory="last"),
      "solve_ik: memory: expected a Memory, got str 'last'"),

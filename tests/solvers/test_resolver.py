@@ -78,8 +78,12 @@ def test_a_setting_that_makes_no_sense_is_named_with_its_value(name, settings):
 
 
 def test_settings_of_parts_are_named():
-    with pytest.raises(HierarchyError, match="merged: scales: 'hand'"):
-        make("merged", scales={"hand": 0.0})
+    for scales, said in (({"hand": 0.0}, ": 'hand'"), (("hand",), " = .'hand',., expected")):
+        with pytest.raises(HierarchyError, match=f"merged: scales{said}"):
+            make("merged", scales=scales)
+    for name, setting in (("hqp", "backend"), ("reverse", "form")):
+        with pytest.raises(UnknownNameError, match=f"{setting} of {name}"):
+            make(name, **{setting: np.zeros(2)})
     assert make("hcod", max_iterations=2**31 - 1).max_iterations == 2147483647
     for wrong in ({"tolerance": -1.0}, {"most": 0}):
         with pytest.raises(HierarchyError, match=next(iter(wrong))):
