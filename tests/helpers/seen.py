@@ -13,7 +13,9 @@ import json
 import os
 import re
 import shlex
+import tempfile
 from functools import partial
+from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
@@ -31,7 +33,9 @@ from scenarios.export import mcap
 from scenarios.measure.comparison import Comparison
 from scenarios.measure.metrics import measure
 from scenarios.measure.runs import Run
-from scenarios.results import page, sections
+from scenarios.problems.families import COUNT, FAMILIES, family
+from scenarios.results import page, sampled_page, sections
+from scenarios.results.sampled import Workers, compare_starts
 from scenarios.scene.drawn import scene
 from solvers import certify, explain, make, names
 from solvers.problems import ANY, generate, structured
@@ -44,7 +48,8 @@ RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "
 COMMANDS = (  # none of which measures a time
     "check ellipse-hqp", "check reach-torque-smooth", "check human", "check wipe",
     *(f"check {file}" for file in ROBOTS), "problems list", "problems show HUM38")
-PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "page", "keys")  # need no MuJoCo
+PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "page", "sampled page", "keys",
+         "problems")  # need no MuJoCo
 
 
 def seen_of_run(name):
@@ -121,8 +126,36 @@ def seen_of_page(name):
 
     with patch.object(page, "svg", svg), patch.object(sections, "svg", svg):
         text = page.comparison_page(Comparison(runs, "hierarchy compare", {"python": "3"}))
-    text = re.sub(r"<(style|script|iframe)\b.*?</\1>", "", text, flags=re.DOTALL)
-    return {"text": [masked(line) for line in text.splitlines() if line.strip()], "figures": drawn}
+    return {"text": _text_of(text), "figures": drawn}
+
+
+def seen_of_sampled_page(name):
+    """Of the page that compares two resolvers over sampled starts: its text, and its figures."""
+    drawn = {}
+
+    def svg(fig, title):
+        drawn[title] = figure_facts(fig)
+        return title
+
+    with (patch.object(sampled_page, "svg", svg), tempfile.TemporaryDirectory() as folder,
+          patch.object(sampled_page, "versions", lambda: {"python": "3"})):
+        compare_starts([load(name, ["control.duration=0.05"])], ["tpm", "recursive"], 3, 0,
+                       f"{folder}/out", workers=Workers(1), command="hierarchy compare")
+        text = Path(folder, "out", "index.html").read_text().replace(folder, "")
+    return {"text": [re.sub("-[0-9a-f]{6}.toml", "", line) for line in _text_of(text)],
+            "figures": drawn}
+
+
+def _text_of(page):
+    text = re.sub(r"<(style|script|iframe)\b.*?</\1>", "", page, flags=re.DOTALL)
+    return [masked(line) for line in text.splitlines() if line.strip()]
+
+
+def seen_of_problems():
+    """Of two problems of each family that is not simulated: the rows."""
+    return {name: [[condensed([*h.rows, h.start()]), h.names]
+                   for h in family(name).half(5, 2).problems]
+            for name in FAMILIES if family(name).usual == COUNT and name not in OF_PACKAGES}
 
 
 def seen_of_robots():
@@ -211,14 +244,15 @@ def _run(name, resolver="", ticks=0):
         key: taken if key.startswith("time_") else values for key, values in run.signals.items()})
 
 
-OF_PACKAGES = ("panda-ellipse", "romeo", "stand-g1", "stand-g1-smooth", "stand-go2", "stand-talos",
-               "stand-talos-smooth")  # their robots
+OF_PACKAGES = ("panda-ellipse", "romeo", "singular-panda", "singular-romeo", "stand-g1",
+               "stand-g1-smooth", "stand-go2", "stand-talos", "stand-talos-smooth")  # their robots
 OTHERS = sorted({*shipped()} - {*RUNS, *OF_PACKAGES})
 PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
          **{f"ticks {name}": partial(seen_of_ticks, name) for name in OTHERS},
          "answers": seen_of_answers, "live page": partial(seen_of_live_page, "ellipse"),
          "commands": seen_of_commands, "keys": seen_of_keys,
-         "page": partial(seen_of_page, "ellipse"), "robots": seen_of_robots}
+         "page": partial(seen_of_page, "ellipse"), "problems": seen_of_problems,
+         "robots": seen_of_robots, "sampled page": partial(seen_of_sampled_page, "ellipse")}
 
 
 def seen(part):
