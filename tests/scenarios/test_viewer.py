@@ -86,7 +86,7 @@ def test_a_live_page_does_what_is_asked_for_and_says_what_it_refuses():
                        ({"avoidance.nearly": 0.3}, "avoidance.near"),
                        ({"obstacle 0": "up"}, "up"), ({"resolver": [1]}, "list"),
                        ({"resolver": "hcood"}, "hcod"), ({"obstacle 7": [0, 0, 0]}, "7"),
-                       ({"speed": "fast"}, "fast")):
+                       ({"speed": "fast"}, "fast"), ({"speed": float("nan")}, "nan")):
         page.answer(asked)
         page.step(0.03)
         assert why in page.refused

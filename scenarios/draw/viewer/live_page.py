@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, number
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.pose import Pose
@@ -164,7 +164,7 @@ class LivePage:
                 self.live.tick()
                 self._follow()
             elif what == "speed":
-                self.speed = min(max(float(value), 0.01), 100.0)
+                self.speed = min(max(number("speed", value), 0.01), 100.0)
             elif what == "path":
                 self._path_wanted = np.asarray(value, dtype=float).reshape(3) - self.middle
             elif what.startswith("obstacle ") and (obstacles := self.live.obstacles) is not None:

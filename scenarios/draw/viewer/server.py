@@ -72,6 +72,11 @@ class _Handler(BaseHTTPRequestHandler):
         self.page, self.answer = page, answer
         super().__init__(*request)
 
+    def handle(self) -> None:
+        """Answer the requests of a connection, which the browser may cut."""
+        with suppress(ConnectionError):
+            super().handle()
+
     def do_GET(self) -> None:
         if not is_own(self.headers):
             self._send(HTTPStatus.FORBIDDEN, "Only pages of this machine.\n", "text/plain")
