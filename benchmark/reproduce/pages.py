@@ -4,7 +4,7 @@
     <!-- measured: hierarchy bench tick -->  what a command prints
     <!-- measured: hierarchy bench resolvers --fresh 1 | EQ7, fresh .. Times of -->
     <!-- measured: table of hierarchy bench resolvers --seconds 0.2 -->
-    <!-- kept: text of open-2026-11 | Fresh problems, seed .. right: -->
+    <!-- kept: text of open-libraries-2026-11 | As often .. right: -->
     <!-- measured: hierarchy bench open | Fresh .. Public | without , (tight|slack) -->
 
 all up to `<!-- end -->`. After each `|`, only the lines from one that starts with the first text to
