@@ -139,7 +139,7 @@ def seen_of_sampled_page(name):
 
     with (patch.object(sampled_page, "svg", svg), tempfile.TemporaryDirectory() as folder,
           patch.object(sampled_page, "versions", lambda: {"python": "3"})):
-        compare_starts([load(name, ["control.duration=0.05"])], ["tpm", "recursive"], 3, 0,
+        compare_starts([load(name, ["control.duration=0.05"])], ["tpm", "augmented"], 6, 0,
                        f"{folder}/out", workers=Workers(1), command="hierarchy compare")
         text = Path(folder, "out", "index.html").read_text().replace(folder, "")
     return {"text": [re.sub("-[0-9a-f]{6}.toml", "", line) for line in _text_of(text)],
