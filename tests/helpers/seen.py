@@ -182,7 +182,7 @@ def seen_of_commands():
 def figure_facts(fig):
     """Of each axes: what stands beside it, and of what is drawn in it look and numbers."""
     return [[ax.get_title(loc="left"), ax.get_xlabel(), ax.get_ylabel(), ax.get_xscale(),
-             ax.get_yscale(), condensed([ax.get_xlim(), ax.get_ylim()]),
+             ax.get_yscale(), condensed([ax.get_xlim(), ax.get_ylim(), fig.get_size_inches()]),
              [masked(text.get_text()) for text in ax.texts],
              [[line.get_label(), to_hex(line.get_color()), line.get_linewidth(),
                str(line.get_linestyle()), line.get_zorder(), condensed(line.get_xydata())]
