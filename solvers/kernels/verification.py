@@ -160,7 +160,7 @@ def _balances(s, p, reach, factored):
         refine(s, p)
         outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
         rest = _beyond_rounding(s)
-    holds = (not outside and rest <= allowed and _is_seen(s, level, reach)
+    holds = (not outside and rest <= allowed
              and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     left = length_of(s.number[GRADIENT, :s.x.size])
     error = SIGN_MARGIN * (left + rounding) / s.scalar[PIVOT]
@@ -213,16 +213,6 @@ def _add_rows(s, level, reach):
             _add_row(s, mu[i], i)
     turned += 2.0 * cut * most
     return outside, rounding if signed else 0.0, turned
-
-
-@inlined
-def _is_seen(s, level, reach):
-    """Whether no violation is claimed whose force is what `_beyond_rounding` forgives."""
-    seen = True
-    for i in range(level.begin, level.end):
-        miss, norm = abs(s.multiplier[level.p, i]), s.number[NORM, i]
-        seen = seen and not (miss > BAND * norm * reach and miss * norm <= CANCELLED * level.source)
-    return seen
 
 
 @inlined
