@@ -142,8 +142,7 @@ def seen_of_sampled_page(name):
         compare_starts([load(name, ["control.duration=0.05"])], ["tpm", "augmented"], 6, 0,
                        f"{folder}/out", workers=Workers(1), command="hierarchy compare")
         text = Path(folder, "out", "index.html").read_text().replace(folder, "")
-    return {"text": [re.sub("-[0-9a-f]{6}.toml", "", line) for line in _text_of(text)],
-            "figures": drawn}
+    return {"text": _text_of(re.sub("-[0-9a-f]{6}.toml", ".toml", text)), "figures": drawn}
 
 
 def _text_of(page):
