@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from math import inf, isfinite
 from numbers import Real
 from pathlib import Path
@@ -47,6 +47,11 @@ def nearest(name: object, known: Iterable[str], most: int = 5, similarity: float
     containing = sorted((one for one in by_key if asked in one), key=len) if len(asked) > 2 else []
     similar = difflib.get_close_matches(asked, by_key, n=most, cutoff=similarity)
     return [by_key[one] for one in dict.fromkeys([*containing, *similar])][:most]
+
+
+def is_one_of(value: object, known: Container[str]) -> bool:
+    """Whether a value is a text, and one of those known; an array or a list is no text."""
+    return isinstance(value, str) and value in known
 
 
 def refuse(wrong: object, said: str) -> None:

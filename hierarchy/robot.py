@@ -13,7 +13,14 @@ from numpy.typing import ArrayLike
 
 from hierarchy import plugins
 from hierarchy.avoidance.body import ControlPoint
-from hierarchy.errors import RobotError, UnknownNameError, expect, file_path, finite_numbers
+from hierarchy.errors import (
+    RobotError,
+    UnknownNameError,
+    expect,
+    file_path,
+    finite_numbers,
+    is_one_of,
+)
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
@@ -173,7 +180,7 @@ class Robot:
         may download files. `locked` and `root` are those of `from_file`. Raises RobotError and
         UnknownNameError.
         """
-        if base is not None and str(base) not in get_args(Base):
+        if base is not None and not is_one_of(base, get_args(Base)):
             raise RobotError(f"robot {str(model)!r}: base must be one of {get_args(Base)}, got "
                              f"{base!r}")
         model = str(model)
@@ -235,7 +242,7 @@ class Robot:
 
     def joint(self, name: str) -> int:
         """Index of the joint called `name`, as used by frames and control points."""
-        if str(name) not in self.joint_names:
+        if not is_one_of(name, self.joint_names):
             raise UnknownNameError("joint", name, self.joint_names)
         return self.joint_names.index(name) + 1
 
@@ -270,7 +277,7 @@ class Robot:
 
         Raises UnknownNameError if there is none, and RobotError if two places have that name.
         """
-        found = frames_called(self.model, str(name))
+        found = frames_called(self.model, name) if isinstance(name, str) else []
         if not found:
             raise UnknownNameError(what, name, self.frame_names)
         if len(found) > 1:

@@ -11,7 +11,14 @@ from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, ReadingError, UnknownNameError, expect, refuse
+from hierarchy.errors import (
+    HierarchyError,
+    ReadingError,
+    UnknownNameError,
+    expect,
+    is_one_of,
+    refuse,
+)
 from hierarchy.gate import checked_give, checked_metric
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array, Hierarchy
@@ -52,7 +59,7 @@ class Stack:
                  reference: Task | None = None, contacts: Contacts | None = None,
                  metric: ArrayLike | Literal["mass"] | None = None,
                  give: Mapping[str, ArrayLike] | None = None) -> None:
-        refuse(str(level) not in get_args(Level), "level must be 'velocity', 'acceleration' or "
+        refuse(not is_one_of(level, get_args(Level)), "level must be 'velocity', 'acceleration' or "
                f"'torque', got {level!r}")
         if (level == "torque") != (contacts is not None):
             raise HierarchyError(
@@ -86,7 +93,7 @@ class Stack:
         return f"Stack({' > '.join(self._order)}; {self.level} level)"
 
     def __getitem__(self, name: str) -> Task:
-        if not isinstance(name, str) or name not in self._tasks:
+        if not is_one_of(name, self._tasks):
             raise UnknownNameError("task", name, self._tasks)
         return self._tasks[name]
 

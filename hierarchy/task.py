@@ -14,7 +14,7 @@ from hierarchy.avoidance.body import pack_points
 from hierarchy.avoidance.laws import Barrier
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, brief, expect, refuse
+from hierarchy.errors import HierarchyError, brief, expect, is_one_of, refuse
 from hierarchy.gate import check_rows, shaped
 from hierarchy.paths import Path
 from hierarchy.problem import Array
@@ -226,8 +226,8 @@ def check_parts(task: Task) -> None:
     """
     refuse(not isinstance(task.name, str) or not task.name, f"{type(task).__name__}: name: "
            f"expected a text, got {brief(task.name)}")
-    refuse(str(task.kind) not in get_args(Kind), f"task {task.name!r}: kind must be 'equality' or "
-           f"'inequality', got {task.kind!r}")
+    refuse(not is_one_of(task.kind, get_args(Kind)), f"task {task.name!r}: kind must be 'equality' "
+           f"or 'inequality', got {task.kind!r}")
     parts: tuple[Field[Any], ...] = fields(task) if is_dataclass(task) else ()
     for part in parts:
         named = part.type if isinstance(part.type, str) else part.type.__name__

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 import numpy as np
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError, UnknownNameError, brief, expect
+from hierarchy.errors import HierarchyError, UnknownNameError, brief, expect, is_one_of
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
@@ -64,7 +64,7 @@ def whole_number(default: int | None, least: int) -> Any:
 def one_of(*allowed: str) -> Any:
     """Return a field: a setting that is one of these, the first by default."""
     def check(resolver: Resolver, name: str, value: Any) -> None:
-        if str(value) not in allowed:
+        if not is_one_of(value, allowed):
             raise UnknownNameError(f"{name} of {resolver.name}", value, allowed)
 
     return dataclasses.field(default=allowed[0], metadata={_CHECK: check, _CHOICES: allowed})

@@ -208,7 +208,7 @@ class TorqueLimits(TorqueRows):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.refuse(number(f"task {self.name!r}: fraction", self.fraction, 0.0, 1.0) == 0.0,
-                    "fraction must be more than 0")
+                    f"fraction {self.fraction} is not more than 0")
 
     @property
     def limit(self) -> Array:

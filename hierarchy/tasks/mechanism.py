@@ -42,7 +42,8 @@ def model_rows(robot: Robot, period: float = 0.001) -> list[Task]:
     accelerations keep the mechanism, and torques of all joints make them: the mechanism itself then
     transmits no force, and every joint needs a motor.
     """
-    refuse(number("model_rows: period [s]", period) <= 0.0, f"model_rows: period = {period} s")
+    refuse(number("model_rows: period [s]", period) <= 0.0, f"model_rows: period {period} s "
+           "must be positive")
     rate = min(_FASTEST, _PER_PERIOD / period)
     gains = rate**2, 2.0 * rate, rate
     parts: list[Task] = []

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, expect, finite_numbers
+from hierarchy.errors import HierarchyError, expect, finite_numbers, is_one_of
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import row_times, write_identity
 from hierarchy.measured import Measure, Measured, measured
@@ -150,8 +150,8 @@ class JointDamping(JointTask):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(str(self.weight) not in ("identity", "mass"), "weight must be 'identity' or "
-                    f"'mass', got {self.weight!r}")
+        self.refuse(not is_one_of(self.weight, ("identity", "mass")), "weight must be 'identity' "
+                    f"or 'mass', got {self.weight!r}")
         expect(f"task {self.name!r}: joints", self.joints, int, "give robot.n")
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:

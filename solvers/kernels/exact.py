@@ -274,9 +274,9 @@ def _second_pass(s, current, saved, settings, most, level, work):
         blocks += tries
     if code == SOLVED and _costs_more(s, saved):
         code = ZERO + UNPROVED
-    for i in range(s.A.shape[0] if code != SOLVED else 0):
-        s.index[STATE, i] = np.int64(current[0, i])
     if code != SOLVED:
+        for i in range(s.A.shape[0]):
+            s.index[STATE, i] = np.int64(current[0, i])
         restore(s)
     return code, level, steps, blocks
 
@@ -297,18 +297,19 @@ def _costs_more(s, other):
     Or is that much farther from the reference. It then uses a nearly dependent row for a gain above
     that is within `rank_tolerance`.
     """
-    least, last = (BAND * (1.0 + length_of(s.x))) ** 2, s.multiplier.shape[0] - 1
-    for k in range(last + 1):
+    least, more = (BAND * (1.0 + length_of(s.x))) ** 2, (1.0 + DEARER) ** 2
+    square, square_of_other = 0.0, least
+    for c in range(s.x.size):
+        square += (s.x[c] - s.number[REFERENCE, c]) ** 2
+        square_of_other += (other[c] - s.number[REFERENCE, c]) ** 2
+    dearer = square > more * square_of_other
+    for k in range(s.multiplier.shape[0] - 1):
         square, square_of_other = 0.0, least
-        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1] if k < last else s.index[FIRST, k]):
+        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
             square += _violation(s, i, s.x) ** 2
             square_of_other += _violation(s, i, other) ** 2
-        for c in range(s.x.size if k == last else 0):
-            square += (s.x[c] - s.number[REFERENCE, c]) ** 2
-            square_of_other += (other[c] - s.number[REFERENCE, c]) ** 2
-        if square > (1.0 + DEARER) ** 2 * square_of_other:
-            return True
-    return False
+        dearer = dearer or square > more * square_of_other
+    return dearer
 
 
 @inlined

@@ -8,7 +8,7 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import Any, final
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, is_one_of
 
 
 @final
@@ -57,7 +57,7 @@ def backend_of(name: str) -> Backend:
     UnknownNameError : no such backend.
     HierarchyError : it is not installed; names the package or extra to install.
     """
-    if str(name) not in BACKENDS:
+    if not is_one_of(name, BACKENDS):
         raise UnknownNameError("backend of hqp", name, BACKENDS)
     backend = BACKENDS[name]
     if not installed(name):

@@ -118,31 +118,34 @@ def seen_of_page(name):
     """Of the page that compares two resolvers: its text, and its figures."""
     runs = [Run(run.scenario, label, label, run, None)
             for label in ("tpm", "recursive") for run in [_run(name, label)]]
-    drawn = {}
-
-    def svg(fig, title):
-        drawn[title] = figure_facts(fig)
-        return title
-
-    with patch.object(page, "svg", svg), patch.object(sections, "svg", svg):
+    with _drawn_by(page, sections) as drawn:
         text = page.comparison_page(Comparison(runs, "hierarchy compare", {"python": "3"}))
     return {"text": _text_of(text), "figures": drawn}
 
 
 def seen_of_sampled_page(name):
     """Of the page that compares two resolvers over sampled starts: its text, and its figures."""
+    with (_drawn_by(sampled_page) as drawn, tempfile.TemporaryDirectory() as folder,
+          patch.object(sampled_page, "versions", lambda: {"python": "3"})):
+        compare_starts([load(name, ["control.duration=0.05"])], ["tpm", "augmented"], 6, 0,
+                       f"{folder}/out", workers=Workers(1), command="hierarchy compare")
+        text = Path(folder, "out", "index.html").read_text().replace(folder, "")
+    return {"text": _text_of(re.sub("-[0-9a-f]{6}.toml", ".toml", text)), "figures": drawn}
+
+
+@contextlib.contextmanager
+def _drawn_by(*modules):
+    """Yield what is drawn by pages, by title, in place of drawing it."""
     drawn = {}
 
     def svg(fig, title):
         drawn[title] = figure_facts(fig)
         return title
 
-    with (patch.object(sampled_page, "svg", svg), tempfile.TemporaryDirectory() as folder,
-          patch.object(sampled_page, "versions", lambda: {"python": "3"})):
-        compare_starts([load(name, ["control.duration=0.05"])], ["tpm", "augmented"], 6, 0,
-                       f"{folder}/out", workers=Workers(1), command="hierarchy compare")
-        text = Path(folder, "out", "index.html").read_text().replace(folder, "")
-    return {"text": _text_of(re.sub("-[0-9a-f]{6}.toml", ".toml", text)), "figures": drawn}
+    with contextlib.ExitStack() as stack:
+        for module in modules:
+            stack.enter_context(patch.object(module, "svg", svg))
+        yield drawn
 
 
 def _text_of(page):

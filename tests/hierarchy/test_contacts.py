@@ -220,7 +220,7 @@ FRAME, A, B = ROBOT.frame("left_foot"), np.eye(3), np.eye(4, 3)
     (lambda: tasks.CentreOfPressure(Contacts(ROBOT, [Contact(FRAME)])), "no contact is a surface"),
     (lambda: tasks.ContactForce(CONTACTS, "left_foot", (1.0, 2.0)), "is not 1, 3 or 6"),
     (lambda: tasks.ContactMotion(CONTACTS, [A] * 3), "anchors are not (4, 3) for each of 3"),
-    (lambda: Contact(FRAME, open=((2.0, 1.0),)), "each from a time until a later one"),
+    (lambda: Contact(FRAME, open=((2.0, 1.0),)), "open ((2.0, 1.0),), expected pairs of"),
     (lambda: tasks.ContactMotion(opening(), [B] * 2, 9.0), "opens, so its stiffness must be"),
     (lambda: tasks.Momentum("all"), "part 'all' is not one of both, linear, angular"),
     (lambda: tasks.Together([]), "there are no tasks in it"),

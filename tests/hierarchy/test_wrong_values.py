@@ -50,6 +50,7 @@ def limits(**settings):
     (lambda: tasks.TorqueStep(ROBOT, A), "'torque step': step = array"),
     (lambda: tasks.Momentum(target=3), "'momentum': target: expected 6 finite numbers"),
     (lambda: tasks.JointDamping(7, 1.0, A), "weight must be 'identity' or 'mass'"),
+    (lambda: tasks.model_rows(ROBOT, 0.0), "period 0.0 s must be positive"),
     (lambda: tasks.model_rows(ROBOT, None), "period [s] = None: expected a finite number"),
     (lambda: Stack([HAND], A), "level must be 'velocity'"),
     (lambda: Stack([HAND], give=0.1), "give of a stack: expected a Mapping, got float 0.1"),
@@ -98,7 +99,9 @@ def limits(**settings):
     (lambda: Stack([tasks.TorqueLimits(ROBOT)], "velocity").hierarchy(STATE),
      "'torque limits': torque limits need the acceler"),
     *((lambda fraction=fraction: tasks.TorqueLimits(ROBOT, fraction),
-       "fraction ") for fraction in (0.0, -1.0, 80.0, NAN)),
+       f"fraction = {fraction:g}: expected a finite number from 0 to 1")
+      for fraction in (-1.0, 80.0, NAN)),
+    (lambda: tasks.TorqueLimits(ROBOT, 0.0), "fraction 0.0 is not more than 0"),
     (lambda: Blended(TIMES, CORNERS, 0.0), "blend 0.0 s must be positive"),
     (lambda: Blended(TIMES[:1], CORNERS, 0.1), "1 times for 2 points"),
     *((lambda bad=bad: Jittered(THERE, **{"amplitude": 0.1, "rate": 1.0, "seed": 0} | bad),
