@@ -29,6 +29,7 @@ FREE_ROWS = 2.0      # share of the band of a row that acts over that of one tha
 REMAINDER = 2.5e-9   # what may remain of a gradient, as a turn [rad] of the rows of its level
 KNOWN_MULTIPLIER = 1e-4  # what may remain of it over its terms and the smallest pivot
 CUT_BALANCE = 2e-7   # what cut rows may add to a gradient, relative to its terms
+HEAVIER = 1e1        # norm of a row over that of another of its level, which it may round off
 ROUNDING_BALANCE = 5e-9  # the same for rounding
 CUT_OVER_PIVOT = 2e-4  # cut of a row over the smallest pivot: larger ones turn the answer
 RANK_MARGIN = 1.004  # between a pivot or a cut and rank_tolerance, as a factor

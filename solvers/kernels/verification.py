@@ -31,6 +31,7 @@ from solvers.kernels.tolerances import (
     CUT_OVER_PIVOT,
     EPSILON,
     FREE_ROWS,
+    HEAVIER,
     KNOWN_MULTIPLIER,
     NEGLIGIBLE,
     PIVOT_PRODUCT,
@@ -41,15 +42,18 @@ from solvers.kernels.tolerances import (
     SIGN_ROUNDING,
 )
 from solvers.kernels.working_set import (
+    BEGIN,
     CHANGE,
     CUT,
     FIRST,
     GRADIENT,
+    LIST,
     LOWER,
     NEGLECTED,
     NOISE,
     NORM,
     PIVOT,
+    RANK,
     REFERENCE,
     SECOND,
     STATE,
@@ -153,6 +157,7 @@ def _balances(s, p, reach, factored):
     if not last:
         allowed = REMAINDER * level.least * level.least * level.missed
     outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
+    clear = last or length_of(s.number[GRADIENT, :s.x.size]) <= allowed
     if rounding > 0.0 or not last:  # rows with small pivots can make good what is left
         allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
     rest = _beyond_rounding(s)
@@ -160,7 +165,7 @@ def _balances(s, p, reach, factored):
         refine(s, p)
         outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
         rest = _beyond_rounding(s)
-    holds = (not outside and rest <= allowed
+    holds = (not outside and rest <= allowed and (clear or (factored and _is_clear(s, level)))
              and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     left = length_of(s.number[GRADIENT, :s.x.size])
     error = SIGN_MARGIN * (left + rounding) / s.scalar[PIVOT]
@@ -173,6 +178,27 @@ def _balances(s, p, reach, factored):
         _decide(s, level, error + cut, reach)
         return True
     return met
+
+
+@inlined
+def _is_clear(s, level):
+    """Whether no row rounds off the force of a far lighter one, in the column of this one.
+
+    Where pivots are small, a row that comes after has rounding there even if its entry is zero.
+    """
+    clear, begin, end = True, s.index[BEGIN, level.p], s.index[BEGIN, level.p + 1]
+    above, norms = s.index[RANK, level.p], s.number[NORM]
+    rough = CANCELLED * s.scalar[PIVOT] < SIGN_ROUNDING
+    for t in range(above, s.index[RANK, level.p + 1]):
+        own = begin + t - above
+        norm, force = norms[s.index[LIST, own]], 0.0
+        for q in range(begin, end):
+            i = s.index[LIST, q]
+            if (s.W[q, t] != 0.0 or (q > own and rough)) and norms[i] > HEAVIER * norm:
+                force += abs(s.multiplier[level.p, i]) * norms[i]
+        clear = clear and (SIGN_ROUNDING * force
+                           <= REMAINDER * norm * abs(s.W[own, t]) * level.missed)
+    return clear
 
 
 @inlined

@@ -59,10 +59,12 @@ def bounded(h: Hierarchy, seed: int) -> Hierarchy:
     return Hierarchy.from_levels([box, *h.levels()], h.reference)
 
 
-def _singular_arm(rng: Random, digits: int = 12) -> Levels:
+def _singular_arm(rng: Random, digits: int = 12, noise: float = 0.0) -> Levels:
     """Velocity box, position, orientation and posture of an arm at multiples of 90 degrees."""
     n = int(rng.integers(2, 9))
     J = np.round(_jacobian(rng, n, planar=happens(rng, 0.3)), digits)
+    if noise:
+        J += noise * rng.normal(size=J.shape)
     targets = rng.choice([0.0, 0.0, 1.0, -1.0, 0.5], 6)
     levels = [equal(J[:3], targets[:3]), equal(J[3:], targets[3:]), _posture(rng, n)]
     if happens(rng, 0.3):
@@ -76,6 +78,11 @@ def _dusty_arm(rng: Random) -> Levels:
     Strictly, a row of dust with a nonzero target requires an x of 1e17.
     """
     return _singular_arm(rng, digits=30)
+
+
+def _near_singular_arm(rng: Random) -> Levels:
+    """A singular arm, each entry of its Jacobian off by about 1e-14 to 1e-3."""
+    return _singular_arm(rng, noise=10.0**rng.uniform(-14.0, -3.0))
 
 
 def _tied_box(rng: Random) -> Levels:
@@ -134,9 +141,21 @@ def _nested(rng: Random) -> Levels:
 def _mixed_units(rng: Random) -> Levels:
     """Rows of norm 0.001, 1 and 1000 in one level."""
     levels = _around(rng, int(rng.integers(1, 8)), int(rng.integers(1, 5)))
-    scales = (10.0**rng.choice([-3.0, 0.0, 3.0], len(level[0])) for level in levels)
+    return _in_units(levels, lambda size: 10.0**rng.choice([-3.0, 0.0, 3.0], size))
+
+
+def _scaled(rng: Random) -> Levels:
+    """Integers times 0.001 to 1000 in each column, and times 1e-5 to 1e5 in each row."""
+    levels = _integers(rng)
+    by = 10.0**rng.integers(-3, 4, levels[0][0].shape[1])
+    return _in_units([(A * by, lower, upper) for A, lower, upper in levels],
+                     lambda size: 10.0**rng.integers(-5, 6, size))
+
+
+def _in_units(levels: Levels, draw: Callable[[int], Array]) -> Levels:
+    """Return the levels with each row and its sides times a number that is drawn."""
     return [(A * by[:, None], lower * by, upper * by)
-            for (A, lower, upper), by in zip(levels, scales, strict=True)]
+            for A, lower, upper in levels for by in [draw(len(A))]]
 
 
 def _integers(rng: Random) -> Levels:
@@ -217,8 +236,8 @@ def _tiny_rows(rng: Random) -> Levels:
 
 
 def _shifted(rng: Random) -> Levels:
-    """A problem of another kind with all unknowns shifted by the same vector."""
-    kind = str(rng.choice([name for name in _MAKERS if name != "shifted"]))
+    """A problem of a kind listed before, with all unknowns shifted by the same vector."""
+    kind = str(rng.choice(list(_MAKERS)[:list(_MAKERS).index("shifted")]))
     levels = _MAKERS[kind](rng)
     by = rng.normal(size=levels[0][0].shape[1]) * 10.0**rng.integers(-12, 3)
     return [(A, lower + A @ by, np.where(lower == upper, lower + A @ by, upper + A @ by))
@@ -310,6 +329,6 @@ _MAKERS: dict[str, Callable[[Random], Levels]] = {
     "integers": _integers, "chain": _chain, "signs": _signs, "one_unknown": _one_unknown,
     "sixty_unknowns": _sixty_unknowns, "fifteen_levels": _fifteen_levels,
     "near_ties": _near_ties, "nearly_parallel": _nearly_parallel, "tiny_rows": _tiny_rows,
-    "shifted": _shifted}
+    "shifted": _shifted, "near_singular_arm": _near_singular_arm, "scaled": _scaled}
 KINDS = tuple(_MAKERS)
 """The names that `structured` knows."""
