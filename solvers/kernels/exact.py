@@ -202,7 +202,7 @@ def answer(s, record, settings, work):
     current, at = matrix(work, ZERO, levels + 1, m)
     saved, at = vector(work, at, n)
     most, code, steps, blocks = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO, ZERO
-    limit = min(most, SOLVE_STEPS * (m + 1))
+    limit = min(most, SOLVE_STEPS * max(m, 1))
     warm, level, s.count[FINISHED] = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1, 0
     if warm:
         level = _resumed_at(record[3 * m + 2], levels)

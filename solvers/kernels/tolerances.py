@@ -50,7 +50,8 @@ EXACTLY_DEPENDENT, NEARLY_DEPENDENT = 1e-12, 1e-7  # in `weighted`: ill-posed in
 ORTHOGONAL = 1e-30   # squared cosine of two rows: Jacobi rotations stop
 LONGEST = 1e150      # x of `weighted`: squares of longer ones overflow
 
-# Limits. The pass, and the whole solve, end after their number times rows + 1.
+# Limits. The pass ends after its number times rows + 1, the whole solve after its number times
+# rows.
 PASS_STEPS = 2
 SOLVE_STEPS = 4
 SPARED = 3           # rows over columns that are left to them: fewer are reflected one by one
