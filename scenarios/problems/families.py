@@ -118,7 +118,9 @@ _KINDS = {
     "near_ties": "repeated rows whose sides differ by 1e-9",
     "nearly_parallel": "rows at angles of 1e-9 to 1e-6 rad",
     "tiny_rows": "rows of norm 1e-14",
-    "shifted": "another kind with all unknowns shifted"}
+    "shifted": "another kind with all unknowns shifted",
+    "near_singular_arm": "singular arms with noise of 1e-14 to 1e-3",
+    "scaled": "integers, rows times 1e-5 to 1e5, columns times 0.001 to 1000"}
 _POSTURES = {
     "singular-lwr": "KUKA LWR at and near singular postures",
     "singular-dual-arm": "an upper body with two arms, likewise",
