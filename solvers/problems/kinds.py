@@ -141,21 +141,22 @@ def _nested(rng: Random) -> Levels:
 def _mixed_units(rng: Random) -> Levels:
     """Rows of norm 0.001, 1 and 1000 in one level."""
     levels = _around(rng, int(rng.integers(1, 8)), int(rng.integers(1, 5)))
-    return _in_units(levels, lambda size: 10.0**rng.choice([-3.0, 0.0, 3.0], size))
+    return _in_units(rng, levels, np.array([-3.0, 0.0, 3.0]))
 
 
 def _scaled(rng: Random) -> Levels:
     """Integers times 0.001 to 1000 in each column, and times 1e-5 to 1e5 in each row."""
     levels = _integers(rng)
-    by = 10.0**rng.integers(-3, 4, levels[0][0].shape[1])
-    return _in_units([(A * by, lower, upper) for A, lower, upper in levels],
-                     lambda size: 10.0**rng.integers(-5, 6, size))
+    by = 10.0**rng.choice(np.arange(-3.0, 4.0), levels[0][0].shape[1])
+    return _in_units(rng, [(A * by, lower, upper) for A, lower, upper in levels],
+                     np.arange(-5.0, 6.0))
 
 
-def _in_units(levels: Levels, draw: Callable[[int], Array]) -> Levels:
-    """Return the levels with each row and its sides times a number that is drawn."""
+def _in_units(rng: Random, levels: Levels, powers: Array) -> Levels:
+    """Return the levels with each row and its sides times ten to one of these powers."""
+    scales = (10.0**rng.choice(powers, len(level[0])) for level in levels)
     return [(A * by[:, None], lower * by, upper * by)
-            for A, lower, upper in levels for by in [draw(len(A))]]
+            for (A, lower, upper), by in zip(levels, scales, strict=True)]
 
 
 def _integers(rng: Random) -> Levels:
