@@ -25,6 +25,7 @@ from pinned import FOLDER, robot_facts
 from hierarchy import HierarchyError, Robot, tasks
 from scenarios import Scenario, load, shipped, simulate
 from scenarios.cli.main import run_command
+from scenarios.config.distributions import Distribution
 from scenarios.draw.figures import letter
 from scenarios.draw.replay import page as replay
 from scenarios.draw.viewer import live_page
@@ -57,7 +58,8 @@ def seen_of_run(name):
     run = _run(name)
     return {
         "signals": {key: condensed(values) for key, values in run.signals.items()},
-        "metrics": {key: [one.label, one.unit, one.value] for key, one in measure(run).items()},
+        "metrics": {key: [one.label, one.unit, one.note, one.value]
+                    for key, one in measure(run).items()},
         "figures": {key: figure_facts(fig) for key, fig in letter.figures([run])},
         "scene": condensed(dataclasses.asdict(scene(run, 30.0))),
         "exported": condensed([*mcap._entries(run, mcap.grouped(run))]),
@@ -68,7 +70,7 @@ def seen_of_ticks(name):
     """Of the first ticks of one run: signals and metrics."""
     run = _run(name, ticks=8)
     return {"signals": {key: condensed(values) for key, values in run.signals.items()},
-            "metrics": {key: one.value for key, one in measure(run).items()}}
+            "metrics": {key: [one.note, one.value] for key, one in measure(run).items()}}
 
 
 def seen_of_keys():
@@ -79,7 +81,10 @@ def seen_of_keys():
             "tasks": {name: {one.name: str(one.default) for one in dataclasses.fields(kind)
                              if one.default is not dataclasses.MISSING}
                       for name, kind in vars(tasks).items() if dataclasses.is_dataclass(kind)},
-            "labels": [make("weighted", strict_levels=count).label for count in (-1, 0, 2)]}
+            "labels": [make("weighted", strict_levels=count).label for count in (-1, 0, 2)],
+            "sampling": [str(Distribution(**given)) for given in (
+                {"uniform": [1, 2]}, {"normal": [1, 2]}, {"choice": [1, 2]}, {"integers": [1, 2]},
+                {"around": 1}, {"around": [1, 2]})]}
 
 
 def seen_of_live_page(name):

@@ -14,7 +14,7 @@ from hand_made import recording
 
 from scenarios import compare, load, load_run, simulate
 from scenarios.cli import doctor
-from scenarios.cli.main import app, run_command
+from scenarios.cli.main import _with_its_file, app, run_command
 from scenarios.files import OutputError, claim, slug
 from scenarios.measure import run_folder
 
@@ -212,6 +212,13 @@ def test_a_folder_that_cannot_be_made_is_said_before_the_run(name, tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="cannot be written"):
         claim(tmp_path / name)
+
+
+@pytest.mark.parametrize(("text", "files", "said"), [
+    ("no such task", ["own.toml"], "own.toml: no such task"), ("no such task", ["a.toml", "b.toml"],
+     "no such task"), ("own.toml: key", ["own.toml"], "own.toml: key")])
+def test_an_error_names_the_one_file_of_a_command_once(text, files, said):
+    assert _with_its_file(text, ["run", *files]) == said
 
 
 def test_names_of_settings_that_differ_late_give_different_folders():
