@@ -156,8 +156,8 @@ def _balances(s, p, reach, factored):
     source, allowed = (reach if last else level.source), REMAINDER * reach
     if not last:
         allowed = REMAINDER * level.least * level.least * level.missed
+    clear = last or SIGN_ROUNDING * source <= allowed
     outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
-    clear = last or length_of(s.number[GRADIENT, :s.x.size]) <= allowed
     if rounding > 0.0 or not last:  # rows with small pivots can make good what is left
         allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
     rest = _beyond_rounding(s)
