@@ -156,7 +156,9 @@ def _balances(s, p, reach, factored):
     source, allowed = (reach if last else level.source), REMAINDER * reach
     if not last:
         allowed = REMAINDER * level.least * level.least * level.missed
-    clear = last or SIGN_ROUNDING * source <= allowed
+    clear = SIGN_ROUNDING * source <= allowed  # else heavy rows may round off a light one
+    if not (clear or factored):
+        return met
     outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
     if rounding > 0.0 or not last:  # rows with small pivots can make good what is left
         allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
@@ -165,7 +167,7 @@ def _balances(s, p, reach, factored):
         refine(s, p)
         outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
         rest = _beyond_rounding(s)
-    holds = (not outside and rest <= allowed and (clear or (factored and _is_clear(s, level)))
+    holds = (not outside and rest <= allowed and (clear or _is_clear(s, level))
              and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     left = length_of(s.number[GRADIENT, :s.x.size])
     error = SIGN_MARGIN * (left + rounding) / s.scalar[PIVOT]

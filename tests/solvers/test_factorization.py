@@ -116,8 +116,9 @@ def test_a_mistake_is_named_and_changes_nothing(mistake, text):
 
 def test_nearly_parallel_rows_are_left_to_the_exact_engine():
     rng, unclear = np.random.default_rng(5), 0
+    kinds = problems.KINDS[:-2]  # without rows far lighter than others
     for seed in range(812_000_000, 812_000_120):
-        h = problems.structured(seed, ("nearly_parallel", "nested"), equalities_only=True)
+        h = problems.structured(seed, kinds, equalities_only=True)
         targets = {name: b for name, (_, b, _) in zip(h.names, h.levels(), strict=True)}
         factored = Factorization.of(h)
         for _ in range(3):
