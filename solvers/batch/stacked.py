@@ -167,7 +167,7 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
                  cores() if threads is None else threads)
     for p in np.flatnonzero(codes < 0)[:1]:
         if isinstance(resolver, Merged):
-            refuse_safety_alone(batch[int(p)])
+            refuse_safety_alone(resolver, batch[int(p)])
         refuse_inequality(resolver, batch[int(p)], -int(codes[p]) - 1)
     steps = record[:, m] if kernel is batch_merged else record[:, -3] + record[:, -2]
     if kernel is batch_within_bounds:  # only an unknown at a bound is worth a memory

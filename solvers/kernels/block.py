@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined, inner_product
+from hierarchy.jit import as_matrix, compiled, inner_product
 from solvers.kernels.least_squares import least_squares
 from solvers.kernels.rows import ZERO
 from solvers.kernels.space import matrix
@@ -149,18 +149,11 @@ def _one_unknown(M, r, y, at, damped):
 def _least_squares(M, r, y, at, damped, work):
     """Write the minimiser into y, by reflections of [M r; lambda I 0]."""
     p, rows = at.k1 - at.k0, at.i1 - at.i0
-    T, _ = stacked(M, r, at, damped, rows + p if damped > 0.0 else rows, work)
-    least_squares(T[:p], T[p], y[at.k0:])
-
-
-@inlined
-def stacked(M, r, at, damped, height, work):
-    """Return the columns of the block and r as rows, with lambda I behind, and where they end."""
-    p, rows = at.k1 - at.k0, at.i1 - at.i0
-    T, end = matrix(work, ZERO, p + 1, height)
+    height = rows + p if damped > 0.0 else rows
+    T, _ = matrix(work, ZERO, p + 1, height)
     for k in range(p + 1):
         for i in range(rows):
             T[k, i] = M[at.i0 + i, at.k0 + k] if k < p else r[at.i0 + i]
         for i in range(rows, height):
             T[k, i] = damped if i - rows == k else 0.0
-    return T, end
+    least_squares(T[:p], T[p], y[at.k0:])

@@ -18,14 +18,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product
 from solvers.kernels.exact import DAMPING, solve, work_size
 from solvers.kernels.rows import ZERO
 from solvers.kernels.space import View, fill, integers, matrix, vector
 from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
 
 NOTHING = -1     # code: every level is strict
-BY_RULE = -1.0   # of strict levels: see `count_strict`
+BY_RULE, TOP_LIMITS = -1.0, -2.0  # of strict levels: see `count_strict`
 EXACT = 5        # settings of `Hcod` at the start; then those of `Merged`
 OWN = 8          # settings before the weights
 
@@ -34,7 +34,8 @@ class Merged(NamedTuple):
     """The settings of `Merged`, weights and caps (L,), and the rows that are solved.
 
     A (m + n, n), of which the first `m` and some more are written. own (n,): 1 for an unknown that
-    a row to merge names alone.
+    a row to merge names alone. centre (n,): what x is counted from, the reference where damping
+    draws to it.
     """
 
     strict: View
@@ -47,6 +48,7 @@ class Merged(NamedTuple):
     upper: View
     sizes: View
     own: View
+    centre: View
 
 
 @compiled
@@ -58,7 +60,7 @@ def record_size(n, m):
 @inlined
 def merged_size(n, m, levels, damped):
     """Return the numbers that a work space of `merged` needs."""
-    return (m + n) * (n + 2) + levels + n + work_size(n, m + n, levels, damped)
+    return (m + n) * (n + 2) + levels + 2 * n + work_size(n, m + n, levels, damped)
 
 
 @compiled
@@ -81,32 +83,37 @@ def merged(A, lower, upper, sizes, x, record, settings, work):
     (m, n), levels = A.shape, sizes.size
     s, at = _carve(settings, work, m, n, levels)
     strict = count_strict(lower, upper, sizes, s.strict)
-    if strict >= levels > 0:
+    if strict >= levels > 0 and s.strict != TOP_LIMITS:
         return ZERO + NOTHING
     if merged_size(n, m, levels, settings[DAMPING] > 0.0) > work.size:
         return ZERO + TOO_SMALL
+    for c in range(n):
+        s.centre[c] = x[c] if settings[DAMPING] > 0.0 else 0.0
+        x[c] -= s.centre[c]
     y, last = record[:m], min(strict + 1, levels)
     _merge(s, A, lower, upper, sizes, strict, y)
-    rows = _draw(s, m, x)
+    rows = m
     if strict < levels:
+        rows = _draw(s, m, x)
         s.sizes[strict] += rows - m
     inner = record[m + 1:m + 3 * rows + 4]
     code = solve(s.A[:rows], s.lower[:rows], s.upper[:rows], s.sizes[:last], x, inner,
                  settings[:EXACT], work[at:])
     record[m] = inner[3 * rows] + inner[3 * rows + 1]
     if code != NUMERICAL_FAILURE:
+        add_multiple(x, 1.0, s.centre)
         _carry(s, A, lower, upper, sizes, x, y, strict)
     return code
 
 
 @compiled
 def count_strict(lower, upper, sizes, given):
-    """Return how many levels stay strict: those that are set, or by the rule of `Merged`.
+    """Return how many levels stay strict: those that are set, or by a rule.
 
-    The rule: the first run of levels with inequalities and all levels above it; none if no level
-    has inequalities.
+    BY_RULE: the first run of levels with inequalities and all levels above it; none if no level has
+    inequalities. TOP_LIMITS: the top level, if it has inequalities.
     """
-    if given != BY_RULE:
+    if given >= 0.0:
         return ZERO + np.int64(given)
     first, strict = ZERO, ZERO
     for k in range(sizes.size):
@@ -115,7 +122,7 @@ def count_strict(lower, upper, sizes, given):
             bounded |= lower[i] < upper[i]
         if bounded:
             strict = ZERO + k + 1
-        elif strict > 0 and sizes[k] > 0:
+        if sizes[k] > 0 and (given == TOP_LIMITS or (strict > 0 and not bounded)):
             break
         first = last
     return strict
@@ -131,7 +138,9 @@ def _carve(settings, work, m, n, levels):
     upper, at = vector(work, at, m + n)
     sizes, at = integers(work, at, levels)
     own, at = vector(work, at, n)
-    return Merged(strict, regularisation, step, weights, caps, A, lower, upper, sizes, own), at
+    centre, at = vector(work, at, n)
+    return Merged(strict, regularisation, step, weights, caps, A, lower, upper, sizes, own,
+                  centre), at
 
 
 @compiled
@@ -140,15 +149,17 @@ def _merge(s, A, lower, upper, sizes, strict, y):
     first, hard = ZERO, ZERO
     fill(s.own, 0.0)
     for k in range(sizes.size):
-        hard = first if k == strict else hard
+        hard, cap = first if k == strict else hard, _cap(s, sizes, k, strict)
         for i in range(first, first + sizes[k]):
-            moved, weight = 0.0, 1.0
+            y[i] = min(max(y[i], -cap), cap) if np.isfinite(y[i]) else 0.0
+            moved, weight = y[i], 1.0
             if k >= strict:
-                moved, weight, only = y[i], s.weights[k], _only_entry(A[i])
+                weight, only = s.weights[k], _only_entry(A[i])
                 if only >= 0 and lower[i] == upper[i]:
                     s.own[only] = 1.0
                 if only < 0 and _repeats(A, lower, upper, i, hard):
                     weight = 0.0
+            moved -= inner_product(A[i], s.centre)
             for c in range(A.shape[1]):
                 s.A[i, c] = weight * A[i, c]
             s.lower[i], s.upper[i] = weight * (lower[i] + moved), weight * (upper[i] + moved)
@@ -156,6 +167,12 @@ def _merge(s, A, lower, upper, sizes, strict, y):
         if k > strict:
             s.sizes[strict] += sizes[k]
         first += sizes[k]
+
+
+@inlined
+def _cap(s, sizes, k, strict):
+    """Return how far the sides of level k may move; strict rows and the lowest level have none."""
+    return s.caps[k] if strict <= k < sizes.size - 1 else 0.0
 
 
 @inlined
@@ -200,10 +217,10 @@ def _draw(s, m, x):
 
 @compiled
 def _carry(s, A, lower, upper, sizes, x, y, strict):
-    """Move the memory of each row, (a); strict rows and the lowest level have none."""
+    """Move the memory of each row, (a)."""
     first = ZERO
     for k in range(sizes.size):
-        cap = s.caps[k] if strict <= k < sizes.size - 1 else 0.0
+        cap = _cap(s, sizes, k, strict)
         for i in range(first, first + sizes[k]):
             value = inner_product(A[i], x)
             miss = min(max(value - y[i], lower[i]), upper[i]) - value

@@ -46,9 +46,7 @@ DEARER = 0.25        # violation of a level after the second pass over that afte
 UNCLEAR_PIVOT = 1e-5  # of a row in the staircase, or less: the exact engine decides
 LIGHT_ROW = 1e-5     # norm of a row over the largest in a level that is missed: the same
 UNCLEAR_CUT = 0.3    # remainder of a dependent row over the smallest pivot: the same
-EXACTLY_DEPENDENT, NEARLY_DEPENDENT = 1e-12, 1e-7  # in `weighted`: ill-posed in between
 ORTHOGONAL = 1e-30   # squared cosine of two rows: Jacobi rotations stop
-LONGEST = 1e150      # x of `weighted`: squares of longer ones overflow
 
 # Limits. The pass ends after its number times rows + 1, the whole solve after its number times
 # rows.

@@ -1,5 +1,6 @@
 """Strict levels for what must hold, one weighted level with a memory for all that follows."""
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,8 +14,10 @@ from hierarchy.records import set_frozen
 from solvers.kernels.merged import BY_RULE, NOTHING, merged, record_size, write_levels
 from solvers.resolver import Handles, Resolution, Resolver, number, register, whole_number
 from solvers.resolvers.hcod import Hcod, warm_record
-from solvers.status import Status
+from solvers.status import SOLVED, Status
 from solvers.workspace import entry, run
+
+_SOLVED = Status.SOLVED  # a look-up takes twice the time
 
 
 @final
@@ -33,10 +36,46 @@ class MergedResolution(Resolution):
         return self._carried.copy()
 
 
+@dataclass(frozen=True, kw_only=True)
+class OneLevel(Resolver):
+    """A resolver that makes one weighted level of all levels below the strict ones.
+
+    tolerance, max_iterations : as in `hcod`, which solves.
+    """
+
+    handles: ClassVar[Handles] = "inequalities"
+    strict: ClassVar[bool] = False
+    damps: ClassVar[str] = "the merged level as a whole, about the reference"
+    damps_with_bounds: ClassVar[str] = damps
+    tolerance: float = number(Hcod.tolerance, high=1e-3, open_below=True)
+    max_iterations: int = whole_number(Hcod.max_iterations, 1)
+
+    def solve(self, h: Hierarchy, memory: Array | None = None) -> MergedResolution:
+        """Resolve h, continuing an earlier resolution if given.
+
+        Raises HierarchyError if every level is strict, so that none is left to merge.
+        """
+        x, m = h.start(), h.m
+        record = warm_record(memory, record_size(h.n, m))
+        code = run(entry(merged), *h.rows, x, record, self._settings_of(h))
+        if code == NOTHING:
+            refuse_safety_alone(self, h)
+        return MergedResolution(x, _SOLVED if code == SOLVED else Status(code), record, m)
+
+    @abstractmethod
+    def _settings_of(self, h: Hierarchy) -> Array:
+        """Return the settings of the kernel for h."""
+
+    def _before_weights(self, strict: float, regularisation: float, step: float) -> list[float]:
+        """Return the settings of the kernel before the weights."""
+        return [self.damping, self.threshold, self.rank_tolerance, self.tolerance,
+                self.max_iterations, strict, regularisation, step]
+
+
 @final
 @register
 @dataclass(frozen=True, kw_only=True)
-class Merged(Resolver):
+class Merged(OneLevel):
     """Strict for limits, weighted below, with a memory that meets upper levels at rest.
 
     The levels of the tasks become one weighted level below the strict ones, so x moves no faster
@@ -51,22 +90,15 @@ class Merged(Resolver):
         beyond the cap does not count.
     strict_levels : levels that stay strict; None: the first run of inequalities, and all above.
     regularisation : weight of |x - reference|, for unknowns that no merged row names alone.
-    tolerance, max_iterations : as in `hcod`, which solves.
     """
 
     name: ClassVar[str] = "merged"
-    handles: ClassVar[Handles] = "inequalities"
-    strict: ClassVar[bool] = False  # a task can disturb one above it, in motion
-    damps: ClassVar[str] = "the merged level as a whole"
-    damps_with_bounds: ClassVar[str] = damps
     ratio: float = number(4.0, 1.0, 1e6)
     scales: Mapping[str, float] | tuple[tuple[str, float], ...] = ()
     cap: float = number(1.0)
     step: float = number(0.1, high=np.nextafter(1.0, 2.0), open_below=True)
     strict_levels: int | None = whole_number(None, 0)
     regularisation: float = number(1e-3)
-    tolerance: float = number(Hcod.tolerance, high=1e-3, open_below=True)
-    max_iterations: int = whole_number(Hcod.max_iterations, 1)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -88,30 +120,20 @@ class Merged(Resolver):
         if names not in self._known:
             scales, strict = dict(self.scales), self.strict_levels
             self._known[names] = settings = np.array([
-                self.damping, self.threshold, self.rank_tolerance, self.tolerance,
-                self.max_iterations, BY_RULE if strict is None else strict, self.regularisation,
-                self.step, *np.empty(2 * len(names))])
+                *self._before_weights(BY_RULE if strict is None else strict, self.regularisation,
+                                      self.step), *np.empty(2 * len(names))])
             write_levels(settings, self.ratio, self.cap,
                          np.array([scales.get(name, 1.0) for name in names]))
         return self._known[names]
 
-    def solve(self, h: Hierarchy, memory: Array | None = None) -> MergedResolution:
-        """Resolve h, continuing an earlier resolution if given.
-
-        Raises HierarchyError if every level is strict, so that none is left to merge.
-        """
-        x, m = h.start(), h.m
-        record = warm_record(memory, record_size(h.n, m))
-        code = run(entry(merged), *h.rows, x, record, self._settings_for(h.names))
-        if code == NOTHING:
-            refuse_safety_alone(h)
-        return MergedResolution(x, Status(code), record, m)
+    def _settings_of(self, h: Hierarchy) -> Array:
+        return self._settings_for(h.names)
 
 
-def refuse_safety_alone(h: Hierarchy) -> None:
+def refuse_safety_alone(resolver: OneLevel, h: Hierarchy) -> None:
     """Raise a HierarchyError: every level of h is strict."""
-    raise HierarchyError(f"merged: all levels stay strict ({', '.join(h.names)}) and none is left "
-                         "to merge; set strict_levels, or use hcod")
+    raise HierarchyError(f"{resolver.name}: all levels stay strict ({', '.join(h.names)}) and none "
+                         "is left to merge; set strict_levels, or use hcod")
 
 
 def _checked(scales: Mapping[str, float] | tuple[tuple[str, float], ...]

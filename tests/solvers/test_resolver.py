@@ -34,8 +34,8 @@ DEFAULTS = {
     "recursive": {"method": "level", "isotropic": 0.0, "largest": None},
     "reverse": {"form": "published"}, "sns": {"form": "basic", "scales": "target"},
     "tpm": {"form": "staircase"},
-    "weighted": {**STEPS, "guesses": 10, "ratio": 100.0, "weights": None, "regularisation": 1e-6,
-                 "hard_levels": 1, "backend": "own", "strict_levels": 0}}
+    "weighted": {**STEPS, "ratio": 100.0, "weights": None, "regularisation": 0.0,
+                 "strict_levels": None}}
 
 
 @pytest.mark.parametrize("name", names())
@@ -67,8 +67,8 @@ def test_settings_of_every_resolver_are_checked_by_name(name):
     ("recursive", {"method": "nakamura", "isotropic": 0.1}), ("merged", {"scales": 3.0}),
     *(("weighted", {setting: value}) for setting, value in [
         ("weights", [1.0, 0.0]), ("weights", [1.0, "2"]), ("weights", "12"), ("weights", 3.0),
-        ("ratio", 0.5), ("regularisation", 0.0), ("hard_levels", -1), ("hard_levels", True),
-        ("guesses", 0), ("tolerance", 0.0)])], ids=str)
+        ("ratio", 0.5), ("regularisation", -1.0), ("strict_levels", -2), ("strict_levels", True),
+        ("tolerance", 0.0)])], ids=str)
 def test_a_setting_that_makes_no_sense_is_named_with_its_value(name, settings):
     setting, value = list(settings.items())[-1]
     with pytest.raises(HierarchyError, match=re.escape(f"{name}: {setting} = {value!r}")):

@@ -7,7 +7,7 @@ import pytest
 from rank_cases import CASES, boxed, build, family
 
 from hierarchy import Hierarchy, HierarchyError
-from solvers import Status, certify, make, problems
+from solvers import Status, certify, make
 from solvers.qp import backends, programs
 from solvers.resolvers.weighted import lexicographic_weights
 
@@ -18,22 +18,14 @@ EXACT = 1e-9
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3])
 def test_within_limits_it_is_the_minimiser_and_shown_to_be(case, ratio):
     """Of a hierarchy of two levels: constraints, then everything weighted."""
-    h, weighted = boxed(build(case, True), -0.7, 0.7), make("weighted", ratio=ratio)
-    res, n, mu = weighted.solve(h), h.n, weighted.regularisation
+    h = boxed(build(case, True), -0.7, 0.7)
+    res, n = make("weighted", ratio=ratio).solve(h), h.n
     assert res.status is Status.SOLVED
-    w = np.repeat(ratio ** np.arange(len(h.sizes) - 1, -1, -1.0), h.sizes)[n:]
-    soft = (np.vstack([h.A[n:] * w[:, None], mu * np.eye(n)]),
-            np.concatenate([h.lower[n:] * w, mu * h.reference]))
-    two = Hierarchy.from_levels([(h.A[:n], h.lower[:n], h.upper[:n]), soft], h.reference)
+    w = np.repeat(ratio ** np.arange(len(h.sizes) - 1, -1, -1.0), h.sizes)
+    w[:n] = 1.0
+    two = h.changed(A=h.A * w[:, None], lower=h.lower * w, upper=h.upper * w,
+                    sizes=[n, h.m - n], names=("limits", "weighted"))
     assert certify(two, res.x).optimal
-
-
-@pytest.mark.parametrize("seed", [3, 4, 5])
-def test_a_row_released_by_rounding_alone_is_not_released_for_ever(seed):
-    res = make("weighted", ratio=1e8, guesses=1, max_iterations=200).solve(
-        problems.family("DEGEN7", seed))
-    assert res.status is not Status.ITERATION_LIMIT
-    assert res.iterations < 50
 
 
 def test_lexicographic_weights_are_the_smallest_that_do():
@@ -43,35 +35,34 @@ def test_lexicographic_weights_are_the_smallest_that_do():
     assert lexicographic_weights([0.0, 0.0], 0.1, regularised=1.0) == (10.0, 1.0)
 
 
-def test_only_levels_of_inequalities_are_constraints_and_as_many_as_asked_for():
+def test_the_top_level_is_strict_if_it_has_inequalities_or_as_many_as_asked_for():
     box, wish = (np.eye(2), [-1.0] * 2, [1.0] * 2), ([[1.0, 1.0]], [9.0])
     narrow = ([[1.0, 0.0]], [-0.5], [0.5])
     h = Hierarchy.from_levels([box, narrow, wish])
-    violations = {hard: h.violations(make("weighted", ratio=3.0, hard_levels=hard).solve(h).x)
-                  for hard in (0, 1, 2)}
+    violations = {strict: h.violations(make("weighted", ratio=3.0, strict_levels=strict).solve(h).x)
+                  for strict in (0, None, 2)}
     assert (violations[0][:2] > 0.01).all()
-    assert violations[1][0] == pytest.approx(0.0, abs=EXACT)
-    assert violations[1][1] > 0.01
+    assert violations[None][0] == pytest.approx(0.0, abs=EXACT)
+    assert violations[None][1] > 0.01
     assert violations[2][:2] == pytest.approx([0.0, 0.0], abs=EXACT)
+    for side in (1.0, 0.0):  # also where two sides of a limit have met
+        closed = h.changed(lower=np.array([1.0 - side, -1.0, -0.5, 9.0]))
+        assert closed.violations(make("weighted", ratio=3.0).solve(closed).x)[0] < EXACT
+    alone = Hierarchy.from_levels([box], [3.0, 0.5])
+    np.testing.assert_allclose(make("weighted").solve(alone).x, [1.0, 0.5], atol=EXACT)
+    with pytest.raises(HierarchyError, match="weighted: all levels stay strict"):
+        make("weighted", strict_levels=-1).solve(alone)
 
 
-@pytest.mark.parametrize("backend", ["own", "proxqp"])
-def test_constraints_that_exclude_each_other_give_what_violates_them_least(backend):
-    h = Hierarchy.from_levels([([[1.0, 0.0], [1.0, 0.0]], [-np.inf, 1.0], [0.0, np.inf]),
-                               ([[1.0, 1.0]], [9.0])])
-    res = make("weighted", backend=backend).solve(h)
-    assert res.status is Status.INACCURATE
-    assert res.x[0] == pytest.approx(0.5)
-
-
-def test_rows_that_are_nearly_parallel_are_said_to_leave_a_doubt():
-    def nearly(angle):
-        return Hierarchy.from_levels([(np.eye(2), [-1.0] * 2, [1.0] * 2), ([[1.0, 0.0]], [0.5]),
-                                      ([[1.0, angle]], [0.5 + 0.1 * angle])])
-
-    assert make("weighted").solve(nearly(1e-8)).status is Status.INACCURATE
-    for angle in (0.0, 1e-15, 1e-6, 1.0):
-        assert make("weighted").solve(nearly(angle)).status is Status.SOLVED
+def test_damping_draws_to_the_reference():
+    h = Hierarchy.from_levels([([[1.0, 1.0]], [1.0]), ([[1.0, 1.0 + 1e-3]], [2.0])], [3.0, -1.0])
+    w = np.array([100.0, 1.0])[:, None]
+    A, b, damping = w * h.A, w[:, 0] * h.lower, 0.1
+    smallest = np.linalg.svd(A, compute_uv=False)[-1]
+    square = damping ** 2 * (1.0 - (smallest / 0.1) ** 2)
+    step = np.linalg.solve(A.T @ A + square * np.eye(2), A.T @ (b - A @ h.reference))
+    found = make("weighted", damping=damping, threshold=0.1).solve(h)
+    np.testing.assert_allclose(found.x, h.reference + step, atol=EXACT)
 
 
 def test_weights_for_another_number_of_levels_are_refused():
@@ -102,11 +93,10 @@ def test_an_answer_that_cannot_be_shown_right_leaves_the_levels_above(vouched, s
     np.testing.assert_allclose(res.x, [2.0, 0.0], rtol=0.0, atol=3.0 * make("hqp").accuracy)
 
 
-@pytest.mark.parametrize("name", ["hqp", "weighted"])
-def test_a_backend_that_raises_is_a_status_and_the_level_of_limits_is_kept(name, monkeypatch):
+def test_a_backend_that_raises_is_a_status_and_the_level_of_limits_is_kept(monkeypatch):
     monkeypatch.setattr("qpsolvers.solve_problem", lambda *_, **__: 1 / 0)
     h = next(iter(family("HUM38")))[0]
-    res = make(name, backend="proxqp").solve(h)
+    res = make("hqp", backend="proxqp").solve(h)
     assert res.status is Status.BACKEND_FAILURE
     assert np.isfinite(res.x).all()
     assert h.violations(res.x)[0] < 1e-8
