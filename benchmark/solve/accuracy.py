@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmark.packages import OWN, Entrant
 from benchmark.report import Report, Section
+from benchmark.solve import oracle
 from benchmark.solve.entrants import ENTRANTS, NUMPY
 from benchmark.solve.interface import Solver
 from benchmark.solve.resolvers import as_problem
@@ -171,7 +172,7 @@ def run(arms: int = 10_000, checked: int = 300) -> Report:
     rows, tables = list[Row](), []
     for case in CASES:
         problems, least = hierarchies(case, arms)
-        right = [damped(h, case.damping, THRESHOLD) if case.damping else answer(h).x
+        right = [oracle.solve(h, case.damping, THRESHOLD) if case.damping else answer(h).x
                  for h in problems[:max(1, min(checked, arms))]]
         found = [{"case": case.name, "entrant": one.label, "arms": arms, "checked": len(right),
                   **_errors(load(one.adapter)(**one.options), case, problems, least, right)}
@@ -199,24 +200,6 @@ def hierarchies(case: Case, count: int) -> tuple[list[Hierarchy], Array]:
     off = b - b[:, [order.index(row) for row in order]]
     least = np.sqrt(np.add.reduceat(off**2, np.cumsum(sizes) - sizes, axis=1))
     return [Hierarchy(A[i], b[i], b[i], sizes) for i in range(count)], least
-
-
-def damped(h: Hierarchy, damping: float, threshold: float, smallest: float = 1e-9) -> Array:
-    """Return x (n,) of a hierarchy of equalities with the damping of `Resolver`, from numpy's SVD.
-
-    Singular values of a level's rows, projected into the null space of the levels above, count as
-    zero below `smallest`.
-    """
-    x, N = np.zeros(h.n), np.eye(h.n)
-    for A, b, _ in h.levels():
-        U, s, Vt = np.linalg.svd(A @ N)
-        rank = int(np.count_nonzero(s > smallest))
-        least = s[-1] if rank == len(b) else 0.0
-        lam2 = damping**2 * max(0.0, 1.0 - (least / threshold) ** 2)
-        missing = U[:, :rank].T @ (b - A @ x)
-        x = x + N @ (Vt[:rank].T @ (s[:rank] / (s[:rank] ** 2 + lam2) * missing))
-        N = N @ Vt[rank:].T
-    return np.asarray(x + N @ (N.T @ h.reference))
 
 
 def _errors(solver: Solver, case: Case, problems: Sequence[Hierarchy], least: Array,

@@ -1,10 +1,10 @@
 """What is sent in a tick with trouble, and from one stack to the next."""
 
 import numpy as np
-import oracle
 import pytest
 import scene
 
+from benchmark.solve import oracle
 from hierarchy import Hierarchy, Stack
 from hierarchy.tasks import JointLimits
 from scenarios.config import load

@@ -8,10 +8,10 @@ import os
 import tracemalloc
 
 import numpy as np
-import oracle
 import pytest
 from rank_cases import CASES, boxed, build, family, gap, moved, random_levels, rng
 
+from benchmark.solve import oracle
 from hierarchy import Hierarchy, HierarchyError
 from scenarios.problems import reference as families
 from scenarios.problems.reference import EQUALITIES

@@ -1,11 +1,11 @@
 """The Task Priority Matrix: exact as a staircase, where the published form is not, and limits."""
 
 import numpy as np
-import oracle
 import pytest
 from rank_cases import CASES, build
 from scipy.optimize import lsq_linear
 
+from benchmark.solve import oracle
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make
 from solvers.resolvers.tpm import FORMS, task_priority_matrix

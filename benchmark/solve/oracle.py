@@ -6,8 +6,11 @@ what it judges.
 
 import numpy as np
 
+from hierarchy.problem import Array, Hierarchy
 
-def solve(h, damping=0.0, threshold=0.1, rank_tolerance=1e-9):
+
+def solve(h: Hierarchy, damping: float = 0.0, threshold: float = 0.1,
+          rank_tolerance: float = 1e-9) -> Array:
     """Return x (n,) of a hierarchy of equalities, with the damping that `Resolver` describes."""
     x, N = np.zeros(h.n), np.eye(h.n)
     for A, b, _ in h.levels():
@@ -16,7 +19,7 @@ def solve(h, damping=0.0, threshold=0.1, rank_tolerance=1e-9):
         B = A @ N
         size = np.linalg.norm(A, axis=1)
         _, s, Vt = np.linalg.svd(B / np.where(size > 0, size, 1.0)[:, None])
-        rank = np.count_nonzero(s > rank_tolerance)
+        rank = int(np.count_nonzero(s > rank_tolerance))
         V = Vt[:rank].T  # directions of the null space that these rows can see
         M, missing = B @ V, b - A @ x
         lam = damping_of(B, rank, damping, threshold)
@@ -26,16 +29,17 @@ def solve(h, damping=0.0, threshold=0.1, rank_tolerance=1e-9):
             y = np.linalg.pinv(M) @ missing
         x = x + N @ V @ y
         N = N @ Vt[rank:].T
-    return x + N @ (N.T @ h.reference)
+    return np.asarray(x + N @ (N.T @ h.reference))
 
 
-def damping_of(B, rank, damping, threshold):
+def damping_of(B: Array, rank: int, damping: float, threshold: float) -> float:
     """Return lambda of one level, from the smallest singular value counted over its rows."""
     smallest = np.linalg.svd(B, compute_uv=False)[-1] if rank == len(B) else 0.0
-    return damping * np.sqrt(max(0.0, 1.0 - (smallest / threshold) ** 2))
+    return float(damping * np.sqrt(max(0.0, 1.0 - (smallest / threshold) ** 2)))
 
 
-def published(h, rank_tolerance=1e-9, damping=0.0, threshold=0.1):
+def published(h: Hierarchy, rank_tolerance: float = 1e-9, damping: float = 0.0,
+              threshold: float = 0.1) -> tuple[Array, Array]:
     """Return x and F of the published Task Priority Matrix: eqs. (8)-(10), (14)."""
     A, b = h.A, h.lower
     m, n = A.shape
@@ -48,8 +52,8 @@ def published(h, rank_tolerance=1e-9, damping=0.0, threshold=0.1):
     return np.linalg.pinv(A, rcond=rank_tolerance) @ (F @ b - A @ h.reference) + h.reference, F
 
 
-def _pivot(R, tolerance, damping, threshold):
+def _pivot(R: Array, tolerance: float, damping: float, threshold: float) -> Array:
     U, s, Vt = np.linalg.svd(R)
     lam2 = damping**2 * max(0.0, 1.0 - (s[-1] / threshold) ** 2) if len(s) else 0.0
     gain = [v / (v * v + lam2) if lam2 > 0 or v > tolerance else 0.0 for v in s]
-    return Vt.T @ np.diag(gain) @ U.T
+    return np.asarray(Vt.T @ np.diag(gain) @ U.T)
