@@ -29,7 +29,7 @@ from solvers.kernels.tableau import (
     entry_of,
     left_of,
 )
-from solvers.kernels.tolerances import CANCELLED, EPSILON
+from solvers.kernels.tolerances import CANCELLED, EPSILON, FAINT
 from solvers.kernels.working_set import NORM, TOLERANCE, side_at
 
 
@@ -102,13 +102,17 @@ def weigh_rows(t):
 @inlined
 def pull_of_rows(t, begin, end):
     """Add the excess of the rows of a level, times the rows, in the basis vectors begin .. end."""
-    s, pull = t.of, t.of.number[PULL]
     for q in range(t.count[ROWS]):
-        i = s.index[LIST, q]
-        push, column = s.number[OVER, q] * entry_of(t, i), s.index[COLUMN, i]
-        if push != 0.0:
-            for k in range(begin, end):
-                pull[k] += push * t.M[k, column]
+        push_by(t, t.of.index[LIST, q], t.of.number[OVER, q], begin, end)
+
+
+@inlined
+def push_by(t, i, over, begin, end):
+    """Add row i times its excess, without entries so faint that they decide nothing."""
+    s, column, entry = t.of, t.of.index[COLUMN, i], entry_of(t, i)
+    faint, push = FAINT * abs(s.number[NORM, i] / entry), over * entry
+    for k in range(begin, end if push != 0.0 else begin):
+        s.number[PULL, k] += push * t.M[k, column] if abs(t.M[k, column]) > faint else 0.0
 
 
 @inlined

@@ -18,11 +18,10 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import add_multiple, compiled, inlined
-from solvers.kernels.level import balance, pull_of_rows, step_of_rows, weigh_rows
+from solvers.kernels.level import balance, pull_of_rows, push_by, step_of_rows, weigh_rows
 from solvers.kernels.rows import ZERO, length_of
 from solvers.kernels.tableau import (
     BASE,
-    COLUMN,
     FIX,
     FORCE,
     GOAL,
@@ -53,7 +52,6 @@ from solvers.kernels.tableau import (
     add_column,
     around,
     close_column,
-    entry_of,
     fold_to,
     is_independent,
     left_of,
@@ -213,9 +211,7 @@ def _write_multipliers(t, k, whole):
         push = s.multiplier[k, i]
         if push != 0.0:
             largest = max(largest, abs(push) * s.number[NORM, i])
-            column, push = s.index[COLUMN, i], push * entry_of(t, i)
-            for c in range(end):
-                s.number[PULL, c] += push * t.M[c, column]
+            push_by(t, i, push, 0, end)
     t.scalar[ROUNDING] = t.scalar[ROUNDING] if whole else CANCELLED * largest
     balance(t, ZERO, end)
     for c in range(end):

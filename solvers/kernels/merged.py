@@ -87,11 +87,11 @@ def merged(A, lower, upper, sizes, x, record, settings, work):
         return ZERO + NOTHING
     if merged_size(n, m, levels, settings[DAMPING] > 0.0) > work.size:
         return ZERO + TOO_SMALL
+    y, last, damped = record[:m], min(strict + 1, levels), settings[DAMPING] > 0.0
     for c in range(n):
-        s.centre[c] = x[c] if settings[DAMPING] > 0.0 else 0.0
+        s.centre[c] = x[c] if damped else 0.0
         x[c] -= s.centre[c]
-    y, last = record[:m], min(strict + 1, levels)
-    _merge(s, A, lower, upper, sizes, strict, y)
+    _merge(s, A, lower, upper, sizes, strict, y, damped)
     rows = m
     if strict < levels:
         rows = _draw(s, m, x)
@@ -144,7 +144,7 @@ def _carve(settings, work, m, n, levels):
 
 
 @compiled
-def _merge(s, A, lower, upper, sizes, strict, y):
+def _merge(s, A, lower, upper, sizes, strict, y, damped):
     """Write the rows of all levels, those to merge times their weights and at moved sides."""
     first, hard = ZERO, ZERO
     fill(s.own, 0.0)
@@ -159,7 +159,7 @@ def _merge(s, A, lower, upper, sizes, strict, y):
                     s.own[only] = 1.0
                 if only < 0 and _repeats(A, lower, upper, i, hard):
                     weight = 0.0
-            moved -= inner_product(A[i], s.centre)
+            moved -= inner_product(A[i], s.centre) if damped else 0.0
             for c in range(A.shape[1]):
                 s.A[i, c] = weight * A[i, c]
             s.lower[i], s.upper[i] = weight * (lower[i] + moved), weight * (upper[i] + moved)

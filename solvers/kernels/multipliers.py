@@ -19,7 +19,7 @@ from hierarchy.jit import compiled, inlined
 from solvers.kernels.least_squares import turn
 from solvers.kernels.rows import length_of, reflect
 from solvers.kernels.space import matrix
-from solvers.kernels.tolerances import CANCELLED, EPSILON, NEGLIGIBLE, SHADOW
+from solvers.kernels.tolerances import CANCELLED, EPSILON, FAINT, NEGLIGIBLE, SHADOW
 from solvers.kernels.working_set import (
     BEGIN,
     DIAGONAL,
@@ -163,9 +163,10 @@ def _add(s, f, unsure, q, begin, end):
     """Add a multiple of the row at place q to the gradient in these columns."""
     w, gradient, noise = s.W[q], s.number[GRADIENT], s.number[NOISE]
     unsure += CANCELLED * abs(f)
+    faint = FAINT * s.number[NORM, s.index[LIST, q]]
     for t in range(begin, end):
         gradient[t] += f * w[t]
-        noise[t] += abs(w[t]) * unsure
+        noise[t] += abs(w[t]) * unsure + min(abs(w[t]), faint) * abs(f)
 
 
 @compiled
