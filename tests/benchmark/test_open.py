@@ -20,9 +20,7 @@ from benchmark.solve.entrants import chosen, compiled
 from benchmark.solve.judge import judge, summary
 from benchmark.solve.open import QUESTIONS, asked, improve
 from benchmark.worker import Repeats
-from hierarchy import Hierarchy
-from hierarchy.errors import HierarchyError
-from scenarios.cli.main import run_command
+from hierarchy import Hierarchy, HierarchyError
 from solvers import make
 from solvers.problems.files import Collection, Head, read
 from solvers.proof import prove
@@ -161,24 +159,22 @@ def test_an_entrant_that_is_not_there_is_refused(call, said):
         call()
 
 
-def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkeypatch):
+def test_the_command_runs_continues_and_writes_its_page(tmp_path, command, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     out = tmp_path / "open"
-    line = ["bench", "open", "--family", "integers", "--family", "one_unknown", "--count", "3",
-            "--public", "2", "--fresh", "9", "--borders", "--entrant", "hcod", "--out", str(out)]
-    mine = f"{HELPERS / 'fake_entrants.py'}:Moody"
-    assert run_command(line) == 0
+    line = ("bench open --family integers --family one_unknown --count 3 --public 2 --fresh 9 "
+            "--borders --entrant hcod --out", out)
+    first_said = command(*line).err
     first = {file: file.stat().st_mtime_ns for file in out.glob("*/*.*")}
     assert len(first) == 8  # four files of problems, four of rows
     assert len(list(out.glob("borders/*/*.npz"))) == 4 * 8
     (out / "missing.json").write_text('{"absent": "not installed", "Moody": "not installed"}')
-    assert run_command([*line, "--entrant", mine]) == 0
+    said = command(*line, "--entrant", f"{HELPERS / 'fake_entrants.py'}:Moody")
     missing = json.loads((out / "missing.json").read_text())
     assert missing["absent"] == "not installed"
     assert "Moody" not in missing
     assert first.items() <= {file: file.stat().st_mtime_ns for file in out.glob("*/*.*")}.items()
-    said = capsys.readouterr()
-    assert said.err.count("integers, seed 9") == 1
+    assert (first_said + said.err).count("integers, seed 9") == 1
     assert max(len(line) for line in said.out.splitlines() if ": /" not in line) <= 80
     fresh = said.out.index("Fresh problems, seed 9: 6 problems of 2 families")
     assert fresh < said.out.index("Public problems: 4 problems of 2 families")
@@ -190,16 +186,14 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     assert not re.search(r'(src|href)="http', page)
 
 
-def test_the_check_accepts_the_example_of_the_documents_and_not_what_ends(tmp_path, capsys):
+def test_the_check_accepts_the_example_of_the_documents_and_not_what_ends(tmp_path, command):
     page = (Path(__file__).parents[2] / "docs" / "extending" / "entrant.md").read_text()
     (tmp_path / "mine.py").write_text(re.search(r"```python\n(.*?)```", page, re.DOTALL)[1])
-    assert run_command(["bench", "open", "--check", "--entrant", f"{tmp_path}/mine.py:Mine"]) == 0
+    command("bench open --check --entrant", f"{tmp_path}/mine.py:Mine")
     broken = {"Raising": "it raises: ArithmeticError: not today", "Moody": "other bits the second",
               "Slow": "it takes longer than --limit"}
-    line = [part for name in broken for part in ("--entrant",
-                                                 f"{HELPERS / 'fake_entrants.py'}:{name}")]
-    assert run_command(["bench", "open", "--check", "--limit", "0.5", *line]) == 1
-    said = capsys.readouterr().out
+    line = " ".join(f"--entrant '{HELPERS}/fake_entrants.py:{name}'" for name in broken)
+    said = command(f"bench open --check --limit 0.5 {line}", code=1).out
     for rule in broken.values():
         assert re.search(f"a rule is broken: .*{rule}", said)
 

@@ -12,7 +12,6 @@ import scenarios.config.reading as groups_of
 from hierarchy import HierarchyError
 from scenarios import compare
 from scenarios.cell.build import build
-from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError, load, members, shipped
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
@@ -97,17 +96,16 @@ def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them
     ("control.period", ["number > 0 ≤ 1 [s], default 0.001", "Time from tick to tick."]),
     ("start.q", ["[rad or m]"]), ("duration", ["control.duration", "faults.duration"]),
     ("run", ["Usage: hierarchy run"]), ("tasks", ["[[tasks]]"])])
-def test_help_says_what_a_key_means(asked, said, capsys):
-    assert run_command(["help", asked]) == 0
-    text = capsys.readouterr().out
+def test_help_says_what_a_key_means(asked, said, command):
+    text = command("help", asked).out
     assert all(one in text for one in said)
 
 
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
-        tmp_path, monkeypatch, capsys):
+        tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
-    assert run_command(["compare", "ladder", "--duration", "0.02", "--workers", "1"]) == 0
-    assert "Step 2: joint limits above all tasks (tpm)" in capsys.readouterr().out
+    said = command("compare ladder --duration 0.02 --workers 1").out
+    assert "Step 2: joint limits above all tasks (tpm)" in said
     folder = tmp_path / "runs" / "compare-ladder"
     found = json.loads((folder / "comparison.json").read_text())
     assert [run["scenario"] for run in found["runs"]] == members(["ladder"])

@@ -10,13 +10,11 @@ from hand_made import recording
 from scipy.stats import rankdata
 
 from hierarchy import Hierarchy
-from scenarios import load, simulate
-from scenarios.cli.main import run_command
+from scenarios import load, save, simulate
 from scenarios.measure.causes import Tick, causes
 from scenarios.measure.given_up import given_up
 from scenarios.measure.goals import goals
 from scenarios.measure.jumps import jumps
-from scenarios.measure.run_folder import save
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import best, paired, wilson
 from scenarios.measure.verdict import lines, table, verdicts
@@ -237,13 +235,12 @@ def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
     assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
 
 
-def test_the_command_names_the_largest_changes_of_a_run(tmp_path, capsys):
+def test_the_command_names_the_largest_changes_of_a_run(tmp_path, command):
     folder = save(simulate(load("ellipse-hqp", ["control.duration=0.05"])), tmp_path / "run")
-    assert run_command(["why", str(folder), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["jumps"]
+    found = json.loads(command("why --json", folder).out)["jumps"]
     sizes = [one["size"] for one in found]
     assert (len(found), sizes) == (3, sorted(sizes, reverse=True))
-    assert run_command(["why", str(folder), "--tick", str(found[0]["tick"])]) == 0
-    assert f"tick {found[0]['tick']} (t = " in capsys.readouterr().out
-    assert run_command(["why", str(folder), "--tick", "999"]) == 2
-    assert "tick 999: the run has ticks 0 to 49" in capsys.readouterr().err
+    tick = found[0]["tick"]
+    assert f"tick {tick} (t = " in command("why", folder, "--tick", tick).out
+    assert ("tick 999: the run has ticks 0 to 49"
+            in command("why --tick 999", folder, code=2).err)

@@ -14,7 +14,6 @@ from urdf_text import INERTIAL, joint, link, placed, shape, urdf
 from hierarchy import HierarchyError, Robot
 from scenarios import load, load_run, save, simulate
 from scenarios.cell.robot import make_robot
-from scenarios.cli.main import run_command
 from scenarios.draw.replay.page import html
 from scenarios.scene import scene
 
@@ -132,17 +131,16 @@ ROBOTS = {
 }
 
 
-def pasted(model, folder, capsys):
+def pasted(model, folder, command):
     """Return the robot that `check` described, and that of a scenario with what it printed."""
-    assert run_command(["check", model]) == 0
-    said = capsys.readouterr().out
+    said = command("check", model).out
     assert said.count("  follows         f") == 3 * ("gripper" in model)
     section, path = said[said.index("[robot]\n"):], folder / "pasted.toml"
     end = next(line for line in section.splitlines() if line.startswith("end_effector = "))
     path.write_text('name = "pasted"\n' + section + CONTROL
                     + end.replace("end_effector", "frame", 1))
-    assert run_command(["check", str(path)]) == 0, capsys.readouterr().err
-    assert run_command(["run", str(path), "--out", str(folder / "run")]) == 0
+    command("check", path)
+    command("run", path, "--out", folder / "run")
     return Robot.load(model), make_robot(load(path).robot)
 
 
@@ -154,13 +152,13 @@ def expect_the_same(one, other):
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_the_section_to_paste_runs_as_it_is(name, tmp_path, monkeypatch, capsys):
+def test_the_section_to_paste_runs_as_it_is(name, tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     (tmp_path / name).write_text(ROBOTS[name])
-    expect_the_same(*pasted(name, tmp_path, capsys))
+    expect_the_same(*pasted(name, tmp_path, command))
 
 
 @pytest.mark.usefixtures("example_robot_data")
 @pytest.mark.parametrize("name", ["pr2", "romeo"])
-def test_the_section_of_a_public_robot_runs_as_it_is(name, tmp_path, capsys):
-    expect_the_same(*pasted(f"example_robot_data:{name}", tmp_path, capsys))
+def test_the_section_of_a_public_robot_runs_as_it_is(name, tmp_path, command):
+    expect_the_same(*pasted(f"example_robot_data:{name}", tmp_path, command))

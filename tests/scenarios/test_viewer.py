@@ -14,7 +14,6 @@ from headless import chromium
 
 from hierarchy.errors import HierarchyError
 from scenarios import load, save, simulate
-from scenarios.cli.main import run_command
 from scenarios.draw.replay.page import NOTHING, html
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.live_page import LivePage
@@ -259,8 +258,8 @@ def test_the_page_shows_the_arm_in_space_and_plays_it_until_it_is_paused(documen
         assert page.complaints == []
 
 
-def test_the_command_takes_several_runs_and_a_name(runs, tmp_path):
-    folders = [str(save(run, tmp_path / label)) for label, run in runs.items()]
+def test_the_command_takes_several_runs_and_a_name(runs, tmp_path, command):
+    folders = [save(run, tmp_path / label) for label, run in runs.items()]
     file = tmp_path / "new" / "two.html"
-    assert run_command(["replay", *folders, "--out", str(file)]) == 0
+    command("replay", *folders, "--out", file)
     assert len(data_of(file.read_text(encoding="utf-8"))["runs"]) == 2

@@ -1,7 +1,6 @@
 """What a user reads who wrote something wrong: the place, the mend, the nearest name."""
 
 import re
-import shlex
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from hierarchy import Hierarchy, HierarchyError, Robot
 from hierarchy.paths import Still
 from hierarchy.tasks import Position
 from scenarios import compare, load, save, simulate
-from scenarios.cli.main import run_command
 from scenarios.cli.terminal import lines
 from scenarios.config import ScenarioError
 from scenarios.config.validation import doubtful_units
@@ -68,14 +66,12 @@ def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
       "robot.control_points=[{joint='joint_2', offset=[0, 0, 0]}]"],
      "obstacle 2 at [0.0, 0.0, 0.0] m touches control point 1"),
     (["limits={acceleration=10, margin=3}"], "margin 3 leaves joint_1 no room between")])
-def test_what_does_not_fit_the_robot_is_said_by_check_and_run(changes, said, capsys, tmp_path):
+def test_what_does_not_fit_the_robot_is_said_by_check_and_run(changes, said, command, tmp_path):
     sets = [part for change in changes for part in ("--set", change)]
-    assert run_command(["check", "ellipse", *sets]) == 2
-    checked = capsys.readouterr().err
+    checked = command("check ellipse", *sets, code=2).err
     assert said in checked
-    assert run_command(["run", "ellipse", *sets, "--duration", "0.01",
-                        "--out", str(tmp_path / "run")]) == 2
-    assert capsys.readouterr().err.splitlines()[-1] == checked.splitlines()[-1]
+    run = command("run ellipse --duration 0.01 --out", tmp_path / "run", *sets, code=2)
+    assert run.err.splitlines()[-1] == checked.splitlines()[-1]
     assert not list(tmp_path.rglob("*.npz"))
 
 
@@ -130,11 +126,6 @@ def test_files_that_extend_each_other_a_thousand_deep_are_refused(tmp_path):
     assert load(tmp_path / "20.toml").robot.model == "kuka_lwr"
 
 
-def checked(capsys, *changes, name="ellipse"):
-    assert run_command(["check", name, *(p for c in changes for p in ("--set", c))]) == 0
-    return " ".join(capsys.readouterr().out.split())
-
-
 @pytest.mark.parametrize(("name", "changes", "said"), [
     ("strictness", [], "held back by joint limits joint_1 at its upper side, joint_2 at its lower"),
     ("ellipse", ["pointing.alpha_d=0.6"],
@@ -143,9 +134,10 @@ def checked(capsys, *changes, name="ellipse"):
      "posture.target.3 = 90 rad or m: joint angles are in radians"),
     ("ellipse", ["avoidance.near=0.2", "avoidance.far=0.3"],
      "body: 112 mm from the nearest obstacle at the start, less than the 200 mm")])
-def test_check_warns_of_what_is_missed_or_doubtful(name, changes, said, capsys):
-    assert said in checked(capsys, *changes, name=name)
-    assert "Warning" not in checked(capsys)
+def test_check_warns_of_what_is_missed_or_doubtful(name, changes, said, command):
+    told = command("check", name, *(part for change in changes for part in ("--set", change))).out
+    assert said in " ".join(told.split())
+    assert "Warning" not in command("check ellipse").out
 
 
 @pytest.mark.parametrize(("line", "said"), [
@@ -159,10 +151,9 @@ def test_check_warns_of_what_is_missed_or_doubtful(name, changes, said, capsys):
     ("bench [red]nothing[/red]", "[red]nothing[/red]"),
     ("view nowhere --no-browser", "nowhere"),
     ("run ellipse --live --certify", "--certify")])
-def test_a_wrong_command_line_says_what_was_given(line, said, capsys, tmp_path, monkeypatch):
+def test_a_wrong_command_line_says_what_was_given(line, said, command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert run_command(shlex.split(line)) == 2
-    out, err = capsys.readouterr()
+    out, err = command(line, code=2)
     assert out == ""
     assert err.startswith("hierarchy: error: ")
     assert said in err
@@ -227,9 +218,8 @@ def test_a_file_with_a_byte_order_mark_and_names_in_any_alphabet_is_read(tmp_pat
 @pytest.mark.parametrize(("asked", "said"), [
     ("elipse", "did you mean 'ellipse'? The nearest of "), ("m.urdf", "'m.urdf' is a robot"),
     ("ellipse-starts", "to be run by `hierarchy sweep ellipse-starts`")])
-def test_what_is_no_scenario_is_told_with_what_it_is(asked, said, capsys):
-    assert run_command(["run", asked]) == 2
-    text = capsys.readouterr().err
+def test_what_is_no_scenario_is_told_with_what_it_is(asked, said, command):
+    text = command("run", asked, code=2).err
     assert said in text
     assert len(text) < 400
 

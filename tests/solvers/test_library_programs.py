@@ -20,7 +20,6 @@ from benchmark.studies.recorded import record_sequence
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position
-from scenarios.cli.main import run_command
 from scenarios.problems.reference import family
 from solvers import make, problems
 from solvers.library import differs, write
@@ -154,9 +153,8 @@ def test_the_examples_pass_the_address_sanitizer(folder, tmp_path, name, words):
     assert said(program).startswith(words)
 
 
-def test_check_compares_the_kernels(folder, tmp_path, capsys):
-    assert run_command(["library", "--check", "--out", str(folder)]) == 0
-    assert "same kernels" in capsys.readouterr().out
+def test_check_compares_the_kernels(folder, tmp_path, command):
+    assert "same kernels" in command("library --check --out", folder).out
     other = tmp_path / "other"
     shutil.copytree(folder, other)
     header = other / "include" / "task_hierarchy.h"
@@ -165,20 +163,18 @@ def test_check_compares_the_kernels(folder, tmp_path, capsys):
     assert "and libtask_hierarchy.a another" in differs(other)
     code = other / "lib" / "libtask_hierarchy.a"
     code.write_bytes(code.read_bytes().replace(digest.encode(), b"0" * 16))
-    assert run_command(["library", "--check", "--out", str(other)]) == 1
-    assert f"those installed have {digest}" in capsys.readouterr().err
+    said = command("library --check --out", other, code=1).err
+    assert f"those installed have {digest}" in said
     with pytest.raises(HierarchyError, match=r"task_hierarchy\.h is missing"):
         differs(tmp_path)
 
 
 def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and_for_arm(
-        tmp_path, capsys):
-    out, here = tmp_path / "lib", os.uname().machine == "x86_64"
-    line = ["library", "--out", str(out), "--resolvers", "recursive"]
-    assert run_command([*line, "--target", "x86_64" if here else "native"]) == 0
-    assert "libtask_hierarchy.a" in capsys.readouterr().out
-    assert run_command(line) == 2
-    assert "not empty" in capsys.readouterr().err
+        tmp_path, command):
+    out, target = tmp_path / "lib", "x86_64" if os.uname().machine == "x86_64" else "native"
+    line = "library --resolvers recursive --out", out
+    assert "libtask_hierarchy.a" in command(*line, "--target", target).out
+    assert "not empty" in command(*line, code=2).err
     library = c.Library.of(out)
     kinds = problems.KINDS[:-2]  # without rows far lighter than others, where rounding is larger
     for seed in range(30):
@@ -196,9 +192,8 @@ def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    (["--resolvers", "hcdo"], "did you mean 'hcod'"), (["--resolvers", "hqp"], "'hqp'"),
-    (["--resolvers", "hcod,"], "empty name"), (["--target", "x86"], "did you mean 'x86_64'")])
-def test_a_wrong_name_is_an_error_that_names_it(tmp_path, capsys, options, words):
-    assert run_command(["library", "--out", str(tmp_path / "lib"), *options]) == 2
-    assert words in capsys.readouterr().err
+    ("--resolvers hcdo", "did you mean 'hcod'"), ("--resolvers hqp", "'hqp'"),
+    ("--resolvers hcod,", "empty name"), ("--target x86", "did you mean 'x86_64'")])
+def test_a_wrong_name_is_an_error_that_names_it(tmp_path, command, options, words):
+    assert words in command(f"library {options} --out", tmp_path / "lib", code=2).err
     assert not (tmp_path / "lib").exists()
