@@ -59,10 +59,8 @@ KINDS = {
                                    f"{link('b')}</replicate>")),
     "two arms on a table": world(f'<body name="table" pos="0 0 1">{GEOM}{link("a")}{link("b")}'
                                  "</body>"),
-    "a table first": world(TABLE + link("a")),
-    "a target first": world(TARGET + link("a")),
-    "a loose cube first": world(CUBE + link("a")),
-    "a drone": world(CUBE),
+    "a table first": world(TABLE + link("a")), "a target first": world(TARGET + link("a")),
+    "a loose cube first": world(CUBE + link("a")), "a drone": world(CUBE),
     "a walker": world(WALKER + TABLE),
     "a ball joint": world(link("a", 'type="ball" pos=".1 0 0" armature=".2"', link("b"))),
     "a geared drive": world(link("a", more=link("b")), '<actuator><motor joint="b_joint" '
@@ -71,8 +69,7 @@ KINDS = {
         link("a", more='<geom type="mesh" mesh="m" density="500"/>'),
         '<asset><mesh name="m" vertex="0 0 0 .2 0 0 0 .3 0 0 0 .4"/></asset>'),
     "a cloth": world(link("a") + '<flexcomp name="cloth" type="grid" count="2 2 1" '
-                     'spacing=".1 .1 .1" radius=".01" mass="1" dim="2"/>'),
-}
+                     'spacing=".1 .1 .1" radius=".01" mass="1" dim="2"/>')}
 
 
 @pytest.fixture
@@ -166,10 +163,9 @@ def test_a_ball_and_a_free_joint_are_locked_where_mujoco_has_them(joint, value, 
     ('<motor joint="a_joint" ctrlrange="-2 2"/>', 'actuatorfrcrange="-1.5 1.5"', 1.5),
     ('<motor joint="a_joint" ctrlrange="-2 3"/>', "", 2.0),
     ('<motor joint="a_joint" ctrlrange="0 3"/>', "", np.inf),
-    ('<motor joint="a_joint"/>', "", np.inf),
+    ('<motor joint="a_joint"/>', "", np.inf), ("", "", np.inf),
     ('<position joint="a_joint" kp="9" ctrlrange="-1 1"/>', "", np.inf),
-    ('<orientation joint="b_joint"/><motor joint="a_joint" gear="3" ctrlrange="-2 2"/>', "", 6.0),
-    ("", "", np.inf)])
+    ('<orientation joint="b_joint"/><motor joint="a_joint" gear="3" ctrlrange="-2 2"/>', "", 6.0)])
 def test_effort_limits_are_what_actuators_can_do(actuator, joint, effort, written):
     arm = link("a", f'{joint} axis="0 1 0"', link("b", 'type="ball"'))
     robot = Robot.load(written(world(arm, f"<actuator>{actuator}</actuator>")))
