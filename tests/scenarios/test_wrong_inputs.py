@@ -1,13 +1,14 @@
 """What a user reads who wrote something wrong: the place, the mend, the nearest name."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hierarchy import Hierarchy, HierarchyError, Robot
 from hierarchy.paths import Still
-from hierarchy.tasks import Position
+from hierarchy.tasks import JointLimits, Position
 from scenarios import compare, load, save, simulate
 from scenarios.cli.terminal import lines
 from scenarios.config import ScenarioError
@@ -164,7 +165,7 @@ def test_a_wrong_command_line_says_what_was_given(line, said, command, tmp_path,
 SHORT = load("ellipse", ["control.duration=0.01"])
 ROBOT = Robot.load("kuka_lwr")
 HAND = Position(ROBOT.frame("end_effector"), Still([0.3, 0.5, 0.1]))
-Q = [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0]
+Q, SLOW = [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0], JointLimits(ROBOT, 9.0, 0.01)
 H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])])
 
 
@@ -178,6 +179,18 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: compare(SHORT, ["tpm"], out=3), "compare: out: expected a path, got int 3"),
     (lambda: save("ellipse", "x"), "save: expected a Recording, got str 'ellipse'"),
     (lambda: solve_ik(ROBOT, Q, [HAND], limits="yes"), "limits: expected True, False or a task"),
+    (lambda: solve_ik("kuka_lwr", Q, []), "solve_ik: robot: expected a Robot, got str 'kuka_lwr'"),
+    (lambda: solve_ik(ROBOT, Q, HAND), "solve_ik: tasks: expected a Sequence"),
+    (lambda: solve_ik(ROBOT, Q, ["hand"]), "solve_ik: tasks[0]: expected a Task, got str 'hand'"),
+    (lambda: solve_ik(ROBOT, Q, [HAND], dt=0.0), "dt = 0.0 s must be positive"),
+    (lambda: solve_ik(ROBOT, Q, [HAND], memory="last"),
+     "solve_ik: memory: expected a Memory, got str 'last'"),
+    (lambda: solve_ik(ROBOT, Q, [replace(HAND, gain=201.0)], dt=0.01),
+     "task 'position': gain = 201 1/s times the period of 0.01 s is 2.01"),
+    (lambda: solve_ik(ROBOT, Q, [HAND], dt=0.02, limits=SLOW, v=np.zeros(7)),
+     "'joint limits': its period is 0.01 s, that of the "),
+    (lambda: solve_ik(ROBOT, Q, [HAND], limits=SLOW), "give v, the velocity of the tick before"),
+    (lambda: solve_ik(ROBOT, Q, [HAND], until=1e-6, limits=SLOW), "with until, limits are True or"),
     (lambda: certify([], [0.0, 0.0]), "certify: h: expected a Hierarchy, got list"),
     (lambda: explain(H, make("weighted").solve(H)), "hcod"),
     (lambda: explain(H, make("hcod").solve(H), rows="ab"), "rows: expected a list of names"),

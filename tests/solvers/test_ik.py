@@ -8,7 +8,7 @@ import pytest
 from standing import ROBOT as HUMANOID
 from standing import WEIGHT, feet, standing_stack
 
-from hierarchy import HierarchyError, Robot, State
+from hierarchy import Robot, State
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Pose, Position, Posture
 from solvers import Status, certify, explain, make, problems, solve_ik
@@ -16,11 +16,6 @@ from solvers import Status, certify, explain, make, problems, solve_ik
 ROBOT = Robot.named("kuka_lwr")
 FRAME = ROBOT.frame("end_effector")
 Q = np.array([0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3])
-SLOW = JointLimits(ROBOT, 9.0, 0.01)
-
-
-def hand(shift, gain=10.0):
-    return Position(FRAME, Still(State.at(ROBOT, Q).position(FRAME) + shift), gain=gain)
 
 
 def follow(tasks, ticks, **settings):
@@ -41,27 +36,6 @@ def test_limits_of_the_robot_hold_whatever_is_asked():
     assert (q <= ROBOT.upper + 1e-9).all()
     np.testing.assert_allclose(q, ROBOT.upper, atol=1e-9)
     assert (np.abs(solve_ik(ROBOT, Q, [far], limits=False).v) > ROBOT.velocity_limit).any()
-
-
-@pytest.mark.parametrize(("call", "said"), [
-    (lambda: solve_ik("kuka_lwr", Q, []), "solve_ik: robot: expected a Robot, got str 'kuka_lwr'"),
-    (lambda: solve_ik(ROBOT, Q, hand([0, 0, 0])), "solve_ik: tasks: expected a Sequence"),
-    (lambda: solve_ik(ROBOT, Q, ["hand"]), "solve_ik: tasks[0]: expected a Task, got str 'hand'"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], dt=0.0), "dt = 0.0 s must be positive"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], memory="last"),
-     "solve_ik: memory: expected a Memory, got str 'last'"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0.1, 0, 0], gain=201.0)], dt=0.01),
-     "task 'position': gain = 201 1/s times the period of 0.01 s is 2.01"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], dt=0.02, limits=SLOW, v=np.zeros(7)),
-     "'joint limits': its period is 0.01 s, that of the "),
-    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], limits=SLOW),
-     "give v, the velocity of the tick before"),
-    (lambda: solve_ik(ROBOT, Q, [hand([0, 0, 0])], until=1e-6, limits=SLOW),
-     "with until, limits are True or")])
-def test_wrong_arguments_are_named(call, said):
-    with pytest.raises(HierarchyError) as error:
-        call()
-    assert said in str(error.value)
 
 
 @pytest.mark.parametrize(("goal", "below", "settings"), [
