@@ -108,7 +108,8 @@ def test_wrong_levels_are_named(levels, give, said):
         Hierarchy.from_levels(levels, give=give)
 
 
-BROKEN_ONCE = '''
+def test_no_way_of_breaking_an_array_ends_the_process():
+    program = '''
 import contextlib
 import numpy as np
 from hierarchy import Hierarchy, HierarchyError
@@ -141,10 +142,7 @@ for made, broken in [
         print(error)
 print("alive")
 '''
-
-
-def test_no_way_of_breaking_an_array_ends_the_process():
-    done = subprocess.run([sys.executable, "-W", "ignore", "-c", BROKEN_ONCE], text=True,
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", program], text=True,
                           capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
     said = done.stdout.splitlines()

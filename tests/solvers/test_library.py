@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from rank_cases import sequence
 
-from hierarchy import Hierarchy
-from hierarchy.errors import HierarchyError
+from hierarchy import Hierarchy, HierarchyError
 from hierarchy.jit import caching
 from hierarchy.jit.sources import source_digest
 from scenarios.problems.reference import FAMILIES, family
@@ -22,22 +21,16 @@ if not sys.platform.startswith("linux"):
 
 # name in both, settings in Python, the same in C
 RESOLVERS = [
-    ("hcod", {}, {}),
-    ("hcod", {"damping": 0.1}, {"damping": 0.1}),
-    ("hcod", {"tolerance": 1e-8, "max_iterations": 3}, {"tolerance": 1e-8, "max_iterations": 3}),
-    ("tpm", {}, {}),
-    ("tpm", {"damping": 0.1, "threshold": 0.3}, {"damping": 0.1, "threshold": 0.3}),
-    ("recursive", {}, {}),
+    *((name, given, given) for name, given in (
+        ("hcod", {}), ("hcod", {"damping": 0.1}), ("tpm", {}), ("recursive", {}), ("sns", {}),
+        ("merged", {}), ("hcod", {"tolerance": 1e-8, "max_iterations": 3}),
+        ("tpm", {"damping": 0.1, "threshold": 0.3}),
+        ("merged", {"ratio": 2.0, "step": 1.0, "strict_levels": 1}))),
     ("recursive", {"method": "nakamura", "damping": 0.1}, {"method": 1, "damping": 0.1}),
     ("recursive", {"method": "chiaverini", "damping": 0.1, "isotropic": 0.01},
      {"method": 2, "damping": 0.1, "isotropic": 0.01}),
     ("recursive", {"method": "selective", "largest": 0.3}, {"method": 3, "largest": 0.3}),
-    ("sns", {}, {}),
-    ("sns", {"form": "optimal", "scales": "miss"}, {"optimal": 1, "miss": 1}),
-    ("merged", {}, {}),
-    ("merged", {"ratio": 2.0, "step": 1.0, "strict_levels": 1},
-     {"ratio": 2.0, "step": 1.0, "strict_levels": 1}),
-]
+    ("sns", {"form": "optimal", "scales": "miss"}, {"optimal": 1, "miss": 1})]
 
 
 def hierarchies(count, first=0):

@@ -29,12 +29,11 @@ if not sys.platform.startswith("linux"):
 
 ROOT = Path(__file__).parents[2]
 ROS2 = ROOT / "examples" / "ros2_control"
-EXAMPLES, PROGRAM = ROOT / "examples" / "c", ROOT / "tests" / "helpers" / "c_speed.c"
+EXAMPLES = ROOT / "examples" / "c"
 STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"]
 COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 CXX = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
 needs_c = pytest.mark.skipif(COMPILER is None, reason="no compiler of C")
-LIBM = {"hypot", "memset", "memcpy"}  # all that the library asks for
 
 
 @pytest.mark.skipif(shutil.which("nm") is None, reason="no nm")
@@ -42,7 +41,7 @@ def test_it_asks_for_nothing_but_libm_and_owns_no_variable(folder):
     done = subprocess.run(["nm", folder / "lib" / "libtask_hierarchy.a"], capture_output=True,
                           text=True, check=True)
     kinds = re.findall(r"^\w* +(\w) (\S+)$", done.stdout, re.MULTILINE)
-    assert {name for kind, name in kinds if kind == "U"} <= LIBM
+    assert {name for kind, name in kinds if kind == "U"} <= {"hypot", "memset", "memcpy"}
     assert {kind for kind, _ in kinds} <= set("UTtr")  # code and constants
     assert {name for kind, name in kinds if kind == "T"} == {
         *(f"th_solve_{name}" for name in c.NAMES), "th_work_size", "th_record_size",
@@ -137,7 +136,7 @@ def test_cmake_finds_it(folder, tmp_path, linked):
 @pytest.mark.parametrize(("name", "resolver"), [("INEQ7", "hcod"), ("EQ7", "tpm")])
 def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, name, resolver):
     record_sequence(tmp_path / "ticks", sequence(family(name)[0].h, 100))
-    program = built(tmp_path / "study", PROGRAM, folder, "-O2")
+    program = built(tmp_path / "study", ROOT / "tests/helpers/c_speed.c", folder, "-O2")
     solves, failed, allocated, faults, *_ = map(int, said(
         program, tmp_path / "ticks", resolver, "200000").split())
     assert (solves, failed, allocated, faults) == (200_000, 0, 0, 0)

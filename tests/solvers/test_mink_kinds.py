@@ -14,12 +14,12 @@ from solvers.adapters.for_mink import solve_ik
 mink, mujoco = pytest.importorskip("mink"), pytest.importorskip("mujoco")
 
 DT = 0.01
-ROBOT = Path(__file__).parents[1] / "data" / "robots" / "two_arms.xml"
 
 
 @pytest.fixture
 def configuration():
-    model = mujoco.MjModel.from_xml_path(str(ROBOT))
+    path = Path(__file__).parents[1] / "data" / "robots" / "two_arms.xml"
+    model = mujoco.MjModel.from_xml_path(str(path))
     q = mujoco.MjData(model).qpos.copy()
     q[7:] = [0.3, -0.4, 0.6, 0.2, 0.5, 0.7]
     return mink.Configuration(model, q=q)

@@ -85,12 +85,10 @@ def test_settings_of_parts_are_named():
         with pytest.raises(UnknownNameError, match=f"{setting} of {name}"):
             make(name, **{setting: np.zeros(2)})
     assert make("hcod", max_iterations=2**31 - 1).max_iterations == 2147483647
-    for wrong in ({"tolerance": -1.0}, {"most": 0}):
+    for made, wrong in ((SetBased, {"tolerance": -1.0}), (SetBased, {"most": 0}),
+                        (Settled, {"period": 0.0}), (Settled, {"softness": -1.0, "period": 0.1})):
         with pytest.raises(HierarchyError, match=next(iter(wrong))):
-            SetBased(inner=make("tpm"), **wrong)
-    for wrong in ({"period": 0.0}, {"softness": -1.0}):
-        with pytest.raises(HierarchyError, match=next(iter(wrong))):
-            Settled(inner=make("tpm"), **{"period": 0.1, **wrong})
+            made(inner=make("tpm"), **wrong)
     assert Settled(inner=make("tpm"), period=0.1, softness=0.0).softness == 0.0
 
 

@@ -80,15 +80,13 @@ def test_a_backend_that_is_not_installed_names_what_brings_it(name, monkeypatch)
     backends.installed.cache_clear()
 
 
-LIMITS_BELOW = Hierarchy.from_levels([([[1.0, 0.0]], [2.0]), (np.eye(2), [-1.0, 3.0], [1.0, 4.0])])
-
-
 @pytest.mark.parametrize(("vouched", "status"), [(False, Status.BACKEND_FAILURE),
                                                  (True, Status.INACCURATE)])
 def test_an_answer_that_cannot_be_shown_right_leaves_the_levels_above(vouched, status, monkeypatch):
     monkeypatch.setattr(programs.Program, "solve", lambda *_: (np.full(9, 0.1), vouched))
     monkeypatch.setattr("solvers.resolvers.hqp.refined", lambda *_: None)
-    res = make("hqp").solve(LIMITS_BELOW)
+    res = make("hqp").solve(Hierarchy.from_levels([
+        ([[1.0, 0.0]], [2.0]), (np.eye(2), [-1.0, 3.0], [1.0, 4.0])]))
     assert res.status is status
     np.testing.assert_allclose(res.x, [2.0, 0.0], rtol=0.0, atol=3.0 * make("hqp").accuracy)
 
