@@ -148,12 +148,8 @@ def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_p
 
 
 # Where strict resolvers part: the tick, and what was different before it.
-LETTER = "tpm-published"
-
-
 def run_of(spec, q=None, fault=None, **changed):
-    scenario = asked(spec)
-    q = np.zeros((5, 7)) if q is None else q
+    scenario, q = asked(spec), np.zeros((5, 7)) if q is None else q
     return Run(scenario, spec, spec, recording(scenario, fault, q=q, **changed))
 
 
@@ -187,7 +183,8 @@ def test_runs_part_at_a_tick_for_a_reason_that_is_not_after_it(other, tick, why)
 
 def test_resolvers_that_are_not_strict_need_not_agree():
     """Neither as the one compared with, nor as the one compared."""
-    assert partings([run_of(LETTER), run_of("recursive"), run_of("augmented", away_from(1))]) == []
+    runs = [run_of("tpm-published"), run_of("recursive"), run_of("augmented", away_from(1))]
+    assert partings(runs) == []
 
 
 def test_a_backend_that_is_not_installed_leaves_the_default_comparison_and_is_named(monkeypatch):

@@ -23,7 +23,6 @@ from scenarios.config.sensor import CameraSection, ImageSection
 ROBOT = Robot.named("kuka_lwr")
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
-IDEAL = {"ideal": True, "near": 0.0, "far": 1e9}
 FACING = Pinhole(101, 81, 100.0, 100.0)  # at the origin, z forward, its middle in pixel (50, 40)
 SIDE = Pinhole(320, 240, 262.0, 262.0, position=(0.3, 2.2, 0.8),
                rotation=looking_at((0.3, 2.2, 0.8), (0.0, 0.3, 0.1)))
@@ -95,9 +94,10 @@ def test_a_point_in_the_shadow_of_an_obstacle_touches_it_and_leaves_it_where_it_
     np.testing.assert_array_equal(seen.pairs.direction[0, 0], seen.direction[0])
 
 
-def camera_of(*obstacles, errors=IDEAL, capsules=CAPSULES, **settings):
+def camera_of(*obstacles, errors=None, **settings):
+    errors = errors or {"ideal": True, "near": 0.0, "far": 1e9}
     section = CameraSection(**{"kind": "camera", **errors, **settings})
-    return DepthCamera(section, SIDE, Obstacles(obstacles), capsules)
+    return DepthCamera(section, SIDE, Obstacles(obstacles), CAPSULES)
 
 
 def test_the_arm_does_not_avoid_itself():

@@ -10,8 +10,6 @@ from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
 from solvers import certify
 
-SHORT = "control.duration=1.5"
-
 
 def names_of(*changes):
     return build(load("ellipse-hqp", changes)).order(None, 0.0).order
@@ -20,7 +18,8 @@ def names_of(*changes):
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("resolver", ["hcod", "weighted"])
 def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
-    scenario = load("ellipse-hqp", [SHORT, f"control.level={level}"]).with_resolver(resolver)
+    changes = ["control.duration=1.5", f"control.level={level}"]
+    scenario = load("ellipse-hqp", changes).with_resolver(resolver)
     certified = resolver == "hcod"  # at velocity level of levels that were calmed
     run = simulate(scenario, certified=certified)
     assert run.fault is None

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+import tomli_w
 
 from hierarchy import HierarchyError, plugins
 from hierarchy.tasks import Separation
@@ -25,8 +26,6 @@ RELATIVE = {"kind": "relative", "frame": "end_effector", "to": "joint_3",
 
 def scenario_of(tmp_path, *tasks, **sections):
     """A scenario with these tasks, read from a file as a user's is."""
-    import tomli_w
-
     file = tmp_path / "listed.toml"
     file.write_text(tomli_w.dumps({**BASE, **sections, "tasks": list(tasks)}))
     return load(file)
@@ -90,8 +89,8 @@ def on_a_circle(**changed):
      "rotation goes with orientation = true"),
     ({"kind": "manipulability", "frame": "end_effector", "least": 0.1, "part": "speed"},
      "tasks.0.part"),
-    ({"kind": "collision"}, "needs [avoidance] with kind = \"separation\""),
     ({"kind": "look_at", "frame": "end_effector"}, "'look-at'"),
+    ({"kind": "collision"}, "needs [avoidance] with kind = \"separation\""),
     (on_a_circle(radiuss=1),
      "unknown key 'tasks.0.path.radiuss'; did you mean 'tasks.0.path.radius'?"),
     (on_a_circle(times=[1]),

@@ -132,9 +132,6 @@ def test_steps_of_the_command_and_of_the_joints_are_told_apart():
     assert len(labels) == 3
 
 
-NAMES = ("singular", "singular-limits", "singular-acceleration", "singular-acceleration-limits")
-
-
 def jittered(seed=3):
     return Jittered(Still((1.0, 2.0, 3.0)), amplitude=0.002, rate=4.0, seed=seed)
 
@@ -164,7 +161,8 @@ def test_frozen_returned_and_jerk_are_counted(spans, frozen, returned):
     assert found["jerk_max"].value == 2.0
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["singular", "singular-limits", "singular-acceleration",
+                                  "singular-acceleration-limits"])
 def test_a_run_has_the_metrics_of_singularities(name):
     found = measure(simulate(load(name, ["control.duration=0.05"])))
     assert found["ticks_frozen"].value == 0.0

@@ -7,14 +7,13 @@ import pytest
 
 from hierarchy import Hierarchy, HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacles
-from scenarios import load, simulate
+from scenarios import load, load_run, save, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.config.plant import MeasurementSection, PhysicsSection
 from scenarios.loop.audit import ActiveSets
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
-from scenarios.measure.run_folder import load_run, save
 from solvers import Resolution, Status, make
 
 ROBOT = Robot.named("kuka_lwr")
@@ -117,8 +116,7 @@ def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
 
 def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
     def touching(centre):
-        return simulate(load("ellipse", [
-            *PHYSICS, f"avoidance.obstacles=[{{shape='sphere', radius=0.05, centre={centre}}}]"]))
+        return simulate(load("ellipse", [*PHYSICS, *sphere(0.05, centre)]))
 
     forearm = State.at(ROBOT, START).placements[5]  # a capsule along the z axis
     run = touching((forearm[9:] + 0.195 * forearm[6:9] + 0.105 * forearm[:3]).tolist())
@@ -161,9 +159,6 @@ def test_the_servos_of_a_joint_beyond_its_limit_are_led_back_without_a_jump(mujo
     assert arm.q[3] < q[3] - 0.1
 
 
-HAND = ["control.duration=0.2", "plant.kind=kinematic"]
-
-
 def by_hand(robot, q, centre, radius):
     """Distances (K,) of the control points and the end effector to one sphere."""
     state, end = State.at(robot, q), robot.frame(robot.end_effector)
@@ -177,8 +172,7 @@ def by_hand(robot, q, centre, radius):
 
 
 def sphere(radius, centre):
-    return ["avoidance.obstacles=[{shape = 'sphere', "
-            f"radius = {radius}, centre = {list(centre)}}}]"]
+    return [f"avoidance.obstacles=[{{shape='sphere', radius={radius}, centre={list(centre)}}}]"]
 
 
 NEAR, BESIDE = (0.1, 0.5, 0.1), (0.1, 0.75, 0.3)
@@ -187,9 +181,9 @@ NEAR, BESIDE = (0.1, 0.5, 0.1), (0.1, 0.75, 0.3)
 @pytest.mark.parametrize(("name", "changes", "centre", "radius", "q"), [
     ("ellipse", ["control.duration=0.05", *sphere(0.05, NEAR),
                  "plant.measurement.position_noise=0.01"], NEAR, 0.05, "true_q"),
-    pytest.param("human-hqp", [*HAND, *sphere(0.06, BESIDE),
-                               "plant.measurement.velocity_noise=0.0",
-                               "plant.measurement.quantisation=0.0"], BESIDE, 0.06, "q",
+    pytest.param("human-hqp", [
+        "control.duration=0.2", "plant.kind=kinematic", "plant.measurement.velocity_noise=0.0",
+        "plant.measurement.quantisation=0.0", *sphere(0.06, BESIDE)], BESIDE, 0.06, "q",
                  marks=pytest.mark.slow)], ids=["noise of the joints", "camera"])
 def test_true_distances_are_on_record_beside_the_measured(name, changes, centre, radius, q):
     run, robot = simulate(load(name, changes)), Robot.named("kuka_lwr")

@@ -17,9 +17,7 @@ from solvers import Resolution, Status, make
 PERIOD = 0.001
 V = np.array([0.5, -1.0, 0.0])
 X = np.array([3.0, 1.0, -2.0])
-BRAKE, BAD = -10.0 * V, np.array([0.0, np.nan, 0.0])
-KINDS = [*(status.name.lower() for status in Status if status is not Status.SOLVED), "not_finite",
-         "stale", "overrun", "inside"]
+BRAKE = -10.0 * V
 
 
 def policy(level="acceleration", clamp=None, period=PERIOD, **section):
@@ -34,7 +32,9 @@ def bound(x):
 TWO = ["inaccurate", "overrun"]
 CASES = {
     "no trouble": ({}, [([], X, X, [])]),
-    **{f"{kind} brakes": ({}, [([kind], X, BRAKE, ["brake"])]) for kind in KINDS},
+    **{f"{kind} brakes": ({}, [([kind], X, BRAKE, ["brake"])]) for kind in (
+        *(status.name.lower() for status in Status if status is not Status.SOLVED), "not_finite",
+        "stale", "overrun", "inside")},
     "at velocity level it stands still": (
         {"level": "velocity"}, [(["stale"], X, 0 * X, ["brake"])]),
     "held for as long as patience lasts": (
@@ -52,9 +52,8 @@ CASES = {
                                                  ([], X / 3, X / 3, [])]),
     "braking within the limits is no event of its own": (
         {"clamp": bound}, [(["stale"], X, bound(BRAKE), ["brake"])]),
-    "never NaN": ({}, [([], BAD, BRAKE, ["brake"])]),
-    "nor infinite": ({}, [([], np.array([0.0, np.inf, 0.0]), BRAKE, ["brake"])]),
-}
+    **{f"never {bad}": ({}, [([], np.array([0.0, bad, 0.0]), BRAKE, ["brake"])])
+       for bad in (np.nan, np.inf)}}
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -12,14 +12,13 @@ from hand_made import recording
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError
-from scenarios import load, simulate
+from scenarios import load, load_run, save, simulate
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.figures.panels import Panel
 from scenarios.export.mcap import grouped
 from scenarios.files import OutputError, claim, next_free, whole
 from scenarios.measure.metrics import Metric
 from scenarios.measure.motions import motions
-from scenarios.measure.run_folder import load_run, save
 from scenarios.measure.runs import Run, table
 from scenarios.recording.signals import Signal, known
 from scenarios.results.sections import multiples

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scene import FRAME, ROBOT, state_at, states
 
 from hierarchy import HierarchyError
 from hierarchy.task import Rows
@@ -11,7 +12,6 @@ from scenarios import load
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
 from solvers import make
-from tests.helpers.scene import FRAME, ROBOT, state_at, states
 
 
 def distances(cell):

@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import sys
-from collections import Counter
 from unittest import mock
 
 import numpy as np
@@ -48,13 +47,6 @@ def table(file):
         return {(row["resolver"], row["sample"], row["metric"]): (row["value"], row["note"])
                 for row in csv.DictReader(stream) if not row["metric"].startswith("time_")
                 and row["metric"] not in ("wall_seconds", "ticks_late")}
-
-
-def made(folder):
-    """Return how often each run stands in the rows that were written as runs ended."""
-    ends = (line.partition(",")[0] for file in (folder / "runs").iterdir()
-            for line in file.read_text().splitlines() if ",reached_end," in line)
-    return Counter(ends)
 
 
 @pytest.mark.parametrize(("parameters", "changed", "says"), [
@@ -178,9 +170,8 @@ def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path,
 
 
 def test_a_folder_in_use_or_of_something_else_is_refused(tmp_path):
-    held = ("import sys, time; from pathlib import Path\n"
-            "from scenarios.results.store import Store\n"
-            "with Store(Path(sys.argv[1])).opened(): print(flush=True); time.sleep(60)")
+    held = """import sys, time; from pathlib import Path; from scenarios.results.store import Store
+with Store(Path(sys.argv[1])).opened(): print(flush=True); time.sleep(60)"""
     with subprocess.Popen([sys.executable, "-c", held, str(tmp_path / "a")],
                           stdout=subprocess.PIPE) as process:
         process.stdout.readline()

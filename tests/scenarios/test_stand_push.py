@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
-from scenarios import load, simulate
+from scenarios import load, shipped, simulate
 from scenarios.cell.build import build
 from scenarios.config import ScenarioError
-from scenarios.config.reading import shipped
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import tick

@@ -60,8 +60,8 @@ def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
     (["start.q=[0, 0, 0, 90, 0, 0, 0]"], "joint_4 at 90 is beyond its limits, -2.094 to 2.094 (rad "
                                          "or m). Are these degrees?"),
     (["start.end_effector=[5, 5, 5]"], "cannot be reached"),
-    (["avoidance.jacobian=published"], "has no exact derivative"),
     (["robot.model=ur5"], "example_robot_data:ur5_robot"),
+    (["avoidance.jacobian=published"], "has no exact derivative"),
     (["robot.control_points=[{joint='elbow', offset=[0, 0, 0]}]"], "unknown joint 'elbow'"),
     (["avoidance.obstacles=[[5, 5, 5], [0.0, 0.0, 0.0]]", "start.q=[0, 0, 0, 0, 0, 0, 0]",
       "robot.control_points=[{joint='joint_2', offset=[0, 0, 0]}]"],
@@ -99,10 +99,8 @@ def test_obstacles_are_reached_by_number_or_all_at_once():
 
 
 @pytest.mark.parametrize(("text", "said"), [
-    ('name = "x"\n[robot\n', "line 2"),
-    ("a = " + "[" * 5000 + "]" * 5000, "nested too deep"),
-    ("\udcff", "not UTF-8"),
-    ("", "Field required"),
+    ('name = "x"\n[robot\n', "line 2"), ("a = " + "[" * 5000 + "]" * 5000, "nested too deep"),
+    ("\udcff", "not UTF-8"), ("", "Field required"),
     ('extends = "nowhere"', "unknown scenario 'nowhere'"),
     ('extends = "bad.toml"', "extends this file in turn"),
     ('extends = "ellipse"\nreplaces = "avoidance"', "expected a list of sections"),
@@ -142,15 +140,13 @@ def test_check_warns_of_what_is_missed_or_doubtful(name, changes, said, command)
 
 
 @pytest.mark.parametrize(("line", "said"), [
-    ("run ellipse --duration x", "'--duration'"),
-    ("check ur5", "example_robot_data:ur5"),
+    ("run ellipse --duration x", "'--duration'"), ("check ur5", "example_robot_data:ur5"),
     ("check ellipse-hqp --set avoidance.self_collision=5.0", "avoidance.self_collision: barrier"),
     (f"check ellipse --set name={'n' * 101}", "at most 100 characters"),
     ("run ellipse --resolver recursiv", "did you mean 'recursive'"),
     ("sweep ellipse-starts --part 3", "expected I/N"), ("sweep ellipse", "is a scenario"),
-    ("run ellipse --speed 2", "--speed: needs --live"),
+    ("run ellipse --speed 2", "--speed: needs --live"), ("view nowhere --no-browser", "nowhere"),
     ("bench [red]nothing[/red]", "[red]nothing[/red]"),
-    ("view nowhere --no-browser", "nowhere"),
     ("run ellipse --live --certify", "--certify")])
 def test_a_wrong_command_line_says_what_was_given(line, said, command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -198,9 +194,6 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
 def test_a_wrong_argument_is_refused_and_named(call, said):
     with pytest.raises(HierarchyError, match=re.escape(said)):
         call()
-
-
-ARM = Hierarchy.from_levels([(np.eye(7)[:3], np.ones(3))])
 
 
 @pytest.mark.parametrize(("line", "caret", "mend"), [
@@ -257,9 +250,10 @@ def mine(returned):
     (lambda h: h.nonsense, AttributeError, "nonsense")])
 def test_what_a_resolver_of_a_plugin_returns_is_judged_and_its_errors_are_shown(
         returned, error, said):
+    h = Hierarchy.from_levels([(np.eye(7)[:3], np.ones(3))])
     with pytest.raises(error, match=re.escape(said)):
-        mine(returned).solve(ARM)
-    found = mine(lambda h: Resolution(np.full(h.n, np.nan))).solve(ARM)
+        mine(returned).solve(h)
+    found = mine(lambda h: Resolution(np.full(h.n, np.nan))).solve(h)
     assert (found.status, found.x.any()) == (Status.NUMERICAL_FAILURE, False)
 
 
