@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
@@ -109,8 +110,7 @@ def test_a_scene_is_one_robot_unless_a_root_is_named(written):
     assert only.joint_names == ("fore_joint",)
     assert set(only.missing) >= {"left out, since it is not under root: b",
                                  "held at the reference, since it is above root: a_joint"}
-    with pytest.raises(UnknownNameError, match="unknown body 'c'"):
-        Robot.load(path, root="c")
+    refused("unknown body 'c'", Robot.load, path, root="c", error=UnknownNameError)
 
 
 @pytest.mark.parametrize("scene", [link("a") + WALKER, WALKER + WALKER.replace('="', '="other_', 1)
@@ -279,8 +279,7 @@ def test_keyframes_are_starts(written):
     np.testing.assert_allclose(start_of(held, StartSection(keyframe="home"))[0], [0.3])
     moved = StartSection(keyframe="key 1", joints={"leg_joint": 0.1})
     np.testing.assert_allclose(start_of(held, moved)[0], [0.1])
-    with pytest.raises(UnknownNameError, match="unknown keyframe 'hom'"):
-        robot.start("hom")
+    refused("unknown keyframe 'hom'", robot.start, "hom", error=UnknownNameError)
 
 
 def test_a_difference_from_mujoco_names_the_body(written, monkeypatch):
@@ -288,8 +287,7 @@ def test_a_difference_from_mujoco_names_the_body(written, monkeypatch):
 
     path, exact = written(world(link("a", more=link("b")))), model.pose
     monkeypatch.setattr(model, "pose", lambda place, turn: exact(place * (1.0 + 1e-8), turn))
-    with pytest.raises(RobotError, match=r"body 'a' is 3e-09 from where MuJoCo has it"):
-        Robot.load(path)
+    refused("body 'a' is 3e-09 from where MuJoCo has it", Robot.load, path, error=RobotError)
     monkeypatch.setattr(model, "pose", exact)
     inertia = model.pin.Inertia
     monkeypatch.setattr(model.pin, "Inertia", lambda mass, centre, about: inertia(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hand_made import asked, recording
+from refusals import refused
 
 import scenarios.config.reading as groups_of
 from hierarchy import HierarchyError
@@ -38,8 +39,7 @@ def test_a_variant_has_two_names_and_those_of_a_file_extend_it(tmp_path):
     wide = load(f"{tmp_path}/mine.toml:wide")
     assert (wide.name, wide.pointing.alpha_d) == ("mine-wide", 50.0)
     assert wide.limits == load("ellipse-limits").limits
-    with pytest.raises(HierarchyError, match="wide"):
-        load(f"{tmp_path}/mine.toml:wid")
+    refused("wide", load, f"{tmp_path}/mine.toml:wid")
 
 
 def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
@@ -56,8 +56,7 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     path = tmp_path / "idle.toml"
     path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'
                     '[control]\nresolver = "tpm"\nduration = 1.0\n')
-    with pytest.raises(ScenarioError, match="scenario 'idle': the stack is empty"):
-        build(load(path))
+    refused("scenario 'idle': the stack is empty", lambda: build(load(path)), error=ScenarioError)
 
 
 def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():
@@ -143,8 +142,7 @@ def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_p
     assert done.refused == ("recursive is not run on limited, which asks for bounds: it resolves "
                             "equalities",)
     assert done.refused[0] in (tmp_path / "a" / "index.html").read_text()
-    with pytest.raises(HierarchyError, match="recursive is not run on limited"):
-        compare([limited], ["recursive"])
+    refused("recursive is not run on limited", compare, [limited], ["recursive"])
 
 
 # Where strict resolvers part: the tick, and what was different before it.

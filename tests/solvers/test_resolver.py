@@ -2,10 +2,10 @@
 
 import dataclasses
 import pickle
-import re
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.errors import UnknownNameError
@@ -48,16 +48,13 @@ def test_the_defaults_are_those_that_recorded_results_were_made_with(name):
 @pytest.mark.parametrize("name", [*names(), "smooth"])
 def test_settings_of_every_resolver_are_checked_by_name(name):
     assert isinstance(make(name, damping=1).damping, float)
-    with pytest.raises(HierarchyError, match="did you mean 'damping'"):
-        make(name, dampnig=0.1)
-    with pytest.raises(HierarchyError, match="unknown setting"):
-        make(name, _settings=1)
+    refused("did you mean 'damping'", make, name, dampnig=0.1)
+    refused("unknown setting", make, name, _settings=1)
     for setting, value in [("damping", -0.1), ("damping", float("nan")), ("damping", "0.1"),
                            ("threshold", 0.0), ("threshold", float("inf")),
                            ("rank_tolerance", -1e-9), ("rank_tolerance", 1.0),
                            ("rank_tolerance", True)]:
-        with pytest.raises(HierarchyError, match=f"{name}: {setting} = "):
-            make(name, **{setting: value})
+        refused(f"{name}: {setting} = ", make, name, **{setting: value})
 
 
 @pytest.mark.parametrize(("name", "settings"), [
@@ -71,16 +68,14 @@ def test_settings_of_every_resolver_are_checked_by_name(name):
         ("tolerance", 0.0)])], ids=str)
 def test_a_setting_that_makes_no_sense_is_named_with_its_value(name, settings):
     setting, value = list(settings.items())[-1]
-    with pytest.raises(HierarchyError, match=re.escape(f"{name}: {setting} = {value!r}")):
-        make(name, **settings)
+    refused(f"{name}: {setting} = {value!r}", make, name, **settings)
     with pytest.raises(UnknownNameError, match="unknown form of hqp 'slak'; did you mean 'slack'"):
         make("hqp", form="slak")
 
 
 def test_settings_of_parts_are_named():
-    for scales, said in (({"hand": 0.0}, ": 'hand'"), (("hand",), " = .'hand',., expected")):
-        with pytest.raises(HierarchyError, match=f"merged: scales{said}"):
-            make("merged", scales=scales)
+    for scales, said in (({"hand": 0.0}, ": 'hand'"), (("hand",), " = ('hand',), expected")):
+        refused(f"merged: scales{said}", make, "merged", scales=scales)
     for name, setting in (("hqp", "backend"), ("reverse", "form")):
         with pytest.raises(UnknownNameError, match=f"{setting} of {name}"):
             make(name, **{setting: np.zeros(2)})
