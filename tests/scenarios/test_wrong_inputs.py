@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
+import scenarios
 from hierarchy import Hierarchy, HierarchyError, Robot
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position
@@ -55,22 +56,48 @@ def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
     refused(said, load, "ellipse", [change])
 
 
-@pytest.mark.parametrize(("changes", "said"), [
-    (["start.q=[0, 0, 0, 90, 0, 0, 0]"], "joint_4 at 90 is beyond its limits, -2.094 to 2.094 (rad "
-                                         "or m). Are these degrees?"),
-    (["start.end_effector=[5, 5, 5]"], "cannot be reached"),
-    (["robot.model=ur5"], "example_robot_data:ur5_robot"),
-    (["avoidance.jacobian=published"], "has no exact derivative"),
-    (["robot.control_points=[{joint='elbow', offset=[0, 0, 0]}]"], "unknown joint 'elbow'"),
-    (["avoidance.obstacles=[[5, 5, 5], [0.0, 0.0, 0.0]]", "start.q=[0, 0, 0, 0, 0, 0, 0]",
-      "robot.control_points=[{joint='joint_2', offset=[0, 0, 0]}]"],
+@pytest.mark.parametrize(("name", "changes", "said"), [
+    ("ellipse", ["start.q=[0, 0, 0, 90, 0, 0, 0]"],
+     "joint_4 at 90 is beyond its limits, -2.094 to 2.094 (rad or m). Are these degrees?"),
+    ("ellipse", ["start.end_effector=[5, 5, 5]"], "cannot be reached"),
+    ("ellipse", ["robot.model=ur5"], "example_robot_data:ur5_robot"),
+    ("ellipse", ["avoidance.jacobian=published"], "has no exact derivative"),
+    ("ellipse", ["robot.control_points=[{joint='elbow', offset=[0, 0, 0]}]"],
+     "unknown joint 'elbow'"),
+    ("ellipse", ["robot.control_points=[{joint='joint_2', offset=[0, 0, 0]}]",
+                 "avoidance.obstacles=[[5, 5, 5], [0.0, 0.0, 0.0]]", f"start.q={[0] * 7}"],
      "obstacle 2 at [0.0, 0.0, 0.0] m touches control point 1"),
-    (["limits={acceleration=10, margin=3}"], "margin 3 leaves joint_1 no room between")])
-def test_what_does_not_fit_the_robot_is_said_by_check_and_run(changes, said, command, tmp_path):
+    ("ellipse", ["limits={acceleration=10, margin=3}"], "margin 3 leaves joint_1 no room between"),
+    *(("ellipse", ["control.period=0.005", f"plant.measurement.delay={delay}"], said)
+      for delay, said in (("0.0025", "delay = 0.0025 s is not a whole number of periods"),
+                          ("1e30", "delay = 1e+30 s is more than 1000000 periods"))),
+    *(("ellipse", ["plant.kind=mujoco", f"plant.{key}=[1.0, 2.0]"], f"plant.{key} has 2 entries")
+      for key in ("servo.bandwidth", "joints.friction", "joints.armature")),
+    ("human", ["sensor={kind='camera', position=[1,1,1], look_at=[1,1,1]}"],
+     "sensor: camera: position and look_at are both"),
+    ("human", ["sensor.kind=camera", "sensor.rotation=[[1,0,0],[0,1,0],[0,0,-1]]"],
+     "sensor: camera: rotation: expected a rotation matrix (3, 3), but it is a reflection"),
+    ("human", ["sensor.kind=camera", "sensor.jitter=0.1"], "sensor: camera: jitter = 0.1 s must"),
+    ("human", ["sensor={kind='frames', folder='nowhere'}"],
+     f"sensor: unknown folder of frames '{scenarios.__path__[0]}/library/nowhere'"),
+    ("stand-push", ["contacts.0.frame=left_fot"], "'left_fot'; did you mean 'left_foot'?"),
+    ("stand-push", ["contacts.0.up=[0.0, 0.0, 0.0]"],
+     "contacts.0: sole: up (0.0, 0.0, 0.0) is no direction"),
+    ("stand-push", ["forces.least=400.0", "forces.largest=300.0"],
+     "forces: task 'friction': no normal force is pushing"),
+    ("stand-push", ["start.on_floor=true", "contacts=[]"],
+     "start.on_floor needs a floating base and"),
+    ("stand-push", ["forces.edge=0.2"],
+     "forces: task 'centre of pressure': margin 0.2 m of contact 'left_foot'"),
+    ("stand-push", ["plant.pushes.0.joint=trunk"], "plant.pushes: unknown joint 'trunk'")])
+def test_what_does_not_fit_the_robot_is_said_by_check_and_run(name, changes, said, command,
+                                                              tmp_path):
+    if name != "ellipse" or "plant.kind=mujoco" in changes:
+        pytest.importorskip("mujoco")
     sets = [part for change in changes for part in ("--set", change)]
-    checked = command("check ellipse", *sets, code=2).err
+    checked = command("check", name, *sets, code=2).err
     assert said in checked
-    run = command("run ellipse --duration 0.01 --out", tmp_path / "run", *sets, code=2)
+    run = command("run --duration 0.01", name, "--out", tmp_path / "run", *sets, code=2)
     assert run.err.splitlines()[-1] == checked.splitlines()[-1]
     assert not list(tmp_path.rglob("*.npz"))
 
