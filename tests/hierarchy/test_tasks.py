@@ -127,14 +127,12 @@ def test_a_wrong_task_is_named(method, value, said, monkeypatch):
         Elbow().writer(State.at(ROBOT, *STATES[0]), "velocity", Rows.empty(1, 7))()
 
 
-MADE = [*TASKS.values(), tasks.JointLimits(ROBOT, 10.0, 1e-3), tasks.TorqueLimits(ROBOT),
-        tasks.TorqueStep(ROBOT, 1.0),
-        tasks.DangerBounds(tasks.JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
-        tasks.Separation(ROBOT.control_points, Barrier(0.05)),
-        tasks.SelfSeparation(link_capsules(ROBOT_TABLES["kuka_lwr"], foot=0.3), Barrier(0.05))]
-
-
-@pytest.mark.parametrize("task", MADE, ids=lambda task: task.name)
+@pytest.mark.parametrize("task", [
+    *TASKS.values(), tasks.JointLimits(ROBOT, 10.0, 1e-3), tasks.TorqueLimits(ROBOT),
+    tasks.DangerBounds(tasks.JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
+    tasks.TorqueStep(ROBOT, 1.0), tasks.Separation(ROBOT.control_points, Barrier(0.05)),
+    tasks.SelfSeparation(link_capsules(ROBOT_TABLES["kuka_lwr"], foot=0.3), Barrier(0.05))],
+    ids=lambda task: task.name)
 def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(task):
     assert replace(task) == task
     assert replace(task, name="another") != task

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 from refusals import refused
-from scene import Elbow
+from scene import FRAME, ROBOT, Elbow
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
@@ -21,10 +21,8 @@ from hierarchy.robots import TABLES, link_capsules
 
 NAN, INF = float("nan"), float("inf")
 A, B = np.eye(2), np.ones(2)
-ROBOT = Robot.load("kuka_lwr")
 FOOT = HUMANOID.frame("left_foot")
 STATE = State.at(ROBOT, [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0])
-FRAME = ROBOT.frame("end_effector")
 THERE = Still([0.3, 0.5, 0.1])
 HAND = tasks.Position(FRAME, THERE)
 LIMITS, POINTS = tasks.JointLimits(ROBOT, 10.0, 0.01), ROBOT.control_points

@@ -115,7 +115,10 @@ terminal.bar = lambda: contextlib.nullcontext(
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
-INTERRUPTED_AFTER_THE_FIRST_RUN = """import sys
+@pytest.mark.parametrize("page", ["whole", "broken"])
+def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(page,
+                                                                                     tmp_path):
+    done = ended("""import sys
 from scenarios.results import comparing
 
 if sys.argv.pop() == "broken":
@@ -128,14 +131,8 @@ def add_and_interrupt(written, i, run):
     os.kill(os.getpid(), signal.SIGTERM)
 
 comparing._Written.add = add_and_interrupt
-"""
-
-
-@pytest.mark.parametrize("page", ["whole", "broken"])
-def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(page,
-                                                                                     tmp_path):
-    done = ended(INTERRUPTED_AFTER_THE_FIRST_RUN, tmp_path, "compare", "ellipse", "--resolvers",
-                 "tpm,hcod", "--workers", "2", "--duration", "0.02", "--out", "b", page)
+""", tmp_path, "compare", "ellipse", "--resolvers", "tpm,hcod", "--workers", "2", "--duration",
+                 "0.02", "--out", "b", page)
     assert done.returncode == 130
     assert "the runs made so far are in b\n" in done.stderr
     assert list((tmp_path / "b").rglob("run.npz"))

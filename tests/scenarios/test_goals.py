@@ -175,10 +175,7 @@ def test_the_interval_of_a_share_is_wilsons(met, of, low, high):
     assert wilson(met, of) == pytest.approx((low, high), abs=1e-4)
 
 
-NAMES = ("box", "task", "rest")
-
-
-def tick(box, task, rest=((0.0, 0.0), 0.0), reference=(0.0, 0.0), names=NAMES):
+def tick(box, task, rest=((0.0, 0.0), 0.0), reference=(0.0, 0.0), names=("box", "task", "rest")):
     """A box of two unknowns (2, 2), a task and a last row, each (row, target), answered."""
     levels = [(np.eye(2), *np.array(box, dtype=float)),
               *((np.array([row], dtype=float), [target]) for row, target in (task, rest))]
@@ -211,9 +208,9 @@ def test_what_moved_is_named_with_what_is_left_without_it():
     assert said(tick(WIDE, ((1.0, 0.0), 0.0)), tick(WIDE, ((1.0, 0.0), 3.0))) == [
         "side: target of row 0 in task moved by 3, from 0 to 3; without that the change is 0",
         "miss: task changed from met to missed by 2"]
-    (text,) = said(tick(WIDE, ((1.0, 0.0), 0.0)),
-                   tick(WIDE, ((1.0, 0.0), 0.0), reference=(0.0, 0.5)))
-    assert text == "reference: the reference moved; without that the change is 0"
+    assert said(tick(WIDE, ((1.0, 0.0), 0.0)),
+                tick(WIDE, ((1.0, 0.0), 0.0), reference=(0.0, 0.5))) == [
+        "reference: the reference moved; without that the change is 0"]
 
 
 def test_levels_and_sides_that_come_and_go_are_all_that_is_said():

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from scene import ROBOT
 
-from hierarchy import Robot
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
@@ -47,7 +47,6 @@ def test_the_strictness_scenario_measures_what_a_lower_task_moves():
     assert weighted > 1e-7
 
 
-ROBOT = Robot.named("kuka_lwr")
 BEYOND = [1.1657, -0.9476, 0.5844, float(ROBOT.upper[3]) + 0.1, 1.1464, 1.7695, 0.0]
 STARTS = {"stretched": "start.q=[0, 0, 0, 0, 0, 0, 0]",
           "beyond a limit": f"start={{q={BEYOND}, allow_outside_limits=true}}",

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from scene import FRAME, ROBOT
 from standing import ROBOT as HUMANOID
 from standing import WEIGHT, feet, standing_stack
 
@@ -13,8 +14,6 @@ from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Pose, Position, Posture
 from solvers import Status, certify, explain, make, problems, solve_ik
 
-ROBOT = Robot.named("kuka_lwr")
-FRAME = ROBOT.frame("end_effector")
 Q = np.array([0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3])
 
 
