@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from c_library import COMPILER
 
 from benchmark import solve
 from benchmark.packages import OWN, Entrant
@@ -74,10 +74,7 @@ def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
     assert all("code" in row["why"] for row in first if row.get("ended") == CRASHED)
 
 
-CC = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-
-
-@pytest.mark.skipif(CC is None, reason="no compiler of C")
+@pytest.mark.skipif(COMPILER is None, reason="no compiler of C")
 @pytest.mark.skipif(sys.platform != "linux", reason="the C library is made on Linux")
 def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path):
     """The worked example of solver.h; tpm refuses inequalities beyond bounds."""
@@ -86,7 +83,7 @@ def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path
     rows = {}
     for resolver in ("hcod", "tpm"):
         out = tmp_path / f"{resolver}.so"
-        subprocess.run([CC, "-O2", "-fPIC", "-shared", f"-I{SOLVE}", SOLVE / "library.c",
+        subprocess.run([COMPILER, "-O2", "-fPIC", "-shared", f"-I{SOLVE}", SOLVE / "library.c",
                         f"-DSOLVE=th_solve_{resolver}", f"-I{folder / 'include'}",
                         folder / "lib" / "libtask_hierarchy.a", "-lm", "-o", out], check=True)
         with Field(compiled([out], ["ours"]), QUESTIONS) as field:

@@ -13,8 +13,7 @@ from hierarchy import Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import TABLES
 from hierarchy.robots.found import Loop
-from hierarchy.tasks import JointCoupling, JointLimits, Posture
-from hierarchy.tasks.mechanism import Mechanism, model_rows
+from hierarchy.tasks import JointCoupling, JointLimits, Mechanism, Posture, model_rows
 from solvers import make, solve_ik
 
 T = 0.01  # [s]

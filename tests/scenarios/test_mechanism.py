@@ -12,8 +12,7 @@ from urdf_text import joint, link, urdf
 from hierarchy import Robot, State, plugins
 from hierarchy.contacts import Contacts
 from hierarchy.paths import Still
-from hierarchy.tasks import Position
-from hierarchy.tasks.mechanism import Mechanism
+from hierarchy.tasks import Mechanism, Position
 from scenarios import simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot

@@ -8,7 +8,6 @@ from unittest import mock
 
 import numpy as np
 import pytest
-import urdf_text
 from refusals import refused
 from urdf_text import INERTIAL, joint, link, placed, shape, urdf
 
@@ -18,16 +17,11 @@ from scenarios.cell.robot import make_robot
 from scenarios.draw.replay.page import html
 from scenarios.scene import scene
 
-
-def tube(name, middle, length):
-    return link(name, INERTIAL + shape(f'<cylinder radius="0.04" length="{length}"/>',
-                                       f"0 0 {middle}"))
-
-
 LIMIT = '<limit lower="-2.5" upper="2.5" effort="50" velocity="3"/>'
 ARM = urdf(
-    tube("base", 0.05, 0.1), tube("one", 0.1, 0.2), tube("two", 0.15, 0.3),
-    tube("three", 0.15, 0.3), tube("four", 0.05, 0.1), tube("tip", 0, 0.02),
+    *(link(name, INERTIAL + shape(f'<cylinder radius="0.04" length="{length}"/>', f"0 0 {middle}"))
+      for name, middle, length in (("base", 0.05, 0.1), ("one", 0.1, 0.2), ("two", 0.15, 0.3),
+                                   ("three", 0.15, 0.3), ("four", 0.05, 0.1), ("tip", 0, 0.02))),
     joint("turn", "revolute", "base", "one", LIMIT, "0 0 1", placed("0 0 0.1", "0 0 0.2")),
     joint("shoulder", "revolute", "one", "two", LIMIT, "0 1 0", placed("0 0 0.2", "0 0.4 0")),
     joint("elbow", "revolute", "two", "three", LIMIT, "0 0.8 0.6", placed("0 0 0.3", "0 0.9 0")),
@@ -105,7 +99,7 @@ NARROW = '<limit lower="0.5" upper="1" velocity="0" effort="1"/>'
 def tree(*joints):
     """A tree of joints (name, kind, parent, child, inside)."""
     links = dict.fromkeys(end for _, _, *ends, _ in joints for end in ends)
-    return urdf_text.urdf(
+    return urdf(
         *(link(name, INERTIAL + shape('<sphere radius="0.01"/>')) for name in links),
         *(joint(*one, origin=placed("0.1 0.2 0.3")) for one in joints))
 

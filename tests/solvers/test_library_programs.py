@@ -31,9 +31,8 @@ ROOT = Path(__file__).parents[2]
 ROS2 = ROOT / "examples" / "ros2_control"
 EXAMPLES = ROOT / "examples" / "c"
 STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"]
-COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 CXX = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
-needs_c = pytest.mark.skipif(COMPILER is None, reason="no compiler of C")
+needs_c = pytest.mark.skipif(c.COMPILER is None, reason="no compiler of C")
 
 
 @pytest.mark.skipif(shutil.which("nm") is None, reason="no nm")
@@ -48,7 +47,7 @@ def test_it_asks_for_nothing_but_libm_and_owns_no_variable(folder):
         "th_verify", "th_violations", "th_version", "th_digest"}
 
 
-def built(out, source, folder, *flags, compiler=COMPILER):
+def built(out, source, folder, *flags, compiler=c.COMPILER):
     """Compile one file with the static library; returns the program."""
     subprocess.run([compiler, *flags, source, "-I", folder / "include",
                     folder / "lib" / "libtask_hierarchy.a", "-lm", "-o", out], check=True)
@@ -72,7 +71,7 @@ ONCE = {"once.c": ["-std=c99", *STRICT], "once.cpp": ["-std=c++17", "-fno-except
 
 
 def compiler_of(name):
-    found = CXX if name.endswith("cpp") else COMPILER
+    found = CXX if name.endswith("cpp") else c.COMPILER
     if found is None or (name == "eigen.cpp" and not Path("/usr/include/eigen3").exists()):
         pytest.skip(f"no compiler or no library for {name}")
     return found
