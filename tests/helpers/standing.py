@@ -50,8 +50,7 @@ def standing_stack(state, contacts, shift=(0.0, 0.0, 0.0), fraction=1.0, faces=4
         tasks.Together([tasks.TorqueLimits(ROBOT, fraction, contacts=contacts),
                         tasks.Friction(contacts, faces)], "limits"),
         tasks.CentreOfMass(ROBOT, Still(com + shift)), *hands,
-        tasks.Posture(tuple(state.q[7:])), tasks.LeastForce(contacts),
-    ], "torque", contacts=contacts)
+        tasks.Posture(tuple(state.q[7:])), tasks.LeastForce(contacts)], "torque", contacts=contacts)
 
 
 def wrenches_of(state, contacts, forces):

@@ -89,12 +89,10 @@ def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
     found = measure(run)
     assert (found["ticks_hold"].value, found["ticks_brake"].value) == (10, LASTS - 10)
     assert load_run(save(run, tmp_path / "run")).events == run.events
-    events = json.loads((tmp_path / "run" / "metrics.json").read_text())["events"]
-    assert events == [
-        {"kind": "not_finite", "action": "hold", "ticks": 10, "first_tick": AT,
-         "first_time": pytest.approx(AT * 1e-3)},
-        {"kind": "not_finite", "action": "brake", "ticks": LASTS - 10, "first_tick": AT + 10,
-         "first_time": pytest.approx((AT + 10) * 1e-3)}]
+    assert json.loads((tmp_path / "run" / "metrics.json").read_text())["events"] == [
+        {"kind": "not_finite", "action": action, "ticks": ticks, "first_tick": first,
+         "first_time": pytest.approx(first * 1e-3)}
+        for action, ticks, first in (("hold", 10, AT), ("brake", LASTS - 10, AT + 10))]
 
 
 @pytest.mark.parametrize(("fault", "said"), [

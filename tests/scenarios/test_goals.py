@@ -239,5 +239,4 @@ def test_the_command_names_the_largest_changes_of_a_run(tmp_path, command):
     assert (len(found), sizes) == (3, sorted(sizes, reverse=True))
     tick = found[0]["tick"]
     assert f"tick {tick} (t = " in command("why", folder, "--tick", tick).out
-    assert ("tick 999: the run has ticks 0 to 49"
-            in command("why --tick 999", folder, code=2).err)
+    assert "tick 999: the run has ticks 0 to 49" in command("why --tick 999", folder, code=2).err

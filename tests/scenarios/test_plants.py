@@ -160,7 +160,7 @@ NEAR, BESIDE = (0.1, 0.5, 0.1), (0.1, 0.75, 0.3)
     pytest.param("human-hqp", [
         "control.duration=0.2", "plant.kind=kinematic", "plant.measurement.velocity_noise=0.0",
         "plant.measurement.quantisation=0.0", *sphere(0.06, BESIDE)], BESIDE, 0.06, "q",
-                 marks=pytest.mark.slow)], ids=["noise of the joints", "camera"])
+        marks=pytest.mark.slow)], ids=["noise of the joints", "camera"])
 def test_true_distances_are_on_record_beside_the_measured(name, changes, centre, radius, q):
     run, points = simulate(load(name, changes)), (*ROBOT.control_points, FRAME)
     for k in (0, 7, run.ticks - 1):

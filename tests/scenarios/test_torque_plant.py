@@ -161,8 +161,8 @@ def test_a_contact_that_does_not_stand_on_the_floor_is_refused(keys, said):
 
 @pytest.mark.parametrize("keys", [
     tilted(0.4), {"plant.height": -0.0015},
-    {**tilted(8.0), "contacts.0.open": [[0.0, 1.0]], "contacts.1.open": [[0.0, 1.0]]},
-], ids=["a little", "a little above", "open at the start"])
+    {**tilted(8.0), "contacts.0.open": [[0.0, 1.0]], "contacts.1.open": [[0.0, 1.0]]}],
+    ids=["a little", "a little above", "open at the start"])
 def test_what_comes_down_within_a_few_ticks_or_later_is_not_refused(keys):
     build(changed(keys))
 

@@ -49,10 +49,9 @@ def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, me
     Of two tasks that give, the second is met while the first leaves it room.
     """
     A, B = np.random.default_rng(4).normal(size=(2, 2, 6))
-    h, hcod = Hierarchy.from_levels(
-        [(np.eye(6), np.full(6, -1.0), np.full(6, 1.0)), (A, np.full(2, reach)),
-         (B, np.full(2, 0.1)), (np.eye(6), np.full(6, 0.2))],
-        give=[0.0, 0.1, 0.1, 0.0]), make("hcod")
+    levels = [(np.eye(6), np.full(6, -1.0), np.full(6, 1.0)), (A, np.full(2, reach)),
+              (B, np.full(2, 0.1)), (np.eye(6), np.full(6, 0.2))]
+    h, hcod = Hierarchy.from_levels(levels, give=[0.0, 0.1, 0.1, 0.0]), make("hcod")
     cold = hcod.solve(h)
     warm = hcod.solve(h, cold.memory)
     np.testing.assert_allclose(warm.x, cold.x, atol=1e-12)

@@ -197,9 +197,8 @@ def test_too_little_memory_is_a_status(library, name, missing):
 
 def test_settings_without_a_value_are_those_of_python_and_out_of_range_are_invalid(library):
     h = family("INEQ7")[0].h
-    assert (library.solve("hcod", h)[1].answer.tobytes()
-            == library.solve("hcod", h, c.settings_of())[1].answer.tobytes()
-            == make("hcod").solve(h).x.tobytes())
+    plain, given = (library.solve("hcod", h, settings)[1] for settings in (None, c.settings_of()))
+    assert plain.answer.tobytes() == given.answer.tobytes() == make("hcod").solve(h).x.tobytes()
     for wrong in ({"damping": -0.1}, {"damping": np.nan}, {"threshold": 0.0},
                   {"rank_tolerance": 1.0}, {"rank_tolerance": np.nan}, {"tolerance": 0.0},
                   {"tolerance": 0.1}, {"isotropic": -1.0}, {"largest": 0.0}, {"max_iterations": 0},

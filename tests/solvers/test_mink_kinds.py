@@ -54,9 +54,8 @@ def tasks_of(configuration):
 def test_one_level_is_the_minimum_of_minks_cost(configuration, kinds, held, damping):
     model = configuration.model
     tasks = [tasks_of(configuration)[i] for i in kinds]
-    limits = [mink.ConfigurationLimit(model),
-              mink.VelocityLimit(model, {f"{side}_{joint}": 0.8 for side in ("left", "right")
-                                         for joint in "abc"}),
+    slow = {f"{side}_{joint}": 0.8 for side in ("left", "right") for joint in "abc"}
+    limits = [mink.ConfigurationLimit(model), mink.VelocityLimit(model, slow),
               mink.FreeJointVelocityLimit(model, 0.5, 0.9),
               mink.CollisionAvoidanceLimit(model, [(["left_h"], ["right_h"])])]
     frozen = [mink.DofFreezingTask(model, dof_indices=[0, 5])] if held else []
