@@ -102,10 +102,9 @@ def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path
 
 
 def raw(x, collected, problem=0, solved=True, **more):
-    said = {"entrant": "one", "version": "1", "family": "simple", "half": "fresh", "seed": 7,
+    return {"entrant": "one", "version": "1", "family": "simple", "half": "fresh", "seed": 7,
             "sha256": collected.digest, "problem": problem, "solved": solved, "same": True,
-            "x": None if x is None else list(map(float, x)), "cold_ns": [1000, 3000, 2000]}
-    return {**said, **more}
+            "x": None if x is None else list(map(float, x)), "cold_ns": [1000, 3000, 2000], **more}
 
 
 def found(x, solved=True, **more):

@@ -20,10 +20,6 @@ def positions(state):
                            for contact in CONTACTS.contacts for point in contact.points])
 
 
-def random_x(seed):
-    return np.random.default_rng(seed).normal(size=CONTACTS.unknowns)
-
-
 def test_contact_jacobian_is_the_derivative_of_the_positions():
     state = moving_state(1)
     J = CONTACTS.jacobian(state)
@@ -148,7 +144,7 @@ def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_
 @pytest.mark.parametrize("target", [(20.0,), (1.0, 2.0, 3.0), (1.0, 2.0, 3.0, 0.4, 0.5, 0.6)])
 @pytest.mark.parametrize("name", ["left_hand", "right_foot"])
 def test_contact_force_rows_are_the_sum_over_the_points(target, name):
-    state, x = moving_state(9), random_x(9)
+    state, x = moving_state(9), np.random.default_rng(9).normal(size=CONTACTS.unknowns)
     task, contact = tasks.ContactForce(CONTACTS, name, target), CONTACTS[name]
     A, lower, upper = task.rows(state)
     forces = CONTACTS.forces(x, name)
@@ -179,7 +175,7 @@ def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_t
 
 @pytest.mark.parametrize("part", ["both", "linear", "angular"])
 def test_momentum_rows_are_the_rate_of_the_momentum(part):
-    state, a = moving_state(14), random_x(14)[:N]
+    state, a = moving_state(14), np.random.default_rng(14).normal(size=N)
     task = tasks.Momentum(part, damping=4.0)
     of_part = {"both": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}[part]
     A, lower, _ = written(task, state)

@@ -72,11 +72,11 @@ def test_a_wrong_csv_file_is_named_with_its_line(text, said, tmp_path):
 
 
 # BVH files.
-TEXT = (FilePath(__file__).parents[1] / "data" / "motion.bvh").read_text()
+BVH = FilePath(__file__).parents[1] / "data" / "motion.bvh"
 
 
-def test_turns_follow_the_order_of_the_channels(tmp_path):
-    motion = paths.read_bvh(written(tmp_path, TEXT))
+def test_turns_follow_the_order_of_the_channels():
+    motion = paths.read_bvh(BVH)
     np.testing.assert_array_equal(motion.times, [0.0, 0.5])
     expected = {"hips": ([1, 0, 0], [1, 10, 0]), "knee": ([1, -2, 0], [3, 10, 0]),
                 # Rz(90) Ry(90) takes x to -z and y to -x; the knee's turn takes -y to -z.
@@ -94,13 +94,9 @@ def test_turns_follow_the_order_of_the_channels(tmp_path):
     ("Xrotation Yrotation", "Xrotation Wrotation", "'wrotation' is unknown"),
     ("0 90 90\n", "0 90 90\n}", "is no BVH file")])
 def test_a_wrong_file_is_named(tmp_path, old, new, said):
-    file = written(tmp_path, TEXT.replace(old, new, 1))
+    file = tmp_path / "motion.bvh"
+    file.write_text(BVH.read_text().replace(old, new, 1))
     with pytest.raises(HierarchyError, match=said) as error:
         paths.read_bvh(file)
     assert str(file) in str(error.value)
     refused("cannot be read", paths.read_bvh, tmp_path / "none.bvh")
-
-
-def written(folder, text):
-    (folder / "motion.bvh").write_text(text)
-    return folder / "motion.bvh"

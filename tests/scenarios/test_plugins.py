@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import shutil
 import sys
 from pathlib import Path
 
@@ -57,14 +58,12 @@ class Weak(KinematicArm):
         super().act(self.share * command)
 '''
 
-SCENARIO = (Path(__file__).parents[1] / "data" / "own.toml").read_text()
-
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch, no_plugins):
     """A folder with a plugin and a scenario."""
     (tmp_path / "doors_of_mine.py").write_text(MODULE)
-    (tmp_path / "own.toml").write_text(SCENARIO)
+    shutil.copy(Path(__file__).parents[1] / "data" / "own.toml", tmp_path)
     monkeypatch.chdir(tmp_path)
     yield tmp_path
     sys.modules.pop("doors_of_mine", None)

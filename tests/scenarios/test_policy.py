@@ -1,5 +1,7 @@
 """What is sent in a tick with trouble, and from one stack to the next."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import scene
@@ -18,14 +20,11 @@ PERIOD = 0.001
 V = np.array([0.5, -1.0, 0.0])
 X = np.array([3.0, 1.0, -2.0])
 BRAKE = -10.0 * V
+bound = partial(np.clip, a_min=-1.5, a_max=1.5)
 
 
 def policy(level="acceleration", clamp=None, period=PERIOD, **section):
     return Policy(PolicySection(**section), level, period, clamp)
-
-
-def bound(x):
-    return np.clip(x, -1.5, 1.5)
 
 
 # Settings; then tick by tick the troubles, the answer, what is sent, and what is said to be done.

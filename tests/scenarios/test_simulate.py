@@ -117,11 +117,8 @@ REPEATED = {
     "humanoid": ["control.duration=0.1"], "human": ["control.duration=0.1", "sensor.seed=4"]}
 
 
-def run_of(name, changes=()):
-    return simulate(load(name.removesuffix("-noisy"), [*REPEATED[name], *changes]))
-
-
-def bytes_of(run, folder):
+def bytes_of(name, folder):
+    run = simulate(load(name.removesuffix("-noisy"), REPEATED[name]))
     return (save(run, folder) / "run.npz").read_bytes()
 
 
@@ -129,12 +126,12 @@ def bytes_of(run, folder):
 def test_the_same_run_is_written_as_the_same_bytes(name, tmp_path):
     if name == "human":
         pytest.importorskip("mujoco")
-    first, second = (bytes_of(run_of(name), tmp_path / folder) for folder in "ab")
+    first, second = (bytes_of(name, tmp_path / folder) for folder in "ab")
     assert first == second
 
 
 def test_another_process_writes_the_same_bytes(tmp_path):
-    mine = bytes_of(run_of("ellipse"), tmp_path / "mine")
+    mine = bytes_of("ellipse", tmp_path / "mine")
     code = ("import sys; from scenarios import load, save, simulate; "
             "save(simulate(load('ellipse', [sys.argv[2]])), sys.argv[1])")
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "other"), *REPEATED["ellipse"]],

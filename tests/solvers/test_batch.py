@@ -14,7 +14,6 @@ from solvers.batch import Batch, solve, stacked
 SLOW = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 FEW = 12 if SLOW else 50
 COPIES = 1 if SLOW else 4  # of a family's 50 problems, each with targets of its own
-both = pytest.mark.parametrize("name", ["tpm", "hcod"])
 
 
 @pytest.fixture(autouse=True)
@@ -72,7 +71,7 @@ def test_bounds_and_their_memory_are_those_of_each_alone(resolver, half):
                 [resolver.solve(h, res.memory) for h, res in zip(again, alone, strict=True)])
 
 
-@both
+@pytest.mark.parametrize("name", ["tpm", "hcod"])
 @pytest.mark.parametrize("spoil", ["A", "crossed"])
 def test_one_spoilt_problem_fails_alone(name, spoil):
     batch = Batch.of(problems_of("EQ7", copies=1))
@@ -113,7 +112,7 @@ def test_what_makes_no_batch_is_named(call, named):
         call()
 
 
-@both
+@pytest.mark.parametrize("name", ["tpm", "hcod"])
 @pytest.mark.parametrize("shape", [(0, 3), (4, 0), (1, 3)])
 def test_a_batch_may_be_empty_or_without_rows(name, shape):
     count, m = shape

@@ -109,9 +109,6 @@ def test_code_for_fixed_sizes_gives_the_same_bits(tmp_path):
             write(tmp_path, ("hcod",), fix=wrong)
 
 
-every_resolver = pytest.mark.parametrize("name", c.NAMES)
-
-
 def box():
     """Bounds, a task and a posture of three unknowns, in fresh arrays."""
     return Hierarchy.from_levels([(np.eye(3), -np.ones(3), np.ones(3)), (np.ones((1, 3)), [5.0]),
@@ -172,7 +169,7 @@ def test_a_missing_pointer_is_invalid(library, pointer):
     assert library.violations(c.problem_of(h), None, 3)[0] == c.INVALID
 
 
-@every_resolver
+@pytest.mark.parametrize("name", c.NAMES)
 def test_a_record_of_garbage_does_no_harm(library, name):
     for garbage in (np.nan, np.inf, 1e300, -1.0, 2.0):
         h, memory = box(), library.memory(box())
@@ -184,7 +181,7 @@ def test_a_record_of_garbage_does_no_harm(library, name):
                 np.testing.assert_allclose(left.answer, make(name).solve(h).x, atol=1e-9)
 
 
-@every_resolver
+@pytest.mark.parametrize("name", c.NAMES)
 @pytest.mark.parametrize("missing", [{"missing": 1}, {"missing": 10_000}, {"missing_values": 1}],
                          ids=str)
 def test_too_little_memory_is_a_status(library, name, missing):
