@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shlex
 import signal
 import sys
 from importlib.metadata import distributions
@@ -67,6 +68,18 @@ def with_mujoco(tmp_path, monkeypatch):
     """MuJoCo is there, and logs runs that diverge into a folder of the test's own."""
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def command(capsys):
+    """Runs a command line, and further words, that is to end with a code; what it said."""
+    from scenarios.cli.main import run_command
+
+    def ended(line, *words, code=0):
+        assert run_command([*shlex.split(line), *map(str, words)]) == code
+        return capsys.readouterr()
+
+    return ended
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from c_library import COMPILER
 
 from benchmark import solve
 from benchmark.packages import OWN, Entrant
@@ -20,9 +20,7 @@ from benchmark.solve.entrants import chosen, compiled
 from benchmark.solve.judge import judge, summary
 from benchmark.solve.open import QUESTIONS, asked, improve
 from benchmark.worker import Repeats
-from hierarchy import Hierarchy
-from hierarchy.errors import HierarchyError
-from scenarios.cli.main import run_command
+from hierarchy import Hierarchy, HierarchyError
 from solvers import make
 from solvers.problems.files import Collection, Head, read
 from solvers.proof import prove
@@ -76,10 +74,7 @@ def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
     assert all("code" in row["why"] for row in first if row.get("ended") == CRASHED)
 
 
-CC = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-
-
-@pytest.mark.skipif(CC is None, reason="no compiler of C")
+@pytest.mark.skipif(COMPILER is None, reason="no compiler of C")
 @pytest.mark.skipif(sys.platform != "linux", reason="the C library is made on Linux")
 def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path):
     """The worked example of solver.h; tpm refuses inequalities beyond bounds."""
@@ -88,7 +83,7 @@ def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path
     rows = {}
     for resolver in ("hcod", "tpm"):
         out = tmp_path / f"{resolver}.so"
-        subprocess.run([CC, "-O2", "-fPIC", "-shared", f"-I{SOLVE}", SOLVE / "library.c",
+        subprocess.run([COMPILER, "-O2", "-fPIC", "-shared", f"-I{SOLVE}", SOLVE / "library.c",
                         f"-DSOLVE=th_solve_{resolver}", f"-I{folder / 'include'}",
                         folder / "lib" / "libtask_hierarchy.a", "-lm", "-o", out], check=True)
         with Field(compiled([out], ["ours"]), QUESTIONS) as field:
@@ -107,10 +102,9 @@ def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path
 
 
 def raw(x, collected, problem=0, solved=True, **more):
-    said = {"entrant": "one", "version": "1", "family": "simple", "half": "fresh", "seed": 7,
+    return {"entrant": "one", "version": "1", "family": "simple", "half": "fresh", "seed": 7,
             "sha256": collected.digest, "problem": problem, "solved": solved, "same": True,
-            "x": None if x is None else list(map(float, x)), "cold_ns": [1000, 3000, 2000]}
-    return {**said, **more}
+            "x": None if x is None else list(map(float, x)), "cold_ns": [1000, 3000, 2000], **more}
 
 
 def found(x, solved=True, **more):
@@ -161,24 +155,22 @@ def test_an_entrant_that_is_not_there_is_refused(call, said):
         call()
 
 
-def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkeypatch):
+def test_the_command_runs_continues_and_writes_its_page(tmp_path, command, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     out = tmp_path / "open"
-    line = ["bench", "open", "--family", "integers", "--family", "one_unknown", "--count", "3",
-            "--public", "2", "--fresh", "9", "--borders", "--entrant", "hcod", "--out", str(out)]
-    mine = f"{HELPERS / 'fake_entrants.py'}:Moody"
-    assert run_command(line) == 0
+    line = ("bench open --family integers --family one_unknown --count 3 --public 2 --fresh 9 "
+            "--borders --entrant hcod --out", out)
+    first_said = command(*line).err
     first = {file: file.stat().st_mtime_ns for file in out.glob("*/*.*")}
     assert len(first) == 8  # four files of problems, four of rows
     assert len(list(out.glob("borders/*/*.npz"))) == 4 * 8
     (out / "missing.json").write_text('{"absent": "not installed", "Moody": "not installed"}')
-    assert run_command([*line, "--entrant", mine]) == 0
+    said = command(*line, "--entrant", f"{HELPERS / 'fake_entrants.py'}:Moody")
     missing = json.loads((out / "missing.json").read_text())
     assert missing["absent"] == "not installed"
     assert "Moody" not in missing
     assert first.items() <= {file: file.stat().st_mtime_ns for file in out.glob("*/*.*")}.items()
-    said = capsys.readouterr()
-    assert said.err.count("integers, seed 9") == 1
+    assert (first_said + said.err).count("integers, seed 9") == 1
     assert max(len(line) for line in said.out.splitlines() if ": /" not in line) <= 80
     fresh = said.out.index("Fresh problems, seed 9: 6 problems of 2 families")
     assert fresh < said.out.index("Public problems: 4 problems of 2 families")
@@ -190,16 +182,14 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, capsys, monkey
     assert not re.search(r'(src|href)="http', page)
 
 
-def test_the_check_accepts_the_example_of_the_documents_and_not_what_ends(tmp_path, capsys):
+def test_the_check_accepts_the_example_of_the_documents_and_not_what_ends(tmp_path, command):
     page = (Path(__file__).parents[2] / "docs" / "extending" / "entrant.md").read_text()
     (tmp_path / "mine.py").write_text(re.search(r"```python\n(.*?)```", page, re.DOTALL)[1])
-    assert run_command(["bench", "open", "--check", "--entrant", f"{tmp_path}/mine.py:Mine"]) == 0
+    command("bench open --check --entrant", f"{tmp_path}/mine.py:Mine")
     broken = {"Raising": "it raises: ArithmeticError: not today", "Moody": "other bits the second",
               "Slow": "it takes longer than --limit"}
-    line = [part for name in broken for part in ("--entrant",
-                                                 f"{HELPERS / 'fake_entrants.py'}:{name}")]
-    assert run_command(["bench", "open", "--check", "--limit", "0.5", *line]) == 1
-    said = capsys.readouterr().out
+    line = " ".join(f"--entrant '{HELPERS}/fake_entrants.py:{name}'" for name in broken)
+    said = command(f"bench open --check --limit 0.5 {line}", code=1).out
     for rule in broken.values():
         assert re.search(f"a rule is broken: .*{rule}", said)
 

@@ -33,12 +33,8 @@ def verdict(found, **claim):
     return verdicts.judged(replace(PROTOCOL, claims=(of,)), found, "own")[0]
 
 
-@pytest.fixture
-def chance():
-    return np.random.default_rng(5)
-
-
-def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters(chance):
+def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters():
+    chance = np.random.default_rng(5)
     y = chance.uniform(1.0, 2.0, SIZE)
     x = 0.8 * y * np.exp(0.05 * chance.standard_normal(SIZE))
     for matters, expected in ((5.0, "supported"), (20.0, "undecided"),
@@ -58,9 +54,9 @@ def test_a_run_that_ends_in_a_fault_has_the_worst_value():
     assert verdict(rows(x=y), most=5.0).decided == "supported"
 
 
-def test_the_blocked_test_is_wilcoxons_in_one_block_and_ignores_shifts_between_blocks(chance):
+def test_the_blocked_test_is_wilcoxons_in_one_block_and_ignores_shifts_between_blocks():
     scipy = pytest.importorskip("scipy.stats")
-    apart = chance.standard_normal(40) + 0.3
+    apart = np.random.default_rng(5).standard_normal(40) + 0.3
     found = verdicts.blocked(apart, np.zeros(40, dtype=int))
     assert found.p == pytest.approx(scipy.wilcoxon(apart, method="asymptotic").pvalue, rel=0.05)
     assert found.low < found.estimate < found.high

@@ -15,15 +15,13 @@ from benchmark.solve.ours import Ours
 from benchmark.start import Case, Done, run
 from benchmark.tick import PlainTick
 from hierarchy import Hierarchy
+from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.config import load
-from scenarios.loop.simulation import simulate
 from scenarios.problems import reference
 from scenarios.problems.reference import family
 from solvers import Resolution, Resolver, Status, certify, make, names, problems
 from solvers.qp import backends
 
-REGRESSIONS = sorted((Path(__file__).parents[1] / "data" / "regressions").glob("*.npz"))
 JUDGED = [name for name in ("hcod", "tpm", "recursive") if name in names()]
 COUNT = 100 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 400
 PARTS = 2  # so that cores can share them
@@ -45,7 +43,8 @@ def test_structured_problems_end_certified_or_with_a_status(name, kind):
     assert not stress.tally((name, range(FIRST, FIRST + 12), kind)).failing
 
 
-ONCE_FAILED = [(file, name) for file in REGRESSIONS for name in JUDGED
+ONCE_FAILED = [(file, name) for file in sorted(
+    (Path(__file__).parents[1] / "data" / "regressions").glob("*.npz")) for name in JUDGED
                if make(name).handles == "inequalities" or problems.load(file).is_equality]
 
 

@@ -2,6 +2,7 @@
 
 import ctypes
 import dataclasses
+import shutil
 
 import llvmlite.binding as llvm
 import numpy as np
@@ -14,6 +15,7 @@ SOLVED, ITERATION_LIMIT, NUMERICAL_FAILURE, INACCURATE = 0, 1, 2, 4
 TOO_SMALL, CONTRADICTION, REFUSED, INVALID = 8, 10, 11, 12
 CANARY = -3.14159e77
 NAMES = ("hcod", "tpm", "recursive", "sns", "merged")
+COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 
 
 class Problem(ctypes.Structure):

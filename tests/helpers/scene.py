@@ -24,22 +24,18 @@ TASKS = {
     "along": tasks.Along(tasks.Position(FRAME, PATH), ((0.6, 0.0, 0.8), (0.0, 1.0, 0.0))),
     "pointing": tasks.Pointing(FRAME, (1.0, 0.2, 0.0), 0.3),
     "cone": tasks.Pointing(FRAME, (1.0, 0.2, 0.0), 0.3, "inequality"),
-    "avoidance 1-D": tasks.Avoidance(ROBOT.control_points, 1),
-    "avoidance 3-D": tasks.Avoidance(ROBOT.control_points, 3),
-    "pose": tasks.Pose(FRAME, PATH, np.eye(3)),
+    **{f"avoidance {rows}-D": tasks.Avoidance(ROBOT.control_points, rows) for rows in (1, 3)},
+    "pose": tasks.Pose(FRAME, PATH, np.eye(3)), "look-at": tasks.LookAt(FRAME, (0.3, 0.9, 1.4)),
     "frame": tasks.FrameLog(FRAME, Still((0.1, 0.5, 0.1)), np.eye(3)[[1, 2, 0]]),
     "centre of mass": tasks.CentreOfMass(ROBOT, PATH),
     "centre of mass, x and z": tasks.CentreOfMass(ROBOT, PATH, (0, 2)),
-    "posture": tasks.Posture((0.1,) * 7),
-    "damping": tasks.JointDamping(7),
+    "posture": tasks.Posture((0.1,) * 7), "damping": tasks.JointDamping(7),
     "relative pose": tasks.RelativePose(FRAME, ROBOT.frame("joint_3"), (0.1, 0.2, 0.3),
                                   np.eye(3)[[1, 2, 0]]),
     "relative position": tasks.RelativePose(FRAME, ROBOT.frame("joint_3"), (0.1, 0.2, 0.3)),
     "coupling": tasks.JointCoupling(ROBOT, {"joint_2": 1.0, "joint_5": -0.5}, 0.3),
-    "look-at": tasks.LookAt(FRAME, (0.3, 0.9, 1.4)),
     "manipulability": tasks.Manipulability(ROBOT.frame("joint_6"), 0.1),
-    "manipulability of the pose": tasks.Manipulability(FRAME, 0.1, "pose", "equality"),
-}
+    "manipulability of the pose": tasks.Manipulability(FRAME, 0.1, "pose", "equality")}
 
 
 def states(count, seed=1):

@@ -21,11 +21,16 @@ def feet(friction=0.7, robot=ROBOT):
                             for side in ("left", "right")])
 
 
-def soles_and_palm():
-    """A sole, a point of a hand on a wall, and the other sole: every kind of contact."""
-    sole, other = feet().contacts
-    palm = Contact(ROBOT.frame("left_hand"), [(0.01, 0.02, 0.03)], 0.4, (-1.0, 0.2, 0.1))
-    return Contacts(ROBOT, [sole, palm, other])
+def opening(ramp=0.2):
+    """The left foot stays; the right one is open from 1 to 2 s."""
+    return Contacts(ROBOT, [LEFT, Contact(RIGHT.frame, RIGHT.points, open=((1.0, 2.0),),
+                                          ramp=ramp)])
+
+
+PALM = Contact(ROBOT.frame("left_hand"), [(0.01, 0.02, 0.03)], 0.4, (-1.0, 0.2, 0.1))
+LEFT, RIGHT = feet().contacts
+# A sole, a point of a hand on a wall, and the other sole: every kind of contact.
+CONTACTS = Contacts(ROBOT, [LEFT, PALM, RIGHT])
 
 
 def moving_state(seed):
@@ -45,11 +50,10 @@ def standing_stack(state, contacts, shift=(0.0, 0.0, 0.0), fraction=1.0, faces=4
         tasks.Together([tasks.TorqueLimits(ROBOT, fraction, contacts=contacts),
                         tasks.Friction(contacts, faces)], "limits"),
         tasks.CentreOfMass(ROBOT, Still(com + shift)), *hands,
-        tasks.Posture(tuple(state.q[7:])), tasks.LeastForce(contacts),
-    ], "torque", contacts=contacts)
+        tasks.Posture(tuple(state.q[7:])), tasks.LeastForce(contacts)], "torque", contacts=contacts)
 
 
-def external_forces(state, contacts, forces):
+def wrenches_of(state, contacts, forces):
     """Contact forces (p, 3) as pinocchio takes them: a wrench on each joint, in its own frame."""
     wrenches = [pin.Force.Zero() for _ in range(ROBOT.model.njoints)]
     for joint, offset, force in zip(*contacts.points, forces, strict=True):

@@ -12,15 +12,10 @@ from hierarchy.allocation import allocate
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion, SurveillanceAreas
 from hierarchy.paths import Waypoints
 from hierarchy.tasks import CumulatedRepulsion, DangerBounds, JointDamping, JointLimits, Posture
-from scenarios.cell.sensors import ExactDistances
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
-SHAPES = {
-    "point": Obstacle("point", (0.1, -0.2, 0.3)),
-    "sphere": Obstacle("sphere", (0.1, -0.2, 0.3), (0.15,)),
-    "capsule": Obstacle("capsule", (0.1, -0.2, 0.3), (0.1, 0.25), TURN),
-    "box": Obstacle("box", (0.1, -0.2, 0.3), (0.2, 0.1, 0.3), TURN),
-}
+SHAPES = {shape: Obstacle(shape, (0.1, -0.2, 0.3), *size) for shape, *size in (
+    ["point"], ["sphere", (0.15,)], ["capsule", (0.1, 0.25), TURN], ["box", (0.2, 0.1, 0.3), TURN])}
 
 
 def surface_points(obstacle, count):
@@ -75,10 +70,9 @@ def test_magnitude_reaches_its_maximum_at_contact_and_vanishes_at_the_reach():
 
 
 def test_the_active_point_is_the_nearest_one_without_the_end_effector():
-    sensor = ExactDistances(ROBOT, OBSTACLES, BODY, TIP)
     for q, v in states(30, seed=4):
-        seen = sensor.measure(State.at(ROBOT, q, v))
-        for k, point in enumerate(sensor.points):
+        seen = SENSOR.measure(State.at(ROBOT, q, v))
+        for k, point in enumerate(SENSOR.points):
             np.testing.assert_allclose(seen.points[k], place_of(point, q), atol=1e-14)
             each = [distance(o, seen.points[k])[0] for o in OBSTACLES.obstacles]
             assert seen.distance[k] == pytest.approx(min(each))
@@ -119,8 +113,7 @@ A, P, C = "avoidance", "position", "pointing"
     (0.20, 0.20, 0.0, (P,), False),        # on the cone: not asked for
     (0.1500001, 0.1000001, -1, (P,), False),
     (0.0, 0.0, +1, (P, A, C), True),
-    (0.20, 0.20, nan, (P,), False),        # no pointing task
-])
+    (0.20, 0.20, nan, (P,), False)])       # no pointing task
 def test_every_branch_and_tie_of_algorithm_1(body, end, cone, order, repulsion):
     assert allocate(body, end, cone, AREAS) == (order, repulsion)
 
@@ -139,7 +132,6 @@ LIMITS = JointLimits(ROBOT, 30.0, PERIOD)
 QUICK = JointLimits(ROBOT, 1e6, PERIOD)  # its accelerations limit nothing
 V = ROBOT.velocity_limit
 STATES = states(40, seed=8)
-
 levels = pytest.mark.parametrize("level", ["velocity", "acceleration"])
 
 

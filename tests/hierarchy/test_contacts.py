@@ -3,15 +3,13 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing import ROBOT, drift_of, external_forces, feet, moving_state, soles_and_palm, written
+from standing import CONTACTS, ROBOT, drift_of, feet, moving_state, opening, wrenches_of, written
 
-from hierarchy import HierarchyError, Stack, State, tasks
-from hierarchy.contacts import Contact, Contacts
-from hierarchy.errors import UnknownNameError
+from hierarchy import State, tasks
+from hierarchy.contacts import Contacts
 from hierarchy.task import Rows, Task
 
 STEP = 1e-6
-CONTACTS = soles_and_palm()
 N = ROBOT.n
 
 
@@ -20,10 +18,6 @@ def positions(state):
     return np.concatenate([state.position(contact.frame)
                            + state.rotation(contact.frame) @ np.array(point)
                            for contact in CONTACTS.contacts for point in contact.points])
-
-
-def random_x(seed):
-    return np.random.default_rng(seed).normal(size=CONTACTS.unknowns)
 
 
 def test_contact_jacobian_is_the_derivative_of_the_positions():
@@ -42,7 +36,7 @@ def test_base_rows_hold_exactly_where_forward_dynamics_does():
     forces, tau = 50.0 * rng.normal(size=(len(CONTACTS.points.joints), 3)), rng.normal(size=N)
     tau[:6] = 0.0
     a = pin.aba(ROBOT.model, ROBOT.model.createData(), state.q, state.v, tau,
-                external_forces(state, CONTACTS, forces))
+                wrenches_of(state, CONTACTS, forces))
     x = np.concatenate([a, forces.ravel()])
     A, lower, upper = tasks.BaseDynamics(CONTACTS).rows(state)
     np.testing.assert_array_equal(lower, upper)
@@ -89,13 +83,6 @@ def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
                                    atol=1e-12)
         assert not value[:4].any()
     assert 0 < sum(seen) < 300
-
-
-def opening(ramp=0.2):
-    """The left foot stays; the right one is open from 1 to 2 s."""
-    left, right = feet().contacts
-    return Contacts(ROBOT, [left, Contact(right.frame, right.points, open=((1.0, 2.0),),
-                                          ramp=ramp)])
 
 
 @pytest.mark.parametrize(("t", "ramp", "load"), [
@@ -157,7 +144,7 @@ def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_
 @pytest.mark.parametrize("target", [(20.0,), (1.0, 2.0, 3.0), (1.0, 2.0, 3.0, 0.4, 0.5, 0.6)])
 @pytest.mark.parametrize("name", ["left_hand", "right_foot"])
 def test_contact_force_rows_are_the_sum_over_the_points(target, name):
-    state, x = moving_state(9), random_x(9)
+    state, x = moving_state(9), np.random.default_rng(9).normal(size=CONTACTS.unknowns)
     task, contact = tasks.ContactForce(CONTACTS, name, target), CONTACTS[name]
     A, lower, upper = task.rows(state)
     forces = CONTACTS.forces(x, name)
@@ -188,7 +175,7 @@ def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_t
 
 @pytest.mark.parametrize("part", ["both", "linear", "angular"])
 def test_momentum_rows_are_the_rate_of_the_momentum(part):
-    state, a = moving_state(14), random_x(14)[:N]
+    state, a = moving_state(14), np.random.default_rng(14).normal(size=N)
     task = tasks.Momentum(part, damping=4.0)
     of_part = {"both": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}[part]
     A, lower, _ = written(task, state)
@@ -206,30 +193,3 @@ def test_momentum_rows_are_the_rate_of_the_momentum(part):
     aimed = tasks.Momentum(part, tuple(target), 5.0).reference_acceleration(state)
     np.testing.assert_allclose(aimed, 5.0 * (target - task.jacobian(state) @ state.v))
 
-
-FRAME, A, B = ROBOT.frame("left_foot"), np.eye(3), np.eye(4, 3)
-
-
-@pytest.mark.parametrize(("make", "said"), [
-    (lambda: Contact(ROBOT.frame("left_fot")), "did you mean 'left_foot'"),
-    (lambda: Contact(FRAME, friction=0.0), "contact 'left_foot': friction 0.0 must be positive"),
-    (lambda: Contact(FRAME, [(0, 0)]), "are not (k, 3) numbers"),
-    (lambda: Contacts(ROBOT, [Contact(FRAME), Contact(FRAME)]), "two contacts have this name"),
-    (lambda: tasks.Friction(CONTACTS, 6), "6 faces, expected 4 or 8"),
-    (lambda: tasks.Friction(CONTACTS, least=5.0, largest=5.0), "largest 5.0 N"),
-    (lambda: tasks.CentreOfPressure(Contacts(ROBOT, [Contact(FRAME)])), "no contact is a surface"),
-    (lambda: tasks.ContactForce(CONTACTS, "left_foot", (1.0, 2.0)), "is not 1, 3 or 6"),
-    (lambda: tasks.ContactMotion(CONTACTS, [A] * 3), "anchors are not (4, 3) for each of 3"),
-    (lambda: Contact(FRAME, open=((2.0, 1.0),)), "open ((2.0, 1.0),), expected pairs of"),
-    (lambda: tasks.ContactMotion(opening(), [B] * 2, 9.0), "opens, so its stiffness must be"),
-    (lambda: tasks.Momentum("all"), "part 'all' is not one of both, linear, angular"),
-    (lambda: tasks.Together([]), "there are no tasks in it"),
-    (lambda: tasks.TorqueLimits(ROBOT), "give the contacts"),
-    (lambda: Stack(level="torque"), "level 'torque' needs contacts, Contacts(robot) for none"),
-    (lambda: Stack(contacts=CONTACTS), "contacts need the level 'torque', not 'acceleration'"),
-    (lambda: Stack([tasks.Friction(CONTACTS)]), "task 'friction': contact forces need the level"),
-    (lambda: Stack([tasks.Friction(feet())], "torque", contacts=CONTACTS), "not those of the st")])
-def test_bad_input_is_named(make, said):
-    with pytest.raises((HierarchyError, UnknownNameError)) as error:
-        make()
-    assert said in str(error.value)

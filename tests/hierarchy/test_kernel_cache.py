@@ -11,20 +11,19 @@ import pytest
 from hierarchy.jit.sources import source_digest
 from solvers.kernels.exact import solve_hierarchy
 
-NUMBERS, HELPER = "ONE = 1.0\n", """
+MODULES = {"numbers_here.py": "ONE = 1.0\n", "helper.py": """
 from hierarchy.jit import compiled
 from numbers_here import ONE
 @compiled
 def f(x):
     return x + ONE
-"""
-USER = """
+""", "user.py": """
 from hierarchy.jit import compiled
 from helper import f
 @compiled
 def g(x):
     return f(x)
-"""
+"""}
 SOLVE = "from user import g; print(g(10.0), sum(g._cache_misses.values()))"
 pytestmark = [
     pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled"),
@@ -34,9 +33,8 @@ pytestmark = [
 @pytest.fixture
 def ask(tmp_path):
     """Runs a kernel in a new process with settings; returns what it prints on both streams."""
-    (tmp_path / "numbers_here.py").write_text(NUMBERS)
-    (tmp_path / "helper.py").write_text(HELPER)
-    (tmp_path / "user.py").write_text(USER)
+    for name, text in MODULES.items():
+        (tmp_path / name).write_text(text)
 
     def asked(code=SOLVE, **settings):
         kept = {name: value for name, value in os.environ.items()
@@ -114,15 +112,12 @@ def test_a_file_that_another_user_can_have_written_is_not_loaded(ask, cache, cha
     assert ask(XDG_CACHE_HOME=str(cache))[0] == ["11.0", "1"]
 
 
-KEPT = f"""
-import sys
+def test_a_kept_kernel_loads_without_what_compiling_needs_and_others_compile_after_it(ask, cache):
+    code = f"""import sys
 import numpy as np
 {SOLVE}
 print("numba.np.npyimpl" in sys.modules, "scipy.linalg" in sys.modules)
 import numba
 print(float(numba.njit(lambda x: np.cumsum(x)[-1])(np.arange(3.0))))
 """
-
-
-def test_a_kept_kernel_loads_without_what_compiling_needs_and_others_compile_after_it(ask, cache):
-    assert ask(KEPT, XDG_CACHE_HOME=str(cache))[0] == ["11.0", "0", "False", "False", "3.0"]
+    assert ask(code, XDG_CACHE_HOME=str(cache))[0] == ["11.0", "0", "False", "False", "3.0"]

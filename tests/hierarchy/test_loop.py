@@ -173,11 +173,10 @@ def test_a_safe_stop_that_fails_in_the_watchdog_is_reported():
 
 
 @pytest.mark.parametrize(("value", "said"), [
-    (np.array([0.0, np.nan]), "the command is not finite"),
-    (np.array([np.inf, 0.0]), "the command is not finite"),
+    *((wrong, "the command is not finite") for wrong in (
+        np.array([0.0, np.nan]), np.array([np.inf, 0.0]), Resolution(np.full(2, np.nan)))),
     (None, "the step returned no command"),
-    (Resolution(np.ones(2), Status.ITERATION_LIMIT), "iteration limit"),
-    (Resolution(np.full(2, np.nan)), "the command is not finite")])
+    (Resolution(np.ones(2), Status.ITERATION_LIMIT), "iteration limit")])
 def test_a_tick_without_a_command_stops_the_robot_and_sends_nothing(value, said):
     robot, clock = Robot(), Clock()
     log = Loop(PERIOD, clock=clock, sleep=clock.sleep).run(

@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
@@ -59,10 +60,8 @@ KINDS = {
                                    f"{link('b')}</replicate>")),
     "two arms on a table": world(f'<body name="table" pos="0 0 1">{GEOM}{link("a")}{link("b")}'
                                  "</body>"),
-    "a table first": world(TABLE + link("a")),
-    "a target first": world(TARGET + link("a")),
-    "a loose cube first": world(CUBE + link("a")),
-    "a drone": world(CUBE),
+    "a table first": world(TABLE + link("a")), "a target first": world(TARGET + link("a")),
+    "a loose cube first": world(CUBE + link("a")), "a drone": world(CUBE),
     "a walker": world(WALKER + TABLE),
     "a ball joint": world(link("a", 'type="ball" pos=".1 0 0" armature=".2"', link("b"))),
     "a geared drive": world(link("a", more=link("b")), '<actuator><motor joint="b_joint" '
@@ -71,8 +70,7 @@ KINDS = {
         link("a", more='<geom type="mesh" mesh="m" density="500"/>'),
         '<asset><mesh name="m" vertex="0 0 0 .2 0 0 0 .3 0 0 0 .4"/></asset>'),
     "a cloth": world(link("a") + '<flexcomp name="cloth" type="grid" count="2 2 1" '
-                     'spacing=".1 .1 .1" radius=".01" mass="1" dim="2"/>'),
-}
+                     'spacing=".1 .1 .1" radius=".01" mass="1" dim="2"/>')}
 
 
 @pytest.fixture
@@ -112,8 +110,7 @@ def test_a_scene_is_one_robot_unless_a_root_is_named(written):
     assert only.joint_names == ("fore_joint",)
     assert set(only.missing) >= {"left out, since it is not under root: b",
                                  "held at the reference, since it is above root: a_joint"}
-    with pytest.raises(UnknownNameError, match="unknown body 'c'"):
-        Robot.load(path, root="c")
+    refused("unknown body 'c'", Robot.load, path, root="c", error=UnknownNameError)
 
 
 @pytest.mark.parametrize("scene", [link("a") + WALKER, WALKER + WALKER.replace('="', '="other_', 1)
@@ -166,10 +163,9 @@ def test_a_ball_and_a_free_joint_are_locked_where_mujoco_has_them(joint, value, 
     ('<motor joint="a_joint" ctrlrange="-2 2"/>', 'actuatorfrcrange="-1.5 1.5"', 1.5),
     ('<motor joint="a_joint" ctrlrange="-2 3"/>', "", 2.0),
     ('<motor joint="a_joint" ctrlrange="0 3"/>', "", np.inf),
-    ('<motor joint="a_joint"/>', "", np.inf),
+    ('<motor joint="a_joint"/>', "", np.inf), ("", "", np.inf),
     ('<position joint="a_joint" kp="9" ctrlrange="-1 1"/>', "", np.inf),
-    ('<orientation joint="b_joint"/><motor joint="a_joint" gear="3" ctrlrange="-2 2"/>', "", 6.0),
-    ("", "", np.inf)])
+    ('<orientation joint="b_joint"/><motor joint="a_joint" gear="3" ctrlrange="-2 2"/>', "", 6.0)])
 def test_effort_limits_are_what_actuators_can_do(actuator, joint, effort, written):
     arm = link("a", f'{joint} axis="0 1 0"', link("b", 'type="ball"'))
     robot = Robot.load(written(world(arm, f"<actuator>{actuator}</actuator>")))
@@ -283,8 +279,7 @@ def test_keyframes_are_starts(written):
     np.testing.assert_allclose(start_of(held, StartSection(keyframe="home"))[0], [0.3])
     moved = StartSection(keyframe="key 1", joints={"leg_joint": 0.1})
     np.testing.assert_allclose(start_of(held, moved)[0], [0.1])
-    with pytest.raises(UnknownNameError, match="unknown keyframe 'hom'"):
-        robot.start("hom")
+    refused("unknown keyframe 'hom'", robot.start, "hom", error=UnknownNameError)
 
 
 def test_a_difference_from_mujoco_names_the_body(written, monkeypatch):
@@ -292,8 +287,7 @@ def test_a_difference_from_mujoco_names_the_body(written, monkeypatch):
 
     path, exact = written(world(link("a", more=link("b")))), model.pose
     monkeypatch.setattr(model, "pose", lambda place, turn: exact(place * (1.0 + 1e-8), turn))
-    with pytest.raises(RobotError, match=r"body 'a' is 3e-09 from where MuJoCo has it"):
-        Robot.load(path)
+    refused("body 'a' is 3e-09 from where MuJoCo has it", Robot.load, path, error=RobotError)
     monkeypatch.setattr(model, "pose", exact)
     inertia = model.pin.Inertia
     monkeypatch.setattr(model.pin, "Inertia", lambda mass, centre, about: inertia(

@@ -16,7 +16,6 @@ from scenarios.config.references import separable_pairs
 from scenarios.config.robot import RobotSection
 
 ROBOTS = Path(__file__).parents[1] / "data" / "robots"
-ARM = (ROBOTS / "arm.urdf.txt").read_text()
 LIMIT = '<limit lower="0.5" upper="2" velocity="3" effort="10"/>'
 
 
@@ -24,7 +23,8 @@ LIMIT = '<limit lower="0.5" upper="2" velocity="3" effort="10"/>'
 def arm(tmp_path):
     def write(shape='<sphere radius="0.04"/>', limit=LIMIT, kind="revolute"):
         path = tmp_path / "arm.urdf"
-        path.write_text(ARM.format(shape=shape, limit=limit, kind=kind))
+        text = (ROBOTS / "arm.urdf.txt").read_text()
+        path.write_text(text.format(shape=shape, limit=limit, kind=kind))
         return path
     return write
 
@@ -68,9 +68,8 @@ def test_locked_joints_are_no_joints(arm):
     robot = Robot.load(str(arm()), locked={"elbow": 0.8})
     assert robot.joint_names == ("shoulder", "turn")
     free = Robot.load(str(arm()))
-    np.testing.assert_allclose(
-        State.at(robot, [0.6, 0.7]).position(robot.frame("tool0")),
-        State.at(free, [0.6, 0.8, 0.7]).position(free.frame("tool0")))
+    np.testing.assert_allclose(State.at(robot, [0.6, 0.7]).position("tool0"),
+                               State.at(free, [0.6, 0.8, 0.7]).position("tool0"))
     with pytest.raises(UnknownNameError, match="did you mean 'elbow'"):
         Robot.load(str(arm()), locked={"elbo": 0.0})
     with pytest.raises(RobotError, match="its joints cannot be locked"):
@@ -102,30 +101,17 @@ def test_a_package_that_is_missing_is_named_with_its_extra(package, monkeypatch)
         Robot.load(f"{package}:panda")
 
 
-@pytest.fixture
-def descriptions(monkeypatch):
-    """Puts modules in place of the package robot_descriptions, which knows one robot."""
-    index = ModuleType("_descriptions")
-    index.DESCRIPTIONS = {"some_description": None}
-
-    def place(**modules):
-        for name, module in {"_descriptions": index, **modules}.items():
-            monkeypatch.setitem(sys.modules, f"robot_descriptions.{name}", module)
-
-    monkeypatch.setitem(sys.modules, "robot_descriptions", ModuleType("robot_descriptions"))
-    place()
-    return place
-
-
-def test_a_robot_of_robot_descriptions_is_read_from_where_it_was_downloaded(arm, descriptions):
-    module = ModuleType("some_description")
-    module.URDF_PATH = str(arm())
-    descriptions(some_description=module)
+def test_a_robot_of_robot_descriptions_is_read_from_where_it_was_downloaded(arm, monkeypatch):
+    """Modules in place of the package, which knows one robot."""
+    package, index, some = map(ModuleType, ("robot_descriptions", "_descriptions", "some"))
+    index.DESCRIPTIONS, some.URDF_PATH = {"some_description": None}, str(arm())
+    for name, module in {"": package, "._descriptions": index, ".some_description": some}.items():
+        monkeypatch.setitem(sys.modules, f"robot_descriptions{name}", module)
     robot = Robot.load("robot_descriptions:some")
     assert (robot.name, robot.n) == ("some", 3)
     with pytest.raises(UnknownNameError, match="did you mean 'some_description'"):
         Robot.load("robot_descriptions:sum_description")
-    descriptions(some_description=None)
+    monkeypatch.setitem(sys.modules, "robot_descriptions.some_description", None)
     with pytest.raises(RobotError, match="could not be downloaded"):
         Robot.load("robot_descriptions:some_description")
 

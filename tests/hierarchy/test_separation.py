@@ -19,16 +19,12 @@ from scenarios.cell.sensors import ExactDistances
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 ROUND = Ellipse((0.3, 0.5, 0.2), (0.2, 0.1, 0.0), (0.0, 0.1, 0.3), rate=2.0)
 SHAPES = [
-    Obstacle("point", (0.1, 0.5, 0.1)),
-    Obstacle("sphere", (0, 0, 0), (0.07,), path=ROUND),
+    Obstacle("point", (0.1, 0.5, 0.1)), Obstacle("sphere", (0, 0, 0), (0.07,), path=ROUND),
     Obstacle("capsule", (-0.1, 0.4, -0.1), (0.02, 0.2), TURN),
     Obstacle("capsule", (0, 0, 0), (0.05, 0.1), TURN, path=ROUND),
     Obstacle("box", (-0.3, 0.3, 0.4), (0.1, 0.3, 0.2), TURN),
-    Obstacle("box", (0, 0, 0), (0.02, 0.1, 0.05), TURN, path=ROUND),
-]
+    Obstacle("box", (0, 0, 0), (0.02, 0.1, 0.05), TURN, path=ROUND)]
 STATES = states(20, seed=6)
-
-
 SENSOR = ExactDistances(ROBOT, Obstacles(SHAPES), BODY, TIP, pairs=True)
 
 

@@ -11,8 +11,6 @@ from hierarchy.errors import RobotError
 CENTRE = np.array([0.1, 0.2, 0.3])
 INERTIA = np.array([[0.3, 0.01, 0.02], [0.01, 0.4, 0.03], [0.02, 0.03, 0.5]])
 ORIGIN = np.array([1.0, 2.0, 3.0]), Rotation.from_euler("xyz", [0.3, -0.4, 0.5])
-
-
 PLACED, BALL = placed("1 2 3", "0.3 -0.4 0.5"), shape('<sphere radius="0.1"/>', "0.1 0.2 0.3")
 
 

@@ -17,11 +17,12 @@ OUTSIDE = {name: value for name, value in os.environ.items() if name != "PYTHONP
 UNCOMPILED = {**OUTSIDE, "NUMBA_DISABLE_JIT": "1"}  # kernels run as plain Python
 
 
-def run(*command, **kept):
+def run(*command, code=0, **kept):
+    """What a command printed, or what it complained of where it is to end with another code."""
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False,
                           **{"env": OUTSIDE, **kept})
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
-    return done.stdout
+    assert done.returncode == code, done.stdout[-2000:] + done.stderr[-4000:]
+    return done.stderr if code else done.stdout
 
 
 def needed(package, extras=(), found=None):
@@ -72,19 +73,15 @@ def test_it_runs_from_outside_the_source_with_core_dependencies_alone(clean, tmp
 def test_what_needs_an_extra_says_which(clean, tmp_path):
     scheduler = ["sweep", "ellipse-starts", "--scheduler", "tcp://127.0.0.1:9"]
     for extra, command in {"sim": ["run", "human"], "sweep": scheduler}.items():
-        done = subprocess.run([str(clean / "hierarchy"), *command], capture_output=True, text=True,
-                              check=False, cwd=tmp_path, env=UNCOMPILED)
-        assert done.returncode == 2
-        assert f"pip install 'task-hierarchy[{extra}]'" in done.stderr
-        assert "Traceback" not in done.stderr
+        said = run(clean / "hierarchy", *command, code=2, cwd=tmp_path, env=UNCOMPILED)
+        assert f"pip install 'task-hierarchy[{extra}]'" in said
+        assert "Traceback" not in said
 
 
 @pytest.mark.parametrize("command", [["bench", "open", "--fresh", "1"], ["reproduce", "--quick"]])
 def test_what_needs_a_checkout_says_so(clean, tmp_path, command):
-    done = subprocess.run([str(clean / "hierarchy"), *command], capture_output=True, text=True,
-                          check=False, cwd=tmp_path, env=OUTSIDE)
-    assert done.returncode == 2
-    assert f"`hierarchy {command[0]}` is not part of the installed package" in done.stderr
+    said = run(clean / "hierarchy", *command, code=2, cwd=tmp_path)
+    assert f"`hierarchy {command[0]}` is not part of the installed package" in said
 
 
 def test_every_shipped_file_is_in_the_wheel(clean, tmp_path):

@@ -27,7 +27,6 @@ from scenarios.results.plan import load_sweep
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-LARGEST = 60_000  # bytes of a picture of the gallery
 
 
 class Page(HTMLParser):
@@ -49,19 +48,19 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """The built pages by path; any warning is an error."""
+    """The folder of the built site, and its pages by path; any warning is an error."""
     out = tmp_path_factory.mktemp("site")
     done = subprocess.run(
         [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html",
          "-d", str(tmp_path_factory.mktemp("doctrees")), str(DOCS), str(out)],
         capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return {path.resolve(): Page(path) for path in out.rglob("*.html")}
+    return out, {path.resolve(): Page(path) for path in out.rglob("*.html")}
 
 
 def test_no_link_inside_the_site_is_broken_and_nothing_is_loaded_from_a_network(site):
-    broken = []
-    for path, page in site.items():
+    (out, pages), broken = site, []
+    for path, page in pages.items():
         for link in [*page.links, *page.loads]:
             parts = urlsplit(link)
             file = (path.parent / unquote(parts.path)).resolve() if parts.path else path
@@ -69,19 +68,15 @@ def test_no_link_inside_the_site_is_broken_and_nothing_is_loaded_from_a_network(
             if parts.scheme or parts.netloc:
                 broken += [link] if link in page.loads else []
             elif not file.exists() or (
-                    fragment and file in site and fragment not in site[file].ids):
+                    fragment and file in pages and fragment not in pages[file].ids):
                 broken.append((path.name, link))
     assert broken == []
-    for style in root_of(site).rglob("*.css"):
+    for style in out.rglob("*.css"):
         assert not re.search(r"(url\(|@import)\s*['\"]?(https?:)?//", style.read_text()), style
 
 
-def root_of(site):
-    return min((path.parent for path in site), key=lambda folder: len(folder.parts))
-
-
 def test_every_public_name_is_in_the_reference(site):
-    with (root_of(site) / "objects.inv").open("rb") as file:
+    with (site[0] / "objects.inv").open("rb") as file:
         known = InventoryFile.load(file, "", str.__add__)
     described = {name for kind, objects in known.items() if kind.startswith("py:")
                  for name in objects}
@@ -125,14 +120,13 @@ def test_every_scenario_is_in_the_gallery_with_a_picture(name):
     shown = picture.exists() and text.count(section) == 1
     assert shown, (f"run `python -m benchmark.studies.gallery {name}` and give it a section in "
                    "docs/gallery.md, as the others have it")
-    assert picture.stat().st_size < LARGEST
+    assert picture.stat().st_size < 60_000  # bytes
 
 
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"(?<!`)`((?:hierarchy |make |python -m |python docs/)[^`]+)`(?!`)")
 TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
          for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]}
-FENCE = re.compile(r"^(\s*)```(.*)$", re.MULTILINE)
 CHECKED = {"", "python", "toml", "sh", "console", "bash", "c"}  # c: test_library_programs.py
 FOLLOWED = "docs/tutorial.md", "docs/urdf-to-standing.md"  # whose commands are run, not only read
 
@@ -168,7 +162,7 @@ def _in_a_folder_of_its_own(tmp_path, monkeypatch, no_plugins):
 
 def test_no_block_of_a_document_escapes_these_tests():
     assert [(name, indent, language) for name, text in TEXTS.items()
-            for indent, language in FENCE.findall(text)
+            for indent, language in re.findall(r"^(\s*)```(.*)$", text, re.MULTILINE)
             if indent.strip("\n") or language not in CHECKED | {"{toctree}", "{eval-rst}"}] == []
 
 

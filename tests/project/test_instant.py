@@ -40,17 +40,15 @@ def test_the_program_of_the_readme_compiles_nothing(tmp_path):
     assert compiled(program, tmp_path) == []
 
 
-COMMANDS = [
-    "run ellipse --resolver recursive --set pointing.alpha_d=35 --duration 0.1",
-    "run ellipse --duration 0.1", "run human --duration 0.1", "run reach-torque --duration 0.01",
-    "library --resolvers recursive",
-    "compare ellipse ellipse-velocity --resolvers tpm,recursive,hqp,weighted --workers 1 --set "
-    "control.duration=0.02"]
-
-
 def test_commands_compile_nothing(tmp_path):
+    commands = [
+        "run ellipse --resolver recursive --set pointing.alpha_d=35 --duration 0.1",
+        "run ellipse --duration 0.1", "run human --duration 0.1",
+        "run reach-torque --duration 0.01", "library --resolvers recursive",
+        "compare ellipse ellipse-velocity --resolvers tpm,recursive,hqp,weighted --workers 1 --set "
+        "control.duration=0.02"]
     words = [[*shlex.split(command), "--out", str(tmp_path / str(i))]
-             for i, command in enumerate(COMMANDS)]
+             for i, command in enumerate(commands)]
     code = ("from scenarios.cli.main import run_command\n"
             f"assert max(map(run_command, {words})) < 2")
     assert compiled(code, tmp_path) == []

@@ -93,9 +93,8 @@ def test_what_a_package_says_it_exports_is_there(package):
         assert callable(getattr(module, name))
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = module.nothing
-    assert package == "task_hierarchy" or all(
-        getattr(import_module("task_hierarchy"), name) is getattr(module, name)
-        for name in module.__all__)
+    assert package == "task_hierarchy" or all(getattr(import_module("task_hierarchy"), name)
+                                              is getattr(module, name) for name in module.__all__)
 
 
 @pytest.mark.parametrize("name", ["hierarchy", "solvers", "scenarios"])

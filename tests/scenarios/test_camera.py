@@ -24,8 +24,7 @@ SHAPES = {
     "box": Obstacle("box", (0.0, 0.1, 2.0), (0.3, 0.2, 0.5), TURNED),
     "sphere half outside": Obstacle("sphere", (1.1, 0.5, 2.0), (0.3,)),
     "box around the camera's plane": Obstacle("box", (0.4, 0.0, 0.0), (0.1, 0.1, 1.0)),
-    "capsule past the camera": Obstacle("capsule", (0.3, 0.1, 0.2), (0.1, 1.0)),
-}
+    "capsule past the camera": Obstacle("capsule", (0.3, 0.1, 0.2), (0.1, 1.0))}
 
 
 def camera(*obstacles, errors=IDEAL, capsules=(), pinhole=None, **settings):
@@ -134,20 +133,18 @@ def test_jitter_delays_each_frame_by_less_than_its_most_and_by_the_seed():
 
 
 @pytest.mark.parametrize(("make", "said"), [
-    (lambda: Pinhole(width=0), "width = 0 px"),
-    (lambda: Pinhole(fx=np.nan), "fx = nan px"),
+    (lambda: Pinhole(width=0), "width = 0 px"), (lambda: Pinhole(fx=np.nan), "fx = nan px"),
     (lambda: Pinhole(rotation=np.eye(3) * 1.1), "rotation"),
     (lambda: Pinhole(rotation=np.diag([1, 1, -1])), "rotation"),
     (lambda: Pinhole(position=(0, np.inf, 0)), "position"),
-    (lambda: looking_at((1, 2, 3), (1, 2, 3)), "look_at"),
+    (lambda: looking_at((1, 2, 3), (1, 2, 3)), "position and look_at are both"),
+    (lambda: looking_at([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]), "position and look_at are both"),
     (lambda: camera(rate=30.0, jitter=0.05), "jitter = 0.05 s")])
 def test_what_cannot_be_is_refused_by_name(make, said):
     with pytest.raises(HierarchyError, match=said.replace("(", r"\(")):
         make()
 
 
-def test_a_camera_faces_what_it_looks_at_unless_it_is_there():
+def test_a_camera_faces_what_it_looks_at():
     R = looking_at([0.0, 0.0, 1.0], [0.0, 1.0, 1.0])
     np.testing.assert_allclose(R, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], atol=1e-15)
-    with pytest.raises(HierarchyError, match="position and look_at are both"):
-        looking_at([0.0, 0.0, 1.0], [0.0, 0.0, 1.0])

@@ -14,11 +14,9 @@ from hand_made import recording
 
 from scenarios import compare, load, load_run, simulate
 from scenarios.cli import doctor
-from scenarios.cli.main import _with_its_file, app, run_command
+from scenarios.cli.main import _with_its_file, app
 from scenarios.files import OutputError, claim, slug
 from scenarios.measure import run_folder
-
-SHORT = ["--duration", "0.02"]
 
 
 @pytest.fixture(autouse=True)
@@ -31,31 +29,28 @@ def in_an_empty_folder(tmp_path, monkeypatch):
     (0.05, ["certified: 0 of 50 ticks; the first one not certified is tick 0 (t = 0.000 s)\n",
             "damping = 0.05: near a singularity"])])
 def test_certify_counts_the_ticks_whose_answer_is_right_and_names_the_first_that_is_not(
-        damping, said, capsys):
-    assert run_command(["run", "ellipse", "--certify", "--duration", "0.05",
-                        "--set", f"control.options.damping={damping}"]) == 0
-    out = capsys.readouterr().out
+        damping, said, command):
+    out = command("run ellipse --certify --duration 0.05 --set",
+                  f"control.options.damping={damping}").out
     assert all(line in out for line in said)
 
 
-def test_a_saved_run_says_itself_how_to_repeat_it(tmp_path, capsys):
-    first = ["run", "ellipse", *SHORT, "--set", "pointing.alpha_d=35", "--out", "a", "--json"]
-    assert run_command(first) == 0
+def test_a_saved_run_says_itself_how_to_repeat_it(tmp_path, command):
+    said = command("run ellipse --duration 0.02 --set pointing.alpha_d=35 --out a --json").out
     kept = json.loads((tmp_path / "a" / "metrics.json").read_text())
-    assert json.loads(capsys.readouterr().out) == {
+    assert json.loads(said) == {
         "scenario": "ellipse", "resolver": "tpm-published", "folder": "a", **kept}
-    assert run_command(["run", "a/scenario.toml", "--out", "b"]) == 0
-    assert ((tmp_path / "a" / "scenario.toml").read_text()
-            == (tmp_path / "b" / "scenario.toml").read_text())
-    assert "alpha_d = 35" in (tmp_path / "b" / "scenario.toml").read_text()
+    command("run a/scenario.toml --out b")
+    first, second = ((tmp_path / out / "scenario.toml").read_text() for out in "ab")
+    assert first == second
+    assert "alpha_d = 35" in second
 
 
-def test_compare_writes_page_numbers_and_a_folder_for_each_run_in_80_columns(tmp_path, capsys,
+def test_compare_writes_page_numbers_and_a_folder_for_each_run_in_80_columns(tmp_path, command,
                                                                              monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    assert run_command(["compare", "ellipse", "--resolvers", "tpm-published,tpm,recursive", *SHORT,
-                        "--workers", "1", "--out", "b"]) == 0
-    out = capsys.readouterr().out
+    out = command("compare ellipse --resolvers tpm-published,tpm,recursive --duration 0.02 "
+                  "--workers 1 --out b").out
     assert "Report: b/index.html" in out
     assert max(map(len, out.splitlines())) <= 80
     assert "…" not in out
@@ -66,13 +61,12 @@ def test_compare_writes_page_numbers_and_a_folder_for_each_run_in_80_columns(tmp
     assert numbers["runs"][0]["settings"]["damping"] == 0.05
 
 
-def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, capsys, monkeypatch):
+def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, command, monkeypatch):
     simulation_is(mock.Mock(side_effect=AssertionError("the run began")), monkeypatch)
     (tmp_path / "precious").mkdir()
     (tmp_path / "precious" / "thesis.tex").touch()
-    for command in ("run", "compare"):
-        assert run_command([command, "ellipse", "--out", "precious"]) == 2
-        assert "not empty" in capsys.readouterr().err
+    for what in ("run", "compare"):
+        assert "not empty" in command(what, "ellipse", "--out", "precious", code=2).err
     assert [path.name for path in (tmp_path / "precious").iterdir()] == ["thesis.tex"]
 
 
@@ -81,15 +75,14 @@ def simulation_is(stand_in, monkeypatch):
         monkeypatch.setattr(importlib.import_module(module), "simulate", stand_in)
 
 
-def test_a_fault_is_reported_and_the_run_kept(tmp_path, capsys, monkeypatch):
+def test_a_fault_is_reported_and_the_run_kept(tmp_path, command, monkeypatch):
     simulation_is(lambda scenario, **_: recording(scenario, fault="interrupted at tick 5"),
                   monkeypatch)
-    assert run_command(["run", "ellipse", "--out", "a"]) == 1
-    assert "fault: interrupted at tick 5" in capsys.readouterr().err
+    assert "fault: interrupted at tick 5" in command("run ellipse --out a", code=1).err
     assert (tmp_path / "a" / "run.npz").exists()
 
 
-def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, capsys):
+def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, command):
     def breaks_under_recursive(scenario, progress=None):
         if scenario.control.resolver == "recursive":
             raise ArithmeticError("[bold]no[/bold] answer")
@@ -98,9 +91,8 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, cap
     simulation_is(breaks_under_recursive, monkeypatch)
     done = compare("ellipse", ["recursive", "tpm"], out=tmp_path / "b")
     assert [run.fault for run in done.runs] == ["ArithmeticError: [bold]no[/bold] answer", None]
-    assert run_command(["compare", "ellipse", "--resolvers", "recursive,tpm", "--workers", "1",
-                        "--out", "c"]) == 1
-    assert "[bold]no[/bold] answer" in capsys.readouterr().err
+    said = command("compare ellipse --resolvers recursive,tpm --workers 1 --out c", code=1).err
+    assert "[bold]no[/bold] answer" in said
 
 
 def ended(code, folder, *words):
@@ -110,15 +102,11 @@ def ended(code, folder, *words):
                           text=True, check=False)
 
 
-INTERRUPTED_AT_TICK_500 = """import contextlib, scenarios.cli.terminal as terminal
+def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
+    done = ended("""import contextlib, scenarios.cli.terminal as terminal
 terminal.bar = lambda: contextlib.nullcontext(
     lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGTERM))
-"""
-
-
-def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
-    done = ended(INTERRUPTED_AT_TICK_500, tmp_path, "run", "ellipse", "--duration", "20",
-                 "--out", "a")
+""", tmp_path, "run", "ellipse", "--duration", "20", "--out", "a")
     assert done.returncode == 1
     run = load_run(tmp_path / "a")
     assert 500 <= run.ticks < 20_000
@@ -127,7 +115,10 @@ def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
-INTERRUPTED_AFTER_THE_FIRST_RUN = """import sys
+@pytest.mark.parametrize("page", ["whole", "broken"])
+def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(page,
+                                                                                     tmp_path):
+    done = ended("""import sys
 from scenarios.results import comparing
 
 if sys.argv.pop() == "broken":
@@ -140,14 +131,8 @@ def add_and_interrupt(written, i, run):
     os.kill(os.getpid(), signal.SIGTERM)
 
 comparing._Written.add = add_and_interrupt
-"""
-
-
-@pytest.mark.parametrize("page", ["whole", "broken"])
-def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(page,
-                                                                                     tmp_path):
-    done = ended(INTERRUPTED_AFTER_THE_FIRST_RUN, tmp_path, "compare", "ellipse", "--resolvers",
-                 "tpm,hcod", "--workers", "2", *SHORT, "--out", "b", page)
+""", tmp_path, "compare", "ellipse", "--resolvers", "tpm,hcod", "--workers", "2", "--duration",
+                 "0.02", "--out", "b", page)
     assert done.returncode == 130
     assert "the runs made so far are in b\n" in done.stderr
     assert list((tmp_path / "b").rglob("run.npz"))
@@ -183,13 +168,13 @@ def test_ctrl_c_while_it_is_starting_ends_the_command_quietly(tmp_path):
     (OSError(28, "No space left on device", "a/file"), 1,
      "hierarchy: fault: a/file: No space left on device\n")])
 def test_a_command_that_is_interrupted_or_refused_ends_without_a_traceback(
-        error, code, said, monkeypatch, capsys):
+        error, code, said, monkeypatch, command):
     monkeypatch.setattr("scenarios.cli.doctor.doctor_command", mock.Mock(side_effect=error))
-    assert run_command(["doctor"]) == code
-    assert capsys.readouterr().err == said
+    assert command("doctor", code=code).err == said
 
 
-RUN = [sys.executable, "-m", "scenarios.cli.start", "run", "ellipse", *SHORT, "--out", "a"]
+RUN = [sys.executable, "-m", "scenarios.cli.start", "run", "ellipse", "--duration", "0.02",
+       "--out", "a"]
 
 
 def test_a_terminal_that_cannot_show_a_character_gets_a_replacement(tmp_path):
@@ -239,21 +224,16 @@ doctor.doctor_command = broken
     assert (done.returncode, done.stderr) == (130, "hierarchy: interrupted\n")
 
 
-def test_the_doctor_finds_all_well_here(capsys):
-    assert run_command(["doctor"]) == 0
-    out = capsys.readouterr().out
-    assert "No problems found." in out
-    assert "20 of 20 answers certified" in out
-    assert "200 ticks of ellipse" in out
+def test_the_doctor_finds_all_well_here(command):
+    out = command("doctor").out
+    for line in ("No problems found.", "20 of 20 answers certified", "200 ticks of ellipse"):
+        assert line in out
 
 
-def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, capsys):
-    def broken():
-        raise RuntimeError("no such kernel")
-
+def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, command):
+    broken = mock.Mock(side_effect=RuntimeError("no such kernel"))
     monkeypatch.setattr(doctor, "_resolvers_agree", broken)
-    assert run_command(["doctor", "--json"]) == 1
-    said = json.loads(capsys.readouterr().out)
+    said = json.loads(command("doctor --json", code=1).out)
     assert said["well"] is False
     bad = [one for one in said["findings"] if one["well"] is False]
     assert [one["what"] for one in bad] == ["resolvers agree"]

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hand_made import asked, recording
+from refusals import refused
 
 import scenarios.config.reading as groups_of
 from hierarchy import HierarchyError
 from scenarios import compare
 from scenarios.cell.build import build
-from scenarios.cli.main import run_command
 from scenarios.config import ScenarioError, load, members, shipped
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
@@ -39,8 +39,7 @@ def test_a_variant_has_two_names_and_those_of_a_file_extend_it(tmp_path):
     wide = load(f"{tmp_path}/mine.toml:wide")
     assert (wide.name, wide.pointing.alpha_d) == ("mine-wide", 50.0)
     assert wide.limits == load("ellipse-limits").limits
-    with pytest.raises(HierarchyError, match="wide"):
-        load(f"{tmp_path}/mine.toml:wid")
+    refused("wide", load, f"{tmp_path}/mine.toml:wid")
 
 
 def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
@@ -57,8 +56,7 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     path = tmp_path / "idle.toml"
     path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'
                     '[control]\nresolver = "tpm"\nduration = 1.0\n')
-    with pytest.raises(ScenarioError, match="scenario 'idle': the stack is empty"):
-        build(load(path))
+    refused("scenario 'idle': the stack is empty", lambda: build(load(path)), error=ScenarioError)
 
 
 def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():
@@ -97,17 +95,16 @@ def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them
     ("control.period", ["number > 0 ≤ 1 [s], default 0.001", "Time from tick to tick."]),
     ("start.q", ["[rad or m]"]), ("duration", ["control.duration", "faults.duration"]),
     ("run", ["Usage: hierarchy run"]), ("tasks", ["[[tasks]]"])])
-def test_help_says_what_a_key_means(asked, said, capsys):
-    assert run_command(["help", asked]) == 0
-    text = capsys.readouterr().out
+def test_help_says_what_a_key_means(asked, said, command):
+    text = command("help", asked).out
     assert all(one in text for one in said)
 
 
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
-        tmp_path, monkeypatch, capsys):
+        tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
-    assert run_command(["compare", "ladder", "--duration", "0.02", "--workers", "1"]) == 0
-    assert "Step 2: joint limits above all tasks (tpm)" in capsys.readouterr().out
+    said = command("compare ladder --duration 0.02 --workers 1").out
+    assert "Step 2: joint limits above all tasks (tpm)" in said
     folder = tmp_path / "runs" / "compare-ladder"
     found = json.loads((folder / "comparison.json").read_text())
     assert [run["scenario"] for run in found["runs"]] == members(["ladder"])
@@ -145,17 +142,12 @@ def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_p
     assert done.refused == ("recursive is not run on limited, which asks for bounds: it resolves "
                             "equalities",)
     assert done.refused[0] in (tmp_path / "a" / "index.html").read_text()
-    with pytest.raises(HierarchyError, match="recursive is not run on limited"):
-        compare([limited], ["recursive"])
+    refused("recursive is not run on limited", compare, [limited], ["recursive"])
 
 
 # Where strict resolvers part: the tick, and what was different before it.
-LETTER = "tpm-published"
-
-
 def run_of(spec, q=None, fault=None, **changed):
-    scenario = asked(spec)
-    q = np.zeros((5, 7)) if q is None else q
+    scenario, q = asked(spec), np.zeros((5, 7)) if q is None else q
     return Run(scenario, spec, spec, recording(scenario, fault, q=q, **changed))
 
 
@@ -189,7 +181,8 @@ def test_runs_part_at_a_tick_for_a_reason_that_is_not_after_it(other, tick, why)
 
 def test_resolvers_that_are_not_strict_need_not_agree():
     """Neither as the one compared with, nor as the one compared."""
-    assert partings([run_of(LETTER), run_of("recursive"), run_of("augmented", away_from(1))]) == []
+    runs = [run_of("tpm-published"), run_of("recursive"), run_of("augmented", away_from(1))]
+    assert partings(runs) == []
 
 
 def test_a_backend_that_is_not_installed_leaves_the_default_comparison_and_is_named(monkeypatch):

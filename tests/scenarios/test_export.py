@@ -10,10 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Obstacle
-from scenarios import load, simulate
-from scenarios.cli.main import run_command
+from scenarios import load, save, simulate
 from scenarios.export import export, foxglove
-from scenarios.measure.run_folder import save
 from scenarios.recording.recording import Event
 
 
@@ -122,16 +120,14 @@ def test_what_cannot_be_written_says_why(run, tmp_path, name, said, monkeypatch)
         export(run, tmp_path / "run.mcap")
 
 
-def test_the_command_exports_a_run_beside_it_or_where_it_is_told(run, tmp_path, capsys):
+def test_the_command_exports_a_run_beside_it_or_where_it_is_told(run, tmp_path, command):
     pytest.importorskip("mcap")
-    folder = save(run, tmp_path / "run")
-    assert run_command(["export", str(folder), "--format", "mcap"]) == 0
-    assert run_command(["export", str(folder), "--out", str(tmp_path / "other.mcap")]) == 0
-    assert (tmp_path / "other.mcap").read_bytes() == (folder / "run.mcap").read_bytes()
-    assert "other.mcap" in capsys.readouterr().out
-    assert run_command(["export", str(folder), "--format", "csv"]) == 2
-    assert "to_dataframe" in capsys.readouterr().err
-    assert run_command(["export", str(tmp_path / "none")]) == 2
+    folder, other = save(run, tmp_path / "run"), tmp_path / "other.mcap"
+    command("export --format mcap", folder)
+    assert "other.mcap" in command("export", folder, "--out", other).out
+    assert other.read_bytes() == (folder / "run.mcap").read_bytes()
+    assert "to_dataframe" in command("export --format csv", folder, code=2).err
+    command("export", tmp_path / "none", code=2)
 
 
 @pytest.mark.parametrize(("shape", "size", "part", "drawn", "spheres"), [

@@ -7,17 +7,12 @@ import numpy as np
 import pytest
 
 from hierarchy import HierarchyError
+from scenarios import load, load_run, save, simulate
 from scenarios.cell.build import build
-from scenarios.config import load
-from scenarios.loop.simulation import simulate
 from scenarios.measure.metrics import measure
-from scenarios.measure.run_folder import load_run, save
 from solvers import Status
 
 AT, LASTS, END = 50, 60, 200  # ticks of 1 ms
-INSIDE = "place={joint='joint_4', offset=[0.0, 0.0, 0.0]}, radius=0.05"
-STATUSES = ("iteration_limit", "numerical_failure", "backend_failure", "inaccurate")
-
 # What is put into the run, the kind of trouble it makes, and after how many ticks.
 FAULTS = {
     "all positions": ("nan_position", "", "not_finite", 0),
@@ -27,10 +22,11 @@ FAULTS = {
     "all distances": ("nan_distance", "", "not_finite", 0),
     "the distance of the end effector": ("nan_distance", "point=9", "not_finite", 0),
     "stale": ("stale", "", "stale", 20),  # the last measurement is one tick old already
-    **{status: ("status", f"status={status!r}", status, 0) for status in STATUSES},
+    **{status: ("status", f"status={status!r}", status, 0) for status in (
+        "iteration_limit", "numerical_failure", "backend_failure", "inaccurate")},
     "overrun": ("overrun", "takes=60.0", "overrun", 0),
-    "obstacle": ("obstacle", INSIDE, "inside", 0),
-}
+    "obstacle": ("obstacle", "place={joint='joint_4', offset=[0.0, 0.0, 0.0]}, radius=0.05",
+                 "inside", 0)}
 
 
 def scenario(name, put, settings, *changes, kind, policy):
@@ -93,23 +89,21 @@ def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
     found = measure(run)
     assert (found["ticks_hold"].value, found["ticks_brake"].value) == (10, LASTS - 10)
     assert load_run(save(run, tmp_path / "run")).events == run.events
-    events = json.loads((tmp_path / "run" / "metrics.json").read_text())["events"]
-    assert events == [
-        {"kind": "not_finite", "action": "hold", "ticks": 10, "first_tick": AT,
-         "first_time": pytest.approx(AT * 1e-3)},
-        {"kind": "not_finite", "action": "brake", "ticks": LASTS - 10, "first_tick": AT + 10,
-         "first_time": pytest.approx((AT + 10) * 1e-3)}]
+    assert json.loads((tmp_path / "run" / "metrics.json").read_text())["events"] == [
+        {"kind": "not_finite", "action": action, "ticks": ticks, "first_tick": first,
+         "first_time": pytest.approx(first * 1e-3)}
+        for action, ticks, first in (("hold", 10, AT), ("brake", LASTS - 10, AT + 10))]
 
 
 @pytest.mark.parametrize(("fault", "said"), [
-    ("{kind='nan_distance', at=1, duration=1}", "'nan_distance' needs"),
-    ("{kind='status', at=1, duration=1}", "'status' needs status"),
-    ("{kind='stale', at=1, duration=1, joint=3}", "'stale' takes no joint"),
-    ("{kind='obstacle', at=1, duration=1, radius=0.1}", "either a centre or a place"),
-    ("{kind='nan_position', at=1, duration=1, joint=8}", "faults.0.joint = 8: robot 'kuka_lwr'"),
-    ("{kind='nan_distance', at=1, duration=1, point=10}", "faults.0.point = 10: robot"),
-    ("{kind='obstacle', at=1, duration=1, radius=0.1, place={joint='elbow', offset=[0, 0, 0]}}",
+    ("kind='nan_distance'", "'nan_distance' needs"), ("kind='status'", "'status' needs status"),
+    ("kind='stale', joint=3", "'stale' takes no joint"),
+    ("kind='obstacle', radius=0.1", "either a centre or a place"),
+    ("kind='nan_position', joint=8", "faults.0.joint = 8: robot 'kuka_lwr'"),
+    ("kind='nan_distance', point=10", "faults.0.point = 10: robot"),
+    ("kind='obstacle', radius=0.1, place={joint='elbow', offset=[0, 0, 0]}",
      "unknown joint 'elbow'")])
 def test_a_fault_that_cannot_be_put_in_is_named(fault, said):
     with pytest.raises(HierarchyError, match=re.escape(said)):
-        simulate(load("strictness" if "needs" in said else "ellipse", [f"faults=[{fault}]"]))
+        simulate(load("strictness" if "needs" in said else "ellipse",
+                      [f"faults=[{{at=1, duration=1, {fault}}}]"]))

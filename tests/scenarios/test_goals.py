@@ -10,13 +10,11 @@ from hand_made import recording
 from scipy.stats import rankdata
 
 from hierarchy import Hierarchy
-from scenarios import load, simulate
-from scenarios.cli.main import run_command
+from scenarios import load, save, simulate
 from scenarios.measure.causes import Tick, causes
 from scenarios.measure.given_up import given_up
 from scenarios.measure.goals import goals
 from scenarios.measure.jumps import jumps
-from scenarios.measure.run_folder import save
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import best, paired, wilson
 from scenarios.measure.verdict import lines, table, verdicts
@@ -177,10 +175,7 @@ def test_the_interval_of_a_share_is_wilsons(met, of, low, high):
     assert wilson(met, of) == pytest.approx((low, high), abs=1e-4)
 
 
-NAMES = ("box", "task", "rest")
-
-
-def tick(box, task, rest=((0.0, 0.0), 0.0), reference=(0.0, 0.0), names=NAMES):
+def tick(box, task, rest=((0.0, 0.0), 0.0), reference=(0.0, 0.0), names=("box", "task", "rest")):
     """A box of two unknowns (2, 2), a task and a last row, each (row, target), answered."""
     levels = [(np.eye(2), *np.array(box, dtype=float)),
               *((np.array([row], dtype=float), [target]) for row, target in (task, rest))]
@@ -213,9 +208,9 @@ def test_what_moved_is_named_with_what_is_left_without_it():
     assert said(tick(WIDE, ((1.0, 0.0), 0.0)), tick(WIDE, ((1.0, 0.0), 3.0))) == [
         "side: target of row 0 in task moved by 3, from 0 to 3; without that the change is 0",
         "miss: task changed from met to missed by 2"]
-    (text,) = said(tick(WIDE, ((1.0, 0.0), 0.0)),
-                   tick(WIDE, ((1.0, 0.0), 0.0), reference=(0.0, 0.5)))
-    assert text == "reference: the reference moved; without that the change is 0"
+    assert said(tick(WIDE, ((1.0, 0.0), 0.0)),
+                tick(WIDE, ((1.0, 0.0), 0.0), reference=(0.0, 0.5))) == [
+        "reference: the reference moved; without that the change is 0"]
 
 
 def test_levels_and_sides_that_come_and_go_are_all_that_is_said():
@@ -237,13 +232,11 @@ def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
     assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
 
 
-def test_the_command_names_the_largest_changes_of_a_run(tmp_path, capsys):
+def test_the_command_names_the_largest_changes_of_a_run(tmp_path, command):
     folder = save(simulate(load("ellipse-hqp", ["control.duration=0.05"])), tmp_path / "run")
-    assert run_command(["why", str(folder), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["jumps"]
+    found = json.loads(command("why --json", folder).out)["jumps"]
     sizes = [one["size"] for one in found]
     assert (len(found), sizes) == (3, sorted(sizes, reverse=True))
-    assert run_command(["why", str(folder), "--tick", str(found[0]["tick"])]) == 0
-    assert f"tick {found[0]['tick']} (t = " in capsys.readouterr().out
-    assert run_command(["why", str(folder), "--tick", "999"]) == 2
-    assert "tick 999: the run has ticks 0 to 49" in capsys.readouterr().err
+    tick = found[0]["tick"]
+    assert f"tick {tick} (t = " in command("why", folder, "--tick", tick).out
+    assert "tick 999: the run has ticks 0 to 49" in command("why --tick 999", folder, code=2).err

@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
+from scene import ROBOT
 
-from hierarchy import Robot
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
 from solvers import certify
-
-SHORT = "control.duration=1.5"
 
 
 def names_of(*changes):
@@ -20,7 +18,8 @@ def names_of(*changes):
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("resolver", ["hcod", "weighted"])
 def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
-    scenario = load("ellipse-hqp", [SHORT, f"control.level={level}"]).with_resolver(resolver)
+    changes = ["control.duration=1.5", f"control.level={level}"]
+    scenario = load("ellipse-hqp", changes).with_resolver(resolver)
     certified = resolver == "hcod"  # at velocity level of levels that were calmed
     run = simulate(scenario, certified=certified)
     assert run.fault is None
@@ -48,7 +47,6 @@ def test_the_strictness_scenario_measures_what_a_lower_task_moves():
     assert weighted > 1e-7
 
 
-ROBOT = Robot.named("kuka_lwr")
 BEYOND = [1.1657, -0.9476, 0.5844, float(ROBOT.upper[3]) + 0.1, 1.1464, 1.7695, 0.0]
 STARTS = {"stretched": "start.q=[0, 0, 0, 0, 0, 0, 0]",
           "beyond a limit": f"start={{q={BEYOND}, allow_outside_limits=true}}",

@@ -101,10 +101,9 @@ def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_
 
 def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
     far = load("ellipse-hqp", {"avoidance.distance": 0.2, "avoidance.influence": 0.3})
-    found = measure(recording(far, minimal_distance=[1, 0.05, 1, 1, 1],
-                              ee_distance=[1, 1, 1, 0.02, 1],
-                              true_minimal_distance=[1, 0.4, 0.3, 1, 1],
-                              true_ee_distance=[1, 1, 0.35, 1, 1]))
+    found = measure(recording(
+        far, minimal_distance=[1, 0.05, 1, 1, 1], ee_distance=[1, 1, 1, 0.02, 1],
+        true_minimal_distance=[1, 0.4, 0.3, 1, 1], true_ee_distance=[1, 1, 0.35, 1, 1]))
     assert (found["body_distance_min"].value, found["ee_distance_min"].value) == (0.3, 0.35)
     measured = found["body_distance_min_measured"], found["ee_distance_min_measured"]
     assert [metric.value for metric in measured] == [0.05, 0.02]
@@ -130,9 +129,6 @@ def test_steps_of_the_command_and_of_the_joints_are_told_apart():
     labels = {found[name].label for name in ("velocity_step_max", "command_step_max",
                                              "velocity_step_max_measured")}
     assert len(labels) == 3
-
-
-NAMES = ("singular", "singular-limits", "singular-acceleration", "singular-acceleration-limits")
 
 
 def jittered(seed=3):
@@ -164,7 +160,8 @@ def test_frozen_returned_and_jerk_are_counted(spans, frozen, returned):
     assert found["jerk_max"].value == 2.0
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["singular", "singular-limits", "singular-acceleration",
+                                  "singular-acceleration-limits"])
 def test_a_run_has_the_metrics_of_singularities(name):
     found = measure(simulate(load(name, ["control.duration=0.05"])))
     assert found["ticks_frozen"].value == 0.0

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from headless import Balanced
+from refusals import refused
 
-from hierarchy import Hierarchy, HierarchyError
+from hierarchy import Hierarchy
 from hierarchy.notebook import html_table
 from scenarios import compare, load, simulate
 
@@ -66,12 +67,9 @@ def test_a_data_frame_has_a_column_for_each_number(run, library, monkeypatch):
         assert list(found) == [column.name for column in run.columns()]
         np.testing.assert_array_equal(found["q[3]"], run["q"][:, 3])
     monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(HierarchyError, match="needs pandas or polars: pip install pandas"):
-        run.to_dataframe()
-    with pytest.raises(HierarchyError, match=f"needs {library}: pip install {library}"):
-        run.to_dataframe(library)
-    with pytest.raises(HierarchyError, match="unknown library 'panda'; did you mean 'pandas'"):
-        run.to_dataframe("panda")
+    refused("needs pandas or polars: pip install pandas", run.to_dataframe)
+    refused(f"needs {library}: pip install {library}", run.to_dataframe, library)
+    refused("unknown library 'panda'; did you mean 'pandas'", run.to_dataframe, "panda")
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

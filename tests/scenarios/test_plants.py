@@ -4,20 +4,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scene import FRAME, ROBOT, place_of
 
-from hierarchy import Hierarchy, HierarchyError, Robot, State
+from hierarchy import Hierarchy, State
 from hierarchy.avoidance import Obstacles
-from scenarios import load, simulate
-from scenarios.cell.build import build
+from scenarios import load, load_run, save, simulate
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.config.plant import MeasurementSection, PhysicsSection
 from scenarios.loop.audit import ActiveSets
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
-from scenarios.measure.run_folder import load_run, save
 from solvers import Resolution, Status, make
 
-ROBOT = Robot.named("kuka_lwr")
 START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
 STILL = np.zeros(7)
 PERIOD = 0.005  # [s]
@@ -117,8 +115,7 @@ def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
 
 def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
     def touching(centre):
-        return simulate(load("ellipse", [
-            *PHYSICS, f"avoidance.obstacles=[{{shape='sphere', radius=0.05, centre={centre}}}]"]))
+        return simulate(load("ellipse", [*PHYSICS, *sphere(0.05, centre)]))
 
     forearm = State.at(ROBOT, START).placements[5]  # a capsule along the z axis
     run = touching((forearm[9:] + 0.195 * forearm[6:9] + 0.105 * forearm[:3]).tolist())
@@ -131,17 +128,6 @@ def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
     away = measure(touching([0.0, -2.0, 0.0]))
     assert away["contact_ticks"].value == away["contact_force_max"].value == 0.0
     assert "contact_ticks" not in measure(simulate(load("ellipse", SHORT)))
-
-
-@pytest.mark.parametrize(("changes", "said"), [
-    ([*SHORT, "plant.measurement.delay=0.0025"],
-     "delay = 0.0025 s is not a whole number of periods"),
-    ([*SHORT, "plant.measurement.delay=1e30"], "delay = 1e\\+30 s is more than 1000000 periods"),
-    *((["plant.kind=mujoco", f"plant.{setting}=[1.0, 2.0]"], f"plant.{setting} has 2 entries")
-      for setting in ("servo.bandwidth", "joints.friction", "joints.armature"))])
-def test_a_setting_that_does_not_fit_is_named(mujoco, changes, said):
-    with pytest.raises(HierarchyError, match=said):
-        build(load("ellipse", changes))
 
 
 @pytest.mark.parametrize("level", ["acceleration", "velocity"])
@@ -161,24 +147,8 @@ def test_the_servos_of_a_joint_beyond_its_limit_are_led_back_without_a_jump(mujo
     assert arm.q[3] < q[3] - 0.1
 
 
-HAND = ["control.duration=0.2", "plant.kind=kinematic"]
-
-
-def by_hand(robot, q, centre, radius):
-    """Distances (K,) of the control points and the end effector to one sphere."""
-    state, end = State.at(robot, q), robot.frame(robot.end_effector)
-    points = [(p.joint, p.offset) for p in robot.control_points] + [(end.joint, end.offset)]
-    found = []
-    for joint, offset in points:
-        rotation = state.placements[joint][:9].reshape(3, 3).T  # stored column by column
-        where = state.placements[joint][9:] + rotation @ np.asarray(offset)
-        found.append(np.linalg.norm(where - centre) - radius)
-    return np.array(found)
-
-
 def sphere(radius, centre):
-    return ["avoidance.obstacles=[{shape = 'sphere', "
-            f"radius = {radius}, centre = {list(centre)}}}]"]
+    return [f"avoidance.obstacles=[{{shape='sphere', radius={radius}, centre={list(centre)}}}]"]
 
 
 NEAR, BESIDE = (0.1, 0.5, 0.1), (0.1, 0.75, 0.3)
@@ -187,14 +157,15 @@ NEAR, BESIDE = (0.1, 0.5, 0.1), (0.1, 0.75, 0.3)
 @pytest.mark.parametrize(("name", "changes", "centre", "radius", "q"), [
     ("ellipse", ["control.duration=0.05", *sphere(0.05, NEAR),
                  "plant.measurement.position_noise=0.01"], NEAR, 0.05, "true_q"),
-    pytest.param("human-hqp", [*HAND, *sphere(0.06, BESIDE),
-                               "plant.measurement.velocity_noise=0.0",
-                               "plant.measurement.quantisation=0.0"], BESIDE, 0.06, "q",
-                 marks=pytest.mark.slow)], ids=["noise of the joints", "camera"])
+    pytest.param("human-hqp", [
+        "control.duration=0.2", "plant.kind=kinematic", "plant.measurement.velocity_noise=0.0",
+        "plant.measurement.quantisation=0.0", *sphere(0.06, BESIDE)], BESIDE, 0.06, "q",
+        marks=pytest.mark.slow)], ids=["noise of the joints", "camera"])
 def test_true_distances_are_on_record_beside_the_measured(name, changes, centre, radius, q):
-    run, robot = simulate(load(name, changes)), Robot.named("kuka_lwr")
+    run, points = simulate(load(name, changes)), (*ROBOT.control_points, FRAME)
     for k in (0, 7, run.ticks - 1):
-        wanted = by_hand(robot, run[q][k], centre, radius)
+        places = np.array([place_of(point, run[q][k]) for point in points])
+        wanted = np.linalg.norm(places - centre, axis=1) - radius
         np.testing.assert_allclose(run["true_control_point_distance"][k], wanted[:-1], atol=1e-12)
         assert run["true_ee_distance"][k] == pytest.approx(wanted[-1], abs=1e-12)
         assert run["true_minimal_distance"][k] == pytest.approx(wanted[:-1].min(), abs=1e-12)

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from scenarios.cli.main import run_command
 from scenarios.problems import recorded
 from scenarios.problems import reference as families
 from scenarios.problems.answers import export, save
@@ -15,7 +14,7 @@ from solvers import Status, certify, make, problems
 from solvers.problems.files import read
 
 
-def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, capsys, tmp_path):
+def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, command, tmp_path):
     from scenarios.problems import families
 
     def distribution(name):
@@ -27,10 +26,9 @@ def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, capsys, 
     assert {one.name for one in available()} == set(FAMILIES) - absent
     assert set(families.unavailable()) == absent
     monkeypatch.setattr(families, "FAMILIES", {name: FAMILIES[name] for name in ("integers",)})
-    assert run_command(["problems", "export", "all", "--count", "1", "--no-answers",
-                        "--out", str(tmp_path)]) == 0
+    said = command("problems export all --count 1 --no-answers --out", tmp_path).err
     assert ("left out: singular-panda, which needs example-robot-data: pip install "
-            "'task-hierarchy[descriptions]'") in capsys.readouterr().err
+            "'task-hierarchy[descriptions]'") in said
 
 
 @pytest.mark.parametrize("name", ["EQ7", "INEQ7", "DEGEN7", *problems.KINDS, "recipe"])
@@ -48,27 +46,25 @@ def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
         recorded.recorded("ellipse-limits", 3, 2)
 
 
-def test_export_show_and_check(capsys, tmp_path):
-    out = ["--seed", "4", "--count", "3"]
-    assert run_command(["problems", "export", "integers", *out, "--out", str(tmp_path)]) == 0
+def test_export_show_and_check(command, tmp_path):
+    command("problems export integers --seed 4 --count 3 --out", tmp_path)
     file = tmp_path / "integers-fresh-4.npz"
     assert file.is_file()
-    assert run_command(["problems", "show", str(file)]) == 0
-    assert "3 completely" in capsys.readouterr().out
-    assert run_command(["problems", "show", "integers", *out, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["sha256"] == read(file).digest
-    assert run_command(["problems", "show", "EQ7", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["equalities"] == "100 % of the rows"
-    assert run_command(["problems", "check", str(file)]) == 0
+    assert "3 completely" in command("problems show", file).out
+    shown = json.loads(command("problems show integers --seed 4 --count 3 --json").out)
+    assert shown["sha256"] == read(file).digest
+    stored = json.loads(command("problems show EQ7 --json").out)
+    assert stored["equalities"] == "100 % of the rows"
+    command("problems check", file)
 
 
-def test_check_finds_an_answer_that_is_not_proved(capsys, tmp_path):
+def test_check_finds_an_answer_that_is_not_proved(command, tmp_path):
     file = export(family("integers"), 5, 2, True, tmp_path)
     found = read(file)
     found.answers[1].least[0] += 1.0
     save(found, tmp_path)
-    assert run_command(["problems", "check", str(file)]) == 1
-    assert "problem 1: level 1: least violation" in capsys.readouterr().out
+    said = command("problems check", file, code=1).out
+    assert "problem 1: level 1: least violation" in said
 
 
 def test_problems_as_others_make_them_are_what_their_makers_describe():

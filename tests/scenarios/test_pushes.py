@@ -18,16 +18,16 @@ from scenarios.recording.fate import Fate, levels_at
 from scenarios.scene import scene
 from scenarios.scene.pushes import pushes
 
-STANDING, STEP = load("stand-push"), load("step")
+STANDING = load("stand-push")
 FACTS = facts_of(STANDING, Robot.named("humanoid"))
-ORIGIN = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
 
 
 def drawn(contacts, forces, com=None):
     """What is drawn of points of contacts, by name, of a base at the origin."""
     points = tuple(ContactPoint(name, 0, tuple(map(float, p)), (0.0, 0.0, 1.0), 0.5)
                    for name, of in contacts.items() for p in of)
-    return pushes(replace(FACTS, contacts=points), STEP, np.zeros(1), ORIGIN[None, None],
+    origin = np.r_[np.eye(3).ravel(), np.zeros(3)][None, None]
+    return pushes(replace(FACTS, contacts=points), load("step"), np.zeros(1), origin,
                   np.asarray(forces, dtype=float), com).at(0)
 
 

@@ -9,17 +9,17 @@ import sys
 import numpy as np
 import pytest
 from hand_made import recording
+from refusals import refused
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError
-from scenarios import load, simulate
+from scenarios import load, load_run, save, simulate
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.figures.panels import Panel
 from scenarios.export.mcap import grouped
 from scenarios.files import OutputError, claim, next_free, whole
 from scenarios.measure.metrics import Metric
 from scenarios.measure.motions import motions
-from scenarios.measure.run_folder import load_run, save
 from scenarios.measure.runs import Run, table
 from scenarios.recording.signals import Signal, known
 from scenarios.results.sections import multiples
@@ -47,10 +47,9 @@ def test_a_run_folder_holds_arrays_metrics_scenario_and_versions(tmp_path):
 
 
 def test_a_file_that_is_cut_off_or_has_wrong_bits_is_named(tmp_path):
-    with pytest.raises(HierarchyError, match=r"no run\.npz"):
-        load_run(tmp_path)
+    refused("no run.npz", load_run, tmp_path)
     save(recording(), tmp_path)
-    sound, rng, refused = (tmp_path / "run.npz").read_bytes(), np.random.default_rng(1), 0
+    sound, rng, named = (tmp_path / "run.npz").read_bytes(), np.random.default_rng(1), 0
     for trial in range(150):
         damaged = bytearray(sound)[:rng.integers(len(sound)) if trial < 50 else None]
         for at in rng.integers(len(damaged), size=3) if len(damaged) else ():
@@ -59,8 +58,8 @@ def test_a_file_that_is_cut_off_or_has_wrong_bits_is_named(tmp_path):
         try:
             load_run(tmp_path)
         except HierarchyError as error:
-            refused += "run.npz" in str(error)
-    assert refused > 100
+            named += "run.npz" in str(error)
+    assert named > 100
 
 
 def write(folder, error=None):
@@ -90,8 +89,7 @@ def test_a_folder_that_another_process_has_locked_cannot_be_claimed(tmp_path):
     with subprocess.Popen([sys.executable, "-c", code, str(tmp_path / "run")],
                           stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         other.stdout.readline()
-        with pytest.raises(OutputError, match="run is going to be written by"):
-            claim(tmp_path / "run")
+        refused("run is going to be written by", claim, tmp_path / "run", error=OutputError)
         other.stdin.close()
     assert claim(tmp_path / "run") == tmp_path / "run"
 
@@ -106,8 +104,7 @@ def test_a_signal_that_a_run_lacks_is_absent_and_a_misspelt_one_an_error_with_th
     assert run.get("minimal_distance", np.zeros(1)).shape == (1,)
     for ask in (lambda: "minimal_distnce" in run, lambda: run["minimal_distnce"],
                 lambda: run.get("minimal_distnce", np.zeros(0))):
-        with pytest.raises(UnknownNameError, match="minimal_distance"):
-            ask()
+        refused("minimal_distance", ask, error=UnknownNameError)
     for name, values in run.signals.items():
         assert known(name).shape.strip("(,)").count(",") + 1 == values.ndim, name
 

@@ -11,13 +11,11 @@ from hand_made import asked, recording
 from headless import Balanced, chromium
 
 from hierarchy import HierarchyError
-from scenarios.config import load
+from scenarios import load, save, simulate
 from scenarios.config.kinds import ListedPosition
 from scenarios.draw.figures import letter, palette, panels
 from scenarios.draw.figures.timeline import timeline
-from scenarios.loop.simulation import simulate
 from scenarios.measure.comparison import Comparison
-from scenarios.measure.run_folder import save
 from scenarios.measure.runs import Run, table
 from scenarios.recording.recording import Event
 from scenarios.results.page import comparison_page as page
@@ -57,12 +55,10 @@ def test_the_best_of_each_row_is_marked(runs, label, marked):
 
 
 @pytest.mark.parametrize("runs", [
-    [made(LETTER)],
-    [made(LETTER), made("tpm"), made("recursive")],
+    [made(LETTER)], [made(LETTER), made("tpm"), made("recursive")],
     [made(LETTER), made("hqp", fault="diverged at tick 5")],
     [made(LETTER), made("hqp", error="HierarchyError: cannot")],
-    [made("hqp", error="HierarchyError: cannot")],
-    [made(LETTER, t=[0.0])],
+    [made("hqp", error="HierarchyError: cannot")], [made(LETTER, t=[0.0])],
     [made(LETTER), made(LETTER, scenario=asked(name="other"))],
     [made(LETTER, scenario=asked(title="<script>alert(1)</script> & co", pointing=None,
                                  avoidance=None))],
@@ -175,9 +171,8 @@ def test_a_run_far_beyond_the_others_is_cut_and_says_so():
 def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, monkeypatch):
     run_folder = save(recording(), tmp_path / "run")
     for text in ("old", "new"):
-        monkeypatch.setattr(letter, "write_all",
-                            lambda recording, folder, text=text: [
-                                (folder / name).write_text(text) for name in ("a.svg", "b.svg")])
+        monkeypatch.setattr(letter, "write_all", lambda recording, folder, text=text: [
+            (folder / name).write_text(text) for name in ("a.svg", "b.svg")])
         assert letter.redraw([run_folder]) == [run_folder / "a.svg", run_folder / "b.svg"]
     assert (run_folder / "b.svg").read_text() == "new"
     assert (run_folder / "run.npz").exists()

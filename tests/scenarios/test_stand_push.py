@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from hierarchy import HierarchyError
-from scenarios import load, simulate
+from scenarios import load, shipped, simulate
 from scenarios.cell.build import build
 from scenarios.config import ScenarioError
-from scenarios.config.reading import shipped
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import tick
@@ -31,18 +29,6 @@ SHORT = STANDING.with_changes({"control.duration": 0.02, "plant.pushes.0.at": 0.
 def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
     with pytest.raises(ScenarioError, match=said):
         STANDING.with_changes(keys)
-
-
-@pytest.mark.parametrize(("keys", "said"), [
-    ({"contacts.0.frame": "left_fot"}, "left_fot.*left_foot"),
-    ({"contacts.0.up": [0.0, 0.0, 0.0]}, "contacts.0: sole: up .* is no direction"),
-    ({"forces.least": 400.0, "forces.largest": 300.0}, "forces: .* no normal force is pushing"),
-    ({"start.on_floor": True, "contacts": []}, "start.on_floor needs a floating base and"),
-    ({"forces.edge": 0.2}, "forces: .*margin 0.2 m of contact 'left_foot'"),
-    ({"plant.pushes.0.joint": "trunk"}, "plant.pushes: .*'trunk'")])
-def test_what_the_robot_does_not_have_is_named(keys, said):
-    with pytest.raises(HierarchyError, match=said):
-        build(STANDING.with_changes(keys))
 
 
 def test_a_run_records_torques_plans_and_what_the_floor_does_and_has_their_metrics():

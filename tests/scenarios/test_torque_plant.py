@@ -1,5 +1,6 @@
 """A robot in MuJoCo with torque motors: its physics, and contacts before they are trusted."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,10 +23,7 @@ from scenarios.measure.safety import standing
 pytestmark = pytest.mark.usefixtures("with_mujoco")
 
 CONTACTS = feet()
-
-
-def plant_with(**section):
-    return TorqueSection(kind="torque", **section)
+plant_with = partial(TorqueSection, kind="torque")
 
 
 def in_the_air(seed):
@@ -39,8 +37,7 @@ def in_the_air(seed):
 def test_without_contact_it_accelerates_as_the_robots_model(seed):
     """Bodies without mass get 1 mg there, and that is the difference."""
     q, v, torques = in_the_air(seed)
-    expected = pin.aba(ROBOT.model, ROBOT.model.createData(), q, v,
-                       np.concatenate([np.zeros(6), torques]))
+    expected = pin.aba(ROBOT.model, ROBOT.model.createData(), q, v, np.r_[np.zeros(6), torques])
     plant = TorqueRobot(ROBOT, CONTACTS, q, v, section=plant_with(**IDEAL))
     found = accelerations(plant, torques)
     assert np.abs(found - expected).max() < 1e-3 * np.abs(expected).max()
@@ -50,10 +47,9 @@ def test_torques_arrive_late_by_the_delay_and_are_cut_off_at_their_limits():
     q, v, _ = in_the_air(8)
     plant = TorqueRobot(ROBOT, CONTACTS, q, v, section=plant_with(delay=0.002))
     holding = State.at(ROBOT, q).bias_effort()[6:]
-    asked = np.full(30, 1e4)
     sent = []
     for _ in range(4):
-        plant.act(asked)
+        plant.act(np.full(30, 1e4))
         sent.append(plant.data.actuator_force.copy())
     np.testing.assert_allclose(sent[0], np.clip(holding, -ROBOT.effort_limit[6:],
                                                 ROBOT.effort_limit[6:]))
@@ -84,8 +80,8 @@ def test_a_push_gives_the_whole_robot_its_momentum():
 def plant(**keys):
     robot = Robot.named("dual_arm")
     q = robot.configuration(np.zeros(robot.n))
-    return robot, TorqueRobot(robot, Contacts(robot, ()), q, section=TorqueSection(
-        kind="torque", beyond_stop=1e3, fall=1e3, tilt=3.0, **keys))
+    return robot, TorqueRobot(robot, Contacts(robot, ()), q, section=plant_with(
+        beyond_stop=1e3, fall=1e3, tilt=3.0, **keys))
 
 
 def driven(one, torque, seconds):
@@ -97,19 +93,15 @@ def driven(one, torque, seconds):
 def test_a_joint_stops_at_its_limit_unless_it_has_no_stop():
     robot, with_stops = plant()
     _, without = plant(stops=False)
-    torque = np.zeros(robot.n)
-    torque[2] = 20.0
-    limit = robot.upper[2]
+    torque, limit = 20.0 * np.eye(robot.n)[2], robot.upper[2]
     assert driven(with_stops, torque, 2.0).q[2] < limit + 0.1
     assert driven(without, torque, 2.0).q[2] > limit + 0.5
 
 
 def test_torques_follow_with_the_bandwidth_of_the_motors():
     robot, slow = plant(bandwidth=5.0)
-    asked = np.zeros(robot.n)
-    asked[0] = 10.0
     first = slow.data.ctrl[0]
-    driven(slow, asked, 1.0 / (2.0 * np.pi * 5.0))
+    driven(slow, 10.0 * np.eye(robot.n)[0], 1.0 / (2.0 * np.pi * 5.0))
     assert slow.data.ctrl[0] - first == pytest.approx((10.0 - first) * (1.0 - np.exp(-1.0)),
                                                       rel=0.05)
 
@@ -169,8 +161,8 @@ def test_a_contact_that_does_not_stand_on_the_floor_is_refused(keys, said):
 
 @pytest.mark.parametrize("keys", [
     tilted(0.4), {"plant.height": -0.0015},
-    {**tilted(8.0), "contacts.0.open": [[0.0, 1.0]], "contacts.1.open": [[0.0, 1.0]]},
-], ids=["a little", "a little above", "open at the start"])
+    {**tilted(8.0), "contacts.0.open": [[0.0, 1.0]], "contacts.1.open": [[0.0, 1.0]]}],
+    ids=["a little", "a little above", "open at the start"])
 def test_what_comes_down_within_a_few_ticks_or_later_is_not_refused(keys):
     build(changed(keys))
 
@@ -199,8 +191,8 @@ def test_a_base_that_tilts_has_fallen():
     q, v = ROBOT.rest.copy(), np.zeros(ROBOT.n)
     q[2] += 100.0
     v[3:6] = [1.0, -2.0, 0.5]
-    plant = TorqueRobot(ROBOT, feet(), q, v, section=TorqueSection(
-        kind="torque", tilt=0.5, fall=1e3, beyond_stop=1e3))
+    plant = TorqueRobot(ROBOT, feet(), q, v,
+                        section=plant_with(tilt=0.5, fall=1e3, beyond_stop=1e3))
     for _ in range(1000):
         angle = Rotation.from_quat(plant.q[3:7]).apply([0.0, 0.0, 1.0])[2]
         assert (plant.fault is not None) == (np.arccos(angle) > 0.5)

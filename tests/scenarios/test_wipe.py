@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from standing import drift_of
 
-from hierarchy import Robot, Stack, State
+from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
-from hierarchy.errors import HierarchyError
 from hierarchy.paths import Still
 from hierarchy.tasks import Along, ContactMotion, Friction, Position
 from scenarios import load, simulate
@@ -69,8 +68,7 @@ def test_what_cannot_slide_or_is_no_direction_is_refused():
 def test_it_presses_and_wipes_on_a_table_of_unknown_height(height):
     """Friction known: within 1 N of 20 N most of the time, and a few mm of its circle."""
     pytest.importorskip("mujoco")
-    run = simulate(load("wipe").with_changes({
-        "plant.height": height, "control.duration": 3.0}))
+    run = simulate(load("wipe", {"plant.height": height, "control.duration": 3.0}))
     assert run.fault is None
     after = run["t"] > 1.0
     assert np.median(np.abs(run["floor_force"][after, 0, 2] - 20.0)) < 2.0
@@ -83,17 +81,15 @@ def test_it_presses_and_wipes_on_a_table_of_unknown_height(height):
     assert "slip_max" not in found
 
 
-FIRST, LIFT, TOUCH = 3, 0.75, 1.15  # the first foot of `crawl` that steps, and when [s]
-
-
 def test_a_foot_steps_with_the_weight_over_the_other_three():
     pytest.importorskip("mujoco")
-    first_step = simulate(load("crawl").with_changes({
+    first, lift, touch = 3, 0.75, 1.15  # the foot that steps first, and when [s]
+    first_step = simulate(load("crawl", {
         "control.duration": 1.4, "plant.pushes.0.at": 0.3, "plant.pushes.0.force": 20.0}))
     assert first_step.fault is None
     t, force = first_step["t"], first_step["floor_force"]
-    air = (t > LIFT + 0.01) & (t < TOUCH - 0.01)
-    assert (force[air, FIRST] == 0.0).all()
+    air = (t > lift + 0.01) & (t < touch - 0.01)
+    assert (force[air, first] == 0.0).all()
     assert force[air][:, [0, 1, 2], 2].min() > 1.0
     assert first_step["support_margin"][air].min() > 0.03
     moved = first_step["task_position_right_hind_foot"]

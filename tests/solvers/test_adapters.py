@@ -4,6 +4,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 import qpsolvers
 
@@ -36,7 +37,6 @@ def configuration(robot):
 
 def frame_task(configuration, frame="end_effector", shift=(0.05, 0.02, -0.03), turn=0.1, gain=0.5,
                position=1.0, orientation=0.5):
-    import pinocchio as pin
     from pink.tasks import FrameTask
 
     task = FrameTask(frame, position_cost=position, orientation_cost=orientation, gain=gain)
@@ -74,7 +74,6 @@ def wall(configuration, room, gain, safe):
 
 def humanoid_scene(_):
     import pink
-    import pinocchio as pin
     from pink.tasks import ComTask
 
     robot = Robot.named("humanoid")
@@ -145,11 +144,10 @@ def test_pinks_arguments_are_taken_in_pinks_order(configuration):
 
     import pink
 
-    theirs = [(one.name, one.name == "solver" or one.default)
-              for one in inspect.signature(pink.solve_ik).parameters.values()
-              if one.kind is one.POSITIONAL_OR_KEYWORD]
-    ours = [(one.name, one.name == "solver" or one.default)
-            for one in inspect.signature(solve_ik).parameters.values()]
+    ours, theirs = ([(one.name, one.name == "solver" or one.default)
+                     for one in inspect.signature(solve).parameters.values()
+                     if one.kind is one.POSITIONAL_OR_KEYWORD]
+                    for solve in (solve_ik, pink.solve_ik))
     assert ours[:len(theirs)] == theirs
     hand = [frame_task(configuration, turn=0.0)]
     given = solve_ik(configuration, hand, DT, "hcod", 1e-12, [], None, None, True)
@@ -190,8 +188,8 @@ def rows_at(robot, configuration, level):
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, solver="hcod", guess=1),
      "unknown setting of hcod 'guess'"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, damping=-1), "damping -1 must not be neg"),
-    (lambda c, r: solve_ik(c, [posture_task(Q)], 0.0), "period 0"),
     (lambda c, r: solve_ik(c, [posture_task(np.full(7, np.nan))], DT), "PostureTask"),
+    (lambda c, r: solve_ik(c, [posture_task(Q)], 0.0), "period 0"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, limits=[limit((0, np.nan, 1.0))]),
      "SimpleNamespace, row 0"),
     (lambda c, r: pink_hierarchy(c, arm_scene(c, lm_damping=1.0)[1], DT),
@@ -222,21 +220,20 @@ def test_tasks_of_pink_serve_in_a_stack_and_their_configuration_follows(robot, c
 # --- MuJoCo and mink ----------------------------------------------------------------------------
 @pytest.fixture
 def arm():
+    """MuJoCo, the adapter, and a model with its data at the pose."""
     mujoco = pytest.importorskip("mujoco")
+    from solvers.adapters import from_mujoco as adapter
+
     model = mujoco.MjModel.from_xml_path(str(ARM))
     data = mujoco.MjData(model)
     data.qpos[:] = POSE
     mujoco.mj_forward(model, data)
-    return model, data
+    return mujoco, adapter, model, data
 
 
 @pytest.mark.parametrize(("name", "kind"), [("tip", "site"), ("lower", "body"), ("pad", "geom")])
 def test_a_jacobian_of_mujoco_is_the_difference_of_its_frames(arm, name, kind):
-    import mujoco
-
-    from solvers.adapters import from_mujoco as adapter
-
-    model, data = arm
+    mujoco, adapter, model, data = arm
     J, step = adapter.jacobian(model, data, name, kind), 1e-6
     before = adapter.frame(model, data, name, kind)
     for joint in range(model.nv):
@@ -250,11 +247,7 @@ def test_a_jacobian_of_mujoco_is_the_difference_of_its_frames(arm, name, kind):
 
 
 def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
-    import mujoco
-
-    from solvers.adapters import from_mujoco as adapter
-
-    model, data = arm
+    mujoco, adapter, model, data = arm
     start, turn = adapter.frame(model, data, "tip", "site")
     goal, wanted = start + np.array([0.03, -0.05, 0.02]), turn
     for _ in range(60):
@@ -275,8 +268,7 @@ def made_hierarchy(seed):
     rng = np.random.default_rng(seed)
     wanted, row = rng.normal(size=3), rng.normal(size=(1, 7))
     return Hierarchy.from_levels([
-        (np.eye(7), np.full(7, -0.5), np.full(7, 0.5)),
-        (rng.normal(size=(3, 7)), 0.4 * wanted),
+        (np.eye(7), np.full(7, -0.5), np.full(7, 0.5)), (rng.normal(size=(3, 7)), 0.4 * wanted),
         (np.vstack([row, row]), [-np.inf, 1.0], [-1.0, np.inf]),
         (rng.normal(size=(2, 7)), [-np.inf, 0.1], [0.2, np.inf]),
         (rng.normal(size=(3, 7)), wanted)], reference=rng.normal(size=7))
@@ -297,9 +289,8 @@ def test_level_after_level_as_quadratic_programs_is_what_hcod_finds(seed):
 
 def test_a_problem_needs_a_level_that_is_there_and_what_the_levels_above_reach():
     h = made_hierarchy(0)
-    with pytest.raises(HierarchyError, match="level 9: the hierarchy has levels 0 to 4"):
-        level_problem(h, 9)
-    with pytest.raises(HierarchyError, match="level 2: above must be"):
-        level_problem(h, 2)
-    with pytest.raises(HierarchyError, match="level 2: above must be"):
-        level_problem(h, 2, np.full(7, np.nan))
+    for asked, said in (([9], "level 9: the hierarchy has levels 0 to 4"),
+                        ([2], "level 2: above must be"),
+                        ([2, np.full(7, np.nan)], "level 2: above must be")):
+        with pytest.raises(HierarchyError, match=said):
+            level_problem(h, *asked)

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rank_cases import build, family, rng
+from refusals import refused
 
-from hierarchy import Hierarchy, HierarchyError
+from hierarchy import Hierarchy
 from scenarios.problems import reference
 from solvers import certificate, certify, make, problems
 from solvers.problems import Recipe, generate, structured
@@ -102,8 +103,7 @@ def test_a_small_hierarchy_is_judged_at_the_level_at_fault(case):
     for x, level in wrong.items():
         assert not certify(h, x).certified
         assert certify(h, x).level == level
-    with pytest.raises(HierarchyError, match="x has shape"):
-        certify(h, np.zeros(9))
+    refused("x has shape", lambda: certify(h, np.zeros(9)))
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
@@ -222,13 +222,12 @@ def test_a_wrong_candidate_proves_nothing_and_a_metric_is_refused():
     assert right.complete
     np.testing.assert_array_equal(right.x, [1.0, 1.0])
     np.testing.assert_array_equal(right.least, [0.0, 1.0])
-    with pytest.raises(HierarchyError, match="metric"):
-        prove(h.changed(metric=np.diag([1.0, 2.0])), [[1.0, 0.0]])
+    refused("metric", lambda: prove(h.changed(metric=np.diag([1.0, 2.0])), [[1.0, 0.0]]))
 
 
 def test_optimal_but_not_nearest_to_the_reference_is_not_the_answer():
     h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0])], reference=[0.0, 2.0])
-    assert not prove(h, [[1.0, np.nan], [7.0, 7.0], "ab"[:0] or [1.0]]).turn
+    assert not prove(h, [[1.0, np.nan], [7.0, 7.0], [1.0]]).turn
     found = prove(h, [[1.0, 0.0]])  # says only that the row is an equality
     np.testing.assert_array_equal(found.x, [1.0, 2.0])
 

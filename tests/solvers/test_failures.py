@@ -11,22 +11,16 @@ from solvers.proof import prove
 from solvers.qp.backends import BACKENDS, installed
 
 FOLDER = Path(__file__).parents[1] / "data" / "regressions" / "structured"
-SQRT2, SQRT5 = 2.0**0.5, 5.0**0.5
+SQRT2 = 2.0**0.5
 RIGHT = {
-    "hcod_SOLVED_wrong_2x2_integer": [SQRT2, 0.0],
-    "hcod_iterlimit_min_11197": [SQRT2],
-    "hcod_iterlimit_min_11480": [SQRT5],
-    "hcod_n60_2006232_zeros": [0.0] * 7,
+    "hcod_SOLVED_wrong_2x2_integer": [SQRT2, 0.0], "hcod_iterlimit_min_11197": [SQRT2],
+    "hcod_iterlimit_min_11480": [5.0**0.5], "hcod_n60_2006232_zeros": [0.0] * 7,
     "hcod_pinch_avoid_box_task": [0.141421356, 1.66013415],
     "hcod_wrong_min_2003814_order": [0.0, 800.0 / 3.0, 0.0],
-    "hcod_wrong_min_2007743_order": [0.0, 0.0],
-    "hcod_wrong_min_2011075_base": [SQRT2, 0.0, 0.0],
-    "hcod_wrong_min_2011075_order": [SQRT2, 0.0],
-    "hcod_wrong_min_2019756_order": [2.0, 0.0, 2.0],
-    "tpm_wrong_min_3000097": [0.0, 0.0, 0.02],
-    "tpm_wrong_min_3000542": [0.0, 0.0, 0.00196],
-    "tpm_wrong_min_3009328": [0.0, 0.0, 2.27],
-}
+    "hcod_wrong_min_2007743_order": [0.0, 0.0], "hcod_wrong_min_2011075_base": [SQRT2, 0.0, 0.0],
+    "hcod_wrong_min_2011075_order": [SQRT2, 0.0], "hcod_wrong_min_2019756_order": [2.0, 0.0, 2.0],
+    "tpm_wrong_min_3000097": [0.0, 0.0, 0.02], "tpm_wrong_min_3000542": [0.0, 0.0, 0.00196],
+    "tpm_wrong_min_3009328": [0.0, 0.0, 2.27]}
 # A row of 5e-14 beside one of 1000 takes no part, and an answer that misses it says so.
 NEGLECTED = "tpm_wrong_min_3000097", Status.INACCURATE
 UNKNOWN = ["hcod_nested_2004163_shift"]  # near-ties of 1e-9: any answer that says it is not sure

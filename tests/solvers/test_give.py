@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
@@ -48,10 +49,9 @@ def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, me
     Of two tasks that give, the second is met while the first leaves it room.
     """
     A, B = np.random.default_rng(4).normal(size=(2, 2, 6))
-    h, hcod = Hierarchy.from_levels(
-        [(np.eye(6), np.full(6, -1.0), np.full(6, 1.0)), (A, np.full(2, reach)),
-         (B, np.full(2, 0.1)), (np.eye(6), np.full(6, 0.2))],
-        give=[0.0, 0.1, 0.1, 0.0]), make("hcod")
+    levels = [(np.eye(6), np.full(6, -1.0), np.full(6, 1.0)), (A, np.full(2, reach)),
+              (B, np.full(2, 0.1)), (np.eye(6), np.full(6, 0.2))]
+    h, hcod = Hierarchy.from_levels(levels, give=[0.0, 0.1, 0.1, 0.0]), make("hcod")
     cold = hcod.solve(h)
     warm = hcod.solve(h, cold.memory)
     np.testing.assert_allclose(warm.x, cold.x, atol=1e-12)
@@ -96,8 +96,7 @@ def test_the_certificate_rejects_another_x_and_a_witness_that_misses_more(wrong)
     (x if wrong == "x" else witnesses[0])[:] += 1e-3
     assert not certify(h, x, witnesses=witnesses).certified
     assert not certify(h, make("hcod").solve(problem(3, 0.0)).x, witnesses=res.witnesses).certified
-    with pytest.raises(HierarchyError, match=r"1 levels give, so witnesses must be \(1, 6\)"):
-        certify(h, res.x)
+    refused("1 levels give, so witnesses must be (1, 6)", certify, h, res.x)
 
 
 def test_what_cannot_give_refuses_by_name():
@@ -105,8 +104,7 @@ def test_what_cannot_give_refuses_by_name():
     for resolver in map(make, set(names()) - {"hcod", "hqp"}):
         with pytest.raises(HierarchyError, match=r"level 2: it gives, .* has none \(hcod, hqp\)"):
             resolver.solve(h)
-    with pytest.raises(HierarchyError, match="problem 0 gives"):
-        Batch.of([h])
+    refused("problem 0 gives", Batch.of, [h])
 
 
 def test_a_stack_takes_it_by_the_name_of_a_task_in_any_order():
@@ -124,8 +122,7 @@ def test_a_stack_takes_it_by_the_name_of_a_task_in_any_order():
     assert np.abs(h.slacks(make("hcod").solve(h).x)[:3]).max() == pytest.approx(0.1)
     with pytest.raises(HierarchyError, match="task 'position': give has shape"):
         Stack([hand], "velocity", give={"position": [0.1, 0.2]})
-    with pytest.raises(HierarchyError, match="positon"):
-        Stack([hand], "velocity", give={"positon": 0.1})
+    refused("positon", Stack, [hand], "velocity", give={"positon": 0.1})
 
 
 def test_explain_says_what_gives_how_much_and_for_whom():
@@ -146,8 +143,7 @@ def test_explain_says_what_gives_how_much_and_for_whom():
     assert posture.endswith("held back by hand (gives no more).")
     assert said(0.0, 0.5, 0.0)[0] == "hand is met."
     h = problem(1, 0.1)
-    with pytest.raises(HierarchyError, match="explain: 1 units for 14 rows"):
-        explain(h, make("hcod").solve(h), units=["m"])
+    refused("explain: 1 units for 14 rows", lambda: explain(h, make("hcod").solve(h), units=["m"]))
 
 
 EVERY_STRICT = [make(name) for name in names() if make(name).strict]

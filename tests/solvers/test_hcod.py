@@ -56,7 +56,6 @@ def test_a_solved_answer_is_verified_from_its_active_rows_and_no_other_is():
 
 
 X, Y = ([[1.0, 0.0]], [0.0]), ([[0.0, 1.0]], [0.0])
-STRAIGHT = np.array([[0.0, 0.0], [0.6, 0.3], [0.8, 0.4]])  # rows x, y, z of a straight arm
 EXPLAINED = {
     "a box": ([(np.eye(2), [-1.0] * 2, [1.0] * 2), ([[1.0, 0.5]], [3.0])],
               ["level 1 is met.", "level 2 is missed by 1.5: held back by level 1 row 0 at its "
@@ -73,7 +72,7 @@ EXPLAINED = {
         [X, Y, ([[1e-4, 1.0]], [1.0])],
         [..., ..., "level 3 is missed by 1: held back by level 1 and level 2."]),
     "no joint moves it: singular": (
-        [(STRAIGHT, [-0.5, 0.6, 0.8])],
+        [([[0.0, 0.0], [0.6, 0.3], [0.8, 0.4]], [-0.5, 0.6, 0.8])],  # x, y, z of a straight arm
         ["level 1 is missed by 0.5: singular here: no joint moves level 1 along row 0."])}
 
 

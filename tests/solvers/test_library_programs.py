@@ -20,7 +20,6 @@ from benchmark.studies.recorded import record_sequence
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position
-from scenarios.cli.main import run_command
 from scenarios.problems.reference import family
 from solvers import make, problems
 from solvers.library import differs, write
@@ -30,12 +29,10 @@ if not sys.platform.startswith("linux"):
 
 ROOT = Path(__file__).parents[2]
 ROS2 = ROOT / "examples" / "ros2_control"
-EXAMPLES, PROGRAM = ROOT / "examples" / "c", ROOT / "tests" / "helpers" / "c_speed.c"
+EXAMPLES = ROOT / "examples" / "c"
 STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"]
-COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
 CXX = next(filter(None, map(shutil.which, ("c++", "g++", "clang++"))), None)
-needs_c = pytest.mark.skipif(COMPILER is None, reason="no compiler of C")
-LIBM = {"hypot", "memset", "memcpy"}  # all that the library asks for
+needs_c = pytest.mark.skipif(c.COMPILER is None, reason="no compiler of C")
 
 
 @pytest.mark.skipif(shutil.which("nm") is None, reason="no nm")
@@ -43,14 +40,14 @@ def test_it_asks_for_nothing_but_libm_and_owns_no_variable(folder):
     done = subprocess.run(["nm", folder / "lib" / "libtask_hierarchy.a"], capture_output=True,
                           text=True, check=True)
     kinds = re.findall(r"^\w* +(\w) (\S+)$", done.stdout, re.MULTILINE)
-    assert {name for kind, name in kinds if kind == "U"} <= LIBM
+    assert {name for kind, name in kinds if kind == "U"} <= {"hypot", "memset", "memcpy"}
     assert {kind for kind, _ in kinds} <= set("UTtr")  # code and constants
     assert {name for kind, name in kinds if kind == "T"} == {
         *(f"th_solve_{name}" for name in c.NAMES), "th_work_size", "th_record_size",
         "th_verify", "th_violations", "th_version", "th_digest"}
 
 
-def built(out, source, folder, *flags, compiler=COMPILER):
+def built(out, source, folder, *flags, compiler=c.COMPILER):
     """Compile one file with the static library; returns the program."""
     subprocess.run([compiler, *flags, source, "-I", folder / "include",
                     folder / "lib" / "libtask_hierarchy.a", "-lm", "-o", out], check=True)
@@ -74,7 +71,7 @@ ONCE = {"once.c": ["-std=c99", *STRICT], "once.cpp": ["-std=c++17", "-fno-except
 
 
 def compiler_of(name):
-    found = CXX if name.endswith("cpp") else COMPILER
+    found = CXX if name.endswith("cpp") else c.COMPILER
     if found is None or (name == "eigen.cpp" and not Path("/usr/include/eigen3").exists()):
         pytest.skip(f"no compiler or no library for {name}")
     return found
@@ -138,7 +135,7 @@ def test_cmake_finds_it(folder, tmp_path, linked):
 @pytest.mark.parametrize(("name", "resolver"), [("INEQ7", "hcod"), ("EQ7", "tpm")])
 def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, name, resolver):
     record_sequence(tmp_path / "ticks", sequence(family(name)[0].h, 100))
-    program = built(tmp_path / "study", PROGRAM, folder, "-O2")
+    program = built(tmp_path / "study", ROOT / "tests/helpers/c_speed.c", folder, "-O2")
     solves, failed, allocated, faults, *_ = map(int, said(
         program, tmp_path / "ticks", resolver, "200000").split())
     assert (solves, failed, allocated, faults) == (200_000, 0, 0, 0)
@@ -154,9 +151,8 @@ def test_the_examples_pass_the_address_sanitizer(folder, tmp_path, name, words):
     assert said(program).startswith(words)
 
 
-def test_check_compares_the_kernels(folder, tmp_path, capsys):
-    assert run_command(["library", "--check", "--out", str(folder)]) == 0
-    assert "same kernels" in capsys.readouterr().out
+def test_check_compares_the_kernels(folder, tmp_path, command):
+    assert "same kernels" in command("library --check --out", folder).out
     other = tmp_path / "other"
     shutil.copytree(folder, other)
     header = other / "include" / "task_hierarchy.h"
@@ -165,20 +161,18 @@ def test_check_compares_the_kernels(folder, tmp_path, capsys):
     assert "and libtask_hierarchy.a another" in differs(other)
     code = other / "lib" / "libtask_hierarchy.a"
     code.write_bytes(code.read_bytes().replace(digest.encode(), b"0" * 16))
-    assert run_command(["library", "--check", "--out", str(other)]) == 1
-    assert f"those installed have {digest}" in capsys.readouterr().err
+    said = command("library --check --out", other, code=1).err
+    assert f"those installed have {digest}" in said
     with pytest.raises(HierarchyError, match=r"task_hierarchy\.h is missing"):
         differs(tmp_path)
 
 
 def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and_for_arm(
-        tmp_path, capsys):
-    out, here = tmp_path / "lib", os.uname().machine == "x86_64"
-    line = ["library", "--out", str(out), "--resolvers", "recursive"]
-    assert run_command([*line, "--target", "x86_64" if here else "native"]) == 0
-    assert "libtask_hierarchy.a" in capsys.readouterr().out
-    assert run_command(line) == 2
-    assert "not empty" in capsys.readouterr().err
+        tmp_path, command):
+    out, target = tmp_path / "lib", "x86_64" if os.uname().machine == "x86_64" else "native"
+    line = "library --resolvers recursive --out", out
+    assert "libtask_hierarchy.a" in command(*line, "--target", target).out
+    assert "not empty" in command(*line, code=2).err
     library = c.Library.of(out)
     kinds = problems.KINDS[:-2]  # without rows far lighter than others, where rounding is larger
     for seed in range(30):
@@ -196,9 +190,8 @@ def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    (["--resolvers", "hcdo"], "did you mean 'hcod'"), (["--resolvers", "hqp"], "'hqp'"),
-    (["--resolvers", "hcod,"], "empty name"), (["--target", "x86"], "did you mean 'x86_64'")])
-def test_a_wrong_name_is_an_error_that_names_it(tmp_path, capsys, options, words):
-    assert run_command(["library", "--out", str(tmp_path / "lib"), *options]) == 2
-    assert words in capsys.readouterr().err
+    ("--resolvers hcdo", "did you mean 'hcod'"), ("--resolvers hqp", "'hqp'"),
+    ("--resolvers hcod,", "empty name"), ("--target x86", "did you mean 'x86_64'")])
+def test_a_wrong_name_is_an_error_that_names_it(tmp_path, command, options, words):
+    assert words in command(f"library {options} --out", tmp_path / "lib", code=2).err
     assert not (tmp_path / "lib").exists()

@@ -14,12 +14,12 @@ from solvers.adapters.for_mink import solve_ik
 mink, mujoco = pytest.importorskip("mink"), pytest.importorskip("mujoco")
 
 DT = 0.01
-ROBOT = Path(__file__).parents[1] / "data" / "robots" / "two_arms.xml"
 
 
 @pytest.fixture
 def configuration():
-    model = mujoco.MjModel.from_xml_path(str(ROBOT))
+    path = Path(__file__).parents[1] / "data" / "robots" / "two_arms.xml"
+    model = mujoco.MjModel.from_xml_path(str(path))
     q = mujoco.MjData(model).qpos.copy()
     q[7:] = [0.3, -0.4, 0.6, 0.2, 0.5, 0.7]
     return mink.Configuration(model, q=q)
@@ -54,9 +54,8 @@ def tasks_of(configuration):
 def test_one_level_is_the_minimum_of_minks_cost(configuration, kinds, held, damping):
     model = configuration.model
     tasks = [tasks_of(configuration)[i] for i in kinds]
-    limits = [mink.ConfigurationLimit(model),
-              mink.VelocityLimit(model, {f"{side}_{joint}": 0.8 for side in ("left", "right")
-                                         for joint in "abc"}),
+    slow = {f"{side}_{joint}": 0.8 for side in ("left", "right") for joint in "abc"}
+    limits = [mink.ConfigurationLimit(model), mink.VelocityLimit(model, slow),
               mink.FreeJointVelocityLimit(model, 0.5, 0.9),
               mink.CollisionAvoidanceLimit(model, [(["left_h"], ["right_h"])])]
     frozen = [mink.DofFreezingTask(model, dof_indices=[0, 5])] if held else []

@@ -10,7 +10,6 @@ from rank_cases import CASES, boxed, build, gap, random_levels, rng
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make
 
-METHODS = ("nakamura", "chiaverini", "selective")
 LARGEST = 0.7
 
 
@@ -44,7 +43,7 @@ def selective(B, e, gamma_max):
     return clamp(total, gamma_max)
 
 
-INVERSES = {
+METHODS = {
     "nakamura": (lambda B, e: nakamura(B, e, 0.2, 3.0), {"damping": 0.2, "threshold": 3.0}),
     "chiaverini": (lambda B, e: chiaverini(B, e, 0.2, 0.6, 0.05),
                    {"damping": 0.2, "threshold": 0.6, "isotropic": 0.05}),
@@ -64,7 +63,7 @@ def recursion(h, inverse):
 @pytest.mark.parametrize("method", METHODS)
 def test_each_method_is_what_its_paper_says(method):
     """Of tasks whose first level has a small singular value."""
-    inverse, settings = INVERSES[method]
+    inverse, settings = METHODS[method]
     resolver, undamped, changed = make("recursive", method=method, **settings), make("tpm"), 0
     for seed in range(60):
         r = rng(seed)
@@ -106,7 +105,6 @@ def test_it_is_the_published_recursion_at_every_rank(case):
 
 BASIC, OPTIMAL = make("sns"), make("sns", form="optimal")
 JIT = os.environ.get("NUMBA_DISABLE_JIT") != "1"
-MANY = 100 if JIT else 8
 
 
 def as_printed(levels, low, up):
@@ -146,7 +144,7 @@ def as_printed(levels, low, up):
 
 def test_the_basic_form_is_the_algorithm_as_printed():
     judged = 0
-    for seed in range(MANY):
+    for seed in range(100 if JIT else 8):
         levels = random_levels(7, (2, 2, 1), seed)
         low, up = -np.random.default_rng(seed).uniform(0.1, 1.5, (2, 7)) * [[1.0], [-1.0]]
         res = BASIC.solve(boxed(Hierarchy.from_levels(levels), low, up))

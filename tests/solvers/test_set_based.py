@@ -191,25 +191,24 @@ def test_the_activation_is_one_at_the_bound_zero_beyond_the_buffer_and_has_no_ki
 
 def test_what_has_no_answer_is_refused_or_has_a_status():
     two = Hierarchy.from_levels([(np.eye(2), [0.0, -1.0], [INF, 2.0])], names=["walls"])
-    with pytest.raises(HierarchyError, match=r"walls, row 1: two sides, -1 <= a x <= 2"):
-        SET_BASED.solve(two)
     h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [INF])], names=["walls"])
-    with pytest.raises(HierarchyError, match=r"walls, row 0: an inequality.*activation"):
-        SMOOTH.solve(h)
-    with pytest.raises(HierarchyError, match=r"walls, row 0: activation 1\.5 is outside 0 \.\. 1"):
-        SMOOTH.solve_activated(h, np.array([1.5]))
-    below = Hierarchy.from_levels([(np.eye(2), np.zeros(2)), (np.eye(2), np.zeros(2))],
-                                  names=["walls", "tip"])
-    with pytest.raises(HierarchyError, match=r"tip, row 1: activation -1\.0 is outside 0 \.\. 1"):
-        SMOOTH.solve_activated(below, np.array([1.0, 0.5, 0.0, -1.0]))
-    with pytest.raises(HierarchyError, match=r"shape \(2,\), expected \(1,\)"):
-        SMOOTH.solve_activated(h, np.ones(2))
-    with pytest.raises(HierarchyError, match="eta = 0"):
-        make("smooth", eta=0.0)
+    below = Hierarchy.from_levels([(np.eye(2), np.zeros(2))] * 2, names=["walls", "tip"])
+    activated = SMOOTH.solve_activated
+    for call, said in (
+            (lambda: SET_BASED.solve(two), r"walls, row 1: two sides, -1 <= a x <= 2"),
+            (lambda: SMOOTH.solve(h), r"walls, row 0: an inequality.*activation"),
+            (lambda: activated(h, np.array([1.5])),
+             r"walls, row 0: activation 1\.5 is outside 0 \.\. 1"),
+            (lambda: activated(below, np.array([1.0, 0.5, 0.0, -1.0])),
+             r"tip, row 1: activation -1\.0 is outside 0 \.\. 1"),
+            (lambda: activated(h, np.ones(2)), r"shape \(2,\), expected \(1,\)"),
+            (lambda: make("smooth", eta=0.0), "eta = 0")):
+        with pytest.raises(HierarchyError, match=said):
+            call()
     rows = Hierarchy.from_levels([([[1.0, 0.0]], [0.0])])
     for spoilt, array, value in ((h, h.lower, np.nan), (rows, rows.A, np.nan),
                                  (rows, rows.A, np.inf)):
         array[0] = value
-        found = SMOOTH.solve_activated(spoilt, np.ones(1))
+        found = activated(spoilt, np.ones(1))
         assert found.status is Status.NUMERICAL_FAILURE
         assert (found.x == 0.0).all()
