@@ -46,9 +46,9 @@ class Obstacle:
         expected = SHAPES[self.shape]
         refuse(len(self.size) != expected or any(not 0.0 < s < inf for s in self.size),
                f"{self.name}: a {self.shape} takes {expected} positive size(s), got "
-               f"{list(self.size)}")
+               f"{np.asarray(self.size).tolist()}")
         refuse(not np.isfinite(np.asarray(self.centre, dtype=float)).all(),
-               f"{self.name}: centre {list(self.centre)} is not finite")
+               f"{self.name}: centre {np.asarray(self.centre).tolist()} is not finite")
         check_rotation(f"{self.name}: rotation", self.rotation)
 
     def packed(self) -> Array:

@@ -42,8 +42,8 @@ class CentreOfMass(Measured):
         axes = tuple(self.axes)
         if not axes or any(axis not in (0, 1, 2) for axis in axes) or list(axes) != sorted(
                 set(axes)):
-            raise HierarchyError(f"task {self.name!r}: axes {list(axes)} must be some of 0, 1, 2, "
-                                 "in this order")
+            raise HierarchyError(f"task {self.name!r}: axes {np.asarray(axes).tolist()} must be "
+                                 "some of 0, 1, 2, in this order")
         self.refuse(not self.robot.masses.sum() > 0.0, f"robot {self.robot.name!r} has no masses")
 
     @property

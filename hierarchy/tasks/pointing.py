@@ -83,7 +83,7 @@ class Pointing(Measured):
         super().__post_init__()
         axis = finite_numbers(f"task {self.name!r}: axis", self.axis)
         length = float(np.linalg.norm(axis))
-        self.refuse(axis.shape != (3,) or not 1e-9 < length < np.inf, f"axis {list(self.axis)} "
+        self.refuse(axis.shape != (3,) or not 1e-9 < length < np.inf, f"axis {axis.tolist()} "
                     "has no direction")
         number(f"task {self.name!r}: half_angle [rad]", self.half_angle, 0.0, np.pi)
         set_frozen(self, z_d=axis / length, cos_alpha_d=cos(self.half_angle),

@@ -89,7 +89,7 @@ def looking_at(position: ArrayLike, target: ArrayLike) -> Array:
     forward = np.subtract(target, position).astype(float)
     length = float(np.linalg.norm(forward))
     if length == 0.0:
-        raise HierarchyError(f"camera: position and look_at are both {list(np.ravel(target))} m")
+        raise HierarchyError(f"camera: position and look_at are both {np.ravel(target).tolist()} m")
     forward /= length
     upright = np.abs(forward[2]) < 1.0 - _UPRIGHT
     right = np.cross(forward, (0.0, 0.0, 1.0) if upright else (0.0, 1.0, 0.0))
