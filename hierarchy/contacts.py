@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import HierarchyError, UnknownNameError, expect, expect_each, number, refuse
 from hierarchy.gate import array_of
-from hierarchy.jit import compiled
+from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -247,7 +247,7 @@ def _axes(normal: Vector, what: str) -> Array:
     return np.array([tangent, np.cross(n, tangent), n])
 
 
-@compiled
+@internal
 def write_dynamics(M, kinematics, points, A, first):
     """Write the rows of the velocities `first`, ... of [M, -J_c^T] into A."""
     J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, internal
 from hierarchy.problem import Array
 
 
@@ -250,7 +250,7 @@ def column(A, c):
     return A[0, c], A[1, c], A[2, c]
 
 
-@compiled
+@internal
 def times_transposed(A, B):
     """A B^T (3, 3) of two matrices (3, 3)."""
     product = np.zeros((3, 3))
@@ -269,7 +269,7 @@ def turned_back(R, a):
             R[0, 2] * a[0] + R[1, 2] * a[1] + R[2, 2] * a[2])
 
 
-@compiled
+@internal
 def rotation_of(placements, spot):
     """World rotation (3, 3) of a spot."""
     R, T, rotation = np.empty((3, 3)), placements[spot.joint], spot.rotation

@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from hierarchy.errors import HierarchyError
-from hierarchy.jit import compiled
+from hierarchy.jit import compiled, internal
 from hierarchy.problem import Array, Hierarchy
 from solvers.resolution import Resolution
 from solvers.status import Status
@@ -81,7 +81,7 @@ def change_back(L, reference, y):
     return finite
 
 
-@compiled
+@internal
 def _factorise(W, L):
     """Write the lower triangle of L with W = L L^T (Cholesky)."""
     for j in range(W.shape[0]):

@@ -24,7 +24,7 @@ from math import exp
 import numpy as np
 
 from hierarchy.errors import number, refuse
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, internal
 from hierarchy.problem import Array
 
 _ROUNDING = 1e-13  # [m] entries of a row below this are rounding errors
@@ -63,13 +63,13 @@ class Barrier:
         return np.array(astuple(self))
 
 
-@compiled
+@internal
 def least_rate(h, settings):
     """Least dh/dt [m/s] at velocity level; settings of `Barrier.packed`."""
     return min(-settings[1] * h, settings[3])
 
 
-@compiled
+@internal
 def least_acceleration(h, rate_of_h, bend, settings):
     """Least d2h/dt2 - bend [m/s^2] at acceleration level; settings of `Barrier.packed`.
 

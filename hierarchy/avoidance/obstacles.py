@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from hierarchy.errors import UnknownNameError, expect_each, refuse
 from hierarchy.gate import check_rotation
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import inlined, internal
 from hierarchy.kinematics import dot, less
 from hierarchy.paths import Path
 from hierarchy.problem import Array
@@ -128,7 +128,7 @@ def distance_to_obstacle(obstacle, p):
     return D, (dot(obstacle[7:10], u), dot(obstacle[10:13], u), dot(obstacle[13:16], u))
 
 
-@compiled
+@internal
 def turning_off_obstacle(obstacle, p, D):
     """Radius [m] about which the direction away from an obstacle turns, and a vector e, a tuple.
 

@@ -34,22 +34,30 @@ def unlocked(function: Kernel) -> Kernel:
     return _compiled(function, nogil=True)
 
 
-def inlined(function: Kernel) -> Kernel:
-    """Compile `function` into the kernels that call it: for what an inner loop calls.
+def internal(function: Kernel) -> Kernel:
+    """Like `compiled`, for kernels to call; Python cannot.
 
-    A call between compiled functions costs some 2 ns for each array handed over. Python cannot
-    call it: the code for that takes longer to compile than most of these functions.
+    The code for that takes as long to compile as many a function.
     """
-    return _compiled(function, inline=True)
+    return _compiled(function, Internal)
 
 
-def _compiled(function: Kernel, inline: bool = False, nogil: bool = False) -> Kernel:
+def inlined(function: Kernel) -> Kernel:
+    """Like `internal`, compiled into the kernels that call it: for what an inner loop calls.
+
+    A call between compiled functions costs some 2 ns for each array handed over.
+    """
+    return _compiled(function, OnlyInlined)
+
+
+def _compiled(function: Kernel, kind: type[Cached] | None = None, nogil: bool = False) -> Kernel:
     if numba.config.DISABLE_JIT:
         return function
     allocates = _allocates(function)
-    kernel: Any = numba.njit(error_model="numpy", forceinline=inline, nogil=nogil, _nrt=allocates,
-                             no_cpython_wrapper=inline, no_cfunc_wrapper=True)(function)
-    kernel.__class__ = OnlyInlined if inline else Cached
+    kernel: Any = numba.njit(error_model="numpy", forceinline=kind is OnlyInlined, nogil=nogil,
+                             _nrt=allocates, no_cpython_wrapper=kind is not None,
+                             no_cfunc_wrapper=True)(function)
+    kernel.__class__ = kind or Cached
     kernel.allocates, kernel.ready = allocates, {}
     return kernel  # type: ignore[no-any-return]
 
@@ -122,15 +130,19 @@ class Cached(CPUDispatcher):  # type: ignore[misc]
                 return super().compile(signature)
 
 
-class OnlyInlined(Cached):
+class Internal(Cached):
     """A kernel without an entry for Python, where a call would end the process."""
-
-    is_named = kept = False
 
     def __call__(self, *arguments: Any) -> Any:
         """Raise a TypeError."""
-        raise TypeError(f"{self.py_func.__name__} is compiled into other kernels; "
+        raise TypeError(f"{self.py_func.__name__} is compiled for other kernels; "
                         "Python calls what is `compiled`")
+
+
+class OnlyInlined(Internal):
+    """A kernel whose code is linked into its callers."""
+
+    is_named = kept = False
 
 
 def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callable[..., Any]:

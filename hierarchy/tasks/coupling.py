@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError, expect, number
-from hierarchy.jit import compiled
+from hierarchy.jit import internal
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -149,7 +149,7 @@ def _part(robot: Robot, name: str) -> Part:
                          f"coupled{''.join(turn)}")
 
 
-@compiled
+@internal
 def _polynomial(c, x):
     """Value, derivative and second derivative of sum_i c_i x^i."""
     value, slope, bend = 0.0, 0.0, 0.0

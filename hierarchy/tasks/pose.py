@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import finite_numbers
 from hierarchy.gate import check_rotation
-from hierarchy.jit import compiled
+from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import (
     Kinematics,
     Placed,
@@ -220,7 +220,7 @@ def _write_jacobian(kinematics, frame, to, R, d, J):
                 J[3 + i, c] = turned[i]
 
 
-@compiled
+@internal
 def _write_drift(kinematics, frame, to, R, d, drift):
     """Write the exact dJ/dt v (3 or 6,), with dR/dt = [w]x R."""
     v, w, a, b = motion_of(kinematics, frame)

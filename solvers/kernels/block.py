@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inner_product
+from hierarchy.jit import as_matrix, compiled, inner_product, internal
 from solvers.kernels.least_squares import least_squares
 from solvers.kernels.rows import ZERO
 from solvers.kernels.space import matrix
 from solvers.kernels.tolerances import ORTHOGONAL, SWEEPS
 
 
-@compiled
+@internal
 def solve_level(M, r, y, at, settings, work):
     """Write into y the step of one level, whose rows and columns of M are the block `at`.
 
@@ -25,7 +25,7 @@ def solve_level(M, r, y, at, settings, work):
     solve_damped_level(M, r, y, at, damped, work)
 
 
-@compiled
+@internal
 def solve_damped_level(M, r, y, at, damped, work):
     """Like `solve_level`, for a given lambda."""
     rank = at.k1 - at.k0
@@ -37,7 +37,7 @@ def solve_damped_level(M, r, y, at, damped, work):
         _least_squares(M, r, y, at, damped, work)
 
 
-@compiled
+@internal
 def _substitute(M, r, y, at):
     """Write the solution of a square block into y."""
     for k in range(at.k0, at.k1):
@@ -45,7 +45,7 @@ def _substitute(M, r, y, at):
         y[k] = (r[i] - inner_product(y[at.k0:k], M[i, at.k0:])) / M[i, k]
 
 
-@compiled
+@internal
 def level_damping(M, at, settings, work):
     """Return lambda, with lambda^2 = (1 - (s / threshold)^2) damping^2 for s < threshold, else 0.
 
@@ -66,7 +66,7 @@ def level_damping(M, at, settings, work):
     return settings.damping * np.sqrt(1.0 - ratio) if ratio < 1.0 else 0.0
 
 
-@compiled
+@internal
 def invert_triangle(M, T, i0, k0, p):
     """Write the inverse transpose of a lower triangle into T (p, p); return its squared norm.
 
@@ -91,7 +91,7 @@ def invert_triangle(M, T, i0, k0, p):
     return square
 
 
-@compiled
+@internal
 def smallest_square(W):
     """Return the smallest squared norm of the rows of W."""
     smallest = np.inf
@@ -100,7 +100,7 @@ def smallest_square(W):
     return smallest
 
 
-@compiled
+@internal
 def orthogonalise_rows(W, U):
     """Rotate the rows of W and U until the rows of W are orthogonal (Hestenes).
 
@@ -126,7 +126,7 @@ def orthogonalise_rows(W, U):
             return
 
 
-@compiled
+@internal
 def _rotate(V, i, j, cosine, t):
     """Rotate rows i and j of V by the angle of this cosine and tangent."""
     for k in range(V.shape[1]):

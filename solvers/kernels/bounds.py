@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, internal
 from solvers.kernels.exact import DAMPING, solve, work_size
 from solvers.kernels.rows import ZERO, all_equal, finish
 from solvers.kernels.space import View, fill, vector
@@ -97,7 +97,7 @@ def _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work):
     return ZERO + (SOLVED if within else UNPROVED)
 
 
-@compiled
+@internal
 def _is_at_bound(A, lower, upper, sizes, x, record, work):
     """Whether x has an unknown at a bound; remove rounding there, and write what the record has.
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hierarchy.jit import add_multiple, compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, inlined, inner_product, internal
 from solvers.kernels.block import level_damping
 from solvers.kernels.rows import (
     NO,
@@ -79,7 +79,7 @@ def carve_damped(work, at, m, n, levels):
     return Damped(A, lower, upper, sizes, factor, E, b, ends, Q, ranks, free), at
 
 
-@compiled
+@internal
 def open_damped(d, A, lower, upper, sizes, x, settings, work):
     """Write the rows, and the x and lambda of the equalities; return whether x meets all rows.
 
@@ -178,7 +178,7 @@ def _factor_equalities(d, A, sizes, settings, work, whole):
         first, begin = last, end
 
 
-@compiled
+@internal
 def damp_level(d, k):
     """Write the rows of damping below level k; return the number of rows up to them."""
     n, end, begin = d.free.size, ZERO, ZERO
@@ -195,7 +195,7 @@ def damp_level(d, k):
     return end
 
 
-@compiled
+@internal
 def keep_reached(d, A, lower, upper, x, k, end):
     """Hold level k where x has brought it: its sides, and its columns of Q for its equalities.
 

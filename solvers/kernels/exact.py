@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, internal
 from solvers.kernels.damping import (
     carve_damped,
     damp_level,
@@ -188,14 +188,14 @@ def keep_staircase(lower, upper, record):
     record[3 * m], record[3 * m + 1], record[3 * m + 2] = 1.0, 0.0, -1.0
 
 
-@compiled
+@internal
 def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
     """Like `solve_hierarchy`, for any rows without damping."""
     s, code, at = open_working_set(A, lower, upper, sizes, x, record, settings, work)
     return answer(s, record, settings, work[at:]) if code == SOLVED else finish(x, code)
 
 
-@compiled
+@internal
 def answer(s, record, settings, work):
     """Find the working set of the answer, beginning with the rows that act; see `solve_exactly`."""
     (m, n), levels, x = s.A.shape, s.multiplier.shape[0] - 1, s.x
@@ -256,7 +256,7 @@ def _pass(s, saved, settings, share, most, work):
     return _verified(s, code, NO), level, t.count[STEPS]
 
 
-@compiled
+@internal
 def _second_pass(s, current, saved, settings, most, level, work):
     """Factor the working set of a pass anew, and pass again where that proves nothing.
 
@@ -290,7 +290,7 @@ def _is_unclear(s):
     return unclear
 
 
-@compiled
+@internal
 def _costs_more(s, other):
     """Whether x violates a level by a share of more than DEARER more than another x does.
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import inlined, internal
 from solvers.kernels.rows import length_of, reflect_by
 from solvers.kernels.space import fill
 
 
-@compiled
+@internal
 def least_squares(T, b, y):
     """Write the minimiser of |T^T y - b| into y[:r]; b (s,) is the residual on return."""
     r = T.shape[0]
@@ -24,7 +24,7 @@ def least_squares(T, b, y):
     turn(T, b, True)
 
 
-@compiled
+@internal
 def triangularise(T, diagonal):
     """Reflect the equations so that column k ends at entry k, which becomes diagonal[k].
 

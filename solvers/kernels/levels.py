@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import add_multiple, compiled, inlined
+from hierarchy.jit import add_multiple, inlined, internal
 from solvers.kernels.level import balance, pull_of_rows, push_by, step_of_rows, weigh_rows
 from solvers.kernels.rows import ZERO, length_of
 from solvers.kernels.tableau import (
@@ -90,7 +90,7 @@ from solvers.status import EQUAL, FREE, SOLVED, UNPROVED
 WATCHED, HELD, SOFT, FIXED, PARALLEL = range(1, 6)
 
 
-@compiled
+@internal
 def pass_through_levels(t, tolerance, limit):
     """Write x, and the claims of the working set; return SOLVED, or UNPROVED if steps ran out.
 

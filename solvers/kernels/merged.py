@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import add_multiple, compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product, internal
 from solvers.kernels.exact import DAMPING, solve, work_size
 from solvers.kernels.rows import ZERO
 from solvers.kernels.space import View, fill, integers, matrix, vector
@@ -143,7 +143,7 @@ def _carve(settings, work, m, n, levels):
                   centre), at
 
 
-@compiled
+@internal
 def _merge(s, A, lower, upper, sizes, strict, y, damped):
     """Write the rows of all levels, those to merge times their weights and at moved sides."""
     first, hard = ZERO, ZERO
@@ -202,7 +202,7 @@ def _repeats(A, lower, upper, i, hard):
     return False
 
 
-@compiled
+@internal
 def _draw(s, m, x):
     """Add a row mu (x - reference) for each unknown without one; return the number of all rows."""
     rows, mu = m, s.regularisation
@@ -215,7 +215,7 @@ def _draw(s, m, x):
     return rows
 
 
-@compiled
+@internal
 def _carry(s, A, lower, upper, sizes, x, y, strict):
     """Move the memory of each row, (a)."""
     first = ZERO

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import inlined, internal
 from solvers.kernels.least_squares import turn
 from solvers.kernels.rows import length_of, reflect
 from solvers.kernels.space import matrix
@@ -52,7 +52,7 @@ from solvers.status import EQUAL
 OUTWARD, UNDECIDED, INWARD = 1, 0, -1
 
 
-@compiled
+@internal
 def write_multipliers(s, tolerance):
     """Write the multipliers of all listed rows, and the sign of the first that is not zero.
 
@@ -169,7 +169,7 @@ def _add(s, f, unsure, q, begin, end):
         noise[t] += abs(w[t]) * unsure + min(abs(w[t]), faint) * abs(f)
 
 
-@compiled
+@internal
 def refine(s, p):
     """Correct the multipliers of level p by what remains of its gradient, by unknown in GRADIENT.
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined, inner_product
+from hierarchy.jit import as_matrix, compiled, inlined, inner_product, internal
 from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_square
 from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
 from solvers.kernels.space import View, assign, fill, integers, matrix, shared, vector
@@ -111,7 +111,7 @@ def _add_least(A, matrices, x, settings, work):
     return code
 
 
-@compiled
+@internal
 def _fill(A, lower, upper, sizes, x, matrices, settings):
     """Write R, its reflectors, F and T; return a code."""
     m, n = A.shape
@@ -172,7 +172,7 @@ def _eliminate(F, D, entries, first, last):
                 F[i, k] -= entries[j] * F[first + j, k]
 
 
-@compiled
+@internal
 def _tolerance(A, rank_tolerance):
     """Return the absolute tolerance of singular values: rank_tolerance times the largest norm."""
     largest = 0.0
@@ -181,7 +181,7 @@ def _tolerance(A, rank_tolerance):
     return rank_tolerance * np.sqrt(largest)
 
 
-@compiled
+@internal
 def _invert_pivot(F, T, first, settings, tolerance, D, work):
     """Write R_ii^# into D, damped if its smallest singular value is small.
 

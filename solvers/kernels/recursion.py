@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import add_multiple, compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, compiled, inlined, inner_product, internal
 from solvers.kernels.block import (
     orthogonalise_rows,
     smallest_square,
@@ -141,7 +141,7 @@ def _decompose(rows, A, first, last, rank, rank_tolerance):
     return rank
 
 
-@compiled
+@internal
 def _project(w, a, P):
     """Set w to a P."""
     fill(w, 0.0)
@@ -149,7 +149,7 @@ def _project(w, a, P):
         add_multiple(w, a[k], P[k])
 
 
-@compiled
+@internal
 def _take_direction(rows, i, last, k, again):
     """Normalise row i of W to V[k], and remove it from the level's rows and from P.
 
@@ -184,7 +184,7 @@ class Singular(NamedTuple):
     total: View
 
 
-@compiled
+@internal
 def invert(rows, y, at, inverse, work):
     """Write the damped step of one level into y.
 

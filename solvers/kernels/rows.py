@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hierarchy.jit import add_multiple, compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, inlined, inner_product, internal
 from solvers.kernels.space import fill
 from solvers.kernels.tolerances import LEAST_SQUARE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
@@ -20,7 +20,7 @@ LANES = 8  # numbers that the inner loops take at a time
 YES, NO = np.bool_(True), np.bool_(False)
 
 
-@compiled
+@internal
 def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
     """Copy A into the first rows of W, check all data, and write when a row counts as zero.
 
@@ -146,7 +146,7 @@ def make_reflector(basis, k, w, square):
     v[k] = scale * head
 
 
-@compiled
+@internal
 def factor_level(rows, basis, begin, end, rank):
     """Factor rows begin .. end - 1, already reflected, into columns of their own; return the rank.
 
@@ -168,7 +168,7 @@ def factor_level(rows, basis, begin, end, rank):
     return rank
 
 
-@compiled
+@internal
 def finish(x, code):
     """Return `code`, or NUMERICAL_FAILURE if x is not finite; x is zero unless SOLVED."""
     if code == SOLVED and not all_finite(x):

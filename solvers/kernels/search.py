@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import inlined, internal
 from solvers.kernels.multipliers import INWARD, UNDECIDED, write_multipliers
 from solvers.kernels.rows import YES, ZERO, length_of
 from solvers.kernels.space import View, assign
@@ -64,7 +64,7 @@ class Found(NamedTuple):
     most: View
 
 
-@compiled
+@internal
 def judge(s, last, newest):
     """Write the changes that a working set asks for in the first `last` levels; see `Found`.
 
@@ -117,7 +117,7 @@ def _heed(s):
     return refuted
 
 
-@compiled
+@internal
 def pivot_in_blocks(s, limit, patience):
     """Change all wrong rows at once while their number falls; return the code and the tries.
 
@@ -152,7 +152,7 @@ def pivot_in_blocks(s, limit, patience):
     return ZERO + UNPROVED, tries
 
 
-@compiled
+@internal
 def pivot_one_by_one(s, current, saved, limit, level):
     """Let rows enter and leave one by one; return the code, the iterations, the last level.
 
@@ -214,7 +214,7 @@ def _copy_states(s, source, target):
         s.index[target, i] = s.index[source, i]
 
 
-@compiled
+@internal
 def save(s, saved, finished):
     """Keep x if it meets more levels than the one kept."""
     if finished > s.count[FINISHED]:

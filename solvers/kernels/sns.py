@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, inner_product
+from hierarchy.jit import compiled, inlined, inner_product, internal
 from solvers.kernels.block import solve_level
 from solvers.kernels.rows import (
     ZERO,
@@ -217,7 +217,7 @@ def _read_box(A, lower, upper, bounds, space, record):
     return SOLVED
 
 
-@compiled
+@internal
 def _saturate(J, lower, upper, sizes, x, space, record):
     """Solve level by level inside the box, then move to the reference; see `sns`."""
     code = load_rows(space.rows.W, space.zero, J, lower, upper, space.reference,
@@ -284,7 +284,7 @@ def _begin(task, x, space):
         space.now[i] = inner_product(task.J[i], x)
 
 
-@compiled
+@internal
 def _see(task, basis, seen, above):
     """Write the rows of the task, reflected by the columns of the tasks above."""
     for i in range(task.b.size):
@@ -311,7 +311,7 @@ def _hold_critical(j, x, space, seen, at, least):
     return _hold(space, seen, j, way, at.above, at.joints - at.above, least)
 
 
-@compiled
+@internal
 def _write_line(task, x, space, at):
     """Write a and c with x_k(s) = s a + c, and their steps y_a and y in coordinates of Q.
 
@@ -364,7 +364,7 @@ def _improves(x, space, at, s):
     return inside
 
 
-@compiled
+@internal
 def _scaling(space):
     """Return the largest s <= 1 with s a + c in the box, or -1, and the most critical joint.
 
@@ -396,7 +396,7 @@ def _scaling(space):
     return (min(largest, 1.0) if feasible else -1.0), critical
 
 
-@compiled
+@internal
 def _release(space, at, s):
     """Release saturated joints whose multiplier has the wrong sign; return whether there were any.
 
@@ -429,7 +429,7 @@ def _bound_of(space, j):
     return space.up[j] if space.side[j] > 0.0 else space.low[j]
 
 
-@compiled
+@internal
 def _hold(space, seen, j, way, above, count, least):
     """Give joint j, whose side is written, a column of Q, and write its step there into y.
 
@@ -453,7 +453,7 @@ def _hold(space, seen, j, way, above, count, least):
     return count + 1
 
 
-@compiled
+@internal
 def _hold_again(space, seen, x, above, count, least):
     """Give columns of Q to the joints among the first `count` that remain held; see `_hold`."""
     holding = ZERO
@@ -465,7 +465,7 @@ def _hold_again(space, seen, x, above, count, least):
     return holding
 
 
-@compiled
+@internal
 def _to_reference(space, x, rank):
     """Move x inside the box, in the columns of Q that no task has; return the number of steps.
 

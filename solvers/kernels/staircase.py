@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, inner_product
+from hierarchy.jit import compiled, inlined, inner_product, internal
 from solvers.kernels.block import solve_level
 from solvers.kernels.rows import (
     ZERO,
@@ -68,7 +68,7 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
     return code
 
 
-@compiled
+@internal
 def climb(A, lower, upper, sizes, x, settings, work):
     """Solve like `solve_by_staircase`, but never INACCURATE; return the code and the least pivot.
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import add_multiple, compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, inlined, inner_product, internal
 from solvers.kernels.rows import ZERO, swap
 from solvers.kernels.space import View, assign, integers, matrix, vector
 from solvers.kernels.tolerances import CLEAR_SQUARE, FLOOR, NEGLIGIBLE
@@ -89,7 +89,7 @@ def carve_tableau(s, work, at):
     return Tableau(s, count, scalar, M, work[at:]), at
 
 
-@compiled
+@internal
 def open_tableau(t):
     """Write M for Q = I, with the columns of the equalities."""
     s, M, base = t.of, t.M, t.M.shape[1] - t.of.x.size
@@ -117,7 +117,7 @@ def add_column(t, i):
         _write_column(t.M, at, t.count[BASE], s.A[i])
 
 
-@compiled
+@internal
 def _write_column(M, at, base, a):
     for r in range(M.shape[0]):
         M[r, at] = inner_product(a, M[r, base:])
@@ -151,7 +151,7 @@ def fold_to(t, k, i):
     fold(t.M, k, t.of.index[COLUMN, i], t.count[TURNING])
 
 
-@compiled
+@internal
 def reflect_columns(M, k, end, column, first, total):
     """Reflect rows k .. end - 1 of M so that `column` is zero below row k.
 
@@ -181,7 +181,7 @@ def reflect_columns(M, k, end, column, first, total):
     M[k, column] = norm
 
 
-@compiled
+@internal
 def fold(M, k, column, first):
     """Rotate rows k and k + 1 of M so that `column` is zero in row k + 1."""
     a, b = M[k, column], M[k + 1, column]

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import inlined, internal
 from solvers.kernels.multipliers import refine
 from solvers.kernels.rows import length_of
 from solvers.kernels.tolerances import (
@@ -70,7 +70,7 @@ from solvers.status import EQUAL, FREE
 OPEN, WEAKLY, DECIDED, REFUTED = range(4)
 
 
-@compiled
+@internal
 def verify(s, factored):
     """Whether the claims of a working set prove its x.
 
@@ -87,7 +87,7 @@ def verify(s, factored):
     return proved
 
 
-@compiled
+@internal
 def neglects(s):
     """Whether x violates a row that is ignored because rows of other levels are far larger."""
     missed, reach = False, 1.0 + length_of(s.x)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined, inner_product
+from hierarchy.jit import as_matrix, inlined, inner_product, internal
 from solvers.kernels.least_squares import substitute_back, triangularise, turn
 from solvers.kernels.rows import ZERO, factor_level, reflect, swap
 from solvers.kernels.space import Rows, View, integers, matrix, vector
@@ -105,7 +105,7 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
     return WorkingSet(A, x, number, index, count, scalar, multiplier, W, basis, T, C), at
 
 
-@compiled
+@internal
 def load(s, lower, upper, sizes, record, rank_tolerance):
     """Check and copy the data; return SOLVED, or NUMERICAL_FAILURE if an entry is not finite.
 
@@ -165,7 +165,7 @@ def _small_length(a):
     return largest * np.sqrt(square)
 
 
-@compiled
+@internal
 def rescale(s, lower, upper, scaled):
     """Write the rows and sides times a power of two that brings their norms into range.
 
@@ -206,7 +206,7 @@ def _measure(s, i):
     return square
 
 
-@compiled
+@internal
 def restore(s):
     """Give all rows back what was cut from them."""
     s.count[DIRTY] = 0
@@ -216,7 +216,7 @@ def restore(s):
             _measure(s, i)
 
 
-@compiled
+@internal
 def take_up(s):
     """Give the rows that are negligible beside those of other levels their norms."""
     s.count[NEGLECTED] = s.count[FACTORED] = 0
@@ -249,7 +249,7 @@ def side_at(s, i):
     return s.number[LOWER, i] if s.index[STATE, i] < 0 else s.number[UPPER, i]
 
 
-@compiled
+@internal
 def meet(s, last):
     """Factor the rows that act in the first `last` levels, and write the x that meets them.
 

@@ -18,7 +18,7 @@ from hierarchy.avoidance import Capsule, Obstacles
 from hierarchy.avoidance.body import pack_capsules
 from hierarchy.errors import UnknownNameError
 from hierarchy.gate import check_rotation
-from hierarchy.jit import compiled
+from hierarchy.jit import compiled, internal
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.rendering import draw_scene
@@ -247,7 +247,7 @@ def expose(depth, normal, uniform, errors, reading):
                 reading[v, u] = z
 
 
-@compiled
+@internal
 def _at_edge(depth, v, u):
     z = depth[v, u]
     return ((v > 0 and abs(depth[v - 1, u] - z) > _EDGE)

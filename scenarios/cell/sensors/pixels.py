@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.avoidance.laws import repulsion
-from hierarchy.jit import compiled
+from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import dot, place
 from hierarchy.problem import Array
 from scenarios.cell.sensors.rendering import in_camera, pixels_of_ball
@@ -95,7 +95,7 @@ def find_obstacles(reading, robot, support, band, beyond, depth, tiles):
     return read / (height * width)
 
 
-@compiled
+@internal
 def _supported(depth, v, u, support, band):
     agree = 0
     for j in range(max(v - 1, 0), min(v + 2, depth.shape[0])):
@@ -193,7 +193,7 @@ def _search(space, image, mean, c):
     return DD, at, (nx, ny, nz), (sx, sy, sz)
 
 
-@compiled
+@internal
 def _turn_unit_back(eye, vector, out):
     """Write the unit vector along one in the camera's frame into out (3,), in the world's."""
     x, y, z = vector

@@ -14,7 +14,7 @@ from math import ceil, floor, sqrt
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, internal
 from hierarchy.kinematics import dot, place, turned
 
 _ALONG = 1e-12  # squared sine between ray and axis below which the side of a capsule is not met
@@ -49,7 +49,7 @@ def draw_robot(depth, eye, placements, joints, capsules, margin):
     _draw_robot(depth, eye, placements, joints, capsules, margin)
 
 
-@compiled
+@internal
 def _draw_robot(depth, eye, placements, joints, capsules, margin):
     for k in range(len(joints)):
         T, capsule = placements[joints[k]], capsules[k]
@@ -59,7 +59,7 @@ def _draw_robot(depth, eye, placements, joints, capsules, margin):
                       capsule[6] + margin)
 
 
-@compiled
+@internal
 def _draw_capsule(depth, eye, start, along, radius):
     """Draw a capsule from its start along its axis, both in the camera's frame."""
     (x, y, z), (ax, ay, az) = start, along
@@ -110,7 +110,7 @@ def _pixels_of_capsule(f, c, size, x, z, ax, az, radius):
     return min(first, other_first), max(end, other_end)
 
 
-@compiled
+@internal
 def _draw_box(depth, eye, row):
     height, width = depth.shape
     cx, cy, cz = in_camera(eye, row[4], row[5], row[6])
