@@ -52,7 +52,7 @@ FILES = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.p
 MAP = ROOT / "build" / "tests-of-lines"
 MOST = 40  # tests of a mutant, beside those of SEEN
 SEEN = "tests/scenarios/test_seen.py"
-COMPILED = ("compiled", "unlocked", "inlined", "measured")
+COMPILED = ("compiled", "unlocked", "internal", "inlined", "measured")
 # The folder of kernels, and the integer codes that kernels read.
 OF_KERNELS = ("solvers/kernels/", "solvers/status.py")
 

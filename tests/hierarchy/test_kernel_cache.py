@@ -7,9 +7,12 @@ from types import FunctionType
 
 import numba
 import pytest
+from refusals import refused
 
 from hierarchy.jit.sources import source_digest
 from solvers.kernels.exact import solve_hierarchy
+from solvers.kernels.rows import swap
+from solvers.kernels.working_set import meet
 
 MODULES = {"numbers_here.py": "ONE = 1.0\n", "helper.py": """
 from hierarchy.jit import compiled
@@ -121,3 +124,8 @@ import numba
 print(float(numba.njit(lambda x: np.cumsum(x)[-1])(np.arange(3.0))))
 """
     assert ask(code, XDG_CACHE_HOME=str(cache))[0] == ["11.0", "0", "False", "False", "3.0"]
+
+
+def test_python_cannot_call_what_is_compiled_for_other_kernels():
+    for kernel in (meet, swap):
+        refused(f"{kernel.py_func.__name__} is compiled for other", kernel, error=TypeError)
