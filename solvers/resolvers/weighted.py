@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
-from solvers.kernels.merged import BY_RULE, TOP_LIMITS, count_strict
+from solvers.kernels.merged import TOP_LIMITS, count_strict
 from solvers.resolver import number, register, whole_number
 from solvers.resolvers.merged import OneLevel
 
@@ -64,13 +64,15 @@ class Weighted(OneLevel):
 
     def _settings_of(self, h: Hierarchy) -> Array:
         levels = len(h.names)
+        strict = TOP_LIMITS if self.strict_levels is None else float(self.strict_levels)
+        if self.weights is not None and len(self.weights) != levels:
+            missing = levels - len(self.weights)
+            if not 0 <= missing <= count_strict(*h.rows[1:], strict):
+                raise HierarchyError(f"weighted: {len(self.weights)} weights for {levels} levels")
         if levels not in self._known:
-            strict = TOP_LIMITS if self.strict_levels is None else self.strict_levels
             self._known[levels] = np.array([
                 *self._before_weights(min(strict, levels - 1), self.regularisation, 1.0),
                 *self._weights(levels), *np.zeros(levels)])
-        if self.weights is not None and len(self.weights) != levels:
-            self._refuse_weights(h)
         return self._known[levels]
 
     def _weights(self, levels: int) -> Array:
@@ -79,18 +81,7 @@ class Weighted(OneLevel):
             with np.errstate(over="ignore"):
                 powers = self.ratio ** np.arange(levels - 1, -1, -1.0)
             return np.minimum(powers, np.finfo(float).max)
-        given = self.weights[max(len(self.weights) - levels, 0):]
-        return np.array([*[1.0] * (levels - len(given)), *given])
-
-    def _refuse_weights(self, h: Hierarchy) -> None:
-        """Raise a HierarchyError if a level that is not strict has no weight."""
-        assert self.weights is not None
-        levels, given = len(h.names), len(self.weights)
-        strict = self.strict_levels or 0
-        if strict < 0:
-            strict = count_strict(*h.rows[1:], BY_RULE)
-        if not 0 <= levels - given <= strict:
-            raise HierarchyError(f"weighted: {given} weights for {levels} levels")
+        return np.array([*[1.0] * (levels - len(self.weights)), *self.weights])
 
 
 def lexicographic_weights(violations: ArrayLike, tolerance: float, regularised: float = 0.0

@@ -46,6 +46,9 @@ def test_the_top_level_is_strict_if_it_has_inequalities_or_as_many_as_asked_for(
     assert violations[None][0] == pytest.approx(0.0, abs=EXACT)
     assert violations[None][1] > 0.01
     assert violations[2][:2] == pytest.approx([0.0, 0.0], abs=EXACT)
+    for weights in ((3.0, 1.0), (7.0, 3.0, 1.0)):  # a strict level needs none
+        np.testing.assert_array_equal(make("weighted", weights=weights).solve(h).x,
+                                      make("weighted", ratio=3.0).solve(h).x)
     for side in (1.0, 0.0):  # also where two sides of a limit have met
         closed = h.changed(lower=np.array([1.0 - side, -1.0, -0.5, 9.0]))
         assert closed.violations(make("weighted", ratio=3.0).solve(closed).x)[0] < EXACT
