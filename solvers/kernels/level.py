@@ -103,7 +103,8 @@ def weigh_rows(t):
 def pull_of_rows(t, begin, end):
     """Add the excess of the rows of a level, times the rows, in the basis vectors begin .. end."""
     for q in range(t.count[ROWS]):
-        push_by(t, t.of.index[LIST, q], t.of.number[OVER, q], begin, end)
+        if t.of.number[OVER, q] != 0.0:
+            push_by(t, t.of.index[LIST, q], t.of.number[OVER, q], begin, end)
 
 
 @inlined
@@ -111,7 +112,7 @@ def push_by(t, i, over, begin, end):
     """Add row i times its excess, without entries so faint that they decide nothing."""
     s, column, entry = t.of, t.of.index[COLUMN, i], entry_of(t, i)
     faint, push = FAINT * abs(s.number[NORM, i] / entry), over * entry
-    for k in range(begin, end if push != 0.0 else begin):
+    for k in range(begin, end):
         s.number[PULL, k] += push * t.M[k, column] if abs(t.M[k, column]) > faint else 0.0
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product, internal
 from solvers.kernels.exact import DAMPING, solve, work_size
 from solvers.kernels.rows import ZERO
-from solvers.kernels.space import View, fill, integers, matrix, vector
+from solvers.kernels.space import View, assign, fill, integers, matrix, vector
 from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
 
 NOTHING = -1     # code: every level is strict
@@ -34,8 +34,8 @@ class Merged(NamedTuple):
     """The settings of `Merged`, weights and caps (L,), and the rows that are solved.
 
     A (m + n, n), of which the first `m` and some more are written. own (n,): 1 for an unknown that
-    a row to merge names alone. centre (n,): what x is counted from, the reference where damping
-    draws to it.
+    a row to merge names alone. centre (n,): with damping, the reference, from which x is then
+    counted.
     """
 
     strict: View
@@ -82,15 +82,15 @@ def merged(A, lower, upper, sizes, x, record, settings, work):
     """
     (m, n), levels = A.shape, sizes.size
     s, at = _carve(settings, work, m, n, levels)
-    strict = count_strict(lower, upper, sizes, s.strict)
+    strict, damped = count_strict(lower, upper, sizes, s.strict), settings[DAMPING] > 0.0
     if strict >= levels > 0 and s.strict != TOP_LIMITS:
         return ZERO + NOTHING
-    if merged_size(n, m, levels, settings[DAMPING] > 0.0) > work.size:
+    if merged_size(n, m, levels, damped) > work.size:
         return ZERO + TOO_SMALL
-    y, last, damped = record[:m], min(strict + 1, levels), settings[DAMPING] > 0.0
-    for c in range(n):
-        s.centre[c] = x[c] if damped else 0.0
-        x[c] -= s.centre[c]
+    y, last = record[:m], min(strict + 1, levels)
+    if damped:
+        assign(s.centre, x)
+        fill(x, 0.0)
     _merge(s, A, lower, upper, sizes, strict, y, damped)
     rows = m
     if strict < levels:
@@ -101,7 +101,8 @@ def merged(A, lower, upper, sizes, x, record, settings, work):
                  settings[:EXACT], work[at:])
     record[m] = inner[3 * rows] + inner[3 * rows + 1]
     if code != NUMERICAL_FAILURE:
-        add_multiple(x, 1.0, s.centre)
+        if damped:
+            add_multiple(x, 1.0, s.centre)
         _carry(s, A, lower, upper, sizes, x, y, strict)
     return code
 
