@@ -1,9 +1,10 @@
 """The exact solve: find a working set, verify it, and search on where that fails.
 
 Python, batches and the C library call this one kernel. The working set comes from the memory of an
-earlier solve, or from a pass level by level; where that is no proof and rows are nearly dependent,
-a second pass counts these as independent. It is factored anew and pivoted in blocks, at the end row
-by row. After each of these the claims are verified, and nothing is SOLVED otherwise.
+earlier solve, or from a pass level by level, which goes on from the memory where that violates no
+row; where that is no proof and rows are nearly dependent, a second pass counts these as
+independent. It is factored anew and pivoted in blocks, at the end row by row. After each of these
+the claims are verified, and nothing is SOLVED otherwise.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ from solvers.kernels.working_set import (
     NORM,
     REFERENCE,
     SCALE,
+    SOUND,
     STATE,
     UPPER,
     Scaled,
@@ -210,7 +212,8 @@ def answer(s, record, settings, work):
         code, blocks = pivot_in_blocks(s, limit, ZERO)
         steps = blocks
     if code in (UNPROVED, INACCURATE) and level < 0 and steps < limit:
-        code, level, more = _pass(s, saved, settings, 1.0, limit - steps, work[at:])
+        code, level, more = _pass(s, saved, settings, 1.0, warm and s.count[SOUND] == 1,
+                                  limit - steps, work[at:])
         steps += more
         if code != SOLVED and steps < limit and _is_unclear(s):
             code, level, more, tries = _second_pass(s, current, saved, settings, limit - steps,
@@ -240,9 +243,10 @@ def answer(s, record, settings, work):
 
 
 @inlined
-def _pass(s, saved, settings, share, most, work):
+def _pass(s, saved, settings, share, seeded, most, work):
     """Pass through the levels, with rows as independent down to a share of `rank_tolerance`.
 
+    seeded: whether from x and the rows that act, else from nothing.
     Returns the code of the verified working set, the level at which its steps ran out (-1: none),
     and the steps.
     """
@@ -250,7 +254,8 @@ def _pass(s, saved, settings, share, most, work):
     restore(s)
     t, _ = carve_tableau(s, work, ZERO)
     s.scalar[RANK] = share * declared
-    code, level = pass_through_levels(t, settings[TOLERANCE], min(most, PASS_STEPS * rows))
+    limit = min(most, PASS_STEPS * rows)
+    code, level = pass_through_levels(t, settings[TOLERANCE], limit, seeded)
     s.scalar[RANK] = declared
     save(s, saved, s.multiplier.shape[0] - 1 if code == SOLVED else level)
     return _verified(s, code, NO), level, t.count[STEPS]
@@ -268,7 +273,8 @@ def _second_pass(s, current, saved, settings, most, level, work):
     code, blocks = pivot_in_blocks(s, ZERO + 1, ZERO)
     if code == SOLVED or level >= 0 or blocks >= most:
         return code, level, ZERO, blocks
-    code, level, steps = _pass(s, saved, settings, INDEPENDENT, most - blocks, work)
+    assign(s.x, saved)
+    code, level, steps = _pass(s, saved, settings, INDEPENDENT, YES, most - blocks, work)
     if code != SOLVED and steps + blocks < most:
         code, tries = pivot_in_blocks(s, most - steps - blocks, ZERO + PATIENCE)
         blocks += tries

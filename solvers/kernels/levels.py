@@ -67,6 +67,7 @@ from solvers.kernels.tolerances import (
     REPIVOT,
 )
 from solvers.kernels.working_set import (
+    ACTED,
     ENTRY,
     FACTORED,
     FIRST,
@@ -91,17 +92,17 @@ WATCHED, HELD, SOFT, FIXED, PARALLEL = range(1, 6)
 
 
 @internal
-def pass_through_levels(t, tolerance, limit):
+def pass_through_levels(t, tolerance, limit, seeded):
     """Write x, and the claims of the working set; return SOLVED, or UNPROVED if steps ran out.
 
     And the level at which they did, -1 for none.
 
-    t: a `Tableau`. tolerance: of violations. limit: on the steps. On return count[STEPS] has their
-    number.
+    t: a `Tableau`. tolerance: of violations. limit: on the steps. seeded: whether to start from x
+    and the rows that act, not from zero and none. On return count[STEPS] has the number of steps.
     """
     s = t.of
     levels = s.multiplier.shape[0] - 1
-    _start(t)
+    _start(t, seeded)
     for k in range(levels + 1):
         first = s.index[FIRST, k]
         last = s.index[FIRST, k + 1] if k < levels else first
@@ -125,19 +126,36 @@ def pass_through_levels(t, tolerance, limit):
         if whole and k < levels:
             s.count[WHOLE] = k
             break
+        _hold_seeded(t, first, last, tolerance)
     return ZERO + SOLVED, ZERO - 1
 
 
 @inlined
-def _start(t):
-    """Start at x = 0 with an empty working set."""
+def _hold_seeded(t, begin, end, tolerance):
+    """Hold the rows of a level that acted in the seed, where x is at their side."""
+    s, t.count[RANKS] = t.of, 0
+    for i in range(begin, end):
+        if s.index[ACTED, i] == FREE or s.index[KIND, i] != WATCHED:
+            continue
+        s.index[STATE, i] = s.index[ACTED, i]
+        side = side_at(s, i)
+        if abs(row_times_x(s, i) - side) <= tolerance * around(s, i, side, t.scalar[SCALE]):
+            _enter(t, i, end)
+        else:
+            s.index[STATE, i] = FREE
+
+
+@inlined
+def _start(t, seeded):
+    """Start at x and the rows that act, or at x = 0 with an empty working set."""
     s = t.of
     s.count[WHOLE], s.count[FACTORED], s.scalar[PIVOT], s.scalar[SECOND] = -1, 0, 1.0, 1.0
     for i in range(s.A.shape[0]):
         s.index[KIND, i], s.number[VALUE, i] = 0, 0.0
+        s.index[ACTED, i] = s.index[STATE, i] if seeded else FREE
         if s.index[STATE, i] != EQUAL:
             s.index[STATE, i] = FREE
-    for c in range(s.x.size):
+    for c in range(0 if seeded else s.x.size):
         s.x[c] = 0.0
     for c in range(t.count.size):
         t.count[c] = 0

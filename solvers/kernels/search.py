@@ -36,6 +36,7 @@ from solvers.kernels.working_set import (
     FINISHED,
     FIRST,
     GOAL,
+    KEPT,
     LIST,
     LOWER,
     NORM,
@@ -45,6 +46,7 @@ from solvers.kernels.working_set import (
     SEEN_LAST,
     SIGN,
     SIZE,
+    SOUND,
     STATE,
     UPPER,
     meet,
@@ -123,10 +125,11 @@ def pivot_in_blocks(s, limit, patience):
 
     Where nothing else is wrong, the rows leave whose signs the verification refutes. SOLVED is
     verified; INACCURATE: nothing is wrong, but that is not verified; UNPROVED: the number does not
-    fall, and the working set is the one that it began with. patience: tries that may not reduce it.
+    fall, and the working set is the one that it began with, or with its x the last that violates
+    nothing and is then SOUND. patience: tries that may not reduce it.
     """
     levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, patience, ZERO
-    refuted = False
+    refuted, s.count[SOUND] = False, 0
     _copy_states(s, STATE, SEED)
     while tries < limit:
         tries += 1
@@ -140,6 +143,10 @@ def pivot_in_blocks(s, limit, patience):
         found = judge(s, levels, ZERO - 1)
         if found.wrong == 0:
             return ZERO + INACCURATE, tries
+        if found.wrong == found.leaving < s.index[BEGIN, levels]:
+            s.count[SOUND] = 1
+            _copy_states(s, STATE, SEED)
+            assign(s.number[KEPT, :s.x.size], s.x)
         left = max(left, patience) if found.wrong < best else left - 1
         best = min(best, found.wrong)
         if left < 0:
@@ -149,6 +156,8 @@ def pivot_in_blocks(s, limit, patience):
             if change != 0:
                 s.index[STATE, i] = FREE if change == LEAVES else change
     _copy_states(s, SEED, STATE)
+    if s.count[SOUND] == 1:
+        assign(s.x, s.number[KEPT])
     return ZERO + UNPROVED, tries
 
 

@@ -28,10 +28,11 @@ from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 # it. By place in the list: the square at which a row counts as dependent, its
 # residual side - a x. Per unknown or column of Q: reference, y, the goal of the free columns, a
 # gradient and what of it may be rounding, scratch; the diagonal of a level with more
-# rows than rank. Per level: SIZE, PIVOT and SECOND of `scalar` before it.
+# rows than rank. Per level: SIZE, PIVOT and SECOND of `scalar` before it. Per unknown: the x of the
+# last working set in blocks that violated nothing.
 (NORM, ENTRY, LOWER, UPPER, CUT, REFERENCE, ZEROED, MISS, Y, GOAL, GRADIENT, NOISE, SCRATCH,
- DIAGONAL, SIZES, PIVOTS, SECONDS) = range(17)
-NUMBERS = 17  # `levels.py` keeps its own behind REFERENCE
+ DIAGONAL, SIZES, PIVOTS, SECONDS, KEPT) = range(18)
+NUMBERS = 18  # `levels.py` keeps its own behind REFERENCE
 # Rows of `index`. Per row of A: its unknown (-1 for several entries), the side at which it acts,
 # the change that the search asks for, how often it entered,
 # the side before a search and at its last checkpoint. By place in the list: the row, the sign
@@ -44,8 +45,9 @@ INDICES = 15
 # In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
 # cut since the rows were those of A, the number of rows that are negligible beside those of other
 # levels alone, the number of levels that the saved x meets, the number of levels in the search at
-# its last checkpoint, the number of levels whose factors stand for the rows and sides that acted.
-PICKED, WHOLE, DIRTY, NEGLECTED, FINISHED, SEEN_LAST, FACTORED = range(7)
+# its last checkpoint, the number of levels whose factors stand for the rows and sides that acted,
+# whether the working set in blocks is that of `KEPT`.
+PICKED, WHOLE, DIRTY, NEGLECTED, FINISHED, SEEN_LAST, FACTORED, SOUND = range(8)
 # In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm
 # and the next one, the factor by which the data are those of the caller.
 TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
@@ -85,7 +87,7 @@ class WorkingSet(NamedTuple):
 @inlined
 def working_set_size(n, m, levels):
     """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 15 + 3 * m * n + n * n
+    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 16 + 3 * m * n + n * n
 
 
 @inlined
@@ -95,7 +97,7 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
     w = max(m, n, sizes.size + 1)
     number, at = matrix(work, at, NUMBERS, w)
     numbers, at = integers(work, at, INDICES * w)
-    count, at = integers(work, at, 7)
+    count, at = integers(work, at, 8)
     scalar, at = vector(work, at, 5)
     W, at = matrix(work, at + (-at & 3), m, n)  # of 32 bytes: 8 % of the time of a humanoid's solve
     basis, at = matrix(work, at, n, n)
