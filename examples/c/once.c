@@ -10,7 +10,7 @@ int main(void) {
   const th_problem problem = {2, 4, 3, A, lower, upper, sizes, NULL};
   double x[2], work[576], values[26]; /* th_work_size(2, 4, 3), th_record_size(2, 4, 3) */
   th_record record = {values, 26, 0, 0, 0, 0};
-  int status = th_solve_hcod(&problem, NULL, &record, x, work, 569);
+  int status = th_solve_hcod(&problem, NULL, &record, x, work, sizeof work / sizeof *work);
   printf("status %d, x = %g %g\n", status, x[0], x[1]);
   return status;
 }
