@@ -273,8 +273,8 @@ def _second_pass(s, current, saved, settings, most, level, work):
     code, blocks = pivot_in_blocks(s, ZERO + 1, ZERO)
     if code == SOLVED or level >= 0 or blocks >= most:
         return code, level, ZERO, blocks
-    assign(s.x, saved)
-    code, level, steps = _pass(s, saved, settings, INDEPENDENT, YES, most - blocks, work)
+    code, level, steps = _pass(s, saved, settings, INDEPENDENT, s.count[SOUND] == 1, most - blocks,
+                               work)
     if code != SOLVED and steps + blocks < most:
         code, tries = pivot_in_blocks(s, most - steps - blocks, ZERO + PATIENCE)
         blocks += tries

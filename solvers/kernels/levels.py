@@ -6,6 +6,9 @@ allows, which is then held at its side. When a level cannot improve, a held row 
 the wrong sign is released; if there is none, the level is solved. The rows that hold it back become
 equalities permanently, the others stay inequalities. The last level moves x to the reference.
 
+A seed, an x and rows that act, saves steps: the rows that it holds are held before the level that
+they hold back, or before the first that its x does not solve.
+
 This finds the working set of most problems in few steps, but nothing keeps it from cycling or from
 mistaking rounding for a sign: its steps are limited, and what it claims must be verified.
 
@@ -71,6 +74,7 @@ from solvers.kernels.working_set import (
     ENTRY,
     FACTORED,
     FIRST,
+    HOLDS,
     LOWER,
     NORM,
     PIVOT,
@@ -107,6 +111,8 @@ def pass_through_levels(t, tolerance, limit, seeded):
         first = s.index[FIRST, k]
         last = s.index[FIRST, k + 1] if k < levels else first
         whole = _sets_goal(t, k)
+        if seeded:
+            _hold_seeded(t, k, first, tolerance)
         solved = not _begin(t, k, last, whole, tolerance)
         while not solved:
             if t.count[STEPS] >= limit:
@@ -126,16 +132,15 @@ def pass_through_levels(t, tolerance, limit, seeded):
         if whole and k < levels:
             s.count[WHOLE] = k
             break
-        _hold_seeded(t, first, last, tolerance)
     return ZERO + SOLVED, ZERO - 1
 
 
 @inlined
-def _hold_seeded(t, begin, end, tolerance):
-    """Hold the rows of a level that acted in the seed, where x is at their side."""
+def _hold_seeded(t, k, end, tolerance):
+    """Hold the rows of the levels above that the seed holds from level k on, if x is there."""
     s, t.count[RANKS] = t.of, 0
-    for i in range(begin, end):
-        if s.index[ACTED, i] == FREE or s.index[KIND, i] != WATCHED:
+    for i in range(end):
+        if s.index[HOLDS, i] != k or s.index[KIND, i] != WATCHED:
             continue
         s.index[STATE, i] = s.index[ACTED, i]
         side = side_at(s, i)
@@ -152,7 +157,7 @@ def _start(t, seeded):
     s.count[WHOLE], s.count[FACTORED], s.scalar[PIVOT], s.scalar[SECOND] = -1, 0, 1.0, 1.0
     for i in range(s.A.shape[0]):
         s.index[KIND, i], s.number[VALUE, i] = 0, 0.0
-        s.index[ACTED, i] = s.index[STATE, i] if seeded else FREE
+        s.index[ACTED, i] = s.index[STATE, i]
         if s.index[STATE, i] != EQUAL:
             s.index[STATE, i] = FREE
     for c in range(0 if seeded else s.x.size):

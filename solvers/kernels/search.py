@@ -36,6 +36,7 @@ from solvers.kernels.working_set import (
     FINISHED,
     FIRST,
     GOAL,
+    HOLDS,
     KEPT,
     LIST,
     LOWER,
@@ -144,9 +145,7 @@ def pivot_in_blocks(s, limit, patience):
         if found.wrong == 0:
             return ZERO + INACCURATE, tries
         if found.wrong == found.leaving < s.index[BEGIN, levels]:
-            s.count[SOUND] = 1
-            _copy_states(s, STATE, SEED)
-            assign(s.number[KEPT, :s.x.size], s.x)
+            _keep_sound(s)
         left = max(left, patience) if found.wrong < best else left - 1
         best = min(best, found.wrong)
         if left < 0:
@@ -159,6 +158,26 @@ def pivot_in_blocks(s, limit, patience):
     if s.count[SOUND] == 1:
         assign(s.x, s.number[KEPT])
     return ZERO + UNPROVED, tries
+
+
+@inlined
+def _keep_sound(s):
+    """Keep the working set as SOUND, with its x, and from which level on each row is held.
+
+    That is the level that it holds back, or an upper one in which another row is to leave.
+    """
+    s.count[SOUND] = 1
+    _copy_states(s, STATE, SEED)
+    assign(s.number[KEPT, :s.x.size], s.x)
+    changed = s.multiplier.shape[0]
+    for i in range(s.A.shape[0]):
+        k, leaves = 0, s.index[CHANGE, i] == LEAVES
+        while k < s.multiplier.shape[0] and s.multiplier[k, i] == 0.0:
+            k += 1
+        changed = min(changed, k) if leaves else changed
+        s.index[HOLDS, i] = -1 if leaves or s.index[STATE, i] == FREE else k
+    for i in range(s.A.shape[0]):
+        s.index[HOLDS, i] = min(s.index[HOLDS, i], changed)
 
 
 @internal
