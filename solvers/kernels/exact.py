@@ -211,17 +211,18 @@ def answer(s, record, settings, work):
     if warm and level < 0:
         code, blocks = pivot_in_blocks(s, limit, ZERO)
         steps = blocks
-    if code in (UNPROVED, INACCURATE) and level < 0 and steps < limit:
-        code, level, more = _pass(s, saved, settings, 1.0, warm and s.count[SOUND] == 1,
-                                  limit - steps, work[at:])
-        steps += more
-        if code != SOLVED and steps < limit and _is_unclear(s):
-            code, level, more, tries = _second_pass(s, current, saved, settings, limit - steps,
-                                                    level, work[at:])
-            steps, blocks = steps + more + tries, blocks + tries
-        if code in (UNPROVED, INACCURATE) and steps < limit:
-            code, tries = pivot_in_blocks(s, limit - steps, ZERO + PATIENCE)
-            steps, blocks = steps + tries, blocks + tries
+    first = level < 0
+    for seeded in range(ZERO + (warm and first and s.count[SOUND] == 1), -1, -1):
+        if first and code in (UNPROVED, INACCURATE) and steps < limit:
+            code, level, more = _pass(s, saved, settings, 1.0, seeded == 1, limit - steps, work[at:])
+            steps += more
+            if code != SOLVED and steps < limit and _is_unclear(s):
+                code, level, more, tries = _second_pass(s, current, saved, settings, limit - steps,
+                                                        level, work[at:])
+                steps, blocks = steps + more + tries, blocks + tries
+            if code in (UNPROVED, INACCURATE) and steps < limit:
+                code, tries = pivot_in_blocks(s, limit - steps, ZERO + PATIENCE)
+                steps, blocks = steps + tries, blocks + tries
     if code in (UNPROVED, INACCURATE) and steps < limit:
         restore(s)
         code, tries, level = pivot_one_by_one(s, current, saved, limit - steps, level)
