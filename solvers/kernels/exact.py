@@ -214,7 +214,8 @@ def answer(s, record, settings, work):
     first = level < 0
     for seeded in range(ZERO + (warm and first and s.count[SOUND] == 1), -1, -1):
         if first and code in (UNPROVED, INACCURATE) and steps < limit:
-            code, level, more = _pass(s, saved, settings, 1.0, seeded == 1, limit - steps, work[at:])
+            code, level, more = _pass(s, saved, settings, 1.0, seeded == 1, limit - steps,
+                                      work[at:])
             steps += more
             if code != SOLVED and steps < limit and _is_unclear(s):
                 code, level, more, tries = _second_pass(s, current, saved, settings, limit - steps,
