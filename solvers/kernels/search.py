@@ -20,7 +20,6 @@ from solvers.kernels.rows import YES, ZERO, length_of
 from solvers.kernels.space import View, assign
 from solvers.kernels.tolerances import (
     MET,
-    PATIENCE,
     RECURRENCES,
     RELEASED,
     RESTORED,
@@ -112,12 +111,10 @@ def _points_inward(s):
 
 @inlined
 def _heed(s):
-    """Let the multipliers whose sign verification refutes point inward; return whether any does."""
-    refuted = False
+    """Let the multipliers whose sign verification refutes point inward."""
     for q in range(s.index[BEGIN, s.multiplier.shape[0] - 1]):
         if s.index[CHANGE, s.index[LIST, q]] == REFUTED:
-            s.index[SIGN, q], refuted = INWARD, True
-    return refuted
+            s.index[SIGN, q] = INWARD
 
 
 @internal
@@ -130,7 +127,7 @@ def pivot_in_blocks(s, limit, patience):
     nothing and is then SOUND. patience: tries that may not reduce it.
     """
     levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, patience, ZERO
-    refuted, s.count[SOUND] = False, 0
+    s.count[SOUND] = 0
     _copy_states(s, STATE, SEED)
     while tries < limit:
         tries += 1
@@ -139,8 +136,7 @@ def pivot_in_blocks(s, limit, patience):
         if not _points_inward(s):
             if verify(s, YES):
                 return ZERO + SOLVED, tries
-            if _heed(s) and not refuted:
-                left, refuted = ZERO + PATIENCE, True
+            _heed(s)
         found = judge(s, levels, ZERO - 1)
         if found.wrong == 0:
             return ZERO + INACCURATE, tries
