@@ -231,10 +231,15 @@ class Hierarchy:
     def upper_part(self, count: int, sides: tuple[Array, Array] | None = None) -> Hierarchy:
         """Return the first `count` levels, as views, none of which gives.
 
-        sides : lower and upper (m,), in place of those of all levels.
+        sides : lower and upper (m,), in place of those of all levels. Raises HierarchyError for
+        another count or shape.
         """
         A, lower, upper, sizes = self.rows
-        lower, upper = sides or (lower, upper)
+        whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
+        if not whole or not 0 <= count <= len(sizes):
+            raise HierarchyError(f"upper_part: count = {brief(count)}: expected 0 to {len(sizes)}")
+        if sides is not None:
+            lower, upper = (gate.shaped("upper_part: sides", side, (self.m,)) for side in sides)
         m = int(_layout(sizes.tobytes())[1][count])
         part = object.__new__(Hierarchy)
         set_frozen(part, rows=(A[:m], lower[:m], upper[:m], sizes[:count]), start=self.start, m=m,

@@ -17,6 +17,7 @@ from hierarchy.errors import (
     RobotError,
     UnknownNameError,
     expect,
+    expect_each,
     file_path,
     finite_numbers,
     is_one_of,
@@ -166,8 +167,7 @@ class Robot:
         everything is the robot but bodies that only float beside it.
         """
         path = file_path("Robot.from_file: path", path)
-        roots = [root] if isinstance(root, str) else root
-        found = read_file(path, base, shapes, locked or {}, roots)
+        found = read_file(path, base, shapes, *_part(locked, root))
         return cls(found.model, Path(path).stem, end_effector, found)
 
     @classmethod
@@ -190,7 +190,7 @@ class Robot:
             return robot
         if is_file_name(model):
             return cls.from_file(model, end_effector, base, locked=locked, root=root)
-        if locked or root:
+        if any(map(len, _part(locked, root))):
             raise RobotError(f"robot {model!r} is a table; its joints cannot be locked, and it has "
                              "no other root")
         robot = cls.named(model, base)
@@ -393,15 +393,24 @@ class Robot:
             return q + step
         return np.asarray(pin.integrate(self.model, q, step))
 
-    def difference(self, q: Array, to: Array) -> Array:
+    def difference(self, q: ArrayLike, to: ArrayLike) -> Array:
         """Return the step (n,) with which `integrate` moves q (nq,) to another configuration.
 
-        The shortest way around: angles are at most pi.
+        The shortest way around: angles are at most pi. Raises what `normalised` raises.
         """
+        q, to = self.normalised(q), self.normalised(to)
         return to - q if self.nq == self.n else np.asarray(pin.difference(self.model, q, to))
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, n={self.n})"
+
+
+def _part(locked: object, root: object) -> tuple[Mapping[str, ArrayLike], Sequence[str]]:
+    """Return the part of a file that is the robot; raise a HierarchyError for a wrong type."""
+    locked, root = {} if locked is None else locked, [root] if isinstance(root, str) else root
+    expect("Robot: locked", locked, Mapping, "give joints with their values")
+    expect_each("Robot: root", root, str, "give the name of a body, or a list of names")
+    return locked, root  # type: ignore[return-value]
 
 
 _UNIT = 1.01  # limit in pinocchio of a cosine, a sine or an entry of a quaternion
