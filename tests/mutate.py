@@ -53,8 +53,8 @@ MAP = ROOT / "build" / "tests-of-lines"
 MOST = 40  # tests of a mutant, beside those of SEEN
 SEEN = "tests/scenarios/test_seen.py"
 COMPILED = ("compiled", "unlocked", "internal", "inlined", "measured")
-# The folder of kernels, and the integer codes that kernels read.
-OF_KERNELS = ("solvers/kernels/", "solvers/status.py")
+# The folder of kernels, the integer codes that kernels read, and the LLVM code that they contain.
+OF_KERNELS = ("solvers/kernels/", "solvers/status.py", "hierarchy/jit/intrinsics.py")
 
 # Loaded by every Python that is started: takes the code of one module from a file.
 HOOK = '''
