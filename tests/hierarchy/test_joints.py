@@ -63,6 +63,14 @@ def test_what_is_no_value_of_a_joint_is_refused_by_name(values, said):
     refused(said, ROBOT.configuration, values)
 
 
+@pytest.mark.parametrize(("robot", "what", "helps"), [
+    (ROBOT, "q", True), (ROBOT, "v", False), (Robot.named("kuka_lwr"), "q", False)])
+def test_values_of_joints_are_offered_where_they_make_more_coordinates(robot, what, helps):
+    with pytest.raises(RobotError, match=rf"{what} has shape \(1,\), expected") as error:
+        State.at(robot, **({"q": robot.rest} | {what: [0.0]}))
+    assert ("robot.configuration makes one" in str(error.value)) == helps
+
+
 @pytest.mark.parametrize(("span", "name"), [(slice(2, 4), "drive"), (slice(4, 6), "wheel"),
                                             (slice(6, 10), "neck")])
 def test_a_configuration_of_another_length_is_refused_by_the_name_of_its_joint(span, name):

@@ -138,13 +138,14 @@ LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"
     ({"axis": "0 0 0"}, "joint 'shoulder': its axis is zero"),
     ({"axis": "0 1"}, "joint 'shoulder': its axis xyz = '0 1' is not three finite numbers"),
     ({"parent": "nobody"}, "joint 'shoulder': its parent link 'nobody' does not exist"),
-    ({"limit": '<limit lower="nan" upper="2"/>'}, "joint 'shoulder': its limit lower = 'nan'"),
+    ({"limit": '<limit lower="nan" upper="0.5"/>'}, "joint 'shoulder': its limit lower = 'nan'"),
     ({"link": '<inertial><mass value="-1"/></inertial>'}, "link 'upper': its mass '-1'"),
     ({"kind": "revolut"}, "joint 'shoulder': its type is 'revolut'"),
     ({"limit": ""}, "joint 'shoulder': it is revolute and has no <limit>"),
     ({"limit": '<limit lower="2" upper="-2"/>'}, "its lower limit 2 is above its upper limit -2"),
     ({"more": LOOP}, "joints 'back', 'elbow' are a loop"),
     ({"more": '<link name="alone"/>'}, "links 'base', 'alone' have no parent"),
+    ({"more": '<link name="upper"/>'}, "link 'upper' occurs 2 times"),
     ({"more": "<xacro:include>"}, "not valid XML"),
     ({"mimic": '<mimic joint="elbow"/>'}, "joint 'elbow': it is to follow itself")])
 def test_a_wrong_urdf_is_refused_with_the_name_of_its_joint(changed, said, tmp_path, capfd):
@@ -153,6 +154,7 @@ def test_a_wrong_urdf_is_refused_with_the_name_of_its_joint(changed, said, tmp_p
     with pytest.raises(RobotError) as error:
         Robot.load(path)
     assert said in str(error.value)
+    assert ("above" in str(error.value)) == ("above" in said), "a limit that is no number is not"
     assert "arm.urdf" in str(error.value)
     assert capfd.readouterr() == ("", "")
 

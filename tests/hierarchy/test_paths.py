@@ -30,6 +30,12 @@ def test_velocity_and_acceleration_are_the_derivatives(name):
         np.testing.assert_allclose(rates, now[1:], atol=2e-8, rtol=1e-6)
 
 
+def test_a_circle_about_an_oblique_axis_has_its_radius():
+    from_centre = [PATHS["circle"](t)[0] - (0.1, 0.2, 0.3) for t in TIMES]
+    np.testing.assert_allclose(np.linalg.norm(from_centre, axis=1), 0.2)
+    np.testing.assert_allclose(from_centre @ np.array([0.2, -0.4, 1.0]), 0.0, atol=1e-15)
+
+
 def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
     path = PATHS["blended"]
     for i in (1, 2):
