@@ -186,8 +186,9 @@ def test_a_tick_without_a_command_stops_the_robot_and_sends_nothing(value, said)
 
 
 def test_readings_that_are_not_finite_stop_the_robot_even_if_nobody_looks_at_move():
-    state, robot, clock = State.at(Kuka.named("kuka_lwr"), np.full(7, 0.3)), Robot(), Clock()
+    state, robot, clock = State(Kuka.named("kuka_lwr")), Robot(), Clock()
     stack = Stack([Posture(tuple(np.zeros(7)))], "velocity")
+    assert (stack.hierarchy(state).lower == 0.0).all(), "before the first `move`"
 
     def step(t):
         state.move(t, np.full(7, 0.3 if t < 2 * PERIOD else np.nan), np.zeros(7))

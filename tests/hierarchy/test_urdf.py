@@ -139,9 +139,9 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
         robot.frame("tool")
     assert "tool" not in robot.frame_names
     assert robot.end_effector == "mount", "not the tool, which is two"
-    robot = load(*map(link, ("base", "gripper", "last")), joint("tool", "revolute", "base", "gripper"),
-                 joint("far", "revolute", "gripper", "last"))
-    assert robot.end_effector == "gripper", "neither a joint nor the last link"
+    parts = (*map(link, ("base", "gripper", "last")), joint("far", "revolute", "gripper", "last"),
+             joint("tool", "revolute", "base", "gripper"))
+    assert load(*parts).end_effector == "gripper", "neither a joint nor the last link"
 
 
 @pytest.mark.parametrize(("name", "text", "said"), [

@@ -35,6 +35,8 @@ def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
         k = res.unfinished
         np.testing.assert_allclose(h.violations(res.x)[:k], norms[:k], atol=1e-8)
         assert h.names[k] in explain(h, res)
+    apart = Hierarchy.from_levels([([[1.0], [-1.0]], [1.0, 1.0], [2.0, 2.0])])
+    assert make("hcod", max_iterations=1).solve(apart).unfinished == 0
 
 
 @pytest.mark.parametrize("seed", [5, 9])
