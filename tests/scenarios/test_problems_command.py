@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from hierarchy.archives import read_arrays
+from scenarios import load
 from scenarios.problems import recorded
 from scenarios.problems import reference as families
 from scenarios.problems.answers import export, save
@@ -44,6 +46,10 @@ def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
     monkeypatch.setattr(recorded, "simulate", lambda *_, **__: None)
     with pytest.raises(ScenarioError, match="ellipse-limits: no run with seed 3 has 2 problems"):
         recorded.recorded("ellipse-limits", 3, 2)
+
+
+def test_the_time_between_recorded_problems_is_the_period_of_their_scenario():
+    assert {name: load(name).control.period for name in recorded.SCENARIOS} == recorded.PERIODS
 
 
 def test_export_show_and_check(command, tmp_path):
@@ -107,6 +113,12 @@ def test_the_stored_answers_are_certified_and_half_of_its_ticks_meet_no_limit():
         room = np.minimum(limits - problem.h.lower[18:88], problem.h.upper[18:88] - limits)
         free += bool(room.min() > 1e-6)
     assert 30 <= free <= 70
+    np.testing.assert_allclose(recorded.answer(stored[0].h), stored[0].x, atol=1e-6)
+    made = recorded.packed([(problem.h, problem.x) for problem in stored])
+    kept = read_arrays(families.DATA / "DYN60.npz")
+    assert made.keys() == kept.keys()
+    for name, values in kept.items():
+        np.testing.assert_allclose(made[name], values, atol=1e-9, err_msg=name)
 
 
 def ranks(h):
