@@ -17,6 +17,7 @@ from scenarios import load, shipped, simulate
 from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
 from scenarios.results import pool
+from scenarios.results.columns import Results
 from scenarios.results.plan import load_sweep, plan, shipped_sweeps
 from scenarios.results.run import Job, Outcome, outcome
 from scenarios.results.sampled import Workers, compare_starts
@@ -153,6 +154,22 @@ def test_a_run_that_kills_its_process_costs_only_itself():
     assert [key for key, one in found.items() if one is None] == ["2"]
 
 
+def test_what_has_ended_at_ctrl_c_is_given_up_unless_it_is_asked_for(monkeypatch):
+    all_at_once = pool.as_completed
+    monkeypatch.setattr(pool, "as_completed", lambda made: [*all_at_once(made)])
+    ended = pool.ended(len, ["a", "b"], 2)
+    next(ended)
+    with pytest.raises(KeyboardInterrupt):
+        ended.throw(KeyboardInterrupt)
+
+
+def test_the_distance_was_kept_by_runs_that_were_never_below_it():
+    jobs = tuple(Job(key, "", "tpm", label="tpm") for key in "abc")
+    below = {"body_below_share": np.array([0.0, 0.5, 1.0])}
+    assert Results(jobs, (None,) * 3, {}, below).shares()["Kept the distance asked for"] == {
+        "tpm": (1, 3)}
+
+
 def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path, monkeypatch):
     store, jobs = Store(tmp_path / "out"), [Job(key, "", "tpm") for key in "abc"]
     speed = metrics.Metric("speed_max", "Joint speed, max", 1.5, "rad/s")
@@ -187,8 +204,9 @@ with Store(Path(sys.argv[1])).opened(): print(flush=True); time.sleep(60)"""
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("starts") / "out"
-    found = compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], 7, 3,
-                           folder, workers=Workers(1))
+    with mock.patch("scenarios.results.cluster.ended"):  # which needs another package
+        found = compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], 7, 3,
+                               folder, workers=Workers(1))
     return found, json.loads((folder / "results.json").read_text()), folder
 
 

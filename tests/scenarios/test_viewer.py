@@ -1,11 +1,13 @@
 """Pages in the browser, of a run that goes on and of runs that are over."""
 
 import base64
+import itertools
 import json
 import re
 import time
 from contextlib import closing
 from http.client import HTTPConnection
+from unittest import mock
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -13,7 +15,8 @@ import pytest
 from headless import chromium
 
 from hierarchy.errors import HierarchyError
-from scenarios import load, save, simulate
+from scenarios import load, load_run, save, simulate
+from scenarios.cli import shown
 from scenarios.draw.replay.page import NOTHING, html
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.live_page import LivePage
@@ -135,6 +138,16 @@ def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_mo
         browser.run("player.ask('restart', null)")
         until("player.begun === 1 && player.runs[0].frames > 1")
         assert browser.complaints == []
+
+
+@pytest.mark.parametrize(("frames", "ticks", "code"), [(0, 1, 1), (1, 10, 0)])
+def test_the_command_of_a_live_run_ends_with_1_where_the_run_did_not_end(
+        frames, ticks, code, tmp_path, monkeypatch):
+    sleep = mock.Mock(side_effect=[None] * frames + [KeyboardInterrupt])
+    monkeypatch.setattr(shown, "time", mock.Mock(sleep=sleep, monotonic=itertools.count().__next__))
+    run = load("ellipse", ["control.duration=0.01"])
+    assert shown.show_live(run, tmp_path / "run", 0, 1.0, browser=False, wait=False) == code
+    assert load_run(tmp_path / "run").ticks == ticks
 
 
 @pytest.mark.parametrize(("headers", "own"), [
