@@ -13,7 +13,7 @@ import scenarios.config.reading as groups_of
 from hierarchy import HierarchyError
 from scenarios import compare
 from scenarios.cell.build import build
-from scenarios.config import ScenarioError, load, members, shipped
+from scenarios.config import Scenario, ScenarioError, load, members, shipped
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
 from scenarios.measure.motions import motions, partings
@@ -28,7 +28,7 @@ def test_every_shipped_scenario_loads_under_its_own_name_and_reads_back_the_same
     assert scenario.title
     scenario.make_resolver()
     (tmp_path / "scenario.toml").write_text(scenario.to_toml())
-    assert load(tmp_path / "scenario.toml") == scenario
+    assert load(tmp_path / "scenario.toml") == scenario == Scenario(**dict(scenario))
 
 
 def test_a_variant_has_two_names_and_those_of_a_file_extend_it(tmp_path):
@@ -143,6 +143,7 @@ def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_p
                             "equalities",)
     assert done.refused[0] in (tmp_path / "a" / "index.html").read_text()
     refused("recursive is not run on limited", compare, [limited], ["recursive"])
+    assert limited.with_changes({"limits.place": "guard"}).asks == "equalities"
 
 
 # Where strict resolvers part: the tick, and what was different before it.

@@ -13,7 +13,7 @@ from scenarios.measure.metrics import measure
 from solvers import Status
 
 AT, LASTS, END = 50, 60, 200  # ticks of 1 ms
-# What is put into the run, the kind of trouble it makes, and after how many ticks.
+# What is put into the run from the nearest tick on, its kind of trouble, after how many ticks.
 FAULTS = {
     "all positions": ("nan_position", "", "not_finite", 0),
     "one position": ("nan_position", "joint=3", "not_finite", 0),
@@ -30,7 +30,7 @@ FAULTS = {
 
 
 def scenario(name, put, settings, *changes, kind, policy):
-    fault = ", ".join(filter(None, (f"kind='{put}', at={AT * 1e-3}, duration={LASTS * 1e-3}",
+    fault = ", ".join(filter(None, (f"kind='{put}', at={AT}.4e-3, duration={LASTS * 1e-3}",
                                     settings)))
     return load(name, [f"control.duration={END * 1e-3}", "control.policy.deadline=30.0",
                        f"control.policy.{kind}={policy}", f"faults=[{{{fault}}}]", *changes])

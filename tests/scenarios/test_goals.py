@@ -17,7 +17,7 @@ from scenarios.measure.goals import goals
 from scenarios.measure.jumps import jumps
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import best, paired, wilson
-from scenarios.measure.verdict import lines, table, verdicts
+from scenarios.measure.verdict import Verdict, lines, table, verdicts
 from solvers import make
 
 
@@ -72,14 +72,15 @@ def run(label, **signals):
 
 def test_the_table_has_a_row_for_each_goal_and_a_cell_for_each_run():
     broken = Run(recording().scenario, "c", "c", None, "HierarchyError: no")
-    found = verdicts([run("a", **at([2, 0, 4, 0, 0])), run("b"), broken])
+    found = verdicts([run("a", **at([2, 0, 1204, 4, 4])), run("b"), broken])
     rows = dict(table(found))
-    assert rows["position, at its target"] == ("0 mm, worst 4 mm, out 25 %",
+    assert rows["position, at its target"] == ("4 mm, worst 1204 mm, out 75 %",
                                                "0 mm, worst 0 mm", "–")
     assert rows["joint limits"] == ("kept", "kept", "–")
     assert lines(found)[0] == ("2 of 3 ran to the end; c stopped at 0.00 s of 4 s: "
                                "HierarchyError: no.")
     assert found[0].as_plain_data()["goals"][0]["flag"] == "left"
+    assert Verdict("a", 4.0, 4.0, None, False, ()).end == "ran the whole 4 s"
 
 
 @pytest.mark.parametrize(("name", "asked"), [
@@ -238,5 +239,7 @@ def test_the_command_names_the_largest_changes_of_a_run(tmp_path, command):
     sizes = [one["size"] for one in found]
     assert (len(found), sizes) == (3, sorted(sizes, reverse=True))
     tick = found[0]["tick"]
-    assert f"tick {tick} (t = " in command("why", folder, "--tick", tick).out
+    out = command("why", folder, "--tick", tick).out
+    assert f"tick {tick} (t = " in out
+    assert f"\n  {found[0]['causes'][0]['kind']}: " in out
     assert "tick 999: the run has ticks 0 to 49" in command("why --tick 999", folder, code=2).err

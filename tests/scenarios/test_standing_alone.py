@@ -132,7 +132,7 @@ def pasted(model, folder, command):
     end = next(line for line in section.splitlines() if line.startswith("end_effector = "))
     path.write_text('name = "pasted"\n' + section + CONTROL
                     + end.replace("end_effector", "frame", 1))
-    command("check", path)
+    assert "20 ticks of 1 ms" in command("check", path).out
     command("run", path, "--out", folder / "run")
     return Robot.load(model), make_robot(load(path).robot)
 

@@ -127,7 +127,7 @@ def from_tick(tick, value, shape=(500, 2)):
     ({}, True), ({"v": from_tick(100, 0.3) - from_tick(101, 0.3)}, True),
     ({"v": from_tick(400, 0.3) - from_tick(401, 0.3)}, False),
     ({"q": from_tick(0, 1.1)}, False), ({"support_margin": from_tick(0, np.nan, 500)}, False),
-    ({"com": from_tick(0, [0.0, 0.0, 0.8], (500, 3)) - from_tick(300, [0, 0, 0.1], (500, 3))},
+    ({"com": from_tick(0, [0.0, 0.0, 0.8], (500, 3)) - from_tick(1, [0, 0, 0.1], (500, 3))},
      False), ({"fault": "the robot has fallen"}, False),
     ({"pushes": (SimpleNamespace(at=2.9, duration=0.2),)}, None)])
 def test_a_robot_stands_only_at_rest_upright_and_within_its_limits_until_the_end(changes, stands):

@@ -283,7 +283,7 @@ def test_what_a_resolver_of_a_plugin_returns_is_judged_and_its_errors_are_shown(
 def test_a_long_command_says_every_ten_seconds_how_far_it_is_and_what_is_left(capsys):
     now = [0.0]
     say = lines("ticks", clock=lambda: now[0])
-    for now[0], done in ((0.0, 0), (6.0, 10), (12.0, 20), (18.0, 30), (24.0, 40), (60.0, 100)):
+    for now[0], done in ((0.0, 20), (6.0, 30), (12.0, 40), (18.0, 50), (24.0, 60), (60.0, 100)):
         say("tpm", done, 100)
-    assert capsys.readouterr().err.splitlines() == ["tpm: 20 of 100 ticks, about 48 s left",
-                                                    "tpm: 40 of 100 ticks, about 36 s left"]
+    assert capsys.readouterr().err.splitlines() == ["tpm: 40 of 100 ticks, about 36 s left",
+                                                    "tpm: 60 of 100 ticks, about 24 s left"]
