@@ -66,9 +66,9 @@ def test_what_is_no_value_of_a_joint_is_refused_by_name(values, said):
 @pytest.mark.parametrize(("robot", "what", "helps"), [
     (ROBOT, "q", True), (ROBOT, "v", False), (Robot.named("kuka_lwr"), "q", False)])
 def test_values_of_joints_are_offered_where_they_make_more_coordinates(robot, what, helps):
-    with pytest.raises(RobotError, match=rf"{what} has shape \(1,\), expected") as error:
-        State.at(robot, **({"q": robot.rest} | {what: [0.0]}))
-    assert ("robot.configuration makes one" in str(error.value)) == helps
+    said = refused(f"{what} has shape (1,), expected", State.at, robot,
+                   **({"q": robot.rest} | {what: [0.0]}), error=RobotError)
+    assert ("robot.configuration makes one" in said) == helps
 
 
 @pytest.mark.parametrize(("span", "name"), [(slice(2, 4), "drive"), (slice(4, 6), "wheel"),
@@ -152,8 +152,7 @@ def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_
     assert Robot.load(path, locked={"c": 0.1}).coupled == ()
     refused("locked: joint 'a'", Robot.load, path, locked={"a": (1.0, 1.0)}, error=RobotError)
     refused("robot.configuration({'a': value})", free.coordinate, "a", error=RobotError)
-    with pytest.raises(UnknownNameError):
-        free.configuration({"d": 0.0})
+    refused("unknown joint 'd'", free.configuration, {"d": 0.0}, error=UnknownNameError)
 
 
 def test_joint_limits_cover_a_floating_base_where_it_has_limits():

@@ -7,6 +7,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from hierarchy import Robot, State
 from hierarchy.avoidance.body import pairs_of_tree
@@ -70,10 +71,9 @@ def test_locked_joints_are_no_joints(arm):
     free = Robot.load(str(arm()))
     np.testing.assert_allclose(State.at(robot, [0.6, 0.7]).position("tool0"),
                                State.at(free, [0.6, 0.8, 0.7]).position("tool0"))
-    with pytest.raises(UnknownNameError, match="did you mean 'elbow'"):
-        Robot.load(str(arm()), locked={"elbo": 0.0})
-    with pytest.raises(RobotError, match="its joints cannot be locked"):
-        Robot.load("kuka_lwr", locked={"joint_1": 0.0})
+    refused("did you mean 'elbow'", Robot.load, arm(), locked={"elbo": 0.0}, error=UnknownNameError)
+    refused("its joints cannot be locked", Robot.load, "kuka_lwr", locked={"joint_1": 0.0},
+            error=RobotError)
 
 
 def test_a_section_lists_its_own_points_and_capsules(arm):
@@ -97,8 +97,8 @@ def test_a_package_that_is_missing_is_named_with_its_extra(package, monkeypatch)
     monkeypatch.setattr(names, "distribution", absent)
     monkeypatch.setitem(sys.modules, "robot_descriptions", None)
     monkeypatch.setitem(sys.modules, "robot_descriptions._descriptions", None)
-    with pytest.raises(RobotError, match=r"pip install 'task-hierarchy\[descriptions\]'"):
-        Robot.load(f"{package}:panda")
+    refused("pip install 'task-hierarchy[descriptions]'", Robot.load, f"{package}:panda",
+            error=RobotError)
 
 
 def test_a_robot_of_robot_descriptions_is_read_from_where_it_was_downloaded(arm, monkeypatch):
@@ -109,8 +109,8 @@ def test_a_robot_of_robot_descriptions_is_read_from_where_it_was_downloaded(arm,
         monkeypatch.setitem(sys.modules, f"robot_descriptions{name}", module)
     robot = Robot.load("robot_descriptions:some")
     assert (robot.name, robot.n) == ("some", 3)
-    with pytest.raises(UnknownNameError, match="did you mean 'some_description'"):
-        Robot.load("robot_descriptions:sum_description")
+    refused("did you mean 'some_description'", Robot.load, "robot_descriptions:sum_description",
+            error=UnknownNameError)
     monkeypatch.setitem(sys.modules, "robot_descriptions.some_description", None)
     with pytest.raises(RobotError, match="could not be downloaded"):
         Robot.load("robot_descriptions:some_description")
@@ -151,11 +151,9 @@ LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"
 def test_a_wrong_urdf_is_refused_with_the_name_of_its_joint(changed, said, tmp_path, capfd):
     path = tmp_path / "arm.urdf"
     path.write_text((ROBOTS / "two_joints.urdf.txt").read_text().format(**{**PLAIN, **changed}))
-    with pytest.raises(RobotError) as error:
-        Robot.load(path)
-    assert said in str(error.value)
-    assert ("above" in str(error.value)) == ("above" in said), "a limit that is no number is not"
-    assert "arm.urdf" in str(error.value)
+    text = refused(said, Robot.load, path, error=RobotError)
+    assert ("above" in text) == ("above" in said), "a limit that is no number is not"
+    assert "arm.urdf" in text
     assert capfd.readouterr() == ("", "")
 
 

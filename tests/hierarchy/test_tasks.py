@@ -1,15 +1,15 @@
 """Tasks: rows, errors and their derivatives, by differences; stacks of them."""
 
-import re
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from refusals import refused
 from scene import FRAME, PATH, ROBOT, TASKS, Elbow, compiled_rows, place_of, state_at, states
 from scipy.linalg import expm
 
-from hierarchy import HierarchyError, Stack, State, tasks
+from hierarchy import Stack, State, tasks
 from hierarchy.avoidance import Barrier
 from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
@@ -123,8 +123,8 @@ def test_rates_of_a_frame_that_follows_a_path_are_the_derivatives_of_its_error(a
     ("error", np.array([np.nan]), "task 'elbow', row 0: lower is nan")])
 def test_a_wrong_task_is_named(method, value, said, monkeypatch):
     monkeypatch.setattr(Elbow, method, lambda self, state: value)
-    with pytest.raises(HierarchyError, match=re.escape(said)):
-        Elbow().writer(State.at(ROBOT, *STATES[0]), "velocity", Rows.empty(1, 7))()
+    state = State.at(ROBOT, *STATES[0])
+    refused(said, lambda: Elbow().writer(state, "velocity", Rows.empty(1, 7))())
 
 
 @pytest.mark.parametrize("task", [
@@ -231,8 +231,7 @@ def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
     (lambda s: Stack(level="effort"), "level must be"),
     (lambda s: Stack([tasks.JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot ha")])
 def test_bad_edits_are_named(edit, said):
-    with pytest.raises(HierarchyError, match=re.escape(said)):
-        edit(stack())
+    refused(said, edit, stack())
 
 
 @dataclass(frozen=True)
@@ -251,6 +250,5 @@ class Crossed(tasks.JointLimits):
 
 def test_a_task_whose_sides_cross_is_named_with_its_row():
     stack = Stack([TASKS["position"], Crossed(ROBOT, 5.0, 0.01)], "velocity")
-    third = ROBOT.velocity_names[2]
-    with pytest.raises(HierarchyError, match=f"task 'joint limits', {third}: no value lies betw"):
-        stack.hierarchy(state_at(Q, V))
+    refused(f"task 'joint limits', {ROBOT.velocity_names[2]}: no value lies between",
+            stack.hierarchy, state_at(Q, V))

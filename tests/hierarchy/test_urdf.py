@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 from scipy.spatial.transform import Rotation
 from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape
 
@@ -52,8 +53,7 @@ def test_a_floating_first_joint_is_the_free_base_or_fixed_at_its_place(load, bas
 def test_a_second_joint_with_the_name_of_a_free_base_is_refused(load):
     parts = link("a"), link("b"), joint("root_joint", "revolute", "a", "b")
     assert load(*parts).n == 1
-    with pytest.raises(RobotError, match="root_joint"):
-        load(*parts, base="floating")
+    refused("root_joint", load, *parts, base="floating", error=RobotError)
 
 
 def motion_of(robot, q, along):
@@ -134,9 +134,8 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
     parts = (*map(link, ("base", "wrist", "tool")), joint("tool", "revolute", "base", "wrist"),
              joint("mount", "fixed", "wrist", "tool", "", "", PLACED))
     robot = load(*parts)
-    with pytest.raises(RobotError, match="2 frames are called 'tool', a joint on the body of joint "
-                                         "'tool' and a link on the body of joint 'tool'"):
-        robot.frame("tool")
+    refused("2 frames are called 'tool', a joint on the body of joint 'tool' and a link on the body"
+            " of joint 'tool'", robot.frame, "tool", error=RobotError)
     assert "tool" not in robot.frame_names
     assert robot.end_effector == "mount", "not the tool, which is two"
     parts = (*map(link, ("base", "gripper", "last")), joint("far", "revolute", "gripper", "last"),

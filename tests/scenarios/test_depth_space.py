@@ -6,9 +6,10 @@ from runpy import run_path
 
 import numpy as np
 import pytest
+from refusals import refused
 from scene import ROBOT, deproject
 
-from hierarchy import HierarchyError, State
+from hierarchy import State
 from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles
 from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
@@ -146,8 +147,7 @@ def test_frames_that_cannot_be_used_are_refused_by_name(tmp_path):
     run = simulate(load("human", [*QUICK, "control.duration=0.3"]))
     example = Path(__file__).parents[2] / "examples" / "record_frames.py"
     folder = run_path(str(example))["write"](tmp_path / "some", run, frames=6)
-    with pytest.raises(HierarchyError, match="has no frames"):
-        RecordedFrames(tmp_path, ROBOT)
+    refused("has no frames", RecordedFrames, tmp_path, ROBOT)
     text = (folder / "frames.toml").read_text()
     for wrong, said in ((text.replace("width = 160", "width = 161"), "0000.png"),
                         (text.replace("fx = ", "gx = "), "fx is missing"),
@@ -156,8 +156,7 @@ def test_frames_that_cannot_be_used_are_refused_by_name(tmp_path):
         (tmp_path / "frames.toml").write_text(wrong)
         for png in folder.glob("*.png"):
             (tmp_path / png.name).write_bytes(png.read_bytes())
-        with pytest.raises(HierarchyError, match=said):
-            RecordedFrames(tmp_path, ROBOT)
+        refused(said, RecordedFrames, tmp_path, ROBOT)
 
 
 @pytest.mark.parametrize(("name", "kind"), [("human", "no_frames"), ("human-hqp", "dark_frames")])

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import refused
 from scipy.spatial.transform import Rotation
 
-from hierarchy import HierarchyError, Robot, State
+from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacle
 from scenarios import load, save, simulate
 from scenarios.export import export, foxglove
@@ -112,12 +113,10 @@ def test_the_layout_shows_only_what_the_file_has(messages):
     ("mine.mcap", "exists"), ("run.csv", "to_dataframe"), ("run.parquet", "to_dataframe")])
 def test_what_cannot_be_written_says_why(run, tmp_path, name, said, monkeypatch):
     (tmp_path / "mine.mcap").write_text("mine")
-    with pytest.raises(HierarchyError, match=said):
-        export(run, tmp_path / name)
+    refused(said, export, run, tmp_path / name)
     assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [("mine.mcap", "mine")]
     monkeypatch.setattr("scenarios.export.mcap.find_spec", lambda name: None)
-    with pytest.raises(HierarchyError, match=r"pip install 'task-hierarchy\[export\]'"):
-        export(run, tmp_path / "run.mcap")
+    refused("pip install 'task-hierarchy[export]'", export, run, tmp_path / "run.mcap")
 
 
 def test_the_command_exports_a_run_beside_it_or_where_it_is_told(run, tmp_path, command):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from hierarchy import HierarchyError, Robot, plugins
+from hierarchy import Robot, plugins
 from scenarios import Scenario, load, simulate
 from solvers import make
 
@@ -144,6 +144,5 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
 
 def test_two_things_of_one_name_are_refused():
     plugins.register("tasks", "thing")(type("One", (), {}))
-    with pytest.raises(HierarchyError, match="tasks: 'thing' is already"):
-        plugins.register("tasks", "thing")(type("Two", (), {}))
+    refused("tasks: 'thing' is already", plugins.register("tasks", "thing"), type("Two", (), {}))
     refused("unknown group 'task'; did you mean 'tasks'", plugins.register, "task", "thing")

@@ -7,7 +7,7 @@ import pytest
 from rank_cases import boxed, family, moved, rng
 from refusals import refused
 
-from hierarchy import Hierarchy, HierarchyError
+from hierarchy import Hierarchy
 from solvers import Status, make
 from solvers.batch import Batch, solve, stacked
 
@@ -81,8 +81,7 @@ def test_one_spoilt_problem_fails_alone(name, spoil):
     else:
         getattr(batch, spoil)[7].flat[1] = np.nan
     answer = solve(batch, make(name))
-    assert answer.status[7] == Status.NUMERICAL_FAILURE
-    assert not answer.x[7].any()
+    assert (answer.status[7], answer.x[7].any()) == (Status.NUMERICAL_FAILURE, False)
     others = np.arange(len(batch)) != 7
     assert answer.solved[others].all()
     np.testing.assert_array_equal(answer.x[others], expected[others])
@@ -94,9 +93,9 @@ def arrays(**wrong):
 
 
 @pytest.mark.parametrize(("call", "named"), [
-    (lambda: arrays(A=np.ones((4, 3))), r"A has shape \(4, 3\)"),
+    (lambda: arrays(A=np.ones((4, 3))), "A has shape (4, 3)"),
     (lambda: arrays(A=1j * np.ones((4, 3, 5))), "A is not an array of real"),
-    (lambda: arrays(lower=np.ones((4, 2))), r"lower .* expected \(4, 3\)"),
+    (lambda: arrays(lower=np.ones((4, 2))), "lower has shape (4, 2), expected (4, 3)"),
     (lambda: arrays(upper="high"), "upper"), (lambda: arrays(reference=np.ones((5, 4))), "refer"),
     (lambda: arrays(sizes=[2, 2]), "sizes sum to 4"), (lambda: arrays(sizes=[1.5, 1.5]), "whole"),
     (lambda: Batch.of([Hierarchy.from_levels([(np.eye(3)[:k], np.ones(k))]) for k in (2, 1)]),
@@ -108,8 +107,7 @@ def arrays(**wrong):
     (lambda: solve(arrays(), threads=0), "threads = 0"),
     (lambda: solve(arrays(upper=2 * np.ones((4, 3))), make("tpm")), "problem 0, level 1, row 0")])
 def test_what_makes_no_batch_is_named(call, named):
-    with pytest.raises(HierarchyError, match=named):
-        call()
+    refused(named, call)
 
 
 @pytest.mark.parametrize("name", ["tpm", "hcod"])

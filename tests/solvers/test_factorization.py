@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from rank_cases import CASES, build
+from refusals import refused
 
-from hierarchy import HierarchyError
 from solvers import Status, certify, make, problems
 from solvers.factorization import Factorization
 from solvers.resolvers.tpm import task_priority_matrix
@@ -86,11 +86,9 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     factored = Factorization([[[1.0, 0.0]], [[1e200, 1e200]]], names=["a", "b"])
     for _ in range(2):
         res = factored.solve([[1.0], [1.0]])
-        assert res.status is Status.NUMERICAL_FAILURE
-        assert (res.x == 0.0).all()
+        assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
         factored.swap("a", "b")
-    with pytest.raises(HierarchyError, match="no task priority matrix"):
-        factored.F  # noqa: B018
+    refused("no task priority matrix", lambda: factored.F)
     factored.delete("b")
     assert factored.solve([[1.0]]).status is Status.SOLVED
 
@@ -98,18 +96,17 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
 @pytest.mark.parametrize(("mistake", "text"), [
     (lambda f: f.swap("hand", "elbo"), "unknown level 'elbo'; did you mean 'elbow'"),
     (lambda f: f.insert("hand", np.eye(3)), "hand: a level of this name exists"),
-    (lambda f: f.insert("foot", [[1, 2, 3], [0, np.nan, 0]]), r"foot, row 1: A\[1, 1\] is nan"),
+    (lambda f: f.insert("foot", [[1, 2, 3], [0, np.nan, 0]]), "foot, row 1: A[1, 1] is nan"),
     (lambda f: f.solve({"hand": [1.0, 2.0]}), "elbow: no target given"),
-    (lambda f: f.solve([[1.0, 2.0], [1.0, 2.0]]), r"elbow: b has shape \(2,\), expected \(1,\)"),
+    (lambda f: f.solve([[1.0, 2.0], [1.0, 2.0]]), "elbow: b has shape (2,), expected (1,)"),
     (lambda f: f.solve([[1.0, np.inf], [1.0]]), "hand, row 1: target is inf"),
     (lambda f: Factorization([]), "no levels and no n"),
-    (lambda f: Factorization([np.eye(2), np.eye(3)]), r"level 2: A has shape \(3, 3\)"),
+    (lambda f: Factorization([np.eye(2), np.eye(3)]), "level 2: A has shape (3, 3)"),
     (lambda f: Factorization([], n=2, settings=make("tpm-published")), "staircase form"),
 ], ids=lambda part: part if isinstance(part, str) else "")
 def test_a_mistake_is_named_and_changes_nothing(mistake, text):
     factored = Factorization([np.eye(3)[:2], np.eye(3)[2:]], names=["hand", "elbow"])
-    with pytest.raises(HierarchyError, match=text):
-        mistake(factored)
+    refused(text, mistake, factored)
     assert factored.names == ("hand", "elbow")
     np.testing.assert_allclose(factored.solve([[1.0, 2.0], [3.0]]).x, [1.0, 2.0, 3.0])
 

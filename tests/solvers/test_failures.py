@@ -93,8 +93,7 @@ def test_a_small_row_that_could_be_met_is_not_hidden_by_a_large_one(name, wrong)
 def test_numbers_that_overflow_when_squared_do_not_end_the_process(backend):
     h = read("hqp_segfault")
     res = make("hqp", backend=backend).solve(h)
-    assert res.status is Status.NUMERICAL_FAILURE
-    assert not res.x.any()
+    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
     assert not certify(h, res.x).certified
 
 

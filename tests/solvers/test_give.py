@@ -117,12 +117,11 @@ def test_a_stack_takes_it_by_the_name_of_a_task_in_any_order():
     swapped = stack.hierarchy(state, ("posture", "position"))
     np.testing.assert_array_equal(swapped.give, [*np.zeros(7), 0.1, 0.0, 0.0])
     without = stack.hierarchy(state, ("posture",))
-    assert without.give is None
-    assert without.giving == []
+    assert (without.give, without.giving) == (None, [])
     assert np.abs(h.slacks(make("hcod").solve(h).x)[:3]).max() == pytest.approx(0.1)
-    with pytest.raises(HierarchyError, match="task 'position': give has shape"):
-        Stack([hand], "velocity", give={"position": [0.1, 0.2]})
-    refused("positon", Stack, [hand], "velocity", give={"positon": 0.1})
+    for give, said in (({"position": [0.1, 0.2]}, "task 'position': give has shape"),
+                       ({"positon": 0.1}, "positon")):
+        refused(said, Stack, [hand], "velocity", give=give)
 
 
 def test_explain_says_what_gives_how_much_and_for_whom():
@@ -221,8 +220,7 @@ def test_a_metric_that_loses_definiteness_is_a_numerical_failure(name):
     h = Hierarchy.from_levels([([[1.0, 0.3]], [1.0])], [1.0, 1.0], metric=np.eye(2))
     h.metric[1, 1] = -1.0
     res = make(name).solve(h)
-    assert res.status is Status.NUMERICAL_FAILURE
-    assert not res.x.any()
+    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
     assert not certify(h, [1.0, 0.0]).certified
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from hierarchy import Hierarchy, HierarchyError
+from hierarchy import Hierarchy
 from hierarchy.errors import UnknownNameError
 from solvers import Status, make, names
 from solvers.resolvers.set_based import SetBased
@@ -76,14 +76,12 @@ def test_a_setting_that_makes_no_sense_is_named_with_its_value(name, settings):
 def test_settings_of_parts_are_named():
     for scales, said in (({"hand": 0.0}, ": 'hand'"), (("hand",), " = ('hand',), expected")):
         refused(f"merged: scales{said}", make, "merged", scales=scales)
-    for name, setting in (("hqp", "backend"), ("reverse", "form")):
-        with pytest.raises(UnknownNameError, match=f"{setting} of {name}"):
-            make(name, **{setting: np.zeros(2)})
+    for name, key in (("hqp", "backend"), ("reverse", "form")):
+        refused(f"{key} of {name}", make, name, **{key: np.zeros(2)}, error=UnknownNameError)
     assert make("hcod", max_iterations=2**31 - 1).max_iterations == 2147483647
     for made, wrong in ((SetBased, {"tolerance": -1.0}), (SetBased, {"most": 0}),
                         (Settled, {"period": 0.0}), (Settled, {"softness": -1.0, "period": 0.1})):
-        with pytest.raises(HierarchyError, match=next(iter(wrong))):
-            made(inner=make("tpm"), **wrong)
+        refused(next(iter(wrong)), made, inner=make("tpm"), **wrong)
     assert Settled(inner=make("tpm"), period=0.1, softness=0.0).softness == 0.0
 
 
