@@ -13,7 +13,6 @@ from benchmark.peers import reaching, standing
 from benchmark.peers.compare import joined
 from benchmark.peers.hierarchy import stand
 from benchmark.peers.moving import ENTRANTS, QUESTIONS, START, make_scenes, run
-from benchmark.peers.standing import Judge, followed, make_scene
 from benchmark.process import Field
 from benchmark.solve import entrants as solvers_
 from benchmark.solve import open as solve
@@ -83,13 +82,14 @@ def test_an_adapter_of_the_arm_gives_the_known_velocity(entrant, tmp_path):
 
 @each(standing.ENTRANTS)
 def test_an_adapter_of_the_humanoid_obeys_the_equations_of_motion(entrant, tmp_path):
-    scene = make_scene(tmp_path)
-    states = followed(scene, 1)
+    scene = standing.make_scene(tmp_path)
+    states = standing.followed(scene, 1)
     asked = {key: values.tolist() for key, values in states.items()}
     log = joined(answered(entrant, standing.QUESTIONS, ("open", asdict(scene), asked),
                           ("turn", 1, 0))[1:])
     assert not log["failed"][0]
-    found = Judge(scene, states).residuals(0, log["a"][0], log["torques"][0], log["wrenches"][0])
+    a, torques, wrenches = (log[key][0] for key in ("a", "torques", "wrenches"))
+    found = standing.Judge(scene, states).residuals(0, a, torques, wrenches)
     assert max(found[key] for key in ("dynamics", "contact", "torque")) < 1e-6
 
 
@@ -153,9 +153,9 @@ def test_everybody_is_judged_or_named_with_the_reason(tmp_path, monkeypatch):
 
 
 def test_wrong_answers_to_stand_are_found(tmp_path):
-    scene = make_scene(tmp_path)
-    states = followed(scene, 2)
-    (tick, _), judge = stand(scene, "hcod"), Judge(scene, states)
+    scene = standing.make_scene(tmp_path)
+    states = standing.followed(scene, 2)
+    (tick, _), judge = stand(scene, "hcod"), standing.Judge(scene, states)
     a, torques, wrenches = tick(0.0, states["q"][0], states["v"][0], None)()
     good = judge.residuals(0, a, torques, wrenches)
     assert max(good[key] for key in ("dynamics", "contact", "torque", "friction")) < 1e-6

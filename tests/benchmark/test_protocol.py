@@ -9,9 +9,6 @@ import numpy as np
 import pytest
 
 from benchmark.reproduce import blocks, fronts, pages, protocol, verdicts
-from benchmark.reproduce.blocks import Stored
-from benchmark.reproduce.fronts import Method, dominated
-from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
 from hierarchy.errors import HierarchyError
 from scenarios.measure.statistics import holm
 from scenarios.results.sampled import Workers
@@ -25,12 +22,12 @@ def rows(noisy=None, **columns):
                       "reached_end": list(np.isfinite(some).astype(float))}
                for name, some in run.items()} for run in (columns, {**columns, **(noisy or {})})]
     about = {"speed_max": {"label": "Joint speed, max", "unit": "rad/s", "lower": True}}
-    return Rows(LAYOUTS, SEEDS, STARTS, about, values, [{}, {}])
+    return protocol.Rows(LAYOUTS, SEEDS, STARTS, about, values, [{}, {}])
 
 
 def verdict(found, **claim):
-    of = Claim("one", "own", "a text", "x", "speed_max", **claim)
-    return verdicts.judged(replace(PROTOCOL, claims=(of,)), found, "own")[0]
+    of = protocol.Claim("one", "own", "a text", "x", "speed_max", **claim)
+    return verdicts.judged(replace(protocol.PROTOCOL, claims=(of,)), found, "own")[0]
 
 
 def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters():
@@ -66,19 +63,19 @@ def test_the_blocked_test_is_wilcoxons_in_one_block_and_ignores_shifts_between_b
 
 
 def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
-    layout = PROTOCOL.layouts["lwr"]
-    for name, column in PROTOCOL.columns.items():
+    layout = protocol.PROTOCOL.layouts["lwr"]
+    for name, column in protocol.PROTOCOL.columns.items():
         assert column.load(layout, name).variation
-    for claim in PROTOCOL.claims:
-        assert {claim.of, claim.rival} - {""} <= set(PROTOCOL.columns)
+    for claim in protocol.PROTOCOL.claims:
+        assert {claim.of, claim.rival} - {""} <= set(protocol.PROTOCOL.columns)
         assert bool(claim.quotation) == (claim.family == "letter")
     assert len(blocks.block("asked-letter", blocks.Stored(None, []), str).splitlines()) > 5
 
 
 def test_runs_are_resumed_and_noise_is_small(tmp_path):
-    short = {"lwr": {**PROTOCOL.layouts["lwr"], "control.duration": 0.02}}
-    some = replace(PROTOCOL, layouts=short, seeds=(1,), starts=2,
-                   columns={name: PROTOCOL.columns[name] for name in ("letter", "hqp")})
+    short = {"lwr": {**protocol.PROTOCOL.layouts["lwr"], "control.duration": 0.02}}
+    some = replace(protocol.PROTOCOL, layouts=short, seeds=(1,), starts=2,
+                   columns={name: protocol.PROTOCOL.columns[name] for name in ("letter", "hqp")})
     (first,) = protocol.run(some, tmp_path, Workers(1))
     file = tmp_path / "runs" / "all.csv"
     before = file.stat().st_size
@@ -92,8 +89,8 @@ def test_runs_are_resumed_and_noise_is_small(tmp_path):
 
 def test_only_what_nothing_else_improves_is_on_the_front():
     scores = np.array([[1.0, 4.0], [2.0, 2.0], [2.0, 3.0], [np.inf, np.inf]])
-    assert [dominated(scores, k) for k in range(4)] == [False, False, True, True]
-    assert not dominated(np.full((2, 2), np.inf), 0)
+    assert [fronts.dominated(scores, k) for k in range(4)] == [False, False, True, True]
+    assert not fronts.dominated(np.full((2, 2), np.inf), 0)
 
 
 def test_trials_that_are_left_out_of_the_second_scene_are_not_on_the_front(monkeypatch):
@@ -106,16 +103,16 @@ def test_trials_that_are_left_out_of_the_second_scene_are_not_on_the_front(monke
         return scores[[one["k"] for one in trials], :scenes[1]], []
 
     monkeypatch.setattr(fronts, "_scores", made)
-    found = fronts._trained("", Method("hcod"), [{"k": k} for k in range(40)], ())
+    found = fronts._trained("", fronts.Method("hcod"), [{"k": k} for k in range(40)], ())
     whole = scores.max(axis=1)
-    assert ([k for k in range(40) if not dominated(found, k)]
-            == [k for k in range(40) if not dominated(whole, k)])
+    assert ([k for k in range(40) if not fronts.dominated(found, k)]
+            == [k for k in range(40) if not fronts.dominated(whole, k)])
     assert sum(ran[1:]) < 30
 
 
 ROOT = Path(__file__).parents[2]
 PAGES = pages.marked(ROOT)
-STORED = Stored.read(ROOT)
+STORED = blocks.Stored.read(ROOT)
 
 
 @pytest.mark.parametrize("name", PAGES)

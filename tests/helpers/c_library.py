@@ -86,15 +86,11 @@ class Library:
 
     @classmethod
     def of(cls, folder):
-        """The library in a folder, whether it was linked or not."""
+        """The library in a folder: a shared one, loaded by the system, or one not linked."""
         shared = folder / "lib" / "libtask_hierarchy.so"
-        return cls.linked(shared) if shared.exists() else cls.unlinked(
-            folder / "lib" / "libtask_hierarchy.a")
-
-    @classmethod
-    def linked(cls, path):
-        """A shared library, loaded by the system."""
-        code = ctypes.CDLL(str(path))
+        if not shared.exists():
+            return cls.unlinked(shared.with_suffix(".a"))
+        code = ctypes.CDLL(str(shared))
         return cls(lambda name: ctypes.cast(code[name], ctypes.c_void_p).value)
 
     @classmethod
@@ -129,10 +125,6 @@ class Library:
         solve = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 5, ctypes.c_int64)
         return solve(self.address(f"th_{name}"))(*given.values(), len(memory.work) - 1)
 
-    def verify(self, h, memory):
-        """Status of th_verify on the x and the record in a memory."""
-        return self.call("verify", problem_of(h), memory)
-
     def violations(self, problem, x, count):
         """Status and norms of th_violations; a canary behind the norms stays."""
         norms = np.full(count + 1, CANARY)
@@ -153,15 +145,14 @@ class Library:
 def check_same(library, resolver, h, memory=None, before=None):
     """One solve in both, from memories of both; returns what Python leaves."""
     name, python, settings = resolver
+    status, left = library.solve(name, h, settings_of(**settings), memory)
     try:
         res = make(name, **python).solve(h, before)
     except HierarchyError:
-        status, left = library.solve(name, h, settings_of(**settings), memory)
         assert status in (REFUSED, CONTRADICTION)
         assert 0 <= left.record.row < h.m
         assert not left.answer.any()
         return None
-    status, left = library.solve(name, h, settings_of(**settings), memory)
     assert left.answer.tobytes() == res.x.tobytes()
     assert status == res.status or (name, status) == ("tpm", ITERATION_LIMIT)
     assert left.record.iterations == res.iterations

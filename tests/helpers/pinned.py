@@ -24,9 +24,6 @@ def robot_facts(robot):
     q = pin.integrate(model, robot.rest, np.sin(1.0 + np.arange(robot.n)))
     pin.forwardKinematics(model, data, q)
     pin.updateFramePlacements(model, data)
-    capsules = {capsule.name: [*(data.oMi[capsule.joint].act(np.array(end, dtype=float))
-                                 for end in (capsule.start, capsule.end)), capsule.radius]
-                for capsule in robot.capsules}
     facts = {
         "lower": robot.lower, "upper": robot.upper, "velocity_limit": robot.velocity_limit,
         "effort_limit": robot.effort_limit, "rest": robot.rest, "masses": robot.masses,
@@ -36,7 +33,9 @@ def robot_facts(robot):
                    for frame, place in zip(model.frames, data.oMf, strict=True)},
         "control_points": {point.name: data.oMi[point.joint].act(np.asarray(point.offset))
                            for point in robot.control_points},
-        "capsules": capsules,
+        "capsules": {one.name: [*(data.oMi[one.joint].act(np.array(end, dtype=float))
+                                  for end in (one.start, one.end)), one.radius]
+                     for one in robot.capsules},
         "end_effector": data.oMf[model.getFrameId(robot.end_effector)].translation,
     }
     return json.loads(json.dumps(facts, default=np.ndarray.tolist))

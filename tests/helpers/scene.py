@@ -16,6 +16,7 @@ PATH = Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0), rate=1.3)
 OBSTACLES = Obstacles([
     Obstacle("point", (0.1, 0.5, 0.1)), Obstacle("box", (-0.2, 0.3, 0.2), (0.1, 0.02, 0.03)),
     Obstacle("capsule", (-0.1, 0.4, -0.1), (0.02, 0.1))])
+TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # of an obstacle
 BODY, TIP = Repulsion(0.15, 0.15, 2.0, 3.0), Repulsion(5.0, 0.1, 10.0, 1.5)
 SENSOR = ExactDistances(ROBOT, OBSTACLES, BODY, TIP)
 

@@ -4,7 +4,7 @@ from math import inf, nan
 
 import numpy as np
 import pytest
-from scene import BODY, OBSTACLES, ROBOT, SENSOR, TIP, distance, place_of, state_at, states
+from scene import BODY, OBSTACLES, ROBOT, SENSOR, TIP, TURN, distance, place_of, state_at, states
 from standing import written
 
 from hierarchy import Stack, State
@@ -13,7 +13,6 @@ from hierarchy.avoidance import Obstacle, Obstacles, Repulsion, SurveillanceArea
 from hierarchy.paths import Waypoints
 from hierarchy.tasks import CumulatedRepulsion, DangerBounds, JointDamping, JointLimits, Posture
 
-TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 SHAPES = {shape: Obstacle(shape, (0.1, -0.2, 0.3), *size) for shape, *size in (
     ["point"], ["sphere", (0.15,)], ["capsule", (0.1, 0.25), TURN], ["box", (0.2, 0.1, 0.3), TURN])}
 
@@ -202,8 +201,7 @@ def by_hand(state, acceleration, lever, h=1e-5):
 
         J = row(state.q)
         drift = (row(state.q + 1e-4 * state.v) - row(state.q - 1e-4 * state.v)) @ state.v / 2e-4
-        asked = seen.magnitude[k] - (drift if acceleration else 0.0)
-        total += J * asked / max(J @ J, lever**2)
+        total += J * (seen.magnitude[k] - acceleration * drift) / max(J @ J, lever**2)
     return total
 
 

@@ -192,4 +192,3 @@ def test_momentum_rows_are_the_rate_of_the_momentum(part):
     target = np.arange(1.0, task.dimension + 1.0)
     aimed = tasks.Momentum(part, tuple(target), 5.0).reference_acceleration(state)
     np.testing.assert_allclose(aimed, 5.0 * (target - task.jacobian(state) @ state.v))
-

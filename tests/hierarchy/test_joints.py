@@ -1,6 +1,5 @@
 """Joints of every kind, those that follow others, closed chains; shipped robots."""
 
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -96,8 +95,7 @@ def test_the_rows_of_a_posture_are_the_derivative_of_its_error(name):
     """Everywhere for a joint of one axis, for others along the way to the target."""
     h, task = 1e-6, Posture(THERE, robot=ROBOT)
     state = State.at(ROBOT, ROBOT.configuration(ANYWHERE))
-    error = task.error(state)
-    along = np.where(np.isin(np.arange(9), OF[name]), error, 0.0)
+    along = np.where(np.isin(np.arange(9), OF[name]), task.error(state), 0.0)
     ahead, behind = (task.error(State.at(ROBOT, ROBOT.integrate(state.q, s * h * along)))
                      for s in (1, -1))
     np.testing.assert_allclose((behind - ahead) / (2 * h), task.jacobian(state) @ along, atol=1e-8)
@@ -271,7 +269,6 @@ def test_a_chain_in_a_plane_moves_although_its_file_is_rounded(rigid, rounding):
             q = q + PERIOD * x
         assert Mechanism(robot).gap(q)[0] < 1e-9 + 5.0 * rounding
         ends.append(q)
-    exact = planar_bar(rigid, 0.0)
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
     assert np.abs(ends[0] - begin).max() > 0.1, "it moved"
-    assert Mechanism(exact).gap(ends[0])[0] < 1e-8 + 20.0 * rounding
+    assert Mechanism(planar_bar(rigid, 0.0)).gap(ends[0])[0] < 1e-8 + 20.0 * rounding

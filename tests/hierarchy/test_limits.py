@@ -144,9 +144,8 @@ def test_beyond_the_box_a_limit_is_exceeded_or_the_joint_cannot_stop_in_time(lev
     for sign in (-1, 1):
         box = np.empty((2, JOINTS))
         write_box(q, v, np.vstack([limits, T, T]), level == "acceleration", box[0], box[1])
-        x = box[(sign + 1) // 2]
         more = 1e-4 * A if level == "acceleration" else 1e-4 * A * T
-        x = x + sign * more
+        x = box[(sign + 1) // 2] + sign * more
         a = x if level == "acceleration" else (x - v) / T
         w = v + a * T
         after = q + (v * T + a * T**2 / 2 if level == "acceleration" else x * T)

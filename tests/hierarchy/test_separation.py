@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene import BODY, ROBOT, TIP, compiled_rows, states
+from scene import BODY, ROBOT, TIP, TURN, compiled_rows, states
 from scipy.optimize import lsq_linear
 
 from hierarchy import HierarchyError, State
@@ -16,7 +16,6 @@ from hierarchy.task import Rows
 from hierarchy.tasks import SelfSeparation, Separation
 from scenarios.cell.sensors import ExactDistances
 
-TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 ROUND = Ellipse((0.3, 0.5, 0.2), (0.2, 0.1, 0.0), (0.0, 0.1, 0.3), rate=2.0)
 SHAPES = [
     Obstacle("point", (0.1, 0.5, 0.1)), Obstacle("sphere", (0, 0, 0), (0.07,), path=ROUND),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from refusals import refused
-from scene import deproject, distance
+from scene import TURN, deproject, distance
 
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles
@@ -15,14 +15,13 @@ SMALL = {"width": 80, "height": 60, "fx": 70.0, "fy": 65.0}
 EXACT = {"noise_floor": 0.0, "noise_growth": 0.0, "rounding": "step", "step": 0.0, "missing": 0.0,
          "missing_at_edges": 0.0, "outliers": 0.0}
 IDEAL = {"ideal": True, "near": 0.0, "far": 1e9}
-TURNED = ((0.36, 0.48, -0.8), (-0.8, 0.6, 0.0), (0.48, 0.64, 0.6))
 SHAPES = {
     "sphere": Obstacle("sphere", (0.1, 0.0, 2.0), (0.3,)),
-    "capsule": Obstacle("capsule", (-0.1, 0.1, 2.0), (0.1, 0.4), TURNED),
+    "capsule": Obstacle("capsule", (-0.1, 0.1, 2.0), (0.1, 0.4), TURN),
     "capsule across": Obstacle("capsule", (0.05, 0.1, 2.0), (0.1, 0.4),
                                ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))),
     "capsule along the axis": Obstacle("capsule", (0.02, 0.01, 2.0), (0.1, 0.4)),
-    "box": Obstacle("box", (0.0, 0.1, 2.0), (0.3, 0.2, 0.5), TURNED),
+    "box": Obstacle("box", (0.0, 0.1, 2.0), (0.3, 0.2, 0.5), TURN),
     "sphere half outside": Obstacle("sphere", (1.1, 0.5, 2.0), (0.3,)),
     "box around the camera's plane": Obstacle("box", (0.4, 0.0, 0.0), (0.1, 0.1, 1.0)),
     "capsule past the camera": Obstacle("capsule", (0.3, 0.1, 0.2), (0.1, 1.0))}

@@ -74,8 +74,7 @@ def test_every_fault_under_every_policy(fault, policy, name, limited):
         rest = v + last * 1e-3 if run.scenario.control.level == "acceleration" else last
         np.testing.assert_allclose(rest, 0.0, atol=1e-8)
         return
-    assert run.fault is None
-    assert run.ticks == END
+    assert (run.fault, run.ticks) == (None, END)
     assert [event.tick for event in told] == list(range(first, AT + LASTS))
     held = [event for event in told if event.action == "hold"]
     assert len(held) == (10 if policy == "hold" else 0)

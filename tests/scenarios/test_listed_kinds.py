@@ -1,6 +1,5 @@
 """Every kind of `[[tasks]]` in a scenario: what it reaches, and what is refused."""
 
-
 import numpy as np
 import pytest
 import tomli_w

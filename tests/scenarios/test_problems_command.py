@@ -59,8 +59,7 @@ def test_export_show_and_check(command, tmp_path):
     assert "3 completely" in command("problems show", file).out
     shown = json.loads(command("problems show integers --seed 4 --count 3 --json").out)
     assert shown["sha256"] == read(file).digest
-    stored = json.loads(command("problems show EQ7 --json").out)
-    assert stored["equalities"] == "100 % of the rows"
+    assert json.loads(command("problems show EQ7 --json").out)["equalities"] == "100 % of the rows"
     command("problems check", file)
 
 
@@ -69,15 +68,13 @@ def test_check_finds_an_answer_that_is_not_proved(command, tmp_path):
     found = read(file)
     found.answers[1].least[0] += 1.0
     save(found, tmp_path)
-    said = command("problems check", file, code=1).out
-    assert "problem 1: level 1: least violation" in said
+    assert "problem 1: level 1: least violation" in command("problems check", file, code=1).out
 
 
 def test_problems_as_others_make_them_are_what_their_makers_describe():
     for h in family("of-daqp").half(3, 5).problems:
         x = make("hcod").solve(h).x
-        rows = slice(0, h.sizes[0])
-        apart = np.minimum(h.upper - h.A @ x, h.A @ x - h.lower)[rows]
+        apart = np.minimum(h.upper - h.A @ x, h.A @ x - h.lower)[:h.sizes[0]]
         assert (apart > -1e-9).all()
         assert (apart < 1e-9).sum() == 8
         assert np.linalg.cond(h.A[h.sizes[0]:]) ** 2 == pytest.approx(100.0)

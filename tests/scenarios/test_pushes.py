@@ -48,8 +48,7 @@ def test_the_support_is_the_hull_of_the_contacts_that_carry_something():
     found = drawn(contacts, forces)
     assert sorted(map(tuple, found.support[:, 0])) == sorted(corners)
     np.testing.assert_array_equal(found.support[:, 1], np.roll(found.support[:, 0], -1, axis=0))
-    assert len(found.force) == 6
-    assert len(found.cone) == 3 * 16  # where there is load
+    assert (len(found.force), len(found.cone)) == (6, 3 * 16)  # a cone where there is load
     forces[0, 1] = np.nan
     assert len(drawn(contacts, forces).force) == 5
 

@@ -37,9 +37,8 @@ def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
 
 def test_a_run_folder_holds_arrays_metrics_scenario_and_versions(tmp_path):
     save(recording(), tmp_path / "run")
-    names = {path.name for path in (tmp_path / "run").iterdir()}
-    assert names == {"run.npz", "timings.npz", "facts.json", "metrics.json", "scenario.toml",
-                     "versions.json"}
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {
+        "run.npz", "timings.npz", "facts.json", "metrics.json", "scenario.toml", "versions.json"}
     assert "hand-made" in (tmp_path / "run" / "scenario.toml").read_text()
     assert {"python", "numpy", "pin", "task-hierarchy"} <= json.loads(
         (tmp_path / "run" / "versions.json").read_text()).keys()

@@ -87,12 +87,9 @@ def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
     run = dataclasses.replace(run, recording=dataclasses.replace(
         run.recording, events=(Event(3, "not_finite", "hold"),)))
     text = page(comparison(run, made("hqp")))
-    cells = re.search(r"<td>not finite</td><td>hold</td><td>1</td><td>([^<]*)</td>", text)
-    assert cells is not None
-    assert cells[1] == "3.000 s"
+    assert "<td>not finite</td><td>hold</td><td>1</td><td>3.000 s</td>" in text
     assert "<td>contact</td>" in text
     drawn = re.search(r'aria-label="hand-made, tpm-published: the stack over time".*?</svg>', text)
-    assert drawn is not None
     assert ">not finite: hold</text>" in drawn[0]
     assert ">contact</text>" in drawn[0]
 
@@ -160,11 +157,9 @@ def test_the_errors_of_listed_tasks_are_drawn_with_a_line_for_each():
 
 
 def test_a_run_far_beyond_the_others_is_cut_and_says_so():
-    quiet = recording(v=np.eye(5, 7))
-    wild = recording(v=1000.0 * np.eye(5, 7))
+    quiet, wild = (recording(v=speed * np.eye(5, 7)) for speed in (1.0, 1000.0))
     drawn = beside(panels.PANELS[0], {"a": quiet, "b": quiet, "c": wild})
-    texts = [text.get_text() for text in drawn["c"].axes[0].texts]
-    assert any("cut" in text for text in texts)
+    assert any("cut" in text.get_text() for text in drawn["c"].axes[0].texts)
     assert drawn["a"].axes[0].get_ylim()[1] < 10.0
 
 

@@ -68,10 +68,9 @@ def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
         np.testing.assert_allclose(cell.activation()[:27], 0.5 - 0.5 * np.cos(np.pi * share),
                                    atol=1e-12)
         np.testing.assert_array_equal(cell.activation()[27:30], 1.0)
-        cosine = np.cos(np.radians(5.0)) - controller.cone_error
-        to_end = np.cos(np.radians(3.0)) - cosine
-        width = np.cos(np.radians(3.0)) - np.cos(np.radians(5.0))
-        share = np.clip(to_end / width, 0.0, 1.0)
+        bound, end = np.cos(np.radians([5.0, 3.0]))
+        to_end = end - (bound - controller.cone_error)
+        share = np.clip(to_end / (end - bound), 0.0, 1.0)
         np.testing.assert_allclose(cell.activation()[30], 0.5 - 0.5 * np.cos(np.pi * share),
                                    atol=1e-9)
         assert h.lower[30] == pytest.approx(5.0 * to_end)

@@ -150,8 +150,7 @@ def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path, 
 def test_a_run_that_kills_its_process_costs_only_itself():
     jobs = [Job(str(i), "", "deadly" if i == 2 else "tpm") for i in range(6)]
     found = {job.key: one for job, one in pool.ended(dies_of_one, jobs, 2)}
-    assert len(found) == 6
-    assert [key for key, one in found.items() if one is None] == ["2"]
+    assert (len(found), [key for key, one in found.items() if one is None]) == (6, ["2"])
 
 
 def test_what_has_ended_at_ctrl_c_is_given_up_unless_it_is_asked_for(monkeypatch):

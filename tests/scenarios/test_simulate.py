@@ -22,8 +22,7 @@ def run():
 def test_every_answer_is_certified_where_asked_and_nothing_is_where_not(run):
     judged = simulate(load("ellipse", ["control.options.damping=0.0", "control.duration=0.4"]),
                       certified=True)
-    assert judged["certified"].shape == (400,)
-    assert judged["certified"].all()
+    assert judged["certified"].tolist() == [True] * 400
     assert "certified" not in run
 
 
@@ -91,8 +90,7 @@ def test_the_authors_runs_are_reproduced_tick_for_tick(name):
     expected = reference(name)
     run = simulate(load(*RUNS[name]))
     every = slice(None, None, EVERY)
-    assert run.fault is None
-    assert run.ticks == (5000 if name.endswith("5s") else 18850)
+    assert (run.fault, run.ticks) == (None, 5000 if name.endswith("5s") else 18850)
     np.testing.assert_allclose(run["t"][every], expected["t"], atol=1e-12)
     np.testing.assert_array_equal(run["active_control_point"][every],
                                   expected["active_control_point"])

@@ -33,12 +33,9 @@ def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
 
 def test_a_run_records_torques_plans_and_what_the_floor_does_and_has_their_metrics():
     short = simulate(SHORT, certified=True)
-    assert short.fault is None
-    assert short["certified"].all()
-    robot = build(SHORT).robot
-    assert short["command"].shape == (20, 30)
-    assert short["planned_acceleration"].shape == (20, 36)
-    assert short["planned_force"].shape == (20, 8, 3)
+    assert (short.fault, short["certified"].all()) == (None, True)
+    robot, planned = build(SHORT).robot, ("planned_acceleration", "planned_force")
+    assert [short[one].shape for one in ("command", *planned)] == [(20, 30), (20, 36), (20, 8, 3)]
     np.testing.assert_array_equal(short["torque_limit"], robot.effort_limit[6:])
     weight = 9.81 * robot.masses.sum()
     assert short["planned_force"][0, :, 2].sum() == pytest.approx(weight, rel=1e-6)

@@ -260,8 +260,7 @@ def test_the_page_shows_the_arm_in_space_and_plays_it_until_it_is_paused(documen
         stopped = page.run("player.t")
         assert not page.run("player.playing")
         assert page.screenshot() != before
-        assert page.run("player.t") == stopped
-        assert page.complaints == []
+        assert (page.run("player.t"), page.complaints) == (stopped, [])
 
 
 def test_the_command_takes_several_runs_and_a_name(runs, tmp_path, command):

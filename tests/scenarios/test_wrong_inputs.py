@@ -227,8 +227,7 @@ def test_a_wrong_argument_is_refused_and_named(call, said):
 def test_a_slip_in_a_file_shows_line_caret_and_mend(line, caret, mend, tmp_path):
     file = tmp_path / "slip.toml"
     file.write_text(f"name = 'x'\n{line}\n", encoding="utf-8")
-    text = refused("slip.toml', line ", read_toml, file, "scenario file", HierarchyError)
-    head, shown, pointer, told = text.splitlines()
+    head, shown, pointer, told = refused(mend, read_toml, file, "file", HierarchyError).splitlines()
     assert "slip.toml', line " in head
     assert shown.strip() in line.splitlines()
     assert pointer.index("^") == caret + 3

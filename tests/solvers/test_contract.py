@@ -15,7 +15,6 @@ from refusals import refused
 from benchmark.solve import oracle
 from hierarchy import Hierarchy, HierarchyError
 from scenarios.problems import reference as families
-from scenarios.problems.reference import EQUALITIES
 from solvers import Status, certify, make, names
 from solvers.qp.backends import BACKENDS
 
@@ -57,7 +56,7 @@ def test_strict_resolvers_find_the_oracles_answer(resolver, case):
 
 
 @every(STRICT)
-@pytest.mark.parametrize("name", EQUALITIES)
+@pytest.mark.parametrize("name", families.EQUALITIES)
 def test_strict_resolvers_solve_the_equality_families(resolver, name):
     for h, x, norms in some(resolver, name):
         res = resolver.solve(h)

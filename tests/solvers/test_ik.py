@@ -53,8 +53,7 @@ def test_the_answer_near_a_singularity_is_continuous():
     stretched = np.array([0.2, 0.7, 0.1, 0.0, 0.3, 0.0, 0.1])
     task = [Position(FRAME, Still(1.3 * State.at(ROBOT, stretched).position(FRAME)))]
     bends = np.linspace(-0.02, 0.02, 81)
-    elbow = np.eye(7)[3]
-    v = np.array([solve_ik(ROBOT, stretched + bend * elbow, task).v for bend in bends])
+    v = np.array([solve_ik(ROBOT, stretched + bend * np.eye(7)[3], task).v for bend in bends])
     assert np.abs(np.diff(v, axis=0)).max() < 0.1
 
 
@@ -85,8 +84,7 @@ def test_poses_of_random_configurations_are_found_within_the_limits():
         goal = State.at(ROBOT, rng.uniform(ROBOT.lower, ROBOT.upper))
         pose = Pose(FRAME, Still(goal.position(FRAME)), goal.rotation(FRAME))
         found = solve_ik(ROBOT, Q, [pose], until=1e-6)
-        assert found.met
-        assert found.verdict == "reached"
+        assert (found.met, found.verdict) == (True, "reached")
         assert found.iterations > 0
         assert ((found.q >= ROBOT.lower - 1e-9) & (found.q <= ROBOT.upper + 1e-9)).all()
         here = State.at(ROBOT, found.q)

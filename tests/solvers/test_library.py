@@ -56,7 +56,8 @@ def test_c_verifies_what_python_verifies_and_writes_to_its_work_space_only(libra
         for by in (0.0, 1e-3):
             memory.x[:-1] = x = res.x + by
             found = type(res)(x, res.status, res.memory).verified(h)
-            assert library.verify(h, memory) == (c.SOLVED if found else c.INACCURATE)
+            status = library.call("verify", c.problem_of(h), memory)
+            assert status == (c.SOLVED if found else c.INACCURATE)
             np.testing.assert_array_equal(memory.x[:-1], x)
         np.testing.assert_array_equal(memory.values, values)
         assert memory.untouched

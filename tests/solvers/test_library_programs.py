@@ -16,7 +16,6 @@ import pytest
 from rank_cases import sequence
 
 from benchmark.studies import recorded
-from benchmark.studies.recorded import record_sequence
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position
@@ -134,7 +133,7 @@ def test_cmake_finds_it(folder, tmp_path, linked):
 @needs_c
 @pytest.mark.parametrize(("name", "resolver"), [("INEQ7", "hcod"), ("EQ7", "tpm")])
 def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, name, resolver):
-    record_sequence(tmp_path / "ticks", sequence(family(name)[0].h, 100))
+    recorded.record_sequence(tmp_path / "ticks", sequence(family(name)[0].h, 100))
     program = built(tmp_path / "study", ROOT / "tests/helpers/c_speed.c", folder, "-O2")
     solves, failed, allocated, faults, *_ = map(int, said(
         program, tmp_path / "ticks", resolver, "200000").split())
@@ -161,8 +160,7 @@ def test_check_compares_the_kernels(folder, tmp_path, command):
     assert "and libtask_hierarchy.a another" in differs(other)
     code = other / "lib" / "libtask_hierarchy.a"
     code.write_bytes(code.read_bytes().replace(digest.encode(), b"0" * 16))
-    said = command("library --check --out", other, code=1).err
-    assert f"those installed have {digest}" in said
+    assert f"those installed have {digest}" in command("library --check --out", other, code=1).err
     with pytest.raises(HierarchyError, match=r"task_hierarchy\.h is missing"):
         differs(tmp_path)
 

@@ -65,8 +65,7 @@ def test_damping_draws_to_the_reference():
     h = Hierarchy.from_levels([([[1.0, 1.0]], [1.0]), ([[1.0, 1.0 + 1e-3]], [2.0])], [3.0, -1.0])
     w = np.array([100.0, 1.0])[:, None]
     A, b, damping = w * h.A, w[:, 0] * h.lower, 0.1
-    smallest = np.linalg.svd(A, compute_uv=False)[-1]
-    square = damping ** 2 * (1.0 - (smallest / 0.1) ** 2)
+    square = damping ** 2 * (1.0 - (np.linalg.svd(A, compute_uv=False)[-1] / 0.1) ** 2)
     step = np.linalg.solve(A.T @ A + square * np.eye(2), A.T @ (b - A @ h.reference))
     found = make("weighted", damping=damping, threshold=0.1).solve(h)
     np.testing.assert_allclose(found.x, h.reference + step, atol=EXACT)
