@@ -33,7 +33,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -180,18 +180,13 @@ def change(node: ast.AST, kind: str) -> str:
         node.ops[0] = SWAPS[type(node.ops[0])]()
     elif kind == "operator":
         node.op = SWAPS[type(node.op)]()
-    elif kind == "constant":
-        node.value = _other(node.value)
+    elif kind == "constant":  # the other truth value, the next integer, or zero (one for zero)
+        value = node.value
+        node.value = not value if isinstance(value, bool) else (
+            value + 1 if isinstance(value, int) else float(value == 0.0))
     else:
         node.value = ast.Constant(None)
     return f"{before}  ->  {ast.unparse(node)}"
-
-
-def _other(value: bool | int | float) -> bool | int | float:
-    """Return another constant: the other truth value, the next integer, or zero (one for zero)."""
-    if isinstance(value, bool):
-        return not value
-    return value + 1 if isinstance(value, int) else float(value == 0.0)
 
 
 class Contexts:
@@ -301,16 +296,14 @@ class Runner:
         with (self.folder / "output").open("w") as output, subprocess.Popen(
                 [sys.executable, "-m", "pytest", "-qx", "-n0", "-pno:cacheprovider", *tests],
                 cwd=ROOT, stdout=output, stderr=output, start_new_session=True,
-                preexec_fn=self._limited, env={**os.environ, "PYTHONPATH": path, **environment},
+                preexec_fn=partial(resource.setrlimit, resource.RLIMIT_CPU, (self.limit,) * 2),
+                env={**os.environ, "PYTHONPATH": path, **environment},
         ) as process:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(2.0 * self.limit)  # one that waits for ever
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
         return process.returncode in (0, 5)  # 5: nothing was to be run
-
-    def _limited(self) -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (self.limit, self.limit))
 
     def survives(self, module: str, code: CodeType, tests: tuple[str, ...]) -> bool:
         """Whether the tests pass with this code of a module."""

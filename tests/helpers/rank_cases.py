@@ -1,9 +1,10 @@
-"""Hierarchies of equalities at every rank, the stored families, and how problems change."""
+"""Hierarchies of equalities at every rank, the stored families, how problems change, answers."""
 
 import numpy as np
 
 from hierarchy import Hierarchy
 from scenarios.problems import reference as families
+from solvers import Status
 
 
 def rng(seed=7):
@@ -61,6 +62,13 @@ def boxed(h, low, high):
     """Return h with the bounds low <= x <= high as its first level."""
     box = np.eye(h.n), np.broadcast_to(low, h.n), np.broadcast_to(high, h.n)
     return Hierarchy.from_levels([box, *((A, b) for A, b, _ in h.levels())], h.reference)
+
+
+def solved(resolver, h, memory=None):
+    """Resolve h, and check that it was solved."""
+    found = resolver.solve(h, memory)
+    assert found.status is Status.SOLVED
+    return found
 
 
 def gap(x, expected):

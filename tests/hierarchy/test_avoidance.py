@@ -118,9 +118,8 @@ def test_every_branch_and_tie_of_algorithm_1(body, end, cone, order, repulsion):
 
 
 def test_an_equality_pointing_task_is_always_there_and_one_area_leaves_no_outer_one():
-    assert allocate(0.2, 0.2, -1.0, AREAS, always_point=True).order == (P, C)
-    assert allocate(0.1, 0.2, -1.0, AREAS, always_point=True).order == (P, C, A)
-    assert allocate(0.2, 0.2, nan, AREAS, always_point=True).order == (P,)
+    for body, cone, order in ((0.2, -1.0, (P, C)), (0.1, -1.0, (P, C, A)), (0.2, nan, (P,))):
+        assert allocate(body, 0.2, cone, AREAS, always_point=True).order == order
     areas = SurveillanceAreas(near=0.4, far=0.4, end_effector=0.4)
     assert allocate(0.4, 1.0, -1.0, areas).order == (A, P)
     assert allocate(0.41, 1.0, -1.0, areas).order == (P,)

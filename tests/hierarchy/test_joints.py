@@ -106,8 +106,7 @@ def test_the_rows_of_a_posture_are_the_derivative_of_its_error(name):
 def test_compiled_rows_of_a_posture_are_those_of_its_methods(level, floating):
     robot = mobile(floating)
     v = np.random.default_rng(1).normal(size=robot.n)
-    state = State(robot)
-    task = Posture(THERE, 3.0, 2.0, 4.0)
+    state, task = State(robot), Posture(THERE, 3.0, 2.0, 4.0)
     stack = Stack([task], level)
     for values in (ANYWHERE, THERE, {}):
         state.move(0.0, robot.configuration(values), v)
@@ -216,8 +215,7 @@ def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
     assert task.dimension == (7 if rigid else 4)
     there = {"crank": -0.8, "finger": 0.3}
     start = Mechanism(bar()).closed(robot.configuration(there), there)
-    q = robot.integrate(start, 0.05 * rng.normal(size=robot.n))
-    v = rng.normal(size=robot.n)
+    q, v = robot.integrate(start, 0.05 * rng.normal(size=robot.n)), rng.normal(size=robot.n)
 
     def at(step):
         return State.at(robot, robot.integrate(q, step), v)

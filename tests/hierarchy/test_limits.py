@@ -257,8 +257,7 @@ def test_the_rows_are_the_identity_and_the_box(level):
 
 
 def test_the_error_is_how_far_a_joint_is_from_its_range():
-    task = JointLimits(ROBOT, 10.0, 1e-3, margin=0.1)
-    q = np.zeros(7)
+    task, q = JointLimits(ROBOT, 10.0, 1e-3, margin=0.1), np.zeros(7)
     q[0], q[3] = ROBOT.upper[0], ROBOT.lower[3] - 0.2
     state = State.at(ROBOT, q)
     np.testing.assert_allclose(task.error(state), [-0.1, 0, 0, 0.3, 0, 0, 0], atol=1e-15)

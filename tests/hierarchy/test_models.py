@@ -23,8 +23,7 @@ LIMIT = '<limit lower="0.5" upper="2" velocity="3" effort="10"/>'
 @pytest.fixture
 def arm(tmp_path):
     def write(shape='<sphere radius="0.04"/>', limit=LIMIT, kind="revolute"):
-        path = tmp_path / "arm.urdf"
-        text = (ROBOTS / "arm.urdf.txt").read_text()
+        path, text = tmp_path / "arm.urdf", (ROBOTS / "arm.urdf.txt").read_text()
         path.write_text(text.format(shape=shape, limit=limit, kind=kind))
         return path
     return write

@@ -157,8 +157,7 @@ def test_a_gain_that_is_left_out_is_the_same_in_python_and_in_a_file(task, secti
 
 
 def test_manipulability_is_yoshikawas_and_has_no_row_at_a_singular_posture():
-    task = TASKS["manipulability"]
-    state = state_at(*STATES[4])
+    task, state = TASKS["manipulability"], state_at(*STATES[4])
     J = np.array(tasks.Position(task.frame, PATH).jacobian(state))
     assert task.value(state) == pytest.approx(np.sqrt(np.linalg.det(J @ J.T)), rel=1e-9)
     straight = State.at(ROBOT, np.zeros(7))

@@ -66,8 +66,7 @@ def traced(obstacle, pinhole, u, v):
 @pytest.mark.parametrize("name", SHAPES)
 def test_every_pixel_has_the_depth_at_which_its_ray_meets_the_shape(name):
     """Sphere tracing needs nothing but the distance function; grazing rays are left out."""
-    pinhole = Pinhole(**SMALL)
-    seen = depths(camera(SHAPES[name]))
+    pinhole, seen = Pinhole(**SMALL), depths(camera(SHAPES[name]))
     assert (seen > 0.0).sum() > 20
     beside = np.zeros_like(seen)
     for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):

@@ -47,8 +47,7 @@ def one_by_one(image, pinhole, point, region, thin=inf, within=inf):
     The mean is over what is nearer than `within`, and the nearest where nothing is.
     """
     v, u = np.nonzero(image)
-    depth = image[v, u].astype(float)
-    own = pinhole.project(point)[2]
+    depth, own = image[v, u].astype(float), pinhole.project(point)[2]
     counted = np.where(depth < own, np.minimum(depth + thin, own), depth)
     off = point - deproject(pinhole, np.column_stack([u, v, counted]))
     distance = np.linalg.norm(off, axis=1)

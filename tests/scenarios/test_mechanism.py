@@ -114,8 +114,7 @@ def test_an_ankle_with_two_pushrods_stays_closed(level, rod, tmp_path):
     pytest.importorskip("mujoco")
     path = tmp_path / "ankle.xml"
     path.write_text(ankle(rod))
-    robot = Robot.load(path)
-    asked = {"pitch": -0.35, "roll": 0.15}
+    robot, asked = Robot.load(path), {"pitch": -0.35, "roll": 0.15}
     goal = Mechanism(robot).closed(robot.configuration(asked), asked)
     joints = {name: np.atleast_1d(value).tolist() for name, value in robot.values(goal).items()}
     data = {"name": "ankle", "robot": {"model": str(path)}, "control": {

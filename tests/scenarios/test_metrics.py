@@ -18,10 +18,9 @@ def test_position_error_is_the_norm_over_axes_and_the_start_can_be_left_out():
     error[0] = (3e-3, 4e-3, 0.0)  # 5 mm at t = 0
     error[4] = (0.0, 0.0, 1e-3)  # 1 mm at t = 4 s; [2, 4] s has three ticks
     found = measure(recording(position_error=error))
-    assert found["position_error_max"].value == pytest.approx(5e-3)
-    assert found["position_error_rms"].value == pytest.approx(np.sqrt(26e-6 / 5))
-    assert found["position_error_max_settled"].value == pytest.approx(1e-3)
-    assert found["position_error_rms_settled"].value == pytest.approx(np.sqrt(1e-6 / 3))
+    expected = {"max": 5e-3, "rms": np.sqrt(26e-6 / 5), "max_settled": 1e-3,
+                "rms_settled": np.sqrt(1e-6 / 3)}
+    assert {of: found[f"position_error_{of}"].value for of in expected} == pytest.approx(expected)
     assert found["position_error_median_settled"].value == 0.0
 
 
@@ -76,9 +75,8 @@ def test_each_unit_has_its_decimals(unit, shown):
 
 def test_times_are_given_by_median_and_tails_for_each_part():
     found = measure(recording(t=np.arange(1001.0), time_resolve=np.arange(1001) * 1e-6))
-    assert found["time_resolve_median"].value == pytest.approx(500e-6)
-    assert found["time_resolve_p95"].value == pytest.approx(950e-6)
-    assert found["time_resolve_p999"].value == pytest.approx(999e-6)
+    times = [found[f"time_resolve_{of}"].value for of in ("median", "p95", "p999")]
+    assert times == pytest.approx([500e-6, 950e-6, 999e-6])
     assert found["time_kinematics_median"].shown() == "1.00"
     assert found["time_kinematics_median"].shown_unit == "µs"
     shared = {f"time_{part}_{tail}" for part in ("kinematics", "rows") for tail in ("p95", "p999")}
@@ -120,15 +118,13 @@ def test_steps_of_the_command_and_of_the_joints_are_told_apart():
     v, seen, a = np.zeros((5, 2)), np.zeros((5, 2)), np.zeros((5, 2))
     v[2, 1], seen[2, 1], a[1, 0] = 0.3, 0.5, -40.0  # the period is 1 ms
     found = measure(recording(q=v, v=seen, true_v=v, command=a))
-    assert found["velocity_step_max"].value == pytest.approx(0.3)
-    assert found["velocity_step_max_measured"].value == pytest.approx(0.5)
-    assert found["command_step_max"].value == pytest.approx(0.04)
+    steps = [found[name] for name in ("velocity_step_max", "velocity_step_max_measured",
+                                      "command_step_max")]
+    assert [one.value for one in steps] == pytest.approx([0.3, 0.5, 0.04])
     slow = load("ellipse-velocity")
     command = np.array([[1.0], [1.5], [1.25], [1.25], [1.25]])
     assert measure(recording(slow, q=command, command=command))["command_step_max"].value == 0.5
-    labels = {found[name].label for name in ("velocity_step_max", "command_step_max",
-                                             "velocity_step_max_measured")}
-    assert len(labels) == 3
+    assert len({one.label for one in steps}) == 3
 
 
 def jittered(seed=3):

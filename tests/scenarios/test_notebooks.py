@@ -25,10 +25,8 @@ def run():
 
 def test_a_table_escapes_every_value_marks_the_best_and_says_how_much_is_left_out():
     text = html_table("<b>", ("a&b",), [("<i>",), (2,)], best={(1, 0)})
-    assert "&lt;b&gt;" in text
-    assert "a&amp;b" in text
-    assert "<td>&lt;i&gt;</td>" in text
-    assert "<td><b>2</b></td>" in text
+    for shown in ("&lt;b&gt;", "a&amp;b", "<td>&lt;i&gt;</td>", "<td><b>2</b></td>"):
+        assert shown in text
     assert "<b>" not in html_table("t", ("n",), [(1,)])
     assert "... and 70 more" in html_table("t", ("n",), [(i,) for i in range(100)])
 

@@ -87,8 +87,7 @@ def test_a_run_whose_state_is_lost_or_diverges_ends_with_a_fault(monkeypatch, sp
 
 @pytest.mark.parametrize("name", RUNS)
 def test_the_authors_runs_are_reproduced_tick_for_tick(name):
-    expected = reference(name)
-    run = simulate(load(*RUNS[name]))
+    expected, run = reference(name), simulate(load(*RUNS[name]))
     every = slice(None, None, EVERY)
     assert (run.fault, run.ticks) == (None, 5000 if name.endswith("5s") else 18850)
     np.testing.assert_allclose(run["t"][every], expected["t"], atol=1e-12)

@@ -43,8 +43,7 @@ def test_without_contact_it_accelerates_as_the_robots_model(seed):
 def test_torques_arrive_late_by_the_delay_and_are_cut_off_at_their_limits():
     q, v, _ = in_the_air(8)
     plant = TorqueRobot(ROBOT, CONTACTS, q, v, section=plant_with(delay=0.002))
-    holding = State.at(ROBOT, q).bias_effort()[6:]
-    sent = []
+    holding, sent = State.at(ROBOT, q).bias_effort()[6:], []
     for _ in range(4):
         plant.act(np.full(30, 1e4))
         sent.append(plant.data.actuator_force.copy())

@@ -63,8 +63,7 @@ def test_each_problem_gets_what_it_gets_alone(name, of, threads):
 @pytest.mark.parametrize("half", [0.05, 0.3, 3.0])
 def test_bounds_and_their_memory_are_those_of_each_alone(resolver, half):
     hs = [bounded(seed, half) for seed in range(20)]
-    cold = solve(Batch.of(hs), resolver)
-    alone = [resolver.solve(h) for h in hs]
+    cold, alone = solve(Batch.of(hs), resolver), [resolver.solve(h) for h in hs]
     assert_same(cold, alone)
     again = [moved(h) for h in hs]
     assert_same(solve(Batch.of(again), resolver, memory=cold.memory),

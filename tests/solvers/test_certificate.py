@@ -151,8 +151,7 @@ EXTREMES = (0.0, 5e-324, 1e-310, 1e-200, 1e-160, 1e-8, 1.0, 1e8, 1e153, 1e160, 1
 
 @pytest.mark.parametrize("seed", range(20))
 def test_no_number_is_too_large_or_too_small_to_be_judged(seed):
-    r = rng(seed)
-    levels = []
+    r, levels = rng(seed), []
     for size in r.integers(0, 5, r.integers(1, 4)):
         n = 1 + seed % 4
         A, low, up = (r.choice(EXTREMES, s) * r.choice([-1.0, 1.0], s)

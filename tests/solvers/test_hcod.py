@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rank_cases import family
+from rank_cases import family, solved
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, explain, make
@@ -102,8 +102,7 @@ def test_a_level_that_is_rounding_beside_others_counts_where_limits_hold_x():
     """Recorded in an example of pink: a vertical motion of an arm that moves in a plane."""
     limits, lifted = (np.eye(2), [-2.0] * 2, [2.0] * 2), ([[2.56e-18, 1.8e-18]], [-700.0])
     h = Hierarchy.from_levels([limits, lifted])
-    res = HCOD.solve(h)
-    assert res.status is Status.SOLVED
+    res = solved(HCOD, h)
     np.testing.assert_array_equal(res.x, [-2.0, -2.0])
     assert res.verified(h)
     free = HCOD.solve(Hierarchy.from_levels([([[1.0, 0.0]], [0.5]), lifted]))

@@ -175,8 +175,7 @@ def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and
     kinds = problems.KINDS[:-2]  # without rows far lighter than others, where rounding is larger
     for seed in range(30):
         h = problems.structured(seed, kinds, equalities_only=True)
-        x = make("recursive").solve(h).x
-        left = library.solve("recursive", h)[1]
+        x, left = make("recursive").solve(h).x, library.solve("recursive", h)[1]
         assert np.abs(left.answer - x).max() <= 1e-9 * (1.0 + np.abs(x).max())
     (tmp_path / "arm").mkdir()
     write(tmp_path / "arm", ("recursive",), "aarch64")

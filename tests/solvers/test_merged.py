@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from rank_cases import solved
 from refusals import refused
 
 from hierarchy import Hierarchy
-from solvers import Status, make
+from solvers import make
 
 N, RATIO = 6, 5.0
 
@@ -32,12 +33,6 @@ def targets(seed, size=1.0):
     return size * np.random.default_rng(seed).normal(size=11)
 
 
-def solved(resolver, h, memory=None):
-    found = resolver.solve(h, memory)
-    assert found.status is Status.SOLVED
-    return found
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_x_and_torques_move_no_faster_than_the_targets(seed):
     levels, resolver = arm(seed), make("merged", ratio=RATIO, cap=0.0)
@@ -47,8 +42,7 @@ def test_x_and_torques_move_no_faster_than_the_targets(seed):
     null = np.linalg.svd(levels[0][0])[2][1:].T
     gamma = np.linalg.norm(T @ null @ np.linalg.pinv(W[:, None] * A @ null), axis=1)
     for size in (1e-6, 0.1, 3.0):
-        b = targets(seed)
-        db = targets(seed + 1, size)
+        b, db = targets(seed), targets(seed + 1, size)
         dx = (solved(resolver, with_targets(levels, b + db)).x
               - solved(resolver, with_targets(levels, b)).x)
         moved = np.linalg.norm(W * db)

@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-from rank_cases import CASES, boxed, build, family
+from rank_cases import CASES, boxed, build, family, solved
 from refusals import refused
 
 from hierarchy import Hierarchy, HierarchyError
@@ -20,8 +20,7 @@ EXACT = 1e-9
 def test_within_limits_it_is_the_minimiser_and_shown_to_be(case, ratio):
     """Of a hierarchy of two levels: constraints, then everything weighted."""
     h = boxed(build(case, True), -0.7, 0.7)
-    res, n = make("weighted", ratio=ratio).solve(h), h.n
-    assert res.status is Status.SOLVED
+    res, n = solved(make("weighted", ratio=ratio), h), h.n
     w = np.repeat(ratio ** np.arange(len(h.sizes) - 1, -1, -1.0), h.sizes)
     w[:n] = 1.0
     two = h.changed(A=h.A * w[:, None], lower=h.lower * w, upper=h.upper * w,
@@ -108,8 +107,7 @@ def test_a_backend_that_raises_is_a_status_and_the_level_of_limits_is_kept(monke
      [-2000.0, 0.0, -2000.0], [-2000.0, 1e-3, -2000.0])])
 def test_a_row_a_million_times_smaller_than_its_neighbours_is_met_as_they_are(rows):
     h = Hierarchy.from_levels([rows, (np.eye(3), np.zeros(3))])
-    found = make("hqp").solve(h)
-    assert found.status is Status.SOLVED
+    found = solved(make("hqp"), h)
     np.testing.assert_allclose(h.slacks(found.x)[:3] / np.linalg.norm(h.A[:3], axis=1), 0.0,
                                atol=1e-9)
     assert certify(h, found.x).certified
