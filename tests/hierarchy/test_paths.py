@@ -34,6 +34,7 @@ def test_a_circle_about_an_oblique_axis_has_its_radius():
     from_centre = [PATHS["circle"](t)[0] - (0.1, 0.2, 0.3) for t in TIMES]
     np.testing.assert_allclose(np.linalg.norm(from_centre, axis=1), 0.2)
     np.testing.assert_allclose(from_centre @ np.array([0.2, -0.4, 1.0]), 0.0, atol=1e-15)
+    np.testing.assert_allclose(PATHS["circle about x"](0.0)[0], (0.1, 0.4, 0.3))  # from y
 
 
 def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():

@@ -100,8 +100,7 @@ def test_the_error_of_a_frame_is_the_logarithm_of_its_pose_to_the_target():
 @pytest.mark.parametrize("angle", [1e-6, 0.0999, 0.1001, 1.0, 3.0])
 def test_rates_of_a_frame_that_follows_a_path_are_the_derivatives_of_its_error(angle):
     h, (q, v) = 1e-4, STATES[4]
-    a = np.arange(7.0) - 3.0
-    start = State.at(ROBOT, q)
+    a, start = np.arange(7.0) - 3.0, State.at(ROBOT, q)
     task = tasks.FrameLog(FRAME, Ellipse(start.position(FRAME), (0.2, 0.0, 0.1), (0.0, 0.2, 0.1)),
                     start.rotation(FRAME) @ expm(angle * cross(np.array([0.6, 0.0, 0.8]))))
 

@@ -51,8 +51,7 @@ def bound(errors, depth):
 
 def traced(obstacle, pinhole, u, v):
     """Depth by sphere tracing, from the distance function alone; 0 for a miss."""
-    ray = deproject(pinhole, (u, v, 1.0)) - pinhole.position
-    share = 0.0
+    ray, share = deproject(pinhole, (u, v, 1.0)) - pinhole.position, 0.0
     for _ in range(2000):
         off, _ = distance(obstacle, pinhole.position + share * ray)
         if off < 1e-9:

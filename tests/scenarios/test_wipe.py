@@ -44,8 +44,7 @@ def test_the_force_on_a_sliding_point_is_friction_against_its_velocity(faces):
 def test_a_sliding_contact_is_held_along_its_normal_only():
     normal = np.array([0.6, 0.0, 0.8])
     contacts = Contacts(ARM, [Contact(TIP, normal=tuple(normal), slides=True)])
-    state = State.at(ARM, Q, np.ones(7))
-    motion = ContactMotion(contacts, damping=30.0)
+    state, motion = State.at(ARM, Q, np.ones(7)), ContactMotion(contacts, damping=30.0)
     h = Stack([motion], "torque", contacts=contacts).hierarchy(state)
     J = contacts.jacobian(state)
     np.testing.assert_allclose(h.A[:, :7], normal @ J[None], atol=1e-12)

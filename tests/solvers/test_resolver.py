@@ -18,8 +18,7 @@ from solvers.workspace import WORKSPACE
 @pytest.mark.parametrize("name", [*names(), "tpm-published"])
 def test_a_resolver_that_has_solved_can_be_pickled(name):
     resolver, h = make(name), Hierarchy.from_levels([(np.eye(3)[:2], [1.0, 2.0])])
-    x = resolver.solve(h).x
-    copied = pickle.loads(pickle.dumps(resolver))
+    x, copied = resolver.solve(h).x, pickle.loads(pickle.dumps(resolver))
     assert (copied, copied.handles) == (resolver, resolver.handles)
     np.testing.assert_array_equal(copied.solve(h).x, x)
 
