@@ -9,10 +9,10 @@ value. Its module is replaced as it is imported, in the tests and in every progr
 the checkout is not touched, so kernels come from the cache. The tests are those that run the
 changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
 once, and again when tests have changed), or --tests. Processes that tests start count as theirs. A
-line that runs as its module is imported has the tests of its module. Of many tests those of SEEN
-and MOST others are taken: a case of each function first, those first that run few lines. Prints
-every survivor with its line, and the share of survivors. A mutant whose tests take more CPU time
-than --limit counts as killed.
+line that runs as its module is imported has the tests of its module. Those of SEEN and MOST others
+are the first round: a case of each function first, those first that run few lines. A mutant that
+survives goes on to the next MOST, for at most ROUNDS. Prints every survivor with its line, and the
+share of survivors. A mutant whose round takes more CPU time than --limit counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
 `strict=` of zip (a check that does not fire where shapes have been checked), what only a type
@@ -50,7 +50,7 @@ sys.path[0] = str(ROOT)  # beside this file are folders of tests with the names 
 SAMPLED = ("hierarchy", "solvers", "scenarios")
 FILES = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.py"))
 MAP = ROOT / "build" / "tests-of-lines"
-MOST = 40  # tests of a mutant, beside those of SEEN
+MOST, ROUNDS = 40, 10  # tests of a round, beside those of SEEN; rounds that a mutant has to survive
 SEEN = "tests/scenarios/test_seen.py"
 COMPILED = ("compiled", "unlocked", "internal", "inlined", "measured")
 # The folder of kernels, the integer codes that kernels read, and the LLVM code that they contain.
@@ -263,14 +263,14 @@ def lines_of(module: str) -> dict[int, tuple[str, ...]]:
     return lines | {0: tuple(sorted({test for tests in lines.values() for test in tests}))}
 
 
-def tests_of(mutant: Mutant) -> tuple[str, ...]:
-    """Return the tests that run the line of a mutant, of many MOST of them."""
+def tests_of(mutant: Mutant) -> list[tuple[str, ...]]:
+    """Return the tests that run the line of a mutant, in rounds."""
     line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
     records = ("tests/project/test_project.py::"
                "test_records_are_frozen_and_what_they_compute_is_neither_shown_nor_compared",)
     keys = ("tests/scenarios/test_config.py",)
     if "frozen=" in line:
-        return records
+        return [records]
     lines = lines_of(mutant.module)
     default = mutant.module.startswith("scenarios/config/") and not lines.get(mutant.line)
     seen, order = Counter[str](), dict[str, tuple[int, int]]()
@@ -279,8 +279,9 @@ def tests_of(mutant: Mutant) -> tuple[str, ...]:
         order[test] = seen[function], footprints()[test]
         seen[function] += 1
     first = [test for test in order if test.startswith(SEEN)]  # much in little time
-    others = sorted(order.keys() - {*first}, key=order.__getitem__)[:MOST]
-    return ("field(" in line) * records + default * keys + (*first, *others)
+    others = sorted(order.keys() - {*first}, key=order.__getitem__)
+    begin = ("field(" in line) * records + default * keys + (*first, *others[:MOST])
+    return [begin, *(tuple(others[i:i + MOST]) for i in range(MOST, len(others), MOST))][:ROUNDS]
 
 
 @dataclass(frozen=True)
@@ -322,7 +323,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=10, help="mutants to try")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--limit", type=int, default=300,
-                        help="CPU time that the tests of a mutant have [s]")
+                        help="CPU time that a round of a mutant has [s]")
     options = parser.parse_args()
     if options.map:
         write_map(options.tests or ["tests"])
@@ -341,7 +342,7 @@ def main() -> None:
 
 def _try(sample: list[Mutant], tests: list[str] | None, runner: Runner) -> int:
     """Return how many mutants survive, and print them."""
-    first = tuple(tests or tests_of(sample[0]))
+    first = tuple(tests or tests_of(sample[0])[0])
     if not runner.passes(first):
         sys.exit(f"{(runner.folder / 'output').read_text()}\n{first} fails without any change")
     if runner.survives(sample[0].module, compile("raise ImportError", "", "exec"), first):
@@ -349,7 +350,8 @@ def _try(sample: list[Mutant], tests: list[str] | None, runner: Runner) -> int:
     alive = 0
     for done, mutant in enumerate(sample, 1):
         described, code = mutant.code()
-        survived = runner.survives(mutant.module, code, tuple(tests or tests_of(mutant)))
+        survived = all(runner.survives(mutant.module, code, some)
+                       for some in ([tuple(tests)] if tests else tests_of(mutant)))
         alive += survived
         if survived:
             print(f"survived: {done}: {mutant.module}:{mutant.line}: {described}", flush=True)
