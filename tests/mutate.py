@@ -9,10 +9,11 @@ value. Its module is replaced as it is imported, in the tests and in every progr
 the checkout is not touched, so kernels come from the cache. The tests are those that run the
 changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
 once, and again when tests have changed), or --tests. Processes that tests start count as theirs. A
-line that runs as its module is imported has the tests of its module. Those of SEEN and MOST others
-are the first round: a case of each function first, those first that run few lines. A mutant that
-survives goes on to the next MOST, for at most ROUNDS. Prints every survivor with its line, and the
-share of survivors. A mutant whose round takes more CPU time than --limit counts as killed.
+line that runs as its module is imported has the tests of its module. Of many tests those of SEEN
+and MOST others are taken: a case of each function first, those first that run few lines. A mutant
+that survives meets the WHOLE files with the most of such tests: what a shared fixture runs counts
+only for the test that asked for it first. Prints every survivor with its line, and the share of
+survivors. A mutant whose tests take more CPU time than --limit at once counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
 `strict=` of zip (a check that does not fire where shapes have been checked), what only a type
@@ -50,7 +51,7 @@ sys.path[0] = str(ROOT)  # beside this file are folders of tests with the names 
 SAMPLED = ("hierarchy", "solvers", "scenarios")
 FILES = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.py"))
 MAP = ROOT / "build" / "tests-of-lines"
-MOST, ROUNDS = 40, 10  # tests of a round, beside those of SEEN; rounds that a mutant has to survive
+MOST, WHOLE = 40, 6  # tests of a mutant, beside those of SEEN, and then files of tests
 SEEN = "tests/scenarios/test_seen.py"
 COMPILED = ("compiled", "unlocked", "internal", "inlined", "measured")
 # The folder of kernels, the integer codes that kernels read, and the LLVM code that they contain.
@@ -264,7 +265,7 @@ def lines_of(module: str) -> dict[int, tuple[str, ...]]:
 
 
 def tests_of(mutant: Mutant) -> list[tuple[str, ...]]:
-    """Return the tests that run the line of a mutant, in rounds."""
+    """Return the tests that run the line of a mutant, and then files of them."""
     line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
     records = ("tests/project/test_project.py::"
                "test_records_are_frozen_and_what_they_compute_is_neither_shown_nor_compared",)
@@ -279,9 +280,10 @@ def tests_of(mutant: Mutant) -> list[tuple[str, ...]]:
         order[test] = seen[function], footprints()[test]
         seen[function] += 1
     first = [test for test in order if test.startswith(SEEN)]  # much in little time
-    others = sorted(order.keys() - {*first}, key=order.__getitem__)
-    begin = ("field(" in line) * records + default * keys + (*first, *others[:MOST])
-    return [begin, *(tuple(others[i:i + MOST]) for i in range(MOST, len(others), MOST))][:ROUNDS]
+    others = sorted(order.keys() - {*first}, key=order.__getitem__)[:MOST]
+    files = Counter(test.partition("::")[0] for test in order.keys() - {*first})
+    return [("field(" in line) * records + default * keys + (*first, *others),
+            *((file,) for file, _ in files.most_common(WHOLE))]
 
 
 @dataclass(frozen=True)
@@ -323,7 +325,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=10, help="mutants to try")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--limit", type=int, default=300,
-                        help="CPU time that a round of a mutant has [s]")
+                        help="CPU time that the tests of a mutant have at once [s]")
     options = parser.parse_args()
     if options.map:
         write_map(options.tests or ["tests"])
