@@ -16,6 +16,7 @@ from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
+from hierarchy.robots.library import pin
 from hierarchy.state import State
 from hierarchy.task import Level, Rows, Writer, Written
 
@@ -117,7 +118,7 @@ class Posture(Measured):
             return None
 
         def move(t: float) -> None:
-            goal[0] = robot.difference(state.q, rest)[robot.actuated:]
+            goal[0] = pin.difference(robot.model, state.q, rest)[robot.actuated:]  # both sound
 
         return move
 

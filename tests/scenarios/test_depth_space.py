@@ -66,6 +66,7 @@ def test_distances_and_directions_are_those_of_all_pixels_one_by_one(share, thin
     rng, seen_some = np.random.default_rng(5), 0
     for _ in range(6):
         image = rng.uniform(0.6, 2.5, (81, 101)) * (rng.random((81, 101)) < share)
+        image = image.astype(np.float32)
         points = rng.uniform((-1, -1, 0.3), (1, 1, 2.8), (6, 3))
         for body, tip in ((0.0, 0.0), (0.2, 0.3), (0.3, 0.1), (inf, inf)):
             seen = seen_in(image, *points, thin=thin, mean_within=(body, tip))

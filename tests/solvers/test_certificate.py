@@ -101,7 +101,8 @@ def test_a_small_hierarchy_is_judged_at_the_level_at_fault(case):
     h = Hierarchy.from_levels(levels)
     assert all(certify(h, x).certified for x in right)
     for x, level in wrong.items():
-        assert (certify(h, x).certified, certify(h, x).level) == (False, level)
+        verdict = certify(h, x)
+        assert (verdict.certified, verdict.level) == (False, level)
     refused("x has shape", lambda: certify(h, np.zeros(9)))
 
 
@@ -112,7 +113,8 @@ def test_what_is_not_finite_is_never_certified(bad, where):
     x = make("tpm").solve(h).x
     {"x": x, "A": h.A[0], "reference": h.reference, "target": h.lower}[where][0] = bad
     h.upper[0] = h.lower[0]
-    assert (certify(h, x).certified, certify(h, x).level) == (False, 0)
+    verdict = certify(h, x)
+    assert (verdict.certified, verdict.level) == (False, 0)
 
 
 def test_the_certificate_shares_no_code_with_any_solver():
