@@ -205,15 +205,15 @@ def answer(s, record, settings, work):
     saved, at = vector(work, at, n)
     most, code, steps, blocks = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO, ZERO
     limit = min(most, SOLVE_STEPS * max(m, 1))
-    warm, level, s.count[FINISHED] = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1, 0
+    warm, level = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1
+    s.count[FINISHED], s.count[SOUND] = 0, 0
     if warm:
         level = _resumed_at(record[3 * m + 2], levels)
     if warm and level < 0:
         code, blocks = pivot_in_blocks(s, limit, ZERO)
         steps = blocks
-    first = level < 0
-    for seeded in range(ZERO + (warm and first and s.count[SOUND] == 1), -1, -1):
-        if first and code in (UNPROVED, INACCURATE) and steps < limit:
+    for seeded in range(s.count[SOUND] if level < 0 else ZERO - 1, -1, -1):
+        if code in (UNPROVED, INACCURATE) and steps < limit:
             code, level, more = _pass(s, saved, settings, 1.0, seeded == 1, limit - steps,
                                       work[at:])
             steps += more

@@ -139,6 +139,7 @@ def pivot_in_blocks(s, limit, patience):
             _heed(s)
         found = judge(s, levels, ZERO - 1)
         if found.wrong == 0:
+            s.count[SOUND] = 0  # x is no longer that of an earlier set
             return ZERO + INACCURATE, tries
         if found.wrong == found.leaving < s.index[BEGIN, levels]:
             _keep_sound(s)
