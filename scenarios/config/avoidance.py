@@ -13,6 +13,7 @@ from hierarchy.problem import Array
 from hierarchy.words import listed
 from scenarios.config import sections as keys
 from scenarios.config.paths import PathSection, WaypointsSection
+from scenarios.config.sections import naming
 
 
 class RepulsionSection(keys.Section):
@@ -55,10 +56,11 @@ class ObstacleSection(keys.Section):
     def make(self, name: str) -> Obstacle:
         """Return the obstacle, with its name in messages."""
         sizes = (self.radius, self.half_length, *(self.half_lengths or ()))
+        with naming(name):
+            path = None if self.path is None else self.path.make()
         return Obstacle(self.shape, self.centre or (0.0, 0.0, 0.0),
                         tuple(float(size) for size in sizes if size is not None),
-                        np.array(self.rotation),
-                        None if self.path is None else self.path.make(), name)
+                        np.array(self.rotation), path, name)
 
 
 def as_table(obstacle: Any) -> Any:

@@ -82,6 +82,10 @@ class WaypointsSection(AnyPath):
     blend: keys.Span | None = None
     """Rounds each point in a curve of this duration, nearest to it half that time later."""
 
+    def _wrong(self) -> Iterator[str]:
+        self._steady()  # raises, for points and times that do not fit
+        yield from super()._wrong()
+
     def _steady(self) -> paths.Path:
         return (paths.Waypoints(self.times, self.points) if self.blend is None
                 else paths.Blended(self.times, self.points, self.blend))
