@@ -236,7 +236,7 @@ class Robot:
 
     def start(self, name: str) -> Array:
         """Return a copy of the configuration (nq,) that the file calls `name`; UnknownNameError."""
-        if name not in self.starts:
+        if not is_one_of(name, self.starts):
             raise UnknownNameError("keyframe", name, self.starts)
         return self.starts[name].copy()
 

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import Field, fields, is_dataclass
 from functools import wraps
+from numbers import Integral, Real
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -27,6 +28,7 @@ Kind = Literal["equality", "inequality"]
 
 _ROUNDING = 1e-9  # of a period, relative
 _STEP = 2.0**-10  # [s] of the differences that give the derivative of a Jacobian
+_GAINS = ("stiffness", "damping", "gain")
 _OF_STATE = ("error", "jacobian", "jacobian_derivative", "desired_velocity",
              "desired_acceleration", "reference_velocity", "reference_acceleration", "measure",
              "error_reader", "writer")
@@ -36,6 +38,8 @@ _PARTS: dict[str, tuple[type, str]] = {
     "Path": (Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
     "Contacts": (Contacts, "Contacts(robot, ...) of hierarchy.contacts"),
     "Barrier": (Barrier, "Barrier(distance) of hierarchy.avoidance")}
+_NUMBERS: dict[str, Any] = {"float": Real, "int": Integral, "float | None": Real | None,
+                            "int | None": Integral | None}
 
 
 class Rows(NamedTuple):
@@ -182,9 +186,9 @@ class Task(ABC):
         return self.reference_acceleration(state) - drift
 
 
-def check_gains(task: Task) -> None:
-    """Raise a HierarchyError for a gain of a task that is not a number >= 0, or return None."""
-    for gain in ("stiffness", "damping", "gain"):
+def check_gains(task: Task, rows: int | None = None) -> None:
+    """Raise a HierarchyError for a gain that is not a number >= 0, or one for each of `rows`."""
+    for gain in _GAINS:
         value = getattr(task, gain)
         try:
             sides = np.asarray(value)
@@ -192,6 +196,8 @@ def check_gains(task: Task) -> None:
         except (TypeError, ValueError):
             sound = False
         refuse(not sound, f"task {task.name!r}: {gain} = {value!r}, expected a number >= 0")
+        refuse(rows is not None and sides.shape not in ((), (1,), (rows,)), f"task {task.name!r}: "
+               f"{gain} has the shape {sides.shape}, expected a number or ({rows},)")
 
 
 def check_period(task: Task, period: float) -> None:
@@ -238,6 +244,11 @@ def check_parts(task: Task) -> None:
                 raise HierarchyError(f"task {task.name!r}: {part.name} is the name {value!r}; "
                                      f"give {remedy.replace('NAME', repr(value))}")
             expect(f"task {task.name!r}: {part.name}", value, kind, f"give {remedy}")
+        elif part.init and named in _NUMBERS and part.name not in _GAINS:
+            value = getattr(task, part.name)
+            refuse(isinstance(value, bool) or not isinstance(value, _NUMBERS[named]),
+                   f"task {task.name!r}: {part.name} = {value!r}: expected a "
+                   f"{'whole ' * named.startswith('int')}number")
         refuse(named == "Barrier" and task.kind != "inequality", f"task {task.name!r}: its rows "
                "are inequalities")
     if any(part.type == "Sequence[ControlPoint]" for part in parts) and not len(
@@ -284,6 +295,7 @@ def in_turn(*functions: Writer) -> Writer:
 
 def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Writer:
     """Return the writer of a task; at level "torque" one of the joints writes their columns."""
+    check_gains(task, rows.lower.size)
     if level == "torque" and not task.of_forces:
         level, rows = "acceleration", rows._replace(A=rows.A[:, :state.n])
     return task.writer(state, level, rows)

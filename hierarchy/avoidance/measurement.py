@@ -49,7 +49,7 @@ class Measurement:
                  "pairs", "points", "stamp")
 
     def __init__(self, control_points: int) -> None:
-        size = control_points + 1
+        size = int(number("Measurement: control_points", control_points, 0.0)) + 1
         self.points, self.direction = np.zeros((size, 3)), np.zeros((size, 3))
         self.distance, self.magnitude = np.full(size, inf), np.zeros(size)
         self.nearest = np.full(size, -1, dtype=np.int64)

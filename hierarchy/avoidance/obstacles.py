@@ -9,8 +9,8 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import UnknownNameError, expect_each, refuse
-from hierarchy.gate import check_rotation
+from hierarchy.errors import UnknownNameError, expect_each, finite_numbers, is_one_of, refuse
+from hierarchy.gate import array_of, check_rotation
 from hierarchy.jit import inlined, internal
 from hierarchy.kinematics import dot, less
 from hierarchy.paths import Path
@@ -41,14 +41,13 @@ class Obstacle:
     name: str = "obstacle"
 
     def __post_init__(self) -> None:
-        if self.shape not in SHAPES:
+        if not is_one_of(self.shape, SHAPES):
             raise UnknownNameError("obstacle shape", self.shape, SHAPES)
-        expected = SHAPES[self.shape]
-        refuse(len(self.size) != expected or any(not 0.0 < s < inf for s in self.size),
+        expected, size = SHAPES[self.shape], array_of(f"{self.name}: size", self.size)
+        refuse(size.shape != (expected,) or not ((size > 0.0) & (size < inf)).all(),
                f"{self.name}: a {self.shape} takes {expected} positive size(s), got "
-               f"{np.asarray(self.size).tolist()}")
-        refuse(not np.isfinite(np.asarray(self.centre, dtype=float)).all(),
-               f"{self.name}: centre {np.asarray(self.centre).tolist()} is not finite")
+               f"{size.tolist()}")
+        finite_numbers(f"{self.name}: centre", self.centre, 3)
         check_rotation(f"{self.name}: rotation", self.rotation)
 
     def packed(self) -> Array:

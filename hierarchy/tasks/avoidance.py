@@ -129,6 +129,7 @@ class CumulatedRepulsion(JointTask):
         super().__post_init__()
         self.refuse(not self.lever > 0.0, f"lever {self.lever} m must be positive")
         if self.base is not None:
+            expect(f"task {self.name!r}: base", self.base, Task, "give a task such as Posture")
             self.refuse(self.base.dimension != self.joints, f"{self.base.name!r} has "
                         f"{self.base.dimension} rows, expected {self.joints}")
 

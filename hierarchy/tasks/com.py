@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, finite_numbers, is_one_of
+from hierarchy.errors import finite_numbers, is_one_of
 from hierarchy.jit import compiled
 from hierarchy.kinematics import carried, moving_point, place, plus, row_times, times
 from hierarchy.measured import Measure, Measured, measured
@@ -39,11 +39,9 @@ class CentreOfMass(Measured):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        axes = tuple(self.axes)
-        if not axes or any(axis not in (0, 1, 2) for axis in axes) or list(axes) != sorted(
-                set(axes)):
-            raise HierarchyError(f"task {self.name!r}: axes {np.asarray(axes).tolist()} must be "
-                                 "some of 0, 1, 2, in this order")
+        axes = finite_numbers(f"task {self.name!r}: axes", self.axes).tolist()
+        self.refuse(not {*axes} <= {0, 1, 2} or axes != sorted({*axes}), f"axes {self.axes} must "
+                    "be some of 0, 1, 2, in this order")
         self.refuse(not self.robot.masses.sum() > 0.0, f"robot {self.robot.name!r} has no masses")
 
     @property

@@ -9,6 +9,7 @@ import numpy as np
 
 from hierarchy.contacts import Contact, Contacts, zero_while_open
 from hierarchy.errors import HierarchyError
+from hierarchy.gate import array_of
 from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
@@ -46,13 +47,13 @@ class ContactMotion(NamedRows, Written):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.refuse(not self.of.contacts, "there are no contacts")
-        self.refuse(self.anchors is None and self.stiffness, f"stiffness {self.stiffness} needs "
-                    "anchors")
+        stiff = np.any(self.stiffness)
+        self.refuse(self.anchors is None and stiff, f"stiffness {self.stiffness} needs anchors")
         for contact in self.of.contacts:
-            self.refuse(contact.open and self.stiffness, f"contact {contact.name!r} opens, so its "
+            self.refuse(contact.open and stiff, f"contact {contact.name!r} opens, so its "
                         f"stiffness must be 0, not {self.stiffness}")
-        if self.anchors is not None and [np.shape(one) for one in self.anchors] != [
-                (4, 3)] * len(self.of.contacts):
+        if self.anchors is not None and array_of(f"task {self.name!r}: anchors", self.anchors
+                                                 ).shape != (len(self.of.contacts), 4, 3):
             raise HierarchyError(f"task {self.name!r}: anchors are not (4, 3) for each of "
                                  f"{len(self.of.contacts)} contacts")
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, expect, finite_numbers, is_one_of
+from hierarchy.errors import HierarchyError, expect, finite_numbers, is_one_of, number
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import row_times, write_identity
 from hierarchy.measured import Measure, Measured, measured
@@ -153,7 +153,7 @@ class JointDamping(JointTask):
         super().__post_init__()
         self.refuse(not is_one_of(self.weight, ("identity", "mass")), "weight must be 'identity' "
                     f"or 'mass', got {self.weight!r}")
-        expect(f"task {self.name!r}: joints", self.joints, int, "give robot.n")
+        number(f"task {self.name!r}: damping", self.damping, 0.0)
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""

@@ -49,6 +49,7 @@ from hierarchy.avoidance.laws import (
 )
 from hierarchy.avoidance.measurement import Pairs
 from hierarchy.errors import HierarchyError, expect_each
+from hierarchy.gate import array_of
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
@@ -182,12 +183,14 @@ class SelfSeparation(NamedRows, Written):
     def __post_init__(self) -> None:
         super().__post_init__()
         expect_each("capsules", self.capsules, Capsule, "see robot.capsules")
-        pairs = pairs_of_chain(self.capsules) if self.pairs is None else self.pairs
+        pairs = array_of(f"task {self.name!r}: pairs", pairs_of_chain(self.capsules)
+                         if self.pairs is None else self.pairs)
         count = len(self.capsules)
-        self.refuse(not pairs, f"no pair among {count} capsules")
+        self.refuse(not pairs.size, f"no pair among {count} capsules")
+        self.refuse(pairs.shape[1:] != (2,), f"pairs have the shape {pairs.shape}, not (m, 2)")
         for i, j in pairs:
-            self.refuse(not (0 <= i < count and 0 <= j < count and i != j),
-                        f"pair ({i}, {j}) is no pair among {count} capsules")
+            self.refuse(not (i in range(count) and j in range(count) and i != j),
+                        f"pair ({i:g}, {j:g}) is no pair among {count} capsules")
         set_frozen(self, indices=np.array(pairs, dtype=np.int64))
 
     @property
