@@ -164,6 +164,7 @@ ONE_BODY = """<body name="{0}"><joint name="{0}" axis="0 0 1" range="-90 90"/><g
     ('<mujoco><include file="no.xml"/></mujoco>', "Error opening file '.*no.xml'"),
     ('<mujoco><include file="it.xml"/></mujoco>', "'.*it.xml' already included"),
     ("<mujoco/>", "it has no joint that moves"),
+    (f"<mujoco><worldbody>{ONE_BODY.format('universe', '')}</worldbody></mujoco>", "no model can"),
     (f"<mujoco><worldbody>{ONE_BODY.format('a', ONE_BODY.format('a', ''))}</worldbody></mujoco>",
      "repeated name 'a' in "),
     (f"<mujoco><worldbody>{ONE_BODY.format('a', '')}</worldbody></mujoco>".replace("1", "0"),

@@ -34,7 +34,10 @@ def read(path: Path, base: Base | None, shapes: bool, locked: Mapping[str, Array
     file = compiled(path)
     constraints.refuse(file)
     part = part_of(file, base, locked, root)
-    built = build(part)
+    try:
+        built = build(part)
+    except (ValueError, RuntimeError) as error:  # of pinocchio
+        raise file.error(f"no model can be made of it: {error}") from error
     said = (*part.said, *constraints.set_limits(built), *constraints.effort_limits(built))
     compare(built)
     end_effector = proposed_end_effector(built.model)  # before the loops add frames

@@ -263,7 +263,7 @@ def _compare_inertia(built: Built, q: Array, M: Array, data: Any, times: Any) ->
     both = columns.any(axis=1)
     off = np.abs(np.triu(M - products @ columns.T)[np.ix_(both, both)])
     own = np.sqrt(np.diag(M)[both])
-    allowed = _SAME * np.outer(own, own) + _ROUNDING * np.abs(M).max()
+    allowed = _SAME * np.outer(own, own) + _ROUNDING * np.abs(M).max(initial=0.0)
     for row, column in np.argwhere(~(off <= allowed)):
         v = np.flatnonzero(both)[column]
         j = next(j for j, joint in built.pairs() if joint.idx_v <= v < joint.idx_v + joint.nv)

@@ -60,7 +60,7 @@ def compiled(path: Path) -> Compiled:
         warnings.simplefilter("always")
         try:
             model = _compiled(mujoco.MjSpec.from_file(file))
-        except ValueError as error:
+        except (ValueError, RuntimeError) as error:
             said = _in_one_line(str(error))
             raise RobotError(f"robot file {file!r} cannot be read: {said}") from error
     missing = tuple(dict.fromkeys(f"MuJoCo warns: {_in_one_line(str(one.message))}"
