@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy import gate
-from hierarchy.errors import HierarchyError, brief, expect
+from hierarchy.errors import HierarchyError, brief, expect, refuse
 from hierarchy.gate import Array as Array
 from hierarchy.gate import Sizes
 from hierarchy.notebook import html_table
@@ -223,6 +223,11 @@ class Hierarchy:
         """The levels with a row that gives."""
         give = self._give
         return [] if give is None else list(_giving(give.tobytes(), self.rows[3].tobytes()))
+
+    def refuse_extras(self, what: str, taker: str) -> None:
+        """Raise a HierarchyError where `what`, this one, has what a taker would leave out."""
+        has = "has a metric" if self._metric is not None else "gives" if self.giving else ""
+        refuse(has, f"{what} {has}, which {taker} does not know")
 
     def _bounds(self) -> Iterator[tuple[int, int]]:
         """Yield the first row of each level and the one after its last."""

@@ -81,7 +81,11 @@ class Factorization:
 
     @classmethod
     def of(cls, h: Hierarchy, settings: Tpm | None = None) -> Factorization:
-        """Factor the rows of a hierarchy; pass its targets and reference to `solve`."""
+        """Factor the rows of a hierarchy; pass its targets and reference to `solve`.
+
+        Raises HierarchyError: it has a metric, or levels that give.
+        """
+        h.refuse_extras("the hierarchy", "a factorization")
         return cls([A for A, _, _ in h.levels()], h.names, h.n, settings)
 
     # -- properties -------------------------------------------------------------------------------

@@ -31,7 +31,6 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 
 DIGITS = 120
@@ -87,10 +86,9 @@ def prove(h: Hierarchy, candidates: Iterable[ArrayLike], unclear: float = UNCLEA
 
     Slow: 0.02 s for 7 unknowns and 20 rows, 1 s for 38 unknowns and 106 rows.
 
-    Raises HierarchyError: h has a metric.
+    Raises HierarchyError: h has a metric, or levels that give.
     """
-    if h.metric is not None:
-        raise HierarchyError("prove: the hierarchy has a metric; only the identity is proved")
+    h.refuse_extras("prove: the hierarchy", "the proof")
     points = [np.asarray(x, dtype=np.float64) for x in candidates]
     points = [x for x in points if x.shape == (h.n,) and np.isfinite(x).all()]
     levels = len(h.sizes)

@@ -74,7 +74,7 @@ class Batch:
         """Stack hierarchies of one shape.
 
         Raises HierarchyError: no hierarchies, one with other sizes or unknowns than the first, or
-        one with a metric.
+        one with a metric or levels that give.
         """
         if not hierarchies:
             raise HierarchyError("a batch of no hierarchies has no shape; pass arrays instead")
@@ -82,10 +82,7 @@ class Batch:
         for p, h in enumerate(hierarchies):
             if h.n != first.n or h.sizes.tolist() != first.sizes.tolist():
                 raise HierarchyError(f"problem {p} is {h}, where problem 0 is {first}")
-            if h.metric is not None:
-                raise HierarchyError(f"problem {p} has a metric; a batch has none")
-            if h.giving:
-                raise HierarchyError(f"problem {p} gives; no problem of a batch does")
+            h.refuse_extras(f"problem {p}", "a batch")
         stacked = (np.stack([getattr(h, name) for h in hierarchies])
                    for name in ("A", "lower", "upper", "reference"))
         A, lower, upper, reference = stacked

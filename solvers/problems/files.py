@@ -76,10 +76,7 @@ class Collection:
     def save(self, path: str | Path) -> None:
         """Write a file; the same content makes the same bytes."""
         for p, h in enumerate(self.problems):
-            if h.metric is not None or h.giving:
-                what = "has a metric" if h.metric is not None else "gives"
-                raise HierarchyError(f"problem {p} {what}, which version {VERSION} of the format "
-                                     "does not know")
+            h.refuse_extras(f"problem {p}", f"version {VERSION} of the format")
         arrays = _packed(_DATA, self.problems)
         head = {"format": FORMAT, "version": VERSION, **asdict(self.head),
                 "count": len(self.problems), "answers": self.answers is not None,

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.linalg import norm
 
 from hierarchy.archives import read_arrays
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect, file_path
 from hierarchy.problem import Array, Hierarchy
 from solvers.problems.kinds import Random, happens
 
@@ -81,6 +81,7 @@ class Recipe:
 
 
 ANY = Recipe()
+_MORE = ("metric", "give")  # what a file has of the hierarchies that have it
 
 
 def generate(seed: int, recipe: Recipe = ANY) -> Hierarchy:
@@ -127,20 +128,23 @@ def written(rng: Random, n: int, sizes: Sequence[int], recipe: Recipe = ANY) -> 
 
 def save(h: Hierarchy, path: str | Path) -> None:
     """Write a hierarchy as a small .npz file."""
-    np.savez_compressed(path, allow_pickle=False, A=h.A, lower=h.lower, upper=h.upper,
-                        sizes=h.sizes, reference=h.reference,
-                        names=np.array(h.names, dtype=np.str_))
+    expect("save: h", h, Hierarchy, "make one with Hierarchy.from_levels")
+    more = {name: getattr(h, name) for name in _MORE if getattr(h, name) is not None}
+    np.savez_compressed(file_path("save", path), allow_pickle=False, A=h.A, lower=h.lower,
+                        upper=h.upper, sizes=h.sizes, reference=h.reference,
+                        names=np.array(h.names, dtype=np.str_), **more)
 
 
 def load(path: str | Path) -> Hierarchy:
-    """Read a hierarchy written by `save`; names are optional in the file.
+    """Read a hierarchy written by `save`; names, metric and give are optional in the file.
 
     Raises HierarchyError, naming the file, if it is damaged or what it holds is no hierarchy.
     """
     try:
-        file = read_arrays(Path(path))
+        file = read_arrays(file_path("load", path))
         return Hierarchy(file["A"], file["lower"], file["upper"], file["sizes"], file["reference"],
-                         file["names"].tolist() if "names" in file else None)
+                         file["names"].tolist() if "names" in file else None,
+                         **{name: file.get(name) for name in _MORE})
     except KeyError as error:
         raise HierarchyError(f"{path} has no array {error}") from error
     except HierarchyError as error:

@@ -125,8 +125,10 @@ def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None, *,
     above : (n,) an optimum of the levels above, None for level 0.
     sparse : whether the matrices are sparse, as some backends require.
 
-    Raises HierarchyError: no such level; `above` missing, of a wrong shape or not finite.
+    Raises HierarchyError: no such level; `above` missing, of a wrong shape or not finite; a metric
+    or levels that give.
     """
+    h.refuse_extras("the hierarchy", "level_problem")
     x = _checked(h, level, above)
     m = int(h.offsets[level])
     kept, F = _above(Rows(h.A[:m], h.lower[:m], h.upper[:m]), x)

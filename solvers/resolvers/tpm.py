@@ -125,9 +125,12 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
 
     In the staircase form F = J G. Where J has dependent rows, other matrices F give the same G.
 
-    Raises HierarchyError: an inequality, an invalid setting, or rows that are not finite.
+    Raises HierarchyError: an inequality, an invalid setting, rows that are not finite, or a metric
+    in the published form.
     """
     resolver = Tpm(**settings)
+    if not resolver.strict:
+        h.refuse_extras("the hierarchy", "the published form of tpm")
     if (h.lower < h.upper).any():  # worded as for the published form, which takes no bounds
         refuse_inequality(Tpm(form="published"), h, int((h.lower < h.upper).argmax()))
     if resolver.solve(h).status is not Status.SOLVED:
@@ -148,4 +151,4 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
 
 
 def _answer(resolver: Tpm, h: Hierarchy, b: Array, reference: Array) -> Array:
-    return resolver.solve(h.changed(lower=b, upper=b, reference=reference, metric=None)).x
+    return resolver.solve(h.changed(lower=b, upper=b, reference=reference)).x

@@ -132,10 +132,11 @@ def test_an_archive_is_refused_that_unpacks_to_more_than_it_may(small, monkeypat
 
 def test_a_single_hierarchy_in_a_file_passes_the_same_gate(tmp_path):
     path, h = tmp_path / "one.npz", problems.generate(3)
+    h = h.changed(metric=2.0 * np.eye(h.n), give=np.full(h.m, 0.1))
     problems.save(h, path)
     again = problems.load(path)
     assert again.names == h.names
-    for part in ("A", "lower", "upper", "sizes", "offsets", "reference"):
+    for part in ("A", "lower", "upper", "sizes", "offsets", "reference", "metric", "give"):
         np.testing.assert_array_equal(getattr(again, part), getattr(h, part))
     for content, said in (({"lower": np.zeros(2)}, "lower has shape (2,), expected (3,)"),
                           ({"sizes": np.array([2, 10**9])}, "level 2: size 1000000000"),

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from rank_cases import CASES, build, solved
+from refusals import refused
 from scipy.optimize import lsq_linear
 
 from benchmark.solve import oracle
-from hierarchy import Hierarchy, HierarchyError
+from hierarchy import Hierarchy
 from solvers import Status, certify, make
 from solvers.resolvers.tpm import FORMS, task_priority_matrix
 
@@ -31,14 +32,21 @@ def test_f_and_the_contributions_give_the_answer(case, form):
             close(x, J @ (tpm.F @ h.lower - h.A @ h.reference) + h.reference)  # (14)
 
 
+def test_the_contributions_in_a_metric_give_the_answer():
+    h = Hierarchy.from_levels([([[1.0, 2.0, 0.0]], [1.0])], [0.1, 0.2, 0.3],
+                              metric=np.diag([1.0, 5.0, 2.0]))
+    tpm = task_priority_matrix(h)
+    close(tpm.contributions.sum(axis=0) + tpm.null_space_term, STAIRCASE.solve(h).x)
+    refused("the hierarchy has a metric", task_priority_matrix, h, form="published")
+
+
 def close(x, y):
     np.testing.assert_allclose(x, y, rtol=0, atol=1e-8 * (1.0 + np.abs(y).max(initial=0.0)))
 
 
 def test_the_matrix_of_an_inequality_is_refused():
     h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [1.0])])
-    with pytest.raises(HierarchyError, match="level 1, row 0: an inequality"):
-        task_priority_matrix(h)
+    refused("level 1, row 0: an inequality", task_priority_matrix, h)
 
 
 # -- the published form, as printed: not to be mended ---------------------------------------------
