@@ -18,7 +18,7 @@ from hierarchy.gate import Sizes
 from hierarchy.notebook import html_table
 from hierarchy.records import set_frozen
 
-_ROUNDING = 1e-10  # of a violation, relative to 1 + |a| |x|
+_ROUNDING = 1e-10  # of a violation, relative to |a| (1 + |x|)
 _ARRAYS = ("A", "lower", "upper", "reference", "metric", "give")  # what can be set
 
 
@@ -263,8 +263,8 @@ class Hierarchy:
             raise HierarchyError("relaxed: no level of the hierarchy gives")
         rows = slice(*self.offsets[level:level + 2])
         slack, lower, upper = self.slacks(x)[rows], self.lower.copy(), self.upper.copy()
-        reach = np.linalg.norm(self.A[rows], axis=1) * float(np.linalg.norm(x))
-        slack[np.abs(slack) <= _ROUNDING * (1.0 + reach)] = 0.0
+        reach = np.linalg.norm(self.A[rows], axis=1) * (1.0 + float(np.linalg.norm(x)))
+        slack[np.abs(slack) <= _ROUNDING * reach] = 0.0
         room = np.abs(slack) + self._give[rows]
         lower[rows] -= room
         upper[rows] += room

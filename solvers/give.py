@@ -23,17 +23,18 @@ def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy, leve
     The levels down to the last that gives are resolved alone: the answer is a witness of the least
     miss of the first level that gives, (K, n) in `witnesses` for K such levels. Its rows then get
     that miss and what they give as room, see `Hierarchy.relaxed`. For the next such level the same
-    answer is a witness if it meets the level; otherwise it is resolved again. Without an answer for
-    one of them the resolution is that of the part. `memory` is that of all these solves.
+    answer is a witness if it meets all levels from there to this one; otherwise it is resolved
+    again. Without an answer for one of them the resolution is that of the part. `memory` is that of
+    all these solves.
     """
     (A, lower, upper, sizes), offsets, give = h.rows, h.offsets, h.give
     sides = lower, upper = lower.copy(), upper.copy()
     part, whole = (h.upper_part(count, sides) for count in (levels[-1] + 1, len(sizes)))
     before, after = _split(memory, 1 + len(levels)), list[Array | None]()
-    found, witnesses, inaccurate = None, [], False
+    found, witnesses, inaccurate, room = None, [], False, 0
     for level in levels:
         rows = int(offsets[level]), int(offsets[level + 1])
-        if found is None or misses(A, lower, upper, found.x, *rows):
+        if found is None or misses(A, lower, upper, found.x, room, rows[1]):
             found = solve(part, before[len(after)])
             if found.status not in (Status.SOLVED, Status.INACCURATE):
                 found.memory = None
@@ -42,6 +43,7 @@ def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy, leve
             inaccurate |= found.status is Status.INACCURATE
         witnesses.append(found.x)
         relax(A, lower, upper, give, found.x, *rows)
+        room = rows[1]  # the first row that the room just made may change
     after += [None] * (len(levels) - len(after))
     found = solve(whole, before[-1])
     found.memory = _joined([*after, found.memory])

@@ -19,12 +19,13 @@ from solvers.kernels.working_set import (
     SCALE,
     UPPER,
     WorkingSet,
+    neglect,
     restore,
     start_from,
 )
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
-_ROUNDING = 1e-10  # of a violation, relative to 1 + |a| |x|
+_ROUNDING = 1e-10  # of a violation, relative to |a| (1 + |x|)
 
 
 @inlined
@@ -32,7 +33,7 @@ def _miss(a, lower, upper, x):
     """Return by how much a row is missed at x, zero where that is rounding."""
     value = inner_product(a, x)
     miss = max(value - upper, lower - value, 0.0)
-    return miss if miss > _ROUNDING * (1.0 + length_of(a) * length_of(x)) else 0.0
+    return miss if miss > _ROUNDING * length_of(a) * (1.0 + length_of(x)) else 0.0
 
 
 @compiled
@@ -91,21 +92,20 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
 @inlined
 def _find_witnesses(s, g, record, settings, work):
     """Write the witnesses and move the sides; return a code, and where the last record ends."""
-    code, count, found, at, accurate = ZERO + SOLVED, ZERO, ZERO, ZERO, True
+    code, count, found, at, room, accurate = ZERO + SOLVED, ZERO, ZERO, ZERO, ZERO, True
     for k in range(s.multiplier.shape[0] - 1):
         count = ZERO + k + 1 if _gives(s, g, k) else count
     part, size = _first_levels(s, count), record.size // g.witnesses.shape[0]
     for k in range(count):
-        first, last = s.index[FIRST, k], s.index[FIRST, k + 1]
         if code in (SOLVED, INACCURATE) and _gives(s, g, k):
-            if at == 0 or misses(g.A, g.lower, g.upper, s.x, first, last):
+            if at == 0 or misses(g.A, g.lower, g.upper, s.x, room, s.index[FIRST, k + 1]):
                 _begin(part, record[at:at + size])
                 code = answer(part, record[at:at + size], settings, work)
                 accurate, at = accurate and code == SOLVED, at + size
             if code in (SOLVED, INACCURATE):
                 assign(g.witnesses[found], s.x)
                 _relax(s, g, k)
-                found += 1
+                found, room = found + 1, s.index[FIRST, k + 1]
     fill(record[at:], 0.0)
     return INACCURATE if code == SOLVED and not accurate else code, at - 3
 
@@ -128,8 +128,9 @@ def _first_levels(s, count):
 
 @inlined
 def _begin(s, record):
-    """Begin with the rows that act in a record, as they were before any was cut."""
+    """Begin with the rows that act in a record, as they were before any was cut or taken up."""
     restore(s)
+    neglect(s)
     start_from(s, record)
 
 

@@ -117,9 +117,9 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
     A row counts as zero beside a far larger one of its level; beside one of another level it has a
     negative norm, takes no part, and `neglects` says whether x meets it all the same.
     """
-    number, index, first, sane, most = s.number, s.index, ZERO, True, 0.0
+    number, index, first, sane = s.number, s.index, ZERO, True
     s.scalar[TOLERANCE] = rank_tolerance
-    s.count[DIRTY] = s.count[NEGLECTED] = s.count[FACTORED] = s.count[PICKED] = 0
+    s.count[DIRTY] = s.count[FACTORED] = s.count[PICKED] = 0
     for c in range(s.x.size):
         sane &= np.isfinite(s.x[c])
         number[REFERENCE, c] = s.x[c]
@@ -135,16 +135,29 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
         for i in range(first, first + sizes[k]):
             if number[NORM, i] <= NEGLIGIBLE * largest:
                 number[NORM, i] = 0.0
-        first, most = first + sizes[k], max(most, largest)
+        first += sizes[k]
     index[FIRST, sizes.size] = first
-    for i in range(first):
-        if 0.0 < number[NORM, i] <= NEGLIGIBLE * most:
-            number[NORM, i], s.count[NEGLECTED] = -number[NORM, i], s.count[NEGLECTED] + 1
+    most = neglect(s)
     start_from(s, record)
     if not sane:
         return ZERO + NUMERICAL_FAILURE
     in_range = most == 0.0 or LEAST_SQUARE < most * most < 1.0 / LEAST_SQUARE
     return ZERO + (SOLVED if in_range else UNPROVED)
+
+
+@inlined
+def neglect(s):
+    """Mark the rows that are negligible beside those of other levels; return the largest norm."""
+    most, s.count[NEGLECTED] = 0.0, 0
+    for i in range(s.A.shape[0]):
+        most = max(most, abs(s.number[NORM, i]))
+    for i in range(s.A.shape[0]):
+        norm = abs(s.number[NORM, i])
+        light = 0.0 < norm <= NEGLIGIBLE * most
+        if light != (s.number[NORM, i] < 0.0):
+            s.number[NORM, i], s.count[FACTORED] = -norm if light else norm, 0
+        s.count[NEGLECTED] += light
+    return most
 
 
 @inlined
