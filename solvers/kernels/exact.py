@@ -232,6 +232,7 @@ def answer(s, record, settings, work):
     if code == SOLVED and neglects(s):
         code, tries, more = _solve_with_light_rows(s, current, saved, limit - steps)
         steps, blocks = steps + tries + more, blocks + tries
+        code = ZERO + (ITERATION_LIMIT if code != SOLVED and steps >= most else code)
     elif code not in (SOLVED, NUMERICAL_FAILURE):
         finished = s.count[FINISHED]
         if finished == levels or (code == UNPROVED and finished > 0):
@@ -239,7 +240,7 @@ def answer(s, record, settings, work):
         code = ZERO + (ITERATION_LIMIT if steps >= most else INACCURATE)
     _keep(s, record, blocks, steps - blocks)
     record[3 * m + 2] = -1.0
-    if code == ITERATION_LIMIT:
+    if code == ITERATION_LIMIT and s.count[FINISHED] <= levels:  # not for want of light rows
         record[3 * m + 2] = _resume(s, level)
     return code if np.isfinite(length_of(x)) else finish(x, NUMERICAL_FAILURE)
 

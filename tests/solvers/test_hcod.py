@@ -39,6 +39,17 @@ def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
     assert make("hcod", max_iterations=1).solve(apart).unfinished == 0
 
 
+@pytest.mark.parametrize(("kind", "seed"), [
+    ("tiny_rows", 1), ("tiny_rows", 138), ("contacts", 7), ("sixty_unknowns", 2)])
+def test_slices_of_a_budget_end_with_the_answer_of_one_solve(kind, seed):
+    h, five, slices = structured(460_000_000 + seed, (kind,)), make("hcod", max_iterations=5), 1
+    res = five.solve(h)
+    while res.status is Status.ITERATION_LIMIT and slices < 60:
+        res, slices = five.solve(h, res.memory), slices + 1
+    assert (res.status, slices > 1) == (Status.SOLVED, True)
+    np.testing.assert_allclose(res.x, HCOD.solve(h).x, atol=1e-9)
+
+
 @pytest.mark.parametrize("seed", [5, 9])
 def test_the_levels_are_passed_from_a_memory_that_violates_nothing(seed):
     """Some 40 rows act, of which two leave; from nothing it takes 58 and 86 steps."""
