@@ -13,7 +13,7 @@ from standing import ROBOT as HUMANOID
 from hierarchy import Hierarchy, State, paths, tasks
 from hierarchy.loop import Loop
 from hierarchy.tasks.mechanism import Mechanism, model_rows
-from solvers import certify, explain, make, solve_ik
+from solvers import Resolution, certify, explain, make, solve_ik
 from solvers.batch.stacked import Batch, solve
 from solvers.factorization import Factorization
 from solvers.problems import ANY, generate
@@ -74,8 +74,9 @@ def certificates():
         for off in (0.0, 1e-2):
             x = res.x + off * np.sin(1.0 + np.arange(h.n))
             one = certify(h, x)
-            found[f"{seed} {off}"] = [str(one), one.level, one.certified, one.optimal] + (
-                [*dataclasses.asdict(one).values()] if off else [])
+            off_by = dataclasses.asdict(one) if off else {}
+            found[f"{seed} {off}"] = [str(one), one.level, one.certified, one.optimal, off_by,
+                                      h.plain and Resolution(x, active=res.active).verified(h)]
         if seed < 9:
             found[f"{seed}"] = [repr(h), h._repr_html_(), repr(res), res._repr_html_()]
     for name in CASES:

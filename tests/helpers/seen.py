@@ -18,6 +18,7 @@ import shlex
 import tempfile
 from functools import cache, partial
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import patch
 
 import numpy as np
@@ -34,12 +35,12 @@ from scenarios.cli.main import run_command
 from scenarios.config.distributions import Distribution
 from scenarios.draw.figures import drawing, letter
 from scenarios.draw.replay import page as replay
-from scenarios.draw.viewer import live_page
-from scenarios.draw.viewer.live import Live
+from scenarios.draw.viewer import live, live_page
 from scenarios.export import mcap
 from scenarios.loop import controller, faults
 from scenarios.measure import run_folder
 from scenarios.measure.metrics import measure
+from scenarios.measure.verdict import verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
 from scenarios.results import comparing, page, pool, sampled, sampled_page, sections
 from scenarios.results import run as results_run
@@ -66,7 +67,9 @@ def seen_of_run(name):
     return {**_told(run), "figures": {key: figure_facts(fig) for key, fig in letter.figures([run])},
             "scene": condensed(dataclasses.asdict(scene(run, 30.0))),
             "exported": condensed([*mcap._entries(run, mcap.grouped(run))]),
-            "layout": condensed(mcap.layout(run))}
+            "layout": condensed(mcap.layout(run)), "plot": figure_facts(run.plot()),
+            "shown": [repr(run), run._repr_html_()],
+            "columns": [[one.name, one.unit] for one in run.columns()]}
 
 
 def seen_of_ticks(name):
@@ -77,7 +80,8 @@ def seen_of_ticks(name):
 def _told(run):
     return {"signals": {key: condensed(values) for key, values in run.signals.items()},
             "metrics": {key: [one.label, one.unit, one.note, one.value]
-                        for key, one in measure(run).items()}}
+                        for key, one in measure(run).items()},
+            "verdict": [verdict(run).as_plain_data(), verdict(run).on_page()]}
 
 
 def seen_of_keys():
@@ -97,14 +101,16 @@ def seen_of_keys():
 def seen_of_live_page(name):
     """Of the page of a live run, after some requests: what its script reads."""
     with steadily():
-        shown = live_page.LivePage(Live(load(name)))
+        shown = live_page.LivePage(live.Live(load(name)))
         found = [condensed(shown.data())]
-        for asked in ({"resolver": "recursive"}, {"pointing.alpha_d": 20.0}, {"playing": False},
-                      {"nothing": 1}):
-            shown.answer(asked)
+        for what, value in (
+                ("resolver", "recursive"), ("pointing.alpha_d", 20.0), ("obstacle 0", [0, 0.5, 0]),
+                ("path", [0.02, 0.6, 0.05]), ("speed", 2.0), ("toggle", None), ("nothing", 1),
+                ("obstacle 9", [0, 0, 0]), ("speed", "fast"), ("restart", None)):
+            shown.answer({what: value})
             shown.step(0.02)
             found.append(condensed(shown.data()))
-    return found
+        return [*found, _told(shown.live.recording()), _shown_on(shown.html())]
 
 
 def seen_of_answers():
@@ -146,8 +152,10 @@ def steadily():
                                                        sampled_page)),
                 ("svg", svg, (page, sections, sampled_page)), ("write", write, (drawing,)),
                 ("packed", plain, (replay, live_page)),
+                ("time", SimpleNamespace(perf_counter=clock, monotonic=clock), (live, live_page)),
                 ("get_command", cache(typer.main.get_command), (typer.main,)),  # once
-                ("ended", lambda work, jobs, *_: ((job, work(job)) for job in jobs), (pool,))):
+                ("ended", lambda work, jobs, *_, **__: [(job, work(job)) for job in jobs],
+                 (pool,))):
             for module in modules:
                 stack.enter_context(patch.object(module, name, instead))
         yield drawn
@@ -189,7 +197,11 @@ def _written(file):
         return condensed(found) if file.name == "facts.json" else found
     if file.suffix not in (".html", ".csv", ".toml") or file.parent.name == "runs":
         return ""
-    text = file.read_text()
+    return _shown_on(file.read_text())
+
+
+def _shown_on(text):
+    """Lines of a page, and what its script reads."""
     data = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
     return _cleaned(re.sub(r"<(style|script|iframe)\b.*?</\1>", "", text, flags=re.DOTALL)), (
         condensed(json.loads(data[1])) if data else "")
@@ -238,6 +250,8 @@ def condensed(value):
     """One number for all numbers in nested things, the last few of them, and the texts."""
     if isinstance(value, dict):
         return {str(key): condensed(one) for key, one in value.items()}
+    if isinstance(value, list) and 0 < len(value) < 50 and isinstance(value[0], dict):
+        return [*map(condensed, value)]
     numbers, texts = [], []
     _collect(value, numbers, texts)
     values = np.clip(np.nan_to_num(numbers, nan=7e7), -1e30, 1e30)
