@@ -106,7 +106,9 @@ def seen_of_live_page(name):
         for what, value in (
                 ("resolver", "recursive"), ("pointing.alpha_d", 20.0), ("obstacle 0", [0, 0.5, 0]),
                 ("path", [0.02, 0.6, 0.05]), ("speed", 2.0), ("toggle", None), ("nothing", 1),
-                ("obstacle 9", [0, 0, 0]), ("speed", "fast"), ("restart", None)):
+                ("obstacle 9", [0, 0, 0]), ("speed", "fast"), ("avoidance.near", 0.3),
+                ("avoidance.nearly", 0.3), ("obstacle 0", "up"), ("resolver", [1]),
+                ("resolver", "hcood"), ("speed", float("nan")), ("restart", None)):
             shown.answer({what: value})
             shown.step(0.02)
             found.append(condensed(shown.data()))
@@ -184,7 +186,7 @@ def seen_of_commands(group):
 
 def _cleaned(text):
     """Lines of a text, without where this is and what the code is."""
-    text = re.sub(r"-[0-9a-f]{6}.toml|[0-9a-f]{32,64}|\d+ kB", "", text.replace(str(ROOT), ""))
+    text = re.sub(r"-[0-9a-f]{6}.toml|\b[0-9a-f]{32}\b|\d+ kB", "", text.replace(str(ROOT), ""))
     return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
 
 
@@ -192,9 +194,12 @@ def _written(file):
     """What there is to see of a file."""
     if file.name == "run.npz" and len(file.parts) == 2:
         return _told(load_run(file.parent))
-    if file.suffix == ".json":
+    if file.name == "facts.json":
         found = json.loads(file.read_text())
-        return condensed(found) if file.name == "facts.json" else found
+        del found["robot"]["model"], found["robot"]["digest"]  # which have the path of its file
+        return condensed(found)
+    if file.suffix == ".json":
+        return json.loads(file.read_text())
     if file.suffix not in (".html", ".csv", ".toml") or file.parent.name == "runs":
         return ""
     return _shown_on(file.read_text())
