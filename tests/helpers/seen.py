@@ -181,7 +181,8 @@ def seen_of_commands(group):
                                 if "worst" not in file.parts}
         finally:
             os.chdir(here)
-    return json.loads(json.dumps({**found, "drawn": drawn}).replace(folder, ""))
+    text = json.dumps({**found, "drawn": drawn}).replace(folder, "")
+    return json.loads(text.replace(str(ROOT), ""))
 
 
 def _cleaned(text):
