@@ -306,6 +306,8 @@ class Runner:
                 process.wait(2.0 * self.limit)  # one that waits for ever
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
+        if "\nERROR: not found: " in (self.folder / "output").read_text():
+            sys.exit("tests of the map are gone or have other names: python tests/mutate.py --map")
         return process.returncode in (0, 5)  # 5: nothing was to be run
 
     def survives(self, module: str, code: CodeType, tests: tuple[str, ...]) -> bool:

@@ -7,7 +7,6 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from math import isfinite
 from pathlib import Path
 from textwrap import fill
 from time import monotonic
@@ -49,15 +48,9 @@ def certified(recording: Any, damping: float) -> str:
 
 def print_json(data: Any) -> None:
     """Print plain data as one JSON object; a number that is not finite is null."""
-    print(json.dumps(_finite(data), indent=2, allow_nan=False))
+    from scenarios.files import finite
 
-
-def _finite(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not isfinite(data) else data
+    print(json.dumps(finite(data), indent=2, allow_nan=False))
 
 
 def print_table(runs: list[Run]) -> None:

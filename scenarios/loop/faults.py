@@ -19,6 +19,7 @@ from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import ObstacleSection
 from scenarios.config.control import FaultSection
 from solvers import Resolution, Resolver, Status
+from solvers.resolver import Around, Handles
 
 Clock = Callable[[], float]
 
@@ -122,11 +123,11 @@ class FaultySensor:
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class _FaultyResolver(Resolver):
+class _FaultyResolver(Around):
     """Wraps a resolver; its answers may be late or have another status."""
 
     name: ClassVar[str] = "faulty"
-    inner: Resolver
+    handles: ClassVar[Handles] = "inequalities"
     faults: Faults
 
     def solve(self, h: Hierarchy, memory: Any = None) -> Resolution:

@@ -81,8 +81,9 @@ def _of_contacts(controller: Controller) -> Iterator[str]:
     yield from doubts(cell.scenario, cell.contacts)
     if cell.tasks.limits is None or not controller.answered:
         return
-    robot, limit = cell.robot, cell.tasks.limits.limits.acceleration
+    robot = cell.robot
     asked = controller.resolution.x[robot.actuated:robot.n]
+    limit = cell.tasks.limits.limits.acceleration[-len(asked):]  # a base may have limits too
     i = int((np.abs(asked) / limit).argmax())
     if abs(asked[i]) > _FAR_BEYOND * limit[i]:
         unit = robot.velocity_units[robot.actuated + i]

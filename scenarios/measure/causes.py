@@ -164,7 +164,8 @@ def _largest(before: Tick, after: Tick, k: int) -> Cause:
         old, new = getattr(h, side)[rows], getattr(other, side)[rows]
         acts = [np.abs(one.h.A[rows] @ one.x - values) <= _MISSED * (1.0 + np.abs(values))
                 for one, values in ((before, old), (after, new))]
-        moved = np.where((acts[0] | acts[1]) & np.isfinite(old), np.abs(new - old), 0.0)
+        moved = np.where((acts[0] | acts[1]) & np.isfinite(old),
+                         np.abs(np.nan_to_num(new) - np.nan_to_num(old)), 0.0)
         i = int(moved.argmax())
         found.append((float(moved[i]), side, rows[i], float(old[i]), float(new[i])))
     by, side, i, was, now = max(found)

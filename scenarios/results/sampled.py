@@ -13,7 +13,7 @@ from typing import Any
 from hierarchy.errors import HierarchyError
 from hierarchy.words import listed
 from scenarios.config import Scenario, load
-from scenarios.files import write_text
+from scenarios.files import finite, write_text
 from scenarios.measure.run_folder import versions
 from scenarios.results import cluster, pool
 from scenarios.results.columns import Results, results, verdict
@@ -144,7 +144,8 @@ def _written(planned: Plan, store: Store, source: tuple[str, str]) -> dict[str, 
     found = results(planned, kept)
     command, file = source
     write_table(store.folder / TABLE, [(run, kept[run.key]) for run in planned.runs])
-    texts = {"results.json": json.dumps(_plain(planned, found, command), indent=2) + "\n",
+    texts = {"results.json": json.dumps(finite(_plain(planned, found, command)), indent=2,
+                                        allow_nan=False) + "\n",
              "index.html": sampled_page(planned, found, store.folder, command, file),
              **{f"worst/{name_of(run)}": run.load().to_toml() for run in worst_runs(found)}}
     (store.folder / "worst").mkdir(exist_ok=True)

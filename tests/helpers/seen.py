@@ -1,76 +1,87 @@
-"""What a user sees of short runs: signals, metrics, figures, pages, exports; of keys, of robots.
+"""What a user sees: commands, short runs, pages, figures, exports; of keys, robots, tasks, answers.
 
     PYTHONPATH=.:tests/helpers python tests/helpers/seen.py     writes seen.json.gz
 
-Only after a change that is meant. Texts stand without their numbers, many numbers as a sum.
+Only after a change that is meant. Many numbers stand as a sum, beside the last few of them.
+tests/data/seen has the commands, by group; each group runs in a folder of its own.
 """
 
 import contextlib
 import dataclasses
 import gzip
 import io
+import itertools
 import json
 import os
 import re
 import shlex
 import tempfile
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import patch
 
 import numpy as np
+import typer.main
+from computed import COMPUTED
 from matplotlib.colors import to_hex
 from pinned import FOLDER, robot_facts
 
 from hierarchy import HierarchyError, Robot, tasks
-from scenarios import Scenario, load, shipped, simulate
+from scenarios import Scenario, load, load_run, shipped, simulate
+from scenarios.cell.sensors import depth_sensor
+from scenarios.cli import runs as cli_runs
 from scenarios.cli.main import run_command
 from scenarios.config.distributions import Distribution
-from scenarios.draw.figures import letter
+from scenarios.draw.figures import drawing, letter
 from scenarios.draw.replay import page as replay
-from scenarios.draw.viewer import live_page
-from scenarios.draw.viewer.live import Live
+from scenarios.draw.viewer import live, live_page
 from scenarios.export import mcap
-from scenarios.measure.comparison import Comparison
+from scenarios.loop import controller, faults
+from scenarios.measure import run_folder
 from scenarios.measure.metrics import measure
-from scenarios.measure.runs import Run
+from scenarios.measure.verdict import verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
-from scenarios.results import page, sampled_page, sections
-from scenarios.results.sampled import Workers, compare_starts
+from scenarios.results import comparing, page, pool, sampled, sampled_page, sections
+from scenarios.results import run as results_run
 from scenarios.scene.drawn import scene
 from solvers import certify, explain, make, names
 from solvers.problems import ANY, generate, structured
 
+ROOT = FOLDER.parents[2]
 ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
-          *sorted((FOLDER.parents[2] / "examples" / "robots").iterdir())]
+          *sorted((ROOT / "examples" / "robots").iterdir())]
+GROUPS = {file.stem: file.read_text(encoding="utf-8").splitlines()
+          for file in sorted((FOLDER.parent / "seen").glob("*.txt"))}
 # By scenario: seconds that are simulated.
 RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "wipe": 0.05,
         "reach-torque-smooth": 0.02}
-COMMANDS = (  # none of which measures a time
-    "check ellipse-hqp", "check reach-torque-smooth", "check human", "check wipe",
-    *(f"check {file}" for file in ROBOTS), "problems list", "problems show HUM38")
-PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "page", "sampled page", "keys",
-         "problems")  # need no MuJoCo
+PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "keys", "problems", "commands plain",
+         *(f"computed {name}" for name in COMPUTED))
+NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 
 
 def seen_of_run(name):
     """Of one run: {what: lines or sums}."""
     run = _run(name)
-    return {
-        "signals": {key: condensed(values) for key, values in run.signals.items()},
-        "metrics": {key: [one.label, one.unit, one.note, one.value]
-                    for key, one in measure(run).items()},
-        "figures": {key: figure_facts(fig) for key, fig in letter.figures([run])},
-        "scene": condensed(dataclasses.asdict(scene(run, 30.0))),
-        "exported": condensed([*mcap._entries(run, mcap.grouped(run))]),
-        "layout": condensed(mcap.layout(run))}
+    return {**_told(run), "figures": {key: figure_facts(fig) for key, fig in letter.figures([run])},
+            "scene": condensed(dataclasses.asdict(scene(run, 30.0))),
+            "exported": condensed([*mcap._entries(run, mcap.grouped(run))]),
+            "layout": condensed(mcap.layout(run)), "plot": figure_facts(run.plot()),
+            "shown": [repr(run), run._repr_html_()],
+            "columns": [[one.name, one.unit] for one in run.columns()]}
 
 
 def seen_of_ticks(name):
     """Of the first ticks of one run: signals and metrics."""
-    run = _run(name, ticks=8)
+    return _told(_run(name, ticks=8))
+
+
+def _told(run):
     return {"signals": {key: condensed(values) for key, values in run.signals.items()},
-            "metrics": {key: [one.note, one.value] for key, one in measure(run).items()}}
+            "metrics": {key: [one.label, one.unit, one.note, one.value]
+                        for key, one in measure(run).items()},
+            "verdict": [verdict(run).as_plain_data(), verdict(run).on_page()]}
 
 
 def seen_of_keys():
@@ -89,18 +100,19 @@ def seen_of_keys():
 
 def seen_of_live_page(name):
     """Of the page of a live run, after some requests: what its script reads."""
-    def plain(values, steps=False):
-        return [*np.nan_to_num(values).shape, steps, *np.nan_to_num(values).ravel().tolist()]
-
-    with patch.object(live_page, "packed", plain), patch.object(replay, "packed", plain):
-        shown = live_page.LivePage(Live(load(name)))
+    with steadily():
+        shown = live_page.LivePage(live.Live(load(name)))
         found = [condensed(shown.data())]
-        for asked in ({"resolver": "recursive"}, {"pointing.alpha_d": 20.0}, {"playing": False},
-                      {"nothing": 1}):
-            shown.answer(asked)
+        for what, value in (
+                ("resolver", "recursive"), ("pointing.alpha_d", 20.0), ("obstacle 0", [0, 0.5, 0]),
+                ("path", [0.02, 0.6, 0.05]), ("speed", 2.0), ("toggle", None), ("nothing", 1),
+                ("obstacle 9", [0, 0, 0]), ("speed", "fast"), ("avoidance.near", 0.3),
+                ("avoidance.nearly", 0.3), ("obstacle 0", "up"), ("resolver", [1]),
+                ("resolver", "hcood"), ("speed", float("nan")), ("restart", None)):
+            shown.answer({what: value})
             shown.step(0.02)
             found.append(condensed(shown.data()))
-    return found
+        return [*found, _told(shown.live.recording()), _shown_on(shown.html())]
 
 
 def seen_of_answers():
@@ -114,48 +126,92 @@ def seen_of_answers():
                 with contextlib.suppress(HierarchyError):  # of rows that it does not handle
                     res = resolver.solve(h)
                     found[f"{resolver.label} {damping} {k}"] = [
-                        res.status.name, condensed(res.x), masked(str(explain(h, res))),
+                        res.status.name, condensed(res.x), str(explain(h, res)),
                         certify(h, res.x).certified]
     return found
 
 
-def seen_of_page(name):
-    """Of the page that compares two resolvers: its text, and its figures."""
-    runs = [Run(run.scenario, label, label, run, None)
-            for label in ("tpm", "recursive") for run in [_run(name, label)]]
-    with _drawn_by(page, sections) as drawn:
-        text = page.comparison_page(Comparison(runs, "hierarchy compare", {"python": "3"}))
-    return {"text": _text_of(text), "figures": drawn}
-
-
-def seen_of_sampled_page(name):
-    """Of the page that compares two resolvers over sampled starts: its text, and its figures."""
-    with (_drawn_by(sampled_page) as drawn, tempfile.TemporaryDirectory() as folder,
-          patch.object(sampled_page, "versions", lambda: {"python": "3"})):
-        compare_starts([load(name, ["control.duration=0.05"])], ["tpm", "augmented"], 6, 0,
-                       f"{folder}/out", workers=Workers(1), command="hierarchy compare")
-        text = Path(folder, "out", "index.html").read_text().replace(folder, "")
-    return {"text": _text_of(re.sub("-[0-9a-f]{6}.toml", ".toml", text)), "figures": drawn}
-
-
 @contextlib.contextmanager
-def _drawn_by(*modules):
-    """Yield what is drawn by pages, by title, in place of drawing it."""
-    drawn = {}
+def steadily():
+    """Yield figures drawn meanwhile; a look at a clock moves it by 10 us, runs are made here."""
+    clock, drawn = itertools.count(0.0, 1e-5).__next__, {}
+
+    def plain(values, steps=False):
+        return [*np.nan_to_num(values).shape, steps, *np.nan_to_num(values).ravel().tolist()]
 
     def svg(fig, title):
-        drawn[title] = figure_facts(fig)
+        drawn[str(title)] = figure_facts(fig)
         return title
 
+    def write(fig, stem):
+        drawn[Path(stem).name] = figure_facts(fig)
+        Path(f"{stem}.svg").touch()
+
     with contextlib.ExitStack() as stack:
-        for module in modules:
-            stack.enter_context(patch.object(module, "svg", svg))
+        for name, instead, modules in (
+                ("perf_counter", clock, (controller, faults, depth_sensor, cli_runs, results_run)),
+                ("versions", lambda: {"python": "3"}, (run_folder, comparing, sampled,
+                                                       sampled_page)),
+                ("svg", svg, (page, sections, sampled_page)), ("write", write, (drawing,)),
+                ("packed", plain, (replay, live_page)),
+                ("time", SimpleNamespace(perf_counter=clock, monotonic=clock), (live, live_page)),
+                ("get_command", cache(typer.main.get_command), (typer.main,)),  # once
+                ("ended", lambda work, jobs, *_, **__: [(job, work(job)) for job in jobs],
+                 (pool,))):
+            for module in modules:
+                stack.enter_context(patch.object(module, name, instead))
         yield drawn
 
 
-def _text_of(page):
-    text = re.sub(r"<(style|script|iframe)\b.*?</\1>", "", page, flags=re.DOTALL)
-    return [masked(line) for line in text.splitlines() if line.strip()]
+def seen_of_commands(group):
+    """Of the commands of a group: exit codes, what they print and write, figures, runs."""
+    found, here = {}, Path.cwd()
+    with (tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {"COLUMNS": "100"}),
+          steadily() as drawn):
+        os.chdir(folder)
+        try:
+            for line in filter(None, GROUPS[group]):
+                printed = io.StringIO()
+                command = line.replace("ROOT", str(ROOT))
+                with (contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed),
+                      patch("sys.argv", ["hierarchy", *shlex.split(command)])):
+                    code = run_command(shlex.split(command))
+                found[line] = [code, _cleaned(printed.getvalue())]
+            found["written"] = {str(file): _written(file) for file in sorted(Path().rglob("*"))
+                                if "worst" not in file.parts}
+        finally:
+            os.chdir(here)
+    text = json.dumps({**found, "drawn": drawn}).replace(folder, "")
+    return json.loads(text.replace(str(ROOT), ""))
+
+
+def _cleaned(text):
+    """Lines of a text, without where this is and what the code is."""
+    text = re.sub(r"-[0-9a-f]{6}.toml|\b[0-9a-f]{32}\b|\d+ kB", "", text.replace(str(ROOT), ""))
+    return [" ".join(line.split()) for line in text.splitlines()
+            if line.strip() and not line.startswith("task-hierarchy: ")]  # kernels are compiled
+
+
+def _written(file):
+    """What there is to see of a file."""
+    if file.name == "run.npz" and len(file.parts) == 2:
+        return _told(load_run(file.parent))
+    if file.name == "facts.json":
+        found = json.loads(file.read_text())
+        del found["robot"]["model"], found["robot"]["digest"]  # which have the path of its file
+        return condensed(found)
+    if file.suffix == ".json":
+        return json.loads(file.read_text())
+    if file.suffix not in (".html", ".csv", ".toml") or file.parent.name == "runs":
+        return ""
+    return _shown_on(file.read_text())
+
+
+def _shown_on(text):
+    """Lines of a page, and what its script reads."""
+    data = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    return _cleaned(re.sub(r"<(style|script|iframe)\b.*?</\1>", "", text, flags=re.DOTALL)), (
+        condensed(json.loads(data[1])) if data else "")
 
 
 def seen_of_problems():
@@ -169,46 +225,47 @@ def seen_of_robots():
     """Of each robot file of tests and examples: its numbers, by name, and what is said of it."""
     found = {file.name: Robot.from_file(file) for file in ROBOTS}
     return {name: [{key: condensed(value) for key, value in robot_facts(robot).items()},
-                   [masked(text) for text in robot.missing]] for name, robot in found.items()}
+                   robot.missing] for name, robot in found.items()}
 
 
-def seen_of_commands():
-    """Of each command: its exit code and what it prints."""
-    found = {}
-    with patch.dict(os.environ, {"COLUMNS": "100"}):
-        for command in COMMANDS:
-            printed = io.StringIO()
-            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
-                code = run_command(shlex.split(command))
-            text = printed.getvalue().replace(str(FOLDER.parents[2]), "")
-            found[command.split("/")[-1]] = [code, *(" ".join(masked(line).split())
-                                                     for line in text.splitlines())]
-    return found
+def seen_of_computed(name):
+    """Of what functions of the library return."""
+    found = COMPUTED[name]()
+    return {str(key): [*map(condensed, one)] if isinstance(one, (list, tuple)) else condensed(one)
+            for key, one in (found.items() if isinstance(found, dict) else enumerate(found))}
 
 
 def figure_facts(fig):
     """Of each axes: what stands beside it, and of what is drawn in it look and numbers."""
     return [[ax.get_title(loc="left"), ax.get_xlabel(), ax.get_ylabel(), ax.get_xscale(),
              ax.get_yscale(), condensed([ax.get_xlim(), ax.get_ylim(), fig.get_size_inches()]),
-             [masked(text.get_text()) for text in ax.texts],
-             [[line.get_label(), to_hex(line.get_color()), line.get_linewidth(),
-               str(line.get_linestyle()), line.get_zorder(), condensed(line.get_xydata())]
-              for line in ax.lines],
-             [[type(one).__name__, condensed(one.get_alpha() or 1.0), [
-                 to_hex(colour) for colour in np.atleast_2d(one.get_facecolor())][:3],
+             [[text.get_text(), text.get_rotation(), text.get_fontsize(), text.get_ha(),
+               to_hex(text.get_color()), condensed(text.get_position())] for text in ax.texts],
+             [[line.get_label(), to_hex(line.get_color()), line.get_linewidth(), line.get_marker(),
+               str(line.get_linestyle()), line.get_zorder(), condensed(line.get_alpha() or 1.0),
+               condensed(line.get_xydata())] for line in ax.lines],
+             [[type(one).__name__, condensed([one.get_alpha() or 1.0, one.get_zorder(),
+                                              one.get_linewidth()]), *(
+                 [to_hex(colour, True) for colour in np.atleast_2d(colours)][:3]
+                 for colours in (one.get_facecolor(), one.get_edgecolor())),
                condensed([path.vertices for path in one.get_paths()] if hasattr(one, "get_paths")
                          else one.get_path().vertices)] for one in (*ax.patches, *ax.collections)]]
             for ax in fig.axes]
 
 
 def condensed(value):
-    """One number for all numbers in nested things, beside the texts without their numbers."""
+    """One number for all numbers in nested things, the last few of them, and the texts."""
+    if isinstance(value, dict):
+        return {str(key): condensed(one) for key, one in value.items()}
+    if isinstance(value, list) and 0 < len(value) < 50 and isinstance(value[0], dict):
+        return [*map(condensed, value)]
     numbers, texts = [], []
     _collect(value, numbers, texts)
-    values = np.array([number if np.isfinite(number) else 7e7 for number in numbers])
+    values = np.clip(np.nan_to_num(numbers, nan=7e7), -1e30, 1e30)
     weights = 1.0 + np.modf(0.618 * np.arange(len(values)))[0]
     total = float(f"{np.arcsinh(1e3 * values) @ weights:.9g}") if numbers else 0.0
-    return [total, len(values), *sorted(set(texts))] if texts else [total, len(values)]
+    return [total, len(values), *(float(f"{one:.9g}") for one in values[-7:]),
+            *sorted(set(texts), key=lambda text: (re.sub(NUMBER, "#", text), text))]
 
 
 def _collect(value, numbers, texts):
@@ -224,7 +281,7 @@ def _collect(value, numbers, texts):
     elif isinstance(value, (int, float, np.number)):
         numbers.append(float(value))
     elif value is not None:
-        texts.append(masked(value) if isinstance(value, str) else type(value).__name__)
+        texts.append(value if isinstance(value, str) else type(value).__name__)
 
 
 def _undescribed(schema):
@@ -236,19 +293,33 @@ def _undescribed(schema):
         key: _undescribed(one) for key, one in schema.items() if key not in said}
 
 
-def masked(text):
-    """A text without its numbers, which may differ in the last digit."""
-    return re.sub(r"-?\d[\d.,]*(e-?\d+)?", "#", text)
+def alike(found, expected):
+    """Whether what is seen is as it was: numbers nearly, also those in texts."""
+    if not isinstance(found, str) or not isinstance(expected, str):
+        return type(found) is type(expected) and (
+            found == expected or (isinstance(found, float) and _near(found, expected, 1e-9)))
+    pairs = list(zip(*(re.findall(NUMBER, text) for text in (found, expected)), strict=False))
+    return re.sub(NUMBER, "#", found) == re.sub(NUMBER, "#", expected) and all(
+        one == other or _near(float(one), float(other), _rounding(other)) for one, other in pairs)
+
+
+def _near(found, expected, within):
+    return abs(found - expected) <= max(1e-6 * abs(expected), within)
+
+
+def _rounding(number):
+    """What a printed number may be off: its last place, nothing if it is an integer."""
+    mantissa, _, exponent = number.partition("e")
+    places = len(mantissa.partition(".")[2])
+    return max(1.1 * 10.0 ** (int(exponent or 0) - places), 1e-7) if places or exponent else 0.0
 
 
 def _run(name, resolver="", ticks=0):
     scenario = load(name)
     duration = ticks * scenario.control.period if ticks else RUNS[name]
     scenario = load(name, [f"control.duration={duration:.6g}"])
-    run = simulate(scenario.with_resolver(resolver) if resolver else scenario)
-    taken = 1e-4 + 1e-6 * np.arange(run.ticks)  # [s]; the true ones are others each time
-    return dataclasses.replace(run, signals={
-        key: taken if key.startswith("time_") else values for key, values in run.signals.items()})
+    with steadily():
+        return simulate(scenario.with_resolver(resolver) if resolver else scenario)
 
 
 OF_PACKAGES = ("panda-ellipse", "romeo", "singular-panda", "singular-romeo", "stand-g1",
@@ -256,10 +327,10 @@ OF_PACKAGES = ("panda-ellipse", "romeo", "singular-panda", "singular-romeo", "st
 OTHERS = sorted({*shipped()} - {*RUNS, *OF_PACKAGES})
 PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
          **{f"ticks {name}": partial(seen_of_ticks, name) for name in OTHERS},
+         **{f"commands {group}": partial(seen_of_commands, group) for group in GROUPS},
+         **{f"computed {name}": partial(seen_of_computed, name) for name in COMPUTED},
          "answers": seen_of_answers, "live page": partial(seen_of_live_page, "ellipse"),
-         "commands": seen_of_commands, "keys": seen_of_keys,
-         "page": partial(seen_of_page, "ellipse"), "problems": seen_of_problems,
-         "robots": seen_of_robots, "sampled page": partial(seen_of_sampled_page, "ellipse")}
+         "keys": seen_of_keys, "problems": seen_of_problems, "robots": seen_of_robots}
 
 
 def seen(part):

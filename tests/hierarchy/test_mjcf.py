@@ -172,27 +172,6 @@ def test_effort_limits_are_what_actuators_can_do(actuator, joint, effort, writte
     assert "velocity limits: an MJCF has none" in robot.missing
 
 
-def test_what_is_left_out_is_said(written):
-    robot = Robot.load(written(world(
-        link("a", 'stiffness="1" damping="1"', link("b", 'type="ball" range="0 50"')) + TARGET
-        + CUBE + '<geom name="floor" type="plane" size="1 1 1"/>',
-        '<tendon><fixed name="tie"><joint joint="a_joint" coef="1"/></fixed><spatial name="rope">'
-        '<site site="a_tip"/><site site="b_tip"/></spatial></tendon>'
-        '<actuator><motor name="pull" tendon="tie"/></actuator>'
-        '<equality><tendon name="hold" tendon1="rope"/><weld name="off" body1="a" active="false"/>'
-        '<weld name="drag" body1="target" body2="a"/></equality>')))
-    said = " | ".join(robot.missing)
-    for name in ("mocap bodies are left out: target", "left out (root = \"NAME\" takes one as the "
-                 "robot): cube", "of tendons only couplings of joints are here: tie, rope",
-                 "left out: pull", "left out: hold",
-                 "not active are left out: off", "'drag' is left out", "ball joints are ignored: "
-                 "b_joint", "no actuator moves the joint, and nothing limits its effort here: "
-                 "a_joint", "stiffness and damping of joints", "'floor' is a plane"):
-        assert name in said, name
-    assert robot.loops == ()
-    assert "drag 2" not in robot.frame_names
-
-
 def test_inertia_of_a_tendon_is_refused_by_name(written):
     path = written(world(link("a", more=link("b")), '<tendon><fixed name="tie" armature=".1">'
                          '<joint joint="a_joint" coef="1"/><joint joint="b_joint" coef="1"/>'

@@ -24,43 +24,6 @@ def in_an_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize(("damping", "said"), [
-    (0.0, ["certified: 50 of 50 ticks\n"]),
-    (0.05, ["certified: 0 of 50 ticks; the first one not certified is tick 0 (t = 0.000 s)\n",
-            "damping = 0.05: near a singularity"])])
-def test_certify_counts_the_ticks_whose_answer_is_right_and_names_the_first_that_is_not(
-        damping, said, command):
-    out = command("run ellipse --certify --duration 0.05 --set",
-                  f"control.options.damping={damping}").out
-    assert all(line in out for line in said)
-
-
-def test_a_saved_run_says_itself_how_to_repeat_it(tmp_path, command):
-    said = command("run ellipse --duration 0.02 --set pointing.alpha_d=35 --out a --json").out
-    kept = json.loads((tmp_path / "a" / "metrics.json").read_text())
-    assert json.loads(said) == {
-        "scenario": "ellipse", "resolver": "tpm-published", "folder": "a", **kept}
-    command("run a/scenario.toml --out b")
-    first, second = ((tmp_path / out / "scenario.toml").read_text() for out in "ab")
-    assert first == second
-    assert "alpha_d = 35" in second
-
-
-def test_compare_writes_page_numbers_and_a_folder_for_each_run_in_80_columns(tmp_path, command,
-                                                                             monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    out = command("compare ellipse --resolvers tpm-published,tpm,recursive --duration 0.02 "
-                  "--workers 1 --out b").out
-    assert "Report: b/index.html" in out
-    assert max(map(len, out.splitlines())) <= 80
-    assert "…" not in out
-    assert {path.name for path in (tmp_path / "b" / "ellipse").iterdir()} == {
-        "tpm-published", "tpm", "recursive"}
-    numbers = json.loads((tmp_path / "b" / "comparison.json").read_text())
-    assert [run["label"] for run in numbers["runs"]] == ["tpm-published", "tpm", "recursive"]
-    assert numbers["runs"][0]["settings"]["damping"] == 0.05
-
-
 def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, command, monkeypatch):
     simulation_is(mock.Mock(side_effect=AssertionError("the run began")), monkeypatch)
     (tmp_path / "precious").mkdir()
@@ -226,7 +189,7 @@ doctor.doctor_command = broken
 
 def test_the_doctor_finds_all_well_here(command):
     out = command("doctor").out
-    for line in ("No problems found.", "20 of 20 answers certified", "200 ticks of ellipse"):
+    for line in ("No problems found.", "  ok  python ", "20 of 20 answers", "200 ticks of ellipse"):
         assert line in out
 
 

@@ -88,16 +88,8 @@ def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them
         "run `python docs/_ext/scenario_keys.py`")
 
 
-@pytest.mark.parametrize(("asked", "said"), [
-    ("avoidance.obstacles.path", ["Path of its middle", 'with kind = "waypoints"', "list: 3 × numb"
-                                  "er [m], required"]),
-    ("tasks.0.gain", ['[[tasks]] with kind = "pose"', "[1/s], default 10.0", "default 5.0"]),
-    ("control.period", ["number > 0 ≤ 1 [s], default 0.001", "Time from tick to tick."]),
-    ("start.q", ["[rad or m]"]), ("duration", ["control.duration", "faults.duration"]),
-    ("run", ["Usage: hierarchy run"]), ("tasks", ["[[tasks]]"])])
-def test_help_says_what_a_key_means(asked, said, command):
-    text = command("help", asked).out
-    assert all(one in text for one in said)
+def test_help_of_a_command_is_its_usage(command):
+    assert "Usage: hierarchy run" in command("help run").out
 
 
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(

@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from refusals import refused
 
 from scenarios import load, load_run, save, simulate
 from scenarios.cell.build import build
@@ -90,16 +89,3 @@ def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
         {"kind": "not_finite", "action": action, "ticks": ticks, "first_tick": first,
          "first_time": pytest.approx(first * 1e-3)}
         for action, ticks, first in (("hold", 10, AT), ("brake", LASTS - 10, AT + 10))]
-
-
-@pytest.mark.parametrize(("fault", "said"), [
-    ("kind='nan_distance'", "'nan_distance' needs"), ("kind='status'", "'status' needs status"),
-    ("kind='stale', joint=3", "'stale' takes no joint"),
-    ("kind='obstacle', radius=0.1", "either a centre or a place"),
-    ("kind='nan_position', joint=8", "faults.0.joint = 8: robot 'kuka_lwr'"),
-    ("kind='nan_distance', point=10", "faults.0.point = 10: robot"),
-    ("kind='obstacle', radius=0.1, place={joint='elbow', offset=[0, 0, 0]}",
-     "unknown joint 'elbow'")])
-def test_a_fault_that_cannot_be_put_in_is_named(fault, said):
-    name = "strictness" if "needs" in said else "ellipse"
-    refused(said, lambda: simulate(load(name, [f"faults=[{{at=1, duration=1, {fault}}}]"])))

@@ -1,6 +1,5 @@
 """How far a run was from each goal, what samples tell, and why an answer jumps."""
 
-import json
 from dataclasses import replace
 from itertools import product
 
@@ -10,7 +9,7 @@ from hand_made import recording
 from scipy.stats import rankdata
 
 from hierarchy import Hierarchy
-from scenarios import load, save, simulate
+from scenarios import load, simulate
 from scenarios.measure.causes import Tick, causes
 from scenarios.measure.given_up import given_up
 from scenarios.measure.goals import goals
@@ -231,15 +230,3 @@ def test_an_answer_that_the_resolver_does_not_give_is_not_blamed_on_the_rows():
 def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
     run = simulate(load("reach-torque-smooth").with_changes({"control.duration": 0.05}))
     assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
-
-
-def test_the_command_names_the_largest_changes_of_a_run(tmp_path, command):
-    folder = save(simulate(load("ellipse-hqp", ["control.duration=0.05"])), tmp_path / "run")
-    found = json.loads(command("why --json", folder).out)["jumps"]
-    sizes = [one["size"] for one in found]
-    assert (len(found), sizes) == (3, sorted(sizes, reverse=True))
-    tick = found[0]["tick"]
-    out = command("why", folder, "--tick", tick).out
-    assert f"tick {tick} (t = " in out
-    assert f"\n  {found[0]['causes'][0]['kind']}: " in out
-    assert "tick 999: the run has ticks 0 to 49" in command("why --tick 999", folder, code=2).err

@@ -1,6 +1,5 @@
 """`hierarchy problems`, and whether fresh problems are like the stored ones of their family."""
 
-import json
 
 import numpy as np
 import pytest
@@ -51,17 +50,6 @@ def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
 
 def test_the_time_between_recorded_problems_is_the_period_of_their_scenario():
     assert {name: load(name).control.period for name in recorded.SCENARIOS} == recorded.PERIODS
-
-
-def test_export_show_and_check(command, tmp_path):
-    command("problems export integers --seed 4 --count 3 --out", tmp_path)
-    file = tmp_path / "integers-fresh-4.npz"
-    assert file.is_file()
-    assert "3 completely" in command("problems show", file).out
-    shown = json.loads(command("problems show integers --seed 4 --count 3 --json").out)
-    assert shown["sha256"] == read(file).digest
-    assert json.loads(command("problems show EQ7 --json").out)["equalities"] == "100 % of the rows"
-    command("problems check", file)
 
 
 def test_check_finds_an_answer_that_is_not_proved(command, tmp_path):

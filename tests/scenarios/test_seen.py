@@ -5,7 +5,7 @@ import json
 
 import pytest
 from pinned import FOLDER, leaves
-from seen import PARTS, PLAIN, seen
+from seen import PARTS, PLAIN, alike, seen
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +19,5 @@ def test_what_is_seen_is_as_it_was(part, before):
         pytest.importorskip("mujoco")
     found, expected = leaves(seen(part)), leaves(before[part])
     assert found.keys() == expected.keys()
-    near = {place: pytest.approx(value, rel=1e-6, abs=1e-9) if isinstance(value, float) else value
-            for place, value in expected.items()}
-    assert {place: (value, near[place]) for place, value in found.items()
-            if value != near[place]} == {}
+    assert {place: (value, expected[place]) for place, value in found.items()
+            if not alike(value, expected[place])} == {}

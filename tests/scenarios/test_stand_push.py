@@ -5,7 +5,6 @@ import pytest
 
 from scenarios import load, shipped, simulate
 from scenarios.cell.build import build
-from scenarios.config import ScenarioError
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import tick
@@ -17,18 +16,6 @@ pytest.importorskip("mujoco")
 STANDING = load("stand-push")
 SHORT = STANDING.with_changes({"control.duration": 0.02, "plant.pushes.0.at": 0.005,
                                "plant.pushes.0.duration": 0.01})
-
-
-@pytest.mark.parametrize(("keys", "said"), [
-    ({"control.level": "acceleration"}, r"\[\[contacts\]\] needs control.level = \"torque\""),
-    ({"control.level": "acceleration", "contacts": []},
-     "task 'least force' needs control.level = \"torque\""),
-    ({"control.stack": "switched"}, "goes with control.stack = \"hierarchical\", got"),
-    ({"contacts.0.y": None}, "a sole has x and y, a point neither"),
-    ({"limits.torque_step": 0.0}, "limits.torque_step: .* greater than 0")])
-def test_what_does_not_fit_together_is_refused_by_its_key(keys, said):
-    with pytest.raises(ScenarioError, match=said):
-        STANDING.with_changes(keys)
 
 
 def test_a_run_records_torques_plans_and_what_the_floor_does_and_has_their_metrics():

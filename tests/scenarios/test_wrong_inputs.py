@@ -1,4 +1,4 @@
-"""What a user reads who wrote something wrong: the place, the mend, the nearest name."""
+"""What a user reads who wrote something wrong; most of it is in tests/data/seen/wrong*.txt."""
 
 from dataclasses import replace
 
@@ -6,97 +6,24 @@ import numpy as np
 import pytest
 from refusals import refused
 
-import scenarios
 from hierarchy import Hierarchy, HierarchyError, Robot
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position
 from scenarios import compare, load, save, simulate
 from scenarios.cli.terminal import lines
 from scenarios.config import ScenarioError
-from scenarios.config.validation import doubtful_units
 from scenarios.toml_text import read_toml
 from solvers import Resolution, Resolver, Status, certify, explain, make, solve_ik
 
 WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0, 0.1, 0]]"]
 
 
-@pytest.mark.parametrize(("change", "said"), [
-    # Types are strict.
-    ("control.period=true", "control.period: Input should be a valid number, got True"),
-    ("control.policy.not_finite=use", "control.policy.not_finite"),
-    ("pointing.alpha_d=true", "pointing.alpha_d: Input should be a valid number, got True deg"),
-    # Values that cannot be.
-    ("control.period=0", "control.period: Input should be greater than 0, got 0 s"),
-    ("control.duration=1e9", "1e+12 ticks; a recording keeps at most 10,000,000"),
-    ("avoidance.near=0.5", "near = 0.5 m is beyond far = 0.15 m"),
-    ("avoidance.obstacles=[{shape='point'}]", "either a centre or a path"),
-    ("pointing.alpha_d", "expected key=value"),
-    ("sensor={kind='camera', near=5.0, far=1.0}", "near = 5.0 m must be below far = 1.0 m"),
-    # Keys.
-    ("pointing.alfa_d=5", "did you mean 'pointing.alpha_d'"),
-    ("avoidance.obstacles.7.centre=[0, 0, 1]", "[avoidance.obstacles] has 3 entries"),
-    ("avoidance.*.centre=[0, 0, 1]", "[avoidance] is not a list"),
-    # Keys of another kind, and kinds that do not exist.
-    ("sensor.width=320", "sensor.width: only kind 'camera' has it; the kind here is 'exact'"),
-    ("position.path.times=[1]", "only kind 'waypoints' has it; the kind here is 'ellipse'"),
-    ("avoidance.obstacles.0.shape=sphere", "a sphere takes radius"),
-    ("position.path={kind='still', position=[0.0, 0.5, 0.0], out_of_reach=[[2.0, 1.0]]}",
-     "out_of_reach: times must increase"),
-    # What goes together.
-    ("control.stack=hierarchical", "avoidance.kind = \"repulsion\" goes with"),
-    ("limits={acceleration=10, torque=0.5, place='guard'}", "need limits.place = \"stack\""),
-    ("posture={}", "give [damping] or [posture], not both"),
-    ("tasks=[{kind='posture'}]", "[[tasks]] goes with control.stack"),
-    ("faults=[{kind='no_frames', at=0.0, duration=1.0}]", "need a sensor of kind \"camera\""),
-    # What it may be.
-    ("tasks={kind='pose'}", "tasks: expected a list: for tables write [[tasks]] above each"),
-    ("control=[{period=0.1}]", "control: expected one table, as below [control]"),
-    ("name='a b'", "a name has letters, digits")])
-def test_a_value_that_is_wrong_is_named_with_its_key(change, said):
-    refused(said, load, "ellipse", [change])
-
-
-@pytest.mark.parametrize(("name", "changes", "said"), [
-    ("ellipse", ["start.q=[0, 0, 0, 90, 0, 0, 0]"],
-     "joint_4 at 90 is beyond its limits, -2.094 to 2.094 (rad or m). Are these degrees?"),
-    ("ellipse", ["start.end_effector=[5, 5, 5]"], "cannot be reached"),
-    ("ellipse", ["robot.model=ur5"], "example_robot_data:ur5_robot"),
-    ("ellipse", ["avoidance.jacobian=published"], "has no exact derivative"),
-    ("ellipse", ["robot.control_points=[{joint='elbow', offset=[0, 0, 0]}]"],
-     "unknown joint 'elbow'"),
-    ("ellipse", ["robot.control_points=[{joint='joint_2', offset=[0, 0, 0]}]",
-                 "avoidance.obstacles=[[5, 5, 5], [0.0, 0.0, 0.0]]", f"start.q={[0] * 7}"],
-     "obstacle 2 at [0.0, 0.0, 0.0] m touches control point 1"),
-    ("ellipse", ["limits={acceleration=10, margin=3}"], "margin 3 leaves joint_1 no room between"),
-    *(("ellipse", ["control.period=0.005", f"plant.measurement.delay={delay}"], said)
-      for delay, said in (("0.0025", "delay = 0.0025 s is not a whole number of periods"),
-                          ("1e30", "delay = 1e+30 s is more than 1000000 periods"))),
-    *(("ellipse", ["plant.kind=mujoco", f"plant.{key}=[1.0, 2.0]"], f"plant.{key} has 2 entries")
-      for key in ("servo.bandwidth", "joints.friction", "joints.armature")),
-    ("human", ["sensor={kind='camera', position=[1,1,1], look_at=[1,1,1]}"],
-     "sensor: camera: position and look_at are both"),
-    ("human", ["sensor.kind=camera", "sensor.rotation=[[1,0,0],[0,1,0],[0,0,-1]]"],
-     "sensor: camera: rotation: expected a rotation matrix (3, 3), but it is a reflection"),
-    ("human", ["sensor.kind=camera", "sensor.jitter=0.1"], "sensor: camera: jitter = 0.1 s must"),
-    ("human", ["sensor={kind='frames', folder='nowhere'}"],
-     f"sensor: unknown folder of frames '{scenarios.__path__[0]}/library/nowhere'"),
-    ("stand-push", ["contacts.0.frame=left_fot"], "'left_fot'; did you mean 'left_foot'?"),
-    ("stand-push", ["contacts.0.up=[0.0, 0.0, 0.0]"],
-     "contacts.0: sole: up (0.0, 0.0, 0.0) is no direction"),
-    ("stand-push", ["forces.least=400.0", "forces.largest=300.0"],
-     "forces: task 'friction': no normal force is pushing"),
-    ("stand-push", ["start.on_floor=true", "contacts=[]"],
-     "start.on_floor needs a floating base and"),
-    ("stand-push", ["forces.edge=0.2"],
-     "forces: task 'centre of pressure': margin 0.2 m of contact 'left_foot'"),
-    ("stand-push", ["plant.pushes.0.joint=trunk"], "plant.pushes: unknown joint 'trunk'")])
-def test_what_does_not_fit_the_robot_is_said_by_check_and_run(name, changes, said, command,
-                                                              tmp_path):
-    if name != "ellipse" or "plant.kind=mujoco" in changes:
-        pytest.importorskip("mujoco")
+@pytest.mark.parametrize(("name", "changes"), [
+    ("ellipse", ["start.end_effector=[5, 5, 5]"]), ("ellipse", ["robot.model=ur5"]),
+    ("stand-push", ["contacts.0.frame=left_fot"])])
+def test_what_does_not_fit_the_robot_is_said_by_check_and_run(name, changes, command, tmp_path):
     sets = [part for change in changes for part in ("--set", change)]
     checked = command("check", name, *sets, code=2).err
-    assert said in checked
     run = command("run --duration 0.01", name, "--out", tmp_path / "run", *sets, code=2)
     assert run.err.splitlines()[-1] == checked.splitlines()[-1]
     assert not list(tmp_path.rglob("*.npz"))
@@ -145,20 +72,6 @@ def test_files_that_extend_each_other_a_thousand_deep_are_refused(tmp_path):
         (tmp_path / f"{i}.toml").write_text(f'extends = "{base}"\n')
     refused("more than 50 files", load, tmp_path / "999.toml", error=ScenarioError)
     assert load(tmp_path / "20.toml").robot.model == "kuka_lwr"
-
-
-@pytest.mark.parametrize(("name", "changes", "said"), [
-    ("strictness", [], "held back by joint limits joint_1 at its upper side, joint_2 at its lower"),
-    ("ellipse", ["pointing.alpha_d=0.6"],
-     "Warning: pointing.alpha_d = 0.6 deg: cones are in degrees; all other angles are in radians."),
-    ("strictness", ["posture={target=[0, 0, 0, 90, 0, 0, 0], role='task'}"],
-     "posture.target.3 = 90 rad or m: joint angles are in radians"),
-    ("ellipse", ["avoidance.near=0.2", "avoidance.far=0.3"],
-     "body: 112 mm from the nearest obstacle at the start, less than the 200 mm")])
-def test_check_warns_of_what_is_missed_or_doubtful(name, changes, said, command):
-    told = command("check", name, *(part for change in changes for part in ("--set", change))).out
-    assert said in " ".join(told.split())
-    assert "Warning" not in command("check ellipse").out
 
 
 @pytest.mark.parametrize(("line", "said"), [
@@ -238,22 +151,6 @@ def test_a_file_with_a_byte_order_mark_and_names_in_any_alphabet_is_read(tmp_pat
     file = tmp_path / "größe.toml"
     file.write_bytes('extends = "ellipse"\nname = "Größe-模型"\n'.encode("utf-8-sig"))
     assert load(file).name == "Größe-模型"
-
-
-@pytest.mark.parametrize(("asked", "said"), [
-    ("elipse", "did you mean 'ellipse'? The nearest of "), ("m.urdf", "'m.urdf' is a robot"),
-    ("ellipse-starts", "to be run by `hierarchy sweep ellipse-starts`")])
-def test_what_is_no_scenario_is_told_with_what_it_is(asked, said, command):
-    text = command("run", asked, code=2).err
-    assert said in text
-    assert len(text) < 400
-
-
-def test_values_in_millimetres_are_doubted():
-    path = {"position.path": {"kind": "still", "position": [0.3, 0.0, 300.0]}}
-    assert list(doubtful_units(load("ellipse", path))) == [
-        "position.path.position.2 = 300 m: lengths are in metres, not in millimetres"]
-    assert not list(doubtful_units(load("ellipse")))
 
 
 def mine(returned):

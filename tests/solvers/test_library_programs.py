@@ -184,11 +184,3 @@ def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and
     assert int.from_bytes(elf[18:20], "little") == 183  # EM_AARCH64
     assert not (tmp_path / "arm" / "lib" / "libtask_hierarchy.so").exists()
     assert "th_solve_sns" not in (tmp_path / "arm/include/task_hierarchy.h").read_text()
-
-
-@pytest.mark.parametrize(("options", "words"), [
-    ("--resolvers hcdo", "did you mean 'hcod'"), ("--resolvers hqp", "'hqp'"),
-    ("--resolvers hcod,", "empty name"), ("--target x86", "did you mean 'x86_64'")])
-def test_a_wrong_name_is_an_error_that_names_it(tmp_path, command, options, words):
-    assert words in command(f"library {options} --out", tmp_path / "lib", code=2).err
-    assert not (tmp_path / "lib").exists()

@@ -1,0 +1,162 @@
+"""What functions of the library return for fixed arguments, for tests/helpers/seen.py."""
+
+import dataclasses
+import itertools
+
+import numpy as np
+from mechanisms import four_bar
+from rank_cases import CASES, boxed, build
+from scene import FRAME, PATH, ROBOT, TASKS, state_at, states
+from standing import CONTACTS, moving_state, opening, standing_stack, written
+from standing import ROBOT as HUMANOID
+
+from hierarchy import Hierarchy, State, paths, tasks
+from hierarchy.loop import Loop
+from hierarchy.tasks.mechanism import Mechanism, model_rows
+from solvers import Resolution, certify, make, solve_ik
+from solvers.batch.stacked import Batch, solve
+from solvers.factorization import Factorization
+from solvers.problems import ANY, generate
+from solvers.proof import prove
+
+TIMES, POINTS = (0.5, 1.2, 2.0, 3.5), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2), (0.3, 0.5, 0.0),
+                                       (0.1, 0.2, 0.4))
+PATHS = (paths.circle((0.1, 0.2, 0.3), 0.2, (0.2, -0.4, 1.0), 1.7, 0.4), PATH,
+         paths.circle((0.1, 0.2, 0.3), 0.2, (1.0, 0.1, 0.0)), paths.Waypoints(TIMES, POINTS),
+         paths.Recorded(TIMES, POINTS), paths.line(POINTS[0], POINTS[1], 1.5, 0.4),
+         paths.Shifted(paths.Blended(TIMES, POINTS, 0.7), (0.1, 0.0, 0.2)),
+         paths.Jittered(paths.Still(POINTS[3]), 0.01, 1.0, 3))
+
+
+def rows():
+    """Rows of tasks of an arm, of a humanoid in contact and of a mechanism, by name and level."""
+    (q, v), found = states(1)[0], {}
+    state, moving, bar = state_at(q, v), moving_state(3), four_bar(rigid=True)
+    moving.t = 1.05  # a foot is coming down
+    bent = State.at(bar, bar.integrate(bar.rest, 0.3 + 0.1 * np.arange(bar.n)), np.ones(bar.n))
+    for level in ("velocity", "acceleration"):
+        for name, task in TASKS.items():
+            found[f"{name}, {level}"] = [written(task, state, level, 7), task.error(state)]
+        for task in model_rows(bar, 0.01):
+            found[f"{task.name}, {level}"] = [  # rows that may have the other sign
+                *map(np.abs, written(task, bent, level, bar.n)), task.row_names]
+    for contacts in (CONTACTS, opening()):
+        stiffness = 0.0 if contacts.contacts[1].open else 90.0
+        for task in (tasks.Friction(contacts, 8, 2.0, 500.0), tasks.CentreOfPressure(contacts, .01),
+                     tasks.LeastForce(contacts), tasks.BaseDynamics(contacts),
+                     tasks.ContactForce(contacts, "left_foot", (10.0, 0.0, 99.0, 1.0, 2.0, 3.0)),
+                     tasks.ContactMotion.at(moving, contacts, stiffness), tasks.Momentum("both"),
+                     tasks.TorqueLimits(HUMANOID, 0.5, contacts=contacts)):
+            n = contacts.unknowns if task.of_forces else HUMANOID.n
+            found[f"{task.name} of {len(contacts.names)}"] = [
+                written(task, moving, "torque" if task.of_forces else "acceleration", n),
+                getattr(task, "row_names", ())]
+    return found
+
+
+def mechanism():
+    """How a four-bar is closed, how far open it is, and how it bends."""
+    found = []
+    for rigid, q in itertools.product((False, True), (0.1, 0.5)):
+        bar = four_bar(rigid)
+        one, start = Mechanism(bar), bar.integrate(bar.rest, np.full(bar.n, q))
+        closed = one.closed(start, ("crank",))
+        found.append([one.gap(start), closed, one.moving(closed, np.ones(bar.n)),
+                      one.bend(closed, np.ones(bar.n), 0.01)])
+    return found
+
+
+def certificates():
+    """Certificates of answers that are a little off, and proofs."""
+    found = {}
+    for seed in range(30):
+        h = generate(seed, ANY)
+        res = make("hcod").solve(h)
+        for off in (0.0, 1e-2):
+            x = res.x + off * np.sin(1.0 + np.arange(h.n))
+            one = certify(h, x)
+            off_by = dataclasses.asdict(one) if off else {}
+            found[f"{seed} {off}"] = [str(one), one.level, one.certified, one.optimal, off_by,
+                                      h.plain and Resolution(x, active=res.active).verified(h)]
+        if seed < 9:
+            found[f"{seed}"] = [repr(h), h._repr_html_(), repr(res), res._repr_html_()]
+    for name in CASES:
+        h = boxed(build(name, True), -2.0, 1.5)
+        if h.n < 8 and h.m:
+            one = prove(h, [make("hcod").solve(h).x])
+            found[name] = dataclasses.asdict(one) | {"judged": one.judged}
+    return found
+
+
+def programs():
+    """How `hqp` ends with each backend and form, and whether it has the answer of `hcod`."""
+    found = {}
+    for name, form in itertools.product(("proxqp", "osqp"), ("null-space", "slack")):
+        resolver = make("hqp", backend=name, form=form)
+        for seed in range(8):
+            h = generate(seed, ANY)
+            res, exact = resolver.solve(h), make("hcod").solve(h).x
+            found[f"{resolver.label} {seed}"] = [
+                res.status.name, res.iterations, bool(np.abs(res.x - exact).max() < 1e-4)]
+    return found
+
+
+def edited():
+    """A factorization after edits, and what it refuses."""
+    levels = [A for A, _ in CASES["middle_level_dependent_on_the_first"]]
+    one = Factorization(levels, ["a", "b", "c"])
+    found = []
+    for edit, *arguments in (
+            (one.swap, "a", 2), (one.reorder, [1, 0, 2]), (one.delete, "b"),
+            (one.insert, "d", np.eye(6)[:2] + 0.1, 1), (one.insert, "e", levels[1])):
+        edit(*arguments)
+        b = np.cos(np.arange(one.m))
+        found.append([one.names, one.sizes, one.ranks, one.n, one.F, one.G, one.rows,
+                      one.solve(b).x, one.solve(b, np.ones(6)).x])
+    return found
+
+
+def solved():
+    """Batches, inverse kinematics and configurations that serve tasks best."""
+    problems = [Hierarchy.from_levels([(A + 0.01 * k, b) for A, b in CASES["generic"]])
+                for k in range(3)]
+    found = [dataclasses.asdict(solve(Batch.of(problems), make(name), threads=1))
+             for name in ("tpm", "hcod", "merged")]
+    q = np.array([0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3])
+    for goal in ((0.3, 0.5, 0.1), (0.9, 0.0, 0.35), (0.0, 0.1, 5.0)):
+        asked = [tasks.Position(FRAME, paths.Still(goal)), tasks.Posture(tuple(q), gain=2.0)]
+        for settings in ({}, {"limits": False}, {"resolver": "tpm", "damping": 0.0},
+                         {"limits": tasks.JointLimits(ROBOT, 9.0, 0.01), "v": 0.1 * np.ones(7)}):
+            step = solve_ik(ROBOT, q, asked, **settings)
+            found.append([step.v, step.status.name, repr(step)])
+        reached = solve_ik(ROBOT, q, asked[:1], until=1e-6)
+        found.append([reached.verdict, reached.met, reached.errors, reached.status.name])
+    state = moving_state(5)
+    stack = standing_stack(state, CONTACTS, (0.05, 0.0, 0.0), 0.8, 8)
+    h = stack.hierarchy(state)
+    return [*found, [*h.rows], make("hcod").solve(h).x]
+
+
+def looped():
+    """Logs of loops on a clock of their own, by what a late tick leads to."""
+    found = []
+    for overrun, late in itertools.product(("skip", "catch up", "stop"), (0.125, 0.375, 1.5)):
+        now = [100.0]
+
+        def sleep(seconds, now=now):
+            now[0] += seconds
+
+        def step(t, now=now, late=late):
+            now[0] += late if t == 0.5 else 0.125
+            return np.array([t, -t])
+
+        loop = Loop(0.25, overrun=overrun, behind=3, pause_gc=False, sleep=sleep,
+                    clock=lambda now=now: now[0])
+        log = loop.run(step, lambda: None, 2.0, lambda x: None, record=2)
+        found.append([str(log), log.arrays(), log.summary(), log.overruns, log.skipped, log.due])
+    return found
+
+
+COMPUTED = {"rows": rows, "mechanism": mechanism, "certificates": certificates,
+            "programs": programs, "edited": edited, "solved": solved, "looped": looped,
+            "paths": lambda: [[path(t) for t in np.linspace(-0.2, 4.4, 24)] for path in PATHS]}
