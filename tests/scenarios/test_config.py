@@ -88,10 +88,6 @@ def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them
         "run `python docs/_ext/scenario_keys.py`")
 
 
-def test_help_of_a_command_is_its_usage(command):
-    assert "Usage: hierarchy run" in command("help run").out
-
-
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
         tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
@@ -104,12 +100,6 @@ def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
     assert list(found["verdicts"]) == ["own"]
     assert "Step 6: one-sided distances in place of repulsion (hcod)" in (
         folder / "index.html").read_text()
-
-
-def test_a_group_is_not_a_scenario():
-    with pytest.raises(ScenarioError, match=r"'ladder' is a group .*`hierarchy compare ladder`.*"
-                                            "ladder-7-cone"):
-        load("ladder")
 
 
 @pytest.mark.parametrize(("text", "says"), [

@@ -74,25 +74,6 @@ def test_files_that_extend_each_other_a_thousand_deep_are_refused(tmp_path):
     assert load(tmp_path / "20.toml").robot.model == "kuka_lwr"
 
 
-@pytest.mark.parametrize(("line", "said"), [
-    ("run ellipse --duration x", "'--duration'"), ("check ur5", "example_robot_data:ur5"),
-    ("check ellipse-hqp --set avoidance.self_collision=5.0", "avoidance.self_collision: barrier"),
-    (f"check ellipse --set name={'n' * 101}", "at most 100 characters"),
-    ("run ellipse --resolver recursiv", "did you mean 'recursive'"),
-    ("sweep ellipse-starts --part 3", "expected I/N"), ("sweep ellipse", "is a scenario"),
-    ("run ellipse --speed 2", "--speed: needs --live"), ("view nowhere --no-browser", "nowhere"),
-    ("bench [red]nothing[/red]", "[red]nothing[/red]"),
-    ("run ellipse --live --certify", "--certify")])
-def test_a_wrong_command_line_says_what_was_given(line, said, command, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    out, err = command(line, code=2)
-    assert out == ""
-    assert err.startswith("hierarchy: error: ")
-    assert said in err
-    assert "Traceback" not in err
-    assert not list(tmp_path.rglob("*.npz"))
-
-
 SHORT = load("ellipse", ["control.duration=0.01"])
 ROBOT = Robot.load("kuka_lwr")
 HAND = Position(ROBOT.frame("end_effector"), Still([0.3, 0.5, 0.1]))
