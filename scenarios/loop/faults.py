@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, ClassVar, final
@@ -18,6 +18,7 @@ from scenarios.cell.sensors import DepthSensor, Sensor
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.avoidance import ObstacleSection
 from scenarios.config.control import FaultSection
+from scenarios.config.sections import naming
 from solvers import Resolution, Resolver, Status
 from solvers.resolver import Around, Handles
 
@@ -45,8 +46,7 @@ class Faults:
         The cell is that of the scenario `with_room`. Raises ScenarioError where a fault does not
         fit the robot.
         """
-        for i, fault in enumerate(self._sections):
-            _check(f"faults.{i}", fault, cell.robot)
+        check(self._sections, cell.robot)
         if cell.sensor is not None:
             cell = replace(cell, sensor=FaultySensor(cell.sensor, self))
         self._plant, self._robot, self._sensor = cell.plant, cell.robot, cell.sensor
@@ -152,13 +152,16 @@ def with_room(scenario: Scenario) -> Scenario:
     return scenario.model_copy(update={"avoidance": avoidance})
 
 
-def _check(where: str, fault: FaultSection, robot: Robot) -> None:
+def check(faults: Iterable[FaultSection], robot: Robot) -> None:
+    """Raise a ScenarioError for a fault that does not fit the robot, or return None."""
     joints, points = robot.n - robot.actuated, len(robot.control_points) + 1
-    for key, value, most in (("joint", fault.joint, joints), ("point", fault.point, points)):
-        if value is not None and value > most:
-            raise ScenarioError(f"{where}.{key} = {value}: robot {robot.name!r} has {most}")
-    if fault.place is not None:
-        robot.joint(fault.place.joint)
+    for i, fault in enumerate(faults):
+        for key, value, most in (("joint", fault.joint, joints), ("point", fault.point, points)):
+            if value is not None and value > most:
+                raise ScenarioError(f"faults.{i}.{key} = {value}: robot {robot.name!r} has {most}")
+        if fault.place is not None:
+            with naming(f"faults.{i}.place"):
+                robot.joint(fault.place.joint)
 
 
 def _place(fault: FaultSection, robot: Robot, q: Array) -> Array:
