@@ -121,6 +121,8 @@ def _see(rows, A, b, q, first, last, above):
         rows.miss[i] = b[i] - inner_product(A[i], q)
         if above > 0:
             _project(rows.W[i], A[i], rows.P)
+            if inner_product(rows.W[i], rows.W[i]) <= rows.zero[i]:
+                fill(rows.W[i], 0.0)  # it depends on levels above; what is left is rounding
 
 
 @inlined
