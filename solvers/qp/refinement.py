@@ -149,7 +149,9 @@ class _Refinement(NamedTuple):
         """Return whether z is optimal, and the sides that its rows and multipliers suggest."""
         scale = EXACT * (1.0 + norm(z))
         over, excess = self.kept.excess(z), self.limits.excess(z)
-        near = np.where(active != 0, active, self.kept.sides(z, EXACT))
+        side = self.kept.at(active)
+        held = abs(self.kept.A @ z - side) <= scale + EXACT * abs(side)  # not where too many act
+        near = np.where((active != 0) & held, active, self.kept.sides(z, EXACT))
         gradient = self.E.T @ (self.e - self.E @ z) - self.limits.A.T @ excess
         multipliers, on = np.zeros(len(near)), near != 0  # of rows that may be dependent
         multipliers[on], rest = _non_negative((near[on, None] * self.kept.A[on]).T, gradient)
