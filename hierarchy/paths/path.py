@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import cos, inf, sin
+from numbers import Integral
 from pathlib import Path as File
 
 import numpy as np
@@ -146,7 +147,7 @@ class Jittered(Path):
         for name in ("amplitude", "rate", "seed"):
             number(f"jitter: {name}", getattr(self, name))
         expect("jitter: path", self.path, Path, "see hierarchy.paths")
-        expect("jitter: seed", self.seed, int, "give a whole number")
+        expect("jitter: seed", self.seed, Integral, "give a whole number")
         refuse(not 0.0 <= self.amplitude or not 0.0 < self.rate or self.seed < 0,
                f"jitter: amplitude {self.amplitude}, rate {self.rate}, seed {self.seed}, expected "
                "numbers >= 0, > 0 and >= 0")

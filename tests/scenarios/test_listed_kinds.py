@@ -16,8 +16,8 @@ BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
         "control": {"level": "velocity", "stack": "hierarchical", "period": 0.01,
                     "duration": 1.5, "resolver": "hcod"}, "damping": {"value": 1.0}}
 COUPLING = {"kind": "coupling", "joints": {"joint_2": 1.0, "joint_5": -0.5}, "value": -1.0}
-POSITION = {"kind": "position", "frame": "end_effector"}
-WAYPOINTS = {"kind": "waypoints", "times": [0, 1], "points": [[0, 0, 0], [0, 0, 1]]}
+HAND = {"kind": "position", "frame": "end_effector"}
+VIA = {"kind": "waypoints", "times": [0, 1], "points": [[0, 0, 0], [0, 0, 1]]}
 LOOK = {"kind": "look-at", "frame": "end_effector", "target": [0.3, 0.9, 0.9]}
 FRAME = {"kind": "frame", "frame": "end_effector", "offset": [0.03, 0.05, 0.02],
          "rotation": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]}
@@ -54,10 +54,9 @@ def test_a_task_is_made_of_its_keys(task, tmp_path):
 
 def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     avoidance = {"kind": "separation", "distance": 0.05, "obstacles": [[0.1, 0.5, 0.1]]}
-    first = build(scenario_of(tmp_path, POSITION, avoidance=avoidance))
+    first = build(scenario_of(tmp_path, HAND, avoidance=avoidance))
     assert first.stack.names == ("separation", "position")
-    later = build(scenario_of(tmp_path, POSITION, {"kind": "collision"}, COUPLING,
-                              avoidance=avoidance))
+    later = build(scenario_of(tmp_path, HAND, {"kind": "collision"}, COUPLING, avoidance=avoidance))
     assert later.stack.names == ("position", "separation", "coupling")
     assert isinstance(later.stack["separation"], Separation)
 
@@ -80,7 +79,7 @@ def test_a_path_is_followed(path, tmp_path):
 def on_a_circle(**changed):
     """The end effector on a circle, some keys of which are changed."""
     path = {"kind": "circle", "centre": [0.3, 0.5, 0.1], "radius": 0.05} | changed
-    return POSITION | {"path": path}
+    return HAND | {"path": path}
 
 
 @pytest.mark.parametrize(("task", "said"), [
@@ -97,10 +96,9 @@ def on_a_circle(**changed):
     (on_a_circle(times=[1]),
      "tasks.0.path.times: only kind 'waypoints' has it; the kind here is 'circle'"),
     (on_a_circle(kind="line"), "tasks.0.path.start: Field required"),
-    (POSITION | {"path": WAYPOINTS | {"blend": 2.0}},
+    (HAND | {"path": VIA | {"blend": 2.0}},
      "tasks.0.path: blended waypoints: blend 2.0 s must be positive and at most 1 s"),
-    (POSITION | {"path": WAYPOINTS | {"points": []}},
-     "tasks.0.path: waypoints: 2 times for 0 points")])
+    (HAND | {"path": VIA | {"points": []}}, "tasks.0.path: waypoints: 2 times for 0 points")])
 def test_wrong_values_are_named(task, said, tmp_path):
     refused(said, scenario_of, tmp_path, task)
 
@@ -108,7 +106,7 @@ def test_wrong_values_are_named(task, said, tmp_path):
 @pytest.mark.parametrize(("task", "said"), [
     (COUPLING | {"joints": {"joint_9": 1.0}}, "tasks.0: unknown joint 'joint_9'"),
     ({"kind": "self-collision", "distance": 0.5}, "influence"),
-    (POSITION | {"path": {"kind": "recorded", "file": "none.csv"}}, "none.csv cannot be read")])
+    (HAND | {"path": {"kind": "recorded", "file": "none.csv"}}, "none.csv cannot be read")])
 def test_what_does_not_fit_the_robot_is_named(task, said, tmp_path):
     refused(said, lambda: build(scenario_of(tmp_path, task)))
 

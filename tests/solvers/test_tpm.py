@@ -33,8 +33,7 @@ def test_f_and_the_contributions_give_the_answer(case, form):
 
 
 def test_the_contributions_in_a_metric_give_the_answer():
-    h = Hierarchy.from_levels([([[1.0, 2.0, 0.0]], [1.0])], [0.1, 0.2, 0.3],
-                              metric=np.diag([1.0, 5.0, 2.0]))
+    h = Hierarchy.from_levels([([[1.0, 2.0]], [1.0])], [0.1, 0.2], metric=np.diag([1.0, 5.0]))
     tpm = task_priority_matrix(h)
     close(tpm.contributions.sum(axis=0) + tpm.null_space_term, STAIRCASE.solve(h).x)
     refused("the hierarchy has a metric", task_priority_matrix, h, form="published")
