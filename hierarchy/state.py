@@ -11,7 +11,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.avoidance.measurement import Measurement
-from hierarchy.errors import RobotError, brief, expect, number
+from hierarchy.errors import RobotError, brief, expect, number, refuse
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import Kinematics
 from hierarchy.notebook import numbers
@@ -148,7 +148,7 @@ class State:
     @cached_property
     def dynamics(self) -> Dynamics:
         """M(q) and h(q, v) as views; after the first use, each `move` computes them."""
-        model, data = self._model, self._data
+        model, data = self._with_masses()
         self._from_now_on(partial(pin.crba, model, data, self.q),
                           partial(pin.nonLinearEffects, model, data, self.q, self.v))
         return Dynamics(_columns(data.M, self.n), data.nle)
@@ -156,7 +156,7 @@ class State:
     @cached_property
     def momentum(self) -> Momentum:
         """The centroidal momentum matrix and its derivative: views, as those of `dynamics`."""
-        model, data = self._model, self._data
+        model, data = self._with_masses()
         # Not computeCentroidalMapTimeVariation: its dA is not the derivative of A (pinocchio 4.1).
         self._from_now_on(partial(pin.dccrba, model, data, self.q, self.v))
         return Momentum(_columns(data.Ag, 6), _columns(data.dAg, 6))
@@ -165,6 +165,10 @@ class State:
     def beside(self) -> State:
         """Another state of the robot, to move for differences."""
         return State(self.robot)
+
+    def _with_masses(self) -> tuple[Any, Any]:
+        refuse(not self.robot.masses.any(), f"robot {self.robot.name!r} has no masses")
+        return self._model, self._data
 
     def _from_now_on(self, *computations: Callable[[], object]) -> None:
         self._further += computations

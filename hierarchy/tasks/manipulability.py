@@ -30,8 +30,8 @@ class Manipulability(Measured):
 
     `part` "position" counts the three linear rows of its Jacobian, "pose" all six, which mixes
     metres and radians. With kind = "equality" w goes to `least`. At a singular posture the row is
-    zero: it keeps away from there, but does not lead out. For robots whose joints each have one
-    velocity, on a fixed base.
+    zero: it keeps away from there, but does not lead out. For robots on a fixed base, with at least
+    as many joints as rows, each of one velocity.
     """
 
     frame: Frame
@@ -57,26 +57,32 @@ class Manipulability(Measured):
 
     def value(self, state: State) -> float:
         """w at a state."""
-        return _measure(Placed.of(state.kinematics, self.frame).J[:self.rows])
+        return float(self.least - self.error(state)[0])
 
     def measure(self, state: State) -> Measure:
-        """See `Measured.measure`; HierarchyError for a joint with several velocities."""
+        """See `Measured.measure`; HierarchyError for a robot that this task is not for."""
         self.refuse(len(state.supports) != state.n + 1, "a joint of the robot has several "
                     "velocities, or the base floats")
+        self.refuse(state.n < self.rows, f"robot {state.robot.name!r} has {state.n} joints, so the "
+                    f"manipulability of {self.rows} rows is 0 everywhere")
         return _manipulability, self
 
 
 @plain
 def _manipulability(kinematics: Kinematics, task: Manipulability, goal: Array, J: Array,
                     motion: Motion) -> None:
-    """The row is w tr(J^+ dJ/dq_i), with the derivative of J^+ = J^T (J J^T)^-1 in its drift."""
+    """The row is w tr(J^+ dJ/dq_i), with the derivative of J^+ = J^T (J J^T)^-1 in its drift.
+
+    w is the product of the singular values, which is more exact than a determinant.
+    """
     placed, v, rows = Placed.of(kinematics, task.frame), kinematics.v, slice(task.rows)
-    K, dK, w = placed.J[rows], placed.dJ[rows], _measure(placed.J[rows])
+    K, dK = placed.J[rows], placed.dJ[rows]
+    U, lengths, V = np.linalg.svd(K, full_matrices=False)
+    w = lengths.prod()
     motion.error[0], motion.rate[0], motion.drift[0], J[:] = task.least - w, 0.0, 0.0, 0.0
     if w < _SINGULAR:
         return
-    square = np.linalg.inv(K @ K.T)
-    inverse = K.T @ square
+    square, inverse = (U / lengths**2) @ U.T, (V.T / lengths) @ U.T
     dinverse = dK.T @ square - inverse @ (dK @ K.T + K @ dK.T) @ square
     D = _gradient(placed.J, placed.J)[:, rows]
     dD = (_gradient(placed.dJ, placed.J) + _gradient(placed.J, placed.dJ))[:, rows]
@@ -89,11 +95,6 @@ def _manipulability(kinematics: Kinematics, task: Manipulability, goal: Array, J
 def _traces(D: Array, B: Array) -> Array:
     """tr(D_i B) of each D_i (rows, n): (n,)."""
     return np.asarray(D.reshape(len(D), -1) @ B.T.ravel())
-
-
-def _measure(J: Array) -> float:
-    """The product of the singular values, which is more exact than a determinant."""
-    return float(np.prod(np.linalg.svd(J, compute_uv=False)))
 
 
 def _gradient(turning: Array, turned: Array) -> Array:
