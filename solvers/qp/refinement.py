@@ -16,7 +16,6 @@ AT_ONCE = 10  # the first steps change all rows on the wrong side, later ones a 
 EXACT = 1e-10  # relative tolerance of the optimality conditions
 LITTLE = 1e-3  # rows violated by less are assumed to hold at a nearby minimiser
 LARGEST = 1e50  # entry: sums of products of four stay finite; beyond, backends run for minutes
-ROUNDING = 1e-15  # of a row of order one
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
@@ -139,9 +138,9 @@ class _Refinement(NamedTuple):
         on, out = active != 0, broken != 0
         B, c = self._acting(broken)
         G, g = self.kept.A[on], self.kept.at(active)[on]
-        step_on, free = _least(G, g - G @ z, self.rank_tolerance)
+        step_on, free = _least(G, g - G @ z, norm(G, axis=1), self.rank_tolerance)
         new = z + step_on
-        step_in, unseen = _least(B @ free, c - B @ new, self.rank_tolerance)
+        step_in, unseen = _least(B @ free, c - B @ new, norm(B, axis=1), self.rank_tolerance)
         others = self.kept.where(~on).and_(self.limits.where(~out))
         return _moved_inside(new + free @ step_in, free @ unseen, others)
 
@@ -159,7 +158,7 @@ class _Refinement(NamedTuple):
         next_active = np.where(multipliers > 0.0, near, 0.0)
         next_active = np.where(abs(over) > scale, np.sign(over), next_active)
         sizes = norm(self.limits.A, axis=1)
-        moves = sizes > self.rank_tolerance
+        moves = sizes > 0.0
         next_broken = np.sign(excess) * (abs(excess) > scale * np.where(moves, sizes, 1.0))
         left_out = (next_broken != 0) & (next_broken != broken) & moves
         optimal = (self._within_reach(z) and (abs(over) <= scale).all() and not left_out.any()
@@ -181,8 +180,7 @@ class _Refinement(NamedTuple):
         """
         M = np.vstack([self.E, self.limits.A])
         r, sizes = np.concatenate([self.e - self.E @ z, -excess]), norm(M, axis=1)
-        missed = abs(r) > (EXACT * sizes + ROUNDING) * (1.0 + norm(z))
-        missed &= sizes > self.rank_tolerance
+        missed = (abs(r) > EXACT * sizes * (1.0 + norm(z))) & (sizes > 0.0)
         if not missed.any():
             return True
         met, k = ~missed, len(self.E)
@@ -201,14 +199,18 @@ class _Refinement(NamedTuple):
                 np.concatenate([self.e, self.limits.at(broken)[out]]))
 
 
-def _least(M: Array, r: Array, tolerance: float) -> tuple[Array, Array]:
+def _least(M: Array, r: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]:
     """Return the shortest y that minimises ||M y - r||, and a basis of the null space of M.
 
-    Singular values up to `tolerance` count as zero.
+    Rank is that of rows relative to their `norms`. Heavy rows come first and columns are pivoted,
+    so that the error of each row is relative to its own norm (Cox, Higham 1998).
     """
-    U, s, Vt = np.linalg.svd(M)
-    rank = int((s > tolerance).sum())
-    return Vt[:rank].T @ ((U.T[:rank] @ r) / s[:rank]), Vt[rank:].T
+    from scipy.linalg import qr, solve_triangular
+
+    own, free = split(M, norms, rank_tolerance)
+    order = np.argsort(-norm(M, axis=1), kind="stable")
+    Q, R, columns = qr((M @ own)[order], mode="economic", pivoting=True)
+    return own[:, columns] @ solve_triangular(R, Q.T @ r[order]), free
 
 
 def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:

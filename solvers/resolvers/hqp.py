@@ -18,6 +18,7 @@ from solvers.status import Status
 Mask = NDArray[np.bool_]
 _SHARE = 0.01  # of the declared accuracy: allowed error of one level, which lower levels magnify
 _BROKEN = 1e-4  # excess of a row that must hold, relative to 1 + its side
+_NEGLIGIBLE = 1e-13  # norm of a row over the largest of its level: rounding in the others
 _WIDER = (1.0, 100.0)  # multiples of `slack`, tried in turn
 
 
@@ -140,7 +141,8 @@ class _Cascade:
         if not self.N.shape[1] or not A.any():
             self.steps.append(np.zeros(self.h.n))
             return
-        scale, equal = float(abs(A).max()), lower == upper
+        scale, equal, sizes = float(abs(A).max()), lower == upper, norm(A, axis=1)
+        A = np.where((sizes > _NEGLIGIBLE * sizes.max())[:, None], A, 0.0)
         rows = Rows(A / scale, lower / scale, upper / scale)
         own, free = self._split(rows.A[equal])
         fixed = equal.copy()
@@ -226,7 +228,7 @@ class _Cascade:
             return np.eye(p), N.T @ goal.lower
         if lam:
             return np.vstack([goal.A @ N, lam * np.eye(p)]), np.pad(goal.lower, (0, p))
-        return goal.A @ N @ own @ own.T, goal.lower
+        return self._seen(goal).A @ own @ own.T, goal.lower
 
     def _least_squares(self, z: Array, E: Array, e: Array, own: Array, lam: float) -> Array:
         """Return z if its gradient proves it accurate enough, else the exact least squares."""
