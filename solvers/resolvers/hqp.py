@@ -11,7 +11,7 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.qp.backends import backend_of
 from solvers.qp.programs import null_space_program, slack_program
-from solvers.qp.refinement import EXACT, Rows, below_largest, refined, split
+from solvers.qp.refinement import EXACT, Rows, below_largest, lengths, refined, split
 from solvers.resolver import Handles, Resolution, Resolver, number, one_of, register
 from solvers.status import Status
 
@@ -141,9 +141,10 @@ class _Cascade:
         if not self.N.shape[1] or not A.any():
             self.steps.append(np.zeros(self.h.n))
             return
-        scale, equal, sizes = float(abs(A).max()), lower == upper, norm(A, axis=1)
-        A = np.where((sizes > _NEGLIGIBLE * sizes.max())[:, None], A, 0.0)
+        scale, equal = float(abs(A).max()), lower == upper
         rows = Rows(A / scale, lower / scale, upper / scale)
+        sizes = lengths(rows.A)
+        rows.A[sizes <= _NEGLIGIBLE * sizes.max()] = 0.0
         own, free = self._split(rows.A[equal])
         fixed = equal.copy()
         fixed[~equal] = self._advance(rows, equal, own, scale) != 0
@@ -159,7 +160,7 @@ class _Cascade:
         rows : divided by their largest entry, `scale`; `equal` (m,) tells the equalities.
         """
         limits = rows.where(~equal).from_(self.x)
-        near = EXACT * (1.0 + norm(self.x)) * norm(limits.A, axis=1)
+        near = EXACT * (1.0 + norm(self.x)) * lengths(limits.A)
         if not equal.any() and (abs(limits.excess(np.zeros(self.h.n))) <= near).all():
             self._step(np.zeros(self.N.shape[1]))
             return np.zeros(limits.lower.size)
@@ -172,7 +173,7 @@ class _Cascade:
         return rows.seen(self.N, self.settings.rank_tolerance)
 
     def _split(self, A: Array) -> tuple[Array, Array]:
-        return split(A @ self.N, norm(A, axis=1), self.settings.rank_tolerance)
+        return split(A @ self.N, lengths(A), self.settings.rank_tolerance)
 
     def _lambda(self, A: Array, equal: Mask, own: Array, scale: float) -> float:
         """Return lambda of a level, in its scaled rows; bounds at the top have none."""
@@ -196,7 +197,7 @@ class _Cascade:
 
     def _movable(self) -> Rows:
         """Return the rows from above that a step along N can still move, as rows of that step."""
-        moved = norm(self.kept.A @ self.N, axis=1) > self.settings.rank_tolerance
+        moved = lengths(self.kept.A @ self.N) > self.settings.rank_tolerance
         return self.kept.where(moved).from_(self.x)
 
     def _minimise(self, goal: Rows, limits: Rows, own: Array, lam: float, last: bool = False
