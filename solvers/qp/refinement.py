@@ -101,6 +101,22 @@ def split(M: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]:
     return Vt[:rank].T, Vt[rank:].T
 
 
+def least(M: Array, r: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]:
+    """Return the shortest y that minimises ||M y - r||, and a basis of the null space of M.
+
+    Rank is that of rows relative to their `norms`. Heavy rows come first and columns are pivoted,
+    so that the error of each row is relative to its own norm (Cox, Higham 1998).
+    """
+    from scipy.linalg.lapack import dgelsy
+
+    own, free = split(M, norms, rank_tolerance)
+    order, rank = np.argsort(-lengths(M), kind="stable"), own.shape[1]
+    if rank == 0:
+        return np.zeros(len(own)), free
+    y = dgelsy((M @ own)[order], r[order], np.zeros(rank, np.int32), 0.0, 4 * rank + 1)[1]
+    return own @ y[:rank], free
+
+
 def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows, rank_tolerance: float
             ) -> tuple[Array, Array] | None:
     """Move from a backend's z to the exact minimiser, repairing the active set where necessary.
@@ -143,9 +159,9 @@ class _Refinement(NamedTuple):
         on, out = active != 0, broken != 0
         B, c = self._acting(broken)
         G, g = self.kept.A[on], self.kept.at(active)[on]
-        step_on, free = _least(G, g - G @ z, lengths(G), self.rank_tolerance)
+        step_on, free = least(G, g - G @ z, lengths(G), self.rank_tolerance)
         new = z + step_on
-        step_in, unseen = _least(B @ free, c - B @ new, lengths(B), self.rank_tolerance)
+        step_in, unseen = least(B @ free, c - B @ new, lengths(B), self.rank_tolerance)
         others = self.kept.where(~on).and_(self.limits.where(~out))
         return _moved_inside(new + free @ step_in, free @ unseen, others)
 
@@ -205,22 +221,6 @@ class _Refinement(NamedTuple):
         out = broken != 0
         return (np.vstack([self.E, self.limits.A[out]]),
                 np.concatenate([self.e, self.limits.at(broken)[out]]))
-
-
-def _least(M: Array, r: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]:
-    """Return the shortest y that minimises ||M y - r||, and a basis of the null space of M.
-
-    Rank is that of rows relative to their `norms`. Heavy rows come first and columns are pivoted,
-    so that the error of each row is relative to its own norm (Cox, Higham 1998).
-    """
-    from scipy.linalg.lapack import dgelsy
-
-    own, free = split(M, norms, rank_tolerance)
-    order, rank = np.argsort(-lengths(M), kind="stable"), own.shape[1]
-    if rank == 0:
-        return np.zeros(len(own)), free
-    y = dgelsy((M @ own)[order], r[order], np.zeros(rank, np.int32), 0.0, 4 * rank + 1)[1]
-    return own @ y[:rank], free
 
 
 def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:

@@ -11,7 +11,7 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.qp.backends import backend_of
 from solvers.qp.programs import null_space_program, slack_program
-from solvers.qp.refinement import EXACT, Rows, below_largest, lengths, refined, split
+from solvers.qp.refinement import EXACT, Rows, below_largest, least, lengths, refined, split
 from solvers.resolver import Handles, Resolution, Resolver, number, one_of, register
 from solvers.status import Status
 
@@ -19,7 +19,6 @@ Mask = NDArray[np.bool_]
 _SHARE = 0.01  # of the declared accuracy: allowed error of one level, which lower levels magnify
 _BROKEN = 1e-4  # excess of a row that must hold, relative to 1 + its side
 _NEGLIGIBLE = 1e-13  # norm of a row over the largest of its level: rounding in the others
-_WIDER = (1.0, 100.0)  # multiples of `slack`, tried in turn
 
 
 @final
@@ -208,19 +207,17 @@ class _Cascade:
         Returns z and the side on which each limit remains violated. Raises _StopError if no
         answer could be verified.
         """
-        kept, vouched = self._movable(), False
+        kept = self._movable()
         E, e = self._target(goal, own, lam, last)
-        for wider in _WIDER:
-            z, found = self._ask(goal, limits, kept.relaxed(wider * self.settings.slack), lam, last)
-            vouched |= found
-            if not kept.lower.size and not limits.lower.size:
-                return self._least_squares(z, E, e, own, lam), np.empty(0)
-            for start in (z, np.zeros_like(z)):  # at zero all rows held from above hold
-                exact = refined(start, E, e, self._seen(limits), self._seen(kept),
-                                self.settings.rank_tolerance)
-                if exact is not None:
-                    return exact
-        raise _StopError(Status.INACCURATE if vouched else Status.BACKEND_FAILURE)
+        z, found = self._ask(goal, limits, kept.relaxed(self.settings.slack), lam, last)
+        if not kept.lower.size and not limits.lower.size:
+            return self._least_squares(z, E, e, own, lam), np.empty(0)
+        for start in (z, np.zeros_like(z)):  # at zero all rows held from above hold
+            exact = refined(start, E, e, self._seen(limits), self._seen(kept),
+                            self.settings.rank_tolerance)
+            if exact is not None:
+                return exact
+        raise _StopError(Status.INACCURATE if found else Status.BACKEND_FAILURE)
 
     def _target(self, goal: Rows, own: Array, lam: float, last: bool) -> tuple[Array, Array]:
         """Return E and e: the goal and its damping are ||E z - e||^2."""
@@ -241,7 +238,7 @@ class _Cascade:
         allowed = float(_SHARE * self.backend.accuracy * (1.0 + norm(self.x)))
         if norm(own.T @ (E.T @ e) - own.T @ (E.T @ (E @ (own @ z)))) <= allowed * smallest**2:
             return np.asarray(own @ z)
-        return np.asarray(own @ np.linalg.lstsq(E @ own, e, rcond=None)[0])
+        return least(E, e, lengths(E), self.settings.rank_tolerance)[0]
 
     def _ask(self, goal: Rows, limits: Rows, kept: Rows, lam: float, last: bool
              ) -> tuple[Array, bool]:
