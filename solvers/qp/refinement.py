@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 
-REFINEMENTS = 50  # most steps from a backend's active set to the exact one
-AT_ONCE = 10  # the first steps change all rows on the wrong side, later ones a row in turn
+REFINEMENTS = 100  # most steps from a backend's active set to the exact one
+AT_ONCE = 10  # steps that change all rows on the wrong side, before as many that change one
 EXACT = 1e-10  # relative tolerance of the optimality conditions
 LITTLE = 1e-3  # rows violated by less are assumed to hold at a nearby minimiser
 LARGEST = 1e50  # entry: sums of products of four stay finite; beyond, backends run for minutes
@@ -139,7 +139,7 @@ def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows, rank_toleran
         changed = np.flatnonzero(wanted != sides)
         if not len(changed):
             return None
-        if step >= AT_ONCE:  # changing all rows at once has cycled
+        if step // AT_ONCE % 2:  # changing all rows at once has cycled
             changed = changed[step % len(changed), None]
         sides[changed] = wanted[changed]
     return None
@@ -173,19 +173,21 @@ class _Refinement(NamedTuple):
         held = abs(self.kept.A @ z - side) <= scale + EXACT * abs(side)  # not where too many act
         near = np.where((active != 0) & held, active, self.kept.sides(z, EXACT))
         gradient = self.E.T @ (self.e - self.E @ z) - self.limits.A.T @ excess
-        on = near != 0
-        forces, rest = _non_negative((near[on, None] * self.kept.A[on]).T, gradient)
+        on, forces = near != 0, np.zeros(len(near))
+        forces[on], rest = _non_negative((near[on, None] * self.kept.A[on]).T, gradient)
         multipliers, balanced = self._balanced(z, near, excess)
-        multipliers[on] += forces
         B, c = self._acting(broken)
-        next_active = np.where(multipliers > 0.0, near, 0.0)
+        settled = rest <= EXACT * (1.0 + norm(B.T @ c))
+        next_active = np.where((multipliers > 0.0) | (forces > 0.0), near, 0.0)
+        if not settled and (next_active == active).all():  # met rows hold where none should
+            next_active = np.where(forces > 0.0, near, 0.0)
         next_active = np.where(abs(over) > scale, np.sign(over), next_active)
         sizes = lengths(self.limits.A)
         moves = sizes > 0.0
         next_broken = np.sign(excess) * (abs(excess) > scale * np.where(moves, sizes, 1.0))
         left_out = (next_broken != 0) & (next_broken != broken) & moves
         optimal = (self._within_reach(z) and (abs(over) <= scale).all() and not left_out.any()
-                   and rest <= EXACT * (1.0 + norm(B.T @ c)) and balanced)
+                   and settled and balanced)
         return bool(optimal), np.concatenate([next_active, next_broken])
 
     def _within_reach(self, z: Array) -> bool:
