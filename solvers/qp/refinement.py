@@ -181,6 +181,8 @@ class _Refinement(NamedTuple):
         next_active = np.where((multipliers > 0.0) | (forces > 0.0), near, 0.0)
         if not settled and (next_active == active).all():  # met rows hold where none should
             next_active = np.where(forces > 0.0, near, 0.0)
+        if not held[active != 0].all():  # multipliers of too many rows say little
+            next_active = near
         next_active = np.where(abs(over) > scale, np.sign(over), next_active)
         sizes = lengths(self.limits.A)
         moves = sizes > 0.0

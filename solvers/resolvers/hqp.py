@@ -18,6 +18,7 @@ from solvers.status import Status
 Mask = NDArray[np.bool_]
 _SHARE = 0.01  # of the declared accuracy: allowed error of one level, which lower levels magnify
 _BROKEN = 1e-4  # excess of a row that must hold, relative to 1 + its side
+_WIDER = (1.0, 100.0)  # multiples of `slack`, tried in turn
 _NEGLIGIBLE = 1e-13  # norm of a row over the largest of its level: rounding in the others
 
 
@@ -207,17 +208,19 @@ class _Cascade:
         Returns z and the side on which each limit remains violated. Raises _StopError if no
         answer could be verified.
         """
-        kept = self._movable()
+        kept, vouched = self._movable(), False
         E, e = self._target(goal, own, lam, last)
-        z, found = self._ask(goal, limits, kept.relaxed(self.settings.slack), lam, last)
-        if not kept.lower.size and not limits.lower.size:
-            return self._least_squares(z, E, e, own, lam), np.empty(0)
-        for start in (z, np.zeros_like(z)):  # at zero all rows held from above hold
-            exact = refined(start, E, e, self._seen(limits), self._seen(kept),
-                            self.settings.rank_tolerance)
-            if exact is not None:
-                return exact
-        raise _StopError(Status.INACCURATE if found else Status.BACKEND_FAILURE)
+        for wider in _WIDER:
+            z, found = self._ask(goal, limits, kept.relaxed(wider * self.settings.slack), lam, last)
+            vouched |= found
+            if not kept.lower.size and not limits.lower.size:
+                return self._least_squares(z, E, e, own, lam), np.empty(0)
+            for start in (z, np.zeros_like(z)):  # at zero all rows held from above hold
+                exact = refined(start, E, e, self._seen(limits), self._seen(kept),
+                                self.settings.rank_tolerance)
+                if exact is not None:
+                    return exact
+        raise _StopError(Status.INACCURATE if vouched else Status.BACKEND_FAILURE)
 
     def _target(self, goal: Rows, own: Array, lam: float, last: bool) -> tuple[Array, Array]:
         """Return E and e: the goal and its damping are ||E z - e||^2."""
