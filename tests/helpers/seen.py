@@ -7,6 +7,7 @@ tests/data/seen has the commands, by group; each group runs in a folder of its o
 """
 
 import contextlib
+import csv
 import dataclasses
 import gzip
 import io
@@ -17,6 +18,7 @@ import re
 import shlex
 import tempfile
 from functools import cache, partial
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import patch
@@ -27,10 +29,10 @@ from computed import COMPUTED
 from matplotlib.colors import to_hex
 from pinned import FOLDER, robot_facts
 
-from hierarchy import HierarchyError, Robot, tasks
+from hierarchy import HierarchyError, Robot, jit, tasks
 from scenarios import Scenario, load, load_run, shipped, simulate
 from scenarios.cell.sensors import depth_sensor
-from scenarios.cli import runs as cli_runs
+from scenarios.cli import doctor, runs
 from scenarios.cli.main import run_command
 from scenarios.config.distributions import Distribution
 from scenarios.draw.figures import drawing, letter
@@ -43,10 +45,11 @@ from scenarios.measure.metrics import measure
 from scenarios.measure.verdict import verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
 from scenarios.results import comparing, page, pool, sampled, sampled_page, sections
-from scenarios.results import run as results_run
+from scenarios.results import run as table
 from scenarios.scene.drawn import scene
 from solvers import certify, explain, make, names
 from solvers.problems import ANY, generate, structured
+from solvers.qp import backends
 
 ROOT = FOLDER.parents[2]
 ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
@@ -58,6 +61,12 @@ RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "
         "reach-torque-smooth": 0.02}
 PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "keys", "problems", "commands plain",
          *(f"computed {name}" for name in COMPUTED))
+# What `hierarchy doctor` finds: names of modules of Python.
+REQUIRED = ("json>=2", "calendar>=9", "csv", "string<2", "none>=3", "wave; sys_platform=='no'",
+            *(f"{name}; extra == '{extra}'" for name, extra in (
+                ("json", "robots"), ("json", "sim"), ("none", "sim"), ("none", "export"),
+                ("csv", "adapters"), ("csv", "dev"), ("task-hierarchy[sim]", "all"))))
+INSTALLED = {"task-hierarchy": "0.9", "json": "2.0.9", "calendar": "8.1", "csv": "3", "string": "1"}
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 
 
@@ -149,7 +158,12 @@ def steadily():
 
     with contextlib.ExitStack() as stack:
         for name, instead, modules in (
-                ("perf_counter", clock, (controller, faults, depth_sensor, cli_runs, results_run)),
+                ("perf_counter", clock, (controller, faults, depth_sensor, doctor, runs, table)),
+                ("requires", lambda _: REQUIRED, (doctor,)), ("__file__", "csv.py", (csv,)),
+                ("version", lambda name: INSTALLED.get(name) or version("none"), (doctor,)),
+                ("sys", SimpleNamespace(version="3.11.2 (main)", version_info=(3, 11)), (doctor,)),
+                ("installed", ("osqp", "proxqp").__contains__, (backends,)),
+                ("cache_folder", lambda: Path("cache"), (jit,)),
                 ("versions", lambda: {"python": "3"}, (run_folder, comparing, sampled,
                                                        sampled_page)),
                 ("svg", svg, (page, sections, sampled_page)), ("write", write, (drawing,)),
