@@ -129,6 +129,9 @@ def derived():
         found[f"{name} gives"] = [res.x, h.giving, *(
             str(certify(h, x, witnesses=res.witnesses)) for x in (res.x, res.x + 0.01)), *(
             [*h.relaxed(level, res.x).rows] for level in range(len(levels)))]
+        heavy = h.changed(metric=np.diag(1.0 + np.arange(h.n)))
+        found[f"{name} weighs"] = [make("hcod", damping=damping).solve(one).x
+                                   for damping in (0.0, 0.05) for one in (h, heavy)]
     for name in ("generic", "middle_level_dependent_on_the_first", "levels_without_rows"):
         h = boxed(build(name, True), -0.5, 0.4)
         x = make("hcod").solve(h).x

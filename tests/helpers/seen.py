@@ -149,11 +149,11 @@ def steadily():
         return [*np.nan_to_num(values).shape, steps, *np.nan_to_num(values).ravel().tolist()]
 
     def svg(fig, title):
-        drawn[str(title)] = figure_facts(fig)
+        drawn[f"{len(drawn)} {title}"] = figure_facts(fig)
         return title
 
     def write(fig, stem):
-        drawn[Path(stem).name] = figure_facts(fig)
+        drawn[f"{len(drawn)} {Path(stem).name}"] = figure_facts(fig)
         Path(f"{stem}.svg").touch()
 
     with contextlib.ExitStack() as stack:
