@@ -40,10 +40,11 @@ from scenarios.draw.replay import page as replay
 from scenarios.draw.viewer import live, live_page
 from scenarios.export import mcap
 from scenarios.loop import controller, faults
-from scenarios.measure import run_folder
+from scenarios.measure import run_folder, safety
 from scenarios.measure.metrics import measure
 from scenarios.measure.verdict import verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
+from scenarios.recording.facts import capsules as links
 from scenarios.results import comparing, page, pool, sampled, sampled_page, sections
 from scenarios.results import run as table
 from scenarios.scene.drawn import scene
@@ -87,9 +88,12 @@ def seen_of_ticks(name):
 
 
 def _told(run):
+    usual = measure(run)
     return {"signals": {key: condensed(values) for key, values in run.signals.items()},
             "metrics": {key: [one.label, one.unit, one.note, one.value]
-                        for key, one in measure(run).items()},
+                        for key, one in usual.items()},
+            "early": {key: condensed([one.label, one.value, one.note]) for key, one in measure(
+                run, 0.005, 0.5).items() if one != usual.get(key)},
             "verdict": [verdict(run).as_plain_data(), verdict(run).on_page()]}
 
 
@@ -163,6 +167,7 @@ def steadily():
                 ("version", lambda name: INSTALLED.get(name) or version("none"), (doctor,)),
                 ("sys", SimpleNamespace(version="3.11.2 (main)", version_info=(3, 11)), (doctor,)),
                 ("installed", ("osqp", "proxqp").__contains__, (backends,)),
+                ("REST", 0.004, (safety,)),  # [s]
                 ("cache_folder", lambda: Path("cache"), (jit,)),
                 ("versions", lambda: {"python": "3"}, (run_folder, comparing, sampled,
                                                        sampled_page)),
@@ -236,10 +241,11 @@ def seen_of_problems():
 
 
 def seen_of_robots():
-    """Of each robot file of tests and examples: its numbers, by name, and what is said of it."""
-    found = {file.name: Robot.from_file(file) for file in ROBOTS}
-    return {name: [{key: condensed(value) for key, value in robot_facts(robot).items()},
-                   robot.missing] for name, robot in found.items()}
+    """Of each robot file of tests and examples: its numbers, what is said of it, and its sticks."""
+    return {file.name: [
+        {key: condensed(value) for key, value in robot_facts(robot).items()}, robot.missing,
+        [condensed(dataclasses.astuple(one)) for one in links(Robot.from_file(file, shapes=False))]]
+            for file in ROBOTS for robot in [Robot.from_file(file)]}
 
 
 def seen_of_computed(name):
