@@ -269,11 +269,12 @@ def tests_of(mutant: Mutant) -> list[tuple[str, ...]]:
     line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
     records = ("tests/project/test_project.py::"
                "test_records_are_frozen_and_what_they_compute_is_neither_shown_nor_compared",)
-    keys = ("tests/scenarios/test_config.py",)
+    keys = (f"{SEEN}::test_what_is_seen_is_as_it_was[computed defaults]",
+            "tests/scenarios/test_config.py")[:1 + mutant.module.startswith("scenarios/config/")]
     if "frozen=" in line:
         return [records]
     lines = lines_of(mutant.module)
-    default = mutant.module.startswith("scenarios/config/") and not lines.get(mutant.line)
+    default = not lines.get(mutant.line)
     seen, order = Counter[str](), dict[str, tuple[int, int]]()
     for test in sorted(lines.get(mutant.line) or lines[0]):
         function = test.partition("[")[0]

@@ -12,7 +12,6 @@ from hierarchy.avoidance.body import Capsule, Vector
 from hierarchy.problem import Array
 from hierarchy.robots.table import Table, TreeTable
 
-_AROUND = 24  # points on a circle
 _CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
 _MOST = 2000  # vertices of a mesh that are used to choose the axis
 
@@ -51,11 +50,6 @@ def _points_of(shape: Any, kind: str) -> Array | None:
         return np.asarray(_CORNERS * shape.halfSide, dtype=float)
     if kind == "Ellipsoid":  # the box around it
         return np.asarray(_CORNERS * shape.radii, dtype=float)
-    if kind == "Cone":
-        angles = 2 * np.pi * np.arange(_AROUND) / _AROUND
-        rim = np.column_stack([shape.radius * np.cos(angles), shape.radius * np.sin(angles),
-                               np.full(_AROUND, -shape.halfLength)])
-        return np.vstack([rim, [0.0, 0.0, shape.halfLength]])
     for of_mesh in ("vertices", "points"):
         if hasattr(shape, of_mesh):
             points = getattr(shape, of_mesh)

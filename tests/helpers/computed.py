@@ -1,7 +1,12 @@
 """What functions of the library return for fixed arguments, for tests/helpers/seen.py."""
 
+import contextlib
 import dataclasses
+import importlib
+import inspect
 import itertools
+import pkgutil
+from types import SimpleNamespace
 
 import numpy as np
 from mechanisms import four_bar
@@ -10,14 +15,21 @@ from scene import FRAME, PATH, ROBOT, TASKS, state_at, states
 from standing import CONTACTS, moving_state, opening, standing_stack, written
 from standing import ROBOT as HUMANOID
 
-from hierarchy import Hierarchy, State, paths, tasks
+import hierarchy
+import scenarios
+import solvers
+from hierarchy import Hierarchy, HierarchyError, State, paths, tasks
 from hierarchy.loop import Loop
 from hierarchy.tasks.mechanism import Mechanism, model_rows
 from solvers import Resolution, certify, make, solve_ik
+from solvers.adapters.displacements import Packed, Pull
+from solvers.adapters.drop_in import answer
 from solvers.batch.stacked import Batch, solve
 from solvers.factorization import Factorization
 from solvers.problems import ANY, generate
 from solvers.proof import prove
+from solvers.qp.programs import level_problem
+from solvers.resolvers.weighted import lexicographic_weights
 
 TIMES, POINTS = (0.5, 1.2, 2.0, 3.5), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2), (0.3, 0.5, 0.0),
                                        (0.1, 0.2, 0.4))
@@ -36,7 +48,10 @@ def rows():
     bent = State.at(bar, bar.integrate(bar.rest, 0.3 + 0.1 * np.arange(bar.n)), np.ones(bar.n))
     for level in ("velocity", "acceleration"):
         for name, task in TASKS.items():
-            found[f"{name}, {level}"] = [written(task, state, level, 7), task.error(state)]
+            found[f"{name}, {level}"] = [
+                written(task, state, level, 7), task.error(state), task.jacobian(state),
+                task.jacobian_derivative(state), task.reference_velocity(state),
+                task.reference_acceleration(state), task.desired_acceleration(state)]
         for task in model_rows(bar, 0.01):
             found[f"{task.name}, {level}"] = [  # rows that may have the other sign
                 *map(np.abs, written(task, bent, level, bar.n)), task.row_names]
@@ -91,14 +106,97 @@ def certificates():
 def programs():
     """How `hqp` ends with each backend and form, and whether it has the answer of `hcod`."""
     found = {}
-    for name, form in itertools.product(("proxqp", "osqp"), ("null-space", "slack")):
-        resolver = make("hqp", backend=name, form=form)
+    for name, form, damping in itertools.product(
+            ("proxqp", "osqp"), ("null-space", "slack"), (0.0, 0.05)):
+        resolver = make("hqp", backend=name, form=form, damping=damping)
         for seed in range(8):
             h = generate(seed, ANY)
-            res, exact = resolver.solve(h), make("hcod").solve(h).x
-            found[f"{resolver.label} {seed}"] = [
+            res, exact = resolver.solve(h), make("hcod", damping=damping).solve(h).x
+            found[f"{resolver.label} {damping} {seed}"] = [
                 res.status.name, res.iterations, bool(np.abs(res.x - exact).max() < 1e-4)]
     return found
+
+
+def derived():
+    """Hierarchies that are made of others, and weights."""
+    found = {"weights": [lexicographic_weights(V, 1e-2, r) for V, r in (
+        ((0.1, 0.5, 2.0), 0.0), ((0.0, 1e-3, 5.0, 2.0), 0.3), ((), 0.0), ((0.2,), 1.0))]}
+    for name in CASES:
+        h = build(name, True)
+        levels = [(A, b - 0.1, b + 0.2) for A, b, _ in h.levels()]
+        h = Hierarchy.from_levels(levels, h.reference, give=[0.1 * i for i in range(len(levels))])
+        res = make("hcod").solve(h)
+        found[f"{name} gives"] = [res.x, h.giving, *(
+            str(certify(h, x, witnesses=res.witnesses)) for x in (res.x, res.x + 0.01)), *(
+            [*h.relaxed(level, res.x).rows] for level in range(len(levels)))]
+        heavy = h.changed(metric=np.diag(1.0 + np.arange(h.n)))
+        found[f"{name} weighs"] = [make("hcod", damping=damping).solve(one).x
+                                   for damping in (0.0, 0.05) for one in (h, heavy)]
+    for name in ("generic", "middle_level_dependent_on_the_first", "levels_without_rows"):
+        h = boxed(build(name, True), -0.5, 0.4)
+        x = make("hcod").solve(h).x
+        for level in range(len(h.sizes) + 1):
+            one = level_problem(h, level, x)
+            found[f"{name} {level}"] = [np.abs(part) for part in (
+                one.P, one.q, one.G, one.h, one.A, one.b) if part is not None]
+    return found
+
+
+def adapted():
+    """Levels out of tasks and limits as pink and mink give them, and what is said of wrong ones."""
+    def asked(k, **more):
+        J, e = CASES["generic"][k]
+        return SimpleNamespace(**{"gain": 0.5, "compute_error": lambda _: e,
+                                  "compute_jacobian": lambda _: J} | more)
+
+    eye, found = np.eye(7), []
+    box = ("Box", np.vstack([eye, -eye[:5]]), np.r_[0.01 * np.arange(1, 12), np.inf])
+    plane = ("Plane", np.ones((1, 7)), np.array([0.02]))
+    posture = asked(0, compute_error=lambda _: np.ones(7), compute_jacobian=lambda _: eye)
+    for limits, above, entries, pull in (
+            ([box, plane], [asked(1, gain=0.01)], [asked(0, cost=2.0, frame="arm"), posture], None),
+            ([plane], [], [(asked(0, cost=np.array([1.0, 0.0, 3.0]), frame_name="hand"), asked(1)),
+                           asked(2), asked(2)], None),
+            ([], [], [(asked(0), asked(1)), posture], Pull(0.1, 0.2 * np.ones(7))),
+            ([box], [asked(2, gain=0.01)], [asked(0, lm_damping=0.3), asked(1), asked(2, cost=0.0)],
+             Pull(0.0, np.zeros(7))),
+            ([box], [asked(0), asked(2)], [posture], None),
+            ([box], [], [asked(0, lm_damping=0.3)], None), ([box], [], [SimpleNamespace()], None),
+            ([box, ("Low", -eye[:1], np.array([-0.1]))], [], [posture], None),
+            ([box], [], [asked(0, cost=[1.0, 2.0])], None), ([], [asked(0, gain=np.nan)], [], None),
+            ([("Odd", eye[:, :3], np.ones(7))], [], [posture], None),
+            ([("Odd", eye, np.full(7, np.nan))], [], [posture], None)):
+        def pack(solve, given=(limits, above, entries, pull)):
+            return Packed(None, lambda: list("abcdefg"), 7, 0.1, *given, solve=solve)
+
+        try:
+            h = pack(lambda h: make("hcod").solve(h).x).hierarchy()
+            found.append([" ".join(h.names), " ".join(h.named()), *h.rows])
+            found.append([answer("hcod", {}, 0.0, 1e-9, pack,
+                                 lambda *said: HierarchyError(said[2]))])
+        except HierarchyError as error:
+            found.append(str(error))
+    return found
+
+
+def defaults():
+    """Defaults of what each module calls public: of functions, classes and their methods."""
+    found, plain = {}, (int, float, str, tuple)
+    for package in (hierarchy, solvers, scenarios):
+        for _, name, _ in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if name.endswith(("__main__", "on_jax")):  # which ends here, and needs jax
+                continue
+            public = [(f"{name} {key}", one) for key, one in vars(
+                importlib.import_module(name)).items() if key[0] != "_" and getattr(
+                    one, "__module__", "") == name and not hasattr(one, "__members__")]
+            methods = [(f"{key} {part}", getattr(what, "__func__", what)) for key, one in public
+                       if isinstance(one, type) for part, what in vars(one).items()
+                       if part[0] != "_"]
+            for key, one in (*public, *methods):
+                with contextlib.suppress(TypeError, ValueError):  # nothing that can be called
+                    found[key] = [f"{of} = {given.default!r}" for of, given in inspect.signature(
+                        one).parameters.items() if isinstance(given.default, plain)]
+    return {key: given for key, given in found.items() if given}
 
 
 def edited():
@@ -157,6 +255,7 @@ def looped():
     return found
 
 
-COMPUTED = {"rows": rows, "mechanism": mechanism, "certificates": certificates,
-            "programs": programs, "edited": edited, "solved": solved, "looped": looped,
+COMPUTED = {"rows": rows, "derived": derived, "adapted": adapted, "defaults": defaults,
+            "mechanism": mechanism, "certificates": certificates, "programs": programs,
+            "edited": edited, "solved": solved, "looped": looped,
             "paths": lambda: [[path(t) for t in np.linspace(-0.2, 4.4, 24)] for path in PATHS]}

@@ -7,6 +7,7 @@ tests/data/seen has the commands, by group; each group runs in a folder of its o
 """
 
 import contextlib
+import csv
 import dataclasses
 import gzip
 import io
@@ -17,6 +18,7 @@ import re
 import shlex
 import tempfile
 from functools import cache, partial
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import patch
@@ -27,10 +29,10 @@ from computed import COMPUTED
 from matplotlib.colors import to_hex
 from pinned import FOLDER, robot_facts
 
-from hierarchy import HierarchyError, Robot, tasks
+from hierarchy import HierarchyError, Robot, jit, tasks
 from scenarios import Scenario, load, load_run, shipped, simulate
 from scenarios.cell.sensors import depth_sensor
-from scenarios.cli import runs as cli_runs
+from scenarios.cli import doctor, runs
 from scenarios.cli.main import run_command
 from scenarios.config.distributions import Distribution
 from scenarios.draw.figures import drawing, letter
@@ -38,15 +40,17 @@ from scenarios.draw.replay import page as replay
 from scenarios.draw.viewer import live, live_page
 from scenarios.export import mcap
 from scenarios.loop import controller, faults
-from scenarios.measure import run_folder
+from scenarios.measure import run_folder, safety
 from scenarios.measure.metrics import measure
 from scenarios.measure.verdict import verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
+from scenarios.recording.facts import capsules as links
 from scenarios.results import comparing, page, pool, sampled, sampled_page, sections
-from scenarios.results import run as results_run
+from scenarios.results import run as table
 from scenarios.scene.drawn import scene
 from solvers import certify, explain, make, names
 from solvers.problems import ANY, generate, structured
+from solvers.qp import backends
 
 ROOT = FOLDER.parents[2]
 ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
@@ -58,6 +62,12 @@ RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "
         "reach-torque-smooth": 0.02}
 PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "keys", "problems", "commands plain",
          *(f"computed {name}" for name in COMPUTED))
+# What `hierarchy doctor` finds: names of modules of Python.
+REQUIRED = ("json>=2", "calendar>=9", "csv", "string<2", "none>=3", "wave; sys_platform=='no'",
+            *(f"{name}; extra == '{extra}'" for name, extra in (
+                ("json", "robots"), ("json", "sim"), ("none", "sim"), ("none", "export"),
+                ("csv", "adapters"), ("csv", "dev"), ("task-hierarchy[sim]", "all"))))
+INSTALLED = {"task-hierarchy": "0.9", "json": "2.0.9", "calendar": "8.1", "csv": "3", "string": "1"}
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 
 
@@ -78,9 +88,12 @@ def seen_of_ticks(name):
 
 
 def _told(run):
+    usual = measure(run)
     return {"signals": {key: condensed(values) for key, values in run.signals.items()},
             "metrics": {key: [one.label, one.unit, one.note, one.value]
-                        for key, one in measure(run).items()},
+                        for key, one in usual.items()},
+            "early": {key: condensed([one.label, one.value, one.note]) for key, one in measure(
+                run, 0.005, 0.5).items() if one != usual.get(key)},
             "verdict": [verdict(run).as_plain_data(), verdict(run).on_page()]}
 
 
@@ -140,16 +153,22 @@ def steadily():
         return [*np.nan_to_num(values).shape, steps, *np.nan_to_num(values).ravel().tolist()]
 
     def svg(fig, title):
-        drawn[str(title)] = figure_facts(fig)
+        drawn[f"{len(drawn)} {title}"] = figure_facts(fig)
         return title
 
     def write(fig, stem):
-        drawn[Path(stem).name] = figure_facts(fig)
+        drawn[f"{len(drawn)} {Path(stem).name}"] = figure_facts(fig)
         Path(f"{stem}.svg").touch()
 
     with contextlib.ExitStack() as stack:
         for name, instead, modules in (
-                ("perf_counter", clock, (controller, faults, depth_sensor, cli_runs, results_run)),
+                ("perf_counter", clock, (controller, faults, depth_sensor, doctor, runs, table)),
+                ("requires", lambda _: REQUIRED, (doctor,)), ("__file__", "csv.py", (csv,)),
+                ("version", lambda name: INSTALLED.get(name) or version("none"), (doctor,)),
+                ("sys", SimpleNamespace(version="3.11.2 (main)", version_info=(3, 11)), (doctor,)),
+                ("installed", ("osqp", "proxqp").__contains__, (backends,)),
+                ("REST", 0.004, (safety,)),  # [s]
+                ("cache_folder", lambda: Path("cache"), (jit,)),
                 ("versions", lambda: {"python": "3"}, (run_folder, comparing, sampled,
                                                        sampled_page)),
                 ("svg", svg, (page, sections, sampled_page)), ("write", write, (drawing,)),
@@ -222,10 +241,11 @@ def seen_of_problems():
 
 
 def seen_of_robots():
-    """Of each robot file of tests and examples: its numbers, by name, and what is said of it."""
-    found = {file.name: Robot.from_file(file) for file in ROBOTS}
-    return {name: [{key: condensed(value) for key, value in robot_facts(robot).items()},
-                   robot.missing] for name, robot in found.items()}
+    """Of each robot file of tests and examples: its numbers, what is said of it, and its sticks."""
+    return {file.name: [
+        {key: condensed(value) for key, value in robot_facts(robot).items()}, robot.missing,
+        [condensed(dataclasses.astuple(one)) for one in links(Robot.from_file(file, shapes=False))]]
+            for file in ROBOTS for robot in [Robot.from_file(file)]}
 
 
 def seen_of_computed(name):

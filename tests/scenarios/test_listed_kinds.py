@@ -17,7 +17,6 @@ BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
                     "duration": 1.5, "resolver": "hcod"}, "damping": {"value": 1.0}}
 COUPLING = {"kind": "coupling", "joints": {"joint_2": 1.0, "joint_5": -0.5}, "value": -1.0}
 HAND = {"kind": "position", "frame": "end_effector"}
-VIA = {"kind": "waypoints", "times": [0, 1], "points": [[0, 0, 0], [0, 0, 1]]}
 LOOK = {"kind": "look-at", "frame": "end_effector", "target": [0.3, 0.9, 0.9]}
 FRAME = {"kind": "frame", "frame": "end_effector", "offset": [0.03, 0.05, 0.02],
          "rotation": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]}
@@ -74,33 +73,6 @@ def test_a_path_is_followed(path, tmp_path):
     assert run.fault is None
     # What is left is what integrating velocities over a period leaves: v T / 2 and less.
     assert np.linalg.norm(run["position_error"][-30:], axis=1).max() < 2e-3
-
-
-def on_a_circle(**changed):
-    """The end effector on a circle, some keys of which are changed."""
-    path = {"kind": "circle", "centre": [0.3, 0.5, 0.1], "radius": 0.05} | changed
-    return HAND | {"path": path}
-
-
-@pytest.mark.parametrize(("task", "said"), [
-    (COUPLING | {"joints": {}}, "tasks.0.joints"),
-    (LOOK | {"axis": [0, 0, 1]}, "tasks.0.axis: only kind 'pointing' has it"),
-    (RELATIVE | {"rotation": np.eye(3).tolist(), "orientation": False},
-     "rotation goes with orientation = true"),
-    ({"kind": "manipulability", "frame": "end_effector", "least": 0.1, "part": "speed"},
-     "tasks.0.part"),
-    ({"kind": "look_at", "frame": "end_effector"}, "'look-at'"),
-    ({"kind": "collision"}, "needs [avoidance] with kind = \"separation\""),
-    (on_a_circle(radiuss=1),
-     "unknown key 'tasks.0.path.radiuss'; did you mean 'tasks.0.path.radius'?"),
-    (on_a_circle(times=[1]),
-     "tasks.0.path.times: only kind 'waypoints' has it; the kind here is 'circle'"),
-    (on_a_circle(kind="line"), "tasks.0.path.start: Field required"),
-    (HAND | {"path": VIA | {"blend": 2.0}},
-     "tasks.0.path: blended waypoints: blend 2.0 s must be positive and at most 1 s"),
-    (HAND | {"path": VIA | {"points": []}}, "tasks.0.path: waypoints: 2 times for 0 points")])
-def test_wrong_values_are_named(task, said, tmp_path):
-    refused(said, scenario_of, tmp_path, task)
 
 
 @pytest.mark.parametrize(("task", "said"), [

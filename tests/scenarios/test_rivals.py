@@ -78,30 +78,6 @@ def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
         np.testing.assert_array_equal(controller.resolution.x, alone)
 
 
-@pytest.mark.parametrize(("name", "changes", "says"), [
-    ("ellipse-set-based", ["control.level=acceleration"],
-     r'needs control.level = "velocity", got "acceleration"'),
-    ("ellipse-hqp", ["avoidance.influence=0.05"], r"0.05 m is not below influence"),
-    ("ellipse-hqp", ["control.level=velocity", "limits.torque=0.5"], r"needs control.level"),
-    ("ellipse-published", ["avoidance.place=null-space"], r'place = "null-space" goes with'),
-    ("ellipse-set-based", ["pointing.gain=2.0"], r"pointing.gain = 2 does not go with"),
-    ("ellipse-smooth", ["avoidance.buffer=0.4"], r"buffer = 0.4 m reaches from 0.05 m"),
-    ("ellipse-smooth", ["pointing.kind=equality"], r"buffer = 2 does not go with pointing.kind"),
-    ("ellipse-smooth", ["control.strictness=true"], r"control.strictness = true"),
-    ("ellipse-set-based", ["control.transition=blend"], r'control.transition = "blend"'),
-    ("ellipse-set-based", ["avoidance.rate=3.0"], r"avoidance.rate = 3 does not go with"),
-    ("ellipse-smooth", ["pointing.buffer=9.0"], r"buffer = 9 deg is wider than pointing.alpha_d"),
-    ("ellipse-hqp", ["control.stack=smooth", "control.level=velocity", "limits.place=guard"],
-     r"needs pointing.buffer"),
-    ("ellipse-hqp", ["control.stack=set-based", "control.level=velocity"],
-     r'needs limits.place = "guard", got "stack"'),
-    ("ellipse-velocity", ["control.stack=set-based"],
-     r'"repulsion" goes with control.stack = "switched", got "set-based"')])
-def test_what_does_not_go_together_is_said_with_key_and_value(name, changes, says):
-    with pytest.raises(HierarchyError, match=says):
-        load(name, changes)
-
-
 def test_the_smooth_stack_refuses_a_resolver_without_activations():
     scenario = load("ellipse-smooth").with_resolver("tpm")
     refused('needs control.resolver = "smooth", got "tpm"', Controller, scenario)
