@@ -73,7 +73,8 @@ def timed(call: Callable[[], Any], repeats: Repeats = Repeats()  # noqa: B008
         start = perf_counter_ns()
         found = call()
         passed = perf_counter_ns() - start
-        times.append(min(passed, process_time_ns() - busy) if _FINE else passed)
+        spent = process_time_ns() - busy if _FINE else 0  # 0: the system has not counted yet
+        times.append(min(passed, spent or passed))
     return times, found
 
 
