@@ -13,6 +13,7 @@ from hierarchy.problem import Array
 
 REFINEMENTS = 100  # most steps from a backend's active set to the exact one
 AT_ONCE = 10  # steps that change all rows on the wrong side, before as many that change one
+MOST_HELD = 0.8  # share of the active rows: if more are at their side, the others alone leave
 EXACT = 1e-10  # relative tolerance of the optimality conditions
 LITTLE = 1e-3  # rows violated by less are assumed to hold at a nearby minimiser
 LARGEST = 1e50  # entry: sums of products of four stay finite; beyond, backends run for minutes
@@ -171,7 +172,8 @@ class _Refinement(NamedTuple):
         over, excess = self.kept.excess(z), self.limits.excess(z)
         side = self.kept.at(active)
         held = abs(self.kept.A @ z - side) <= scale + EXACT * abs(side)  # not where too many act
-        near = np.where((active != 0) & held, active, self.kept.sides(z, EXACT))
+        acting = active != 0
+        near = np.where(acting & held, active, self.kept.sides(z, EXACT))
         gradient = self.E.T @ (self.e - self.E @ z) - self.limits.A.T @ excess
         on, forces = near != 0, np.zeros(len(near))
         forces[on], rest = _non_negative((near[on, None] * self.kept.A[on]).T, gradient)
@@ -181,7 +183,7 @@ class _Refinement(NamedTuple):
         next_active = np.where((multipliers > 0.0) | (forces > 0.0), near, 0.0)
         if not settled and (next_active == active).all():  # met rows hold where none should
             next_active = np.where(forces > 0.0, near, 0.0)
-        if not held[active != 0].all():  # multipliers of too many rows say little
+        if MOST_HELD * acting.sum() < (acting & held).sum() < acting.sum():
             next_active = near
         next_active = np.where(abs(over) > scale, np.sign(over), next_active)
         sizes = lengths(self.limits.A)
