@@ -170,20 +170,15 @@ class _Refinement(NamedTuple):
         """Return whether z is optimal, and the sides that its rows and multipliers suggest."""
         scale = EXACT * (1.0 + norm(z))
         over, excess = self.kept.excess(z), self.limits.excess(z)
-        side = self.kept.at(active)
-        held = abs(self.kept.A @ z - side) <= scale + EXACT * abs(side)  # not where too many act
-        acting = active != 0
-        near = np.where(acting & held, active, self.kept.sides(z, EXACT))
-        gradient = self.E.T @ (self.e - self.E @ z) - self.limits.A.T @ excess
-        on, forces = near != 0, np.zeros(len(near))
-        forces[on], rest = _non_negative((near[on, None] * self.kept.A[on]).T, gradient)
+        acting, side = active != 0, self.kept.at(active)
+        held = acting & (abs(self.kept.A @ z - side) <= scale + EXACT * abs(side))
+        near = np.where(held, active, self.kept.sides(z, EXACT))
+        forces, settled = self._settled(z, near, broken, excess)
         multipliers, balanced = self._balanced(z, near, excess)
-        B, c = self._acting(broken)
-        settled = rest <= EXACT * (1.0 + norm(B.T @ c))
         next_active = np.where((multipliers > 0.0) | (forces > 0.0), near, 0.0)
         if not settled and (next_active == active).all():  # met rows hold where none should
             next_active = np.where(forces > 0.0, near, 0.0)
-        if MOST_HELD * acting.sum() < (acting & held).sum() < acting.sum():
+        if MOST_HELD * acting.sum() < held.sum() < acting.sum():
             next_active = near
         next_active = np.where(abs(over) > scale, np.sign(over), next_active)
         sizes = lengths(self.limits.A)
@@ -201,11 +196,18 @@ class _Refinement(NamedTuple):
         asked = float(abs(sides[np.isfinite(sides)]).max(initial=0.0))
         return bool(norm(z) * self.rank_tolerance <= 1.0 + asked)
 
+    def _settled(self, z: Array, near: Array, broken: Array, excess: Array) -> tuple[Array, bool]:
+        """Return multipliers of the kept rows, and whether the gradient is theirs."""
+        gradient = self.E.T @ (self.e - self.E @ z) - self.limits.A.T @ excess
+        forces, on, (B, c) = np.zeros(len(near)), near != 0, self._acting(broken)
+        forces[on], rest = _non_negative((near[on, None] * self.kept.A[on]).T, gradient)
+        return forces, rest <= EXACT * (1.0 + norm(B.T @ c))
+
     def _balanced(self, z: Array, near: Array, excess: Array) -> tuple[Array, bool]:
         """Return multipliers of the kept rows, and whether missed rows balance, however small.
 
-        Next to rows of another scale their forces are lost in `judged`. Rows that are met may hold
-        them like constraints.
+        Next to rows of another scale their forces are lost in `_settled`. Rows that are met may
+        hold them like constraints.
         """
         M = np.vstack([self.E, self.limits.A])
         r, sizes = np.concatenate([self.e - self.E @ z, -excess]), lengths(M)
