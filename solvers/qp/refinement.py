@@ -17,6 +17,7 @@ MOST_HELD = 0.8  # share of the active rows: if more are at their side, the othe
 EXACT = 1e-10  # relative tolerance of the optimality conditions
 LITTLE = 1e-3  # rows violated by less are assumed to hold at a nearby minimiser
 LARGEST = 1e50  # entry: sums of products of four stay finite; beyond, backends run for minutes
+FAINT = 1e-15  # entry of a row over its norm: rounding
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
@@ -46,8 +47,9 @@ class Rows:
 
     def seen(self, N: Array, rank_tolerance: float) -> Rows:
         """Return the same rows for the unknown z of N z, with zeros for rows dependent on N."""
-        A = self.A @ N
-        A[lengths(A) <= rank_tolerance * lengths(self.A)] = 0.0
+        A, sizes = self.A @ N, lengths(self.A)
+        A[lengths(A) <= rank_tolerance * sizes] = 0.0
+        A[abs(A) <= FAINT * sizes[:, None]] = 0.0
         return Rows(A, self.lower, self.upper)
 
     def normalised(self) -> Rows:
@@ -201,7 +203,7 @@ class _Refinement(NamedTuple):
         gradient = self.E.T @ (self.e - self.E @ z) - self.limits.A.T @ excess
         forces, on, (B, c) = np.zeros(len(near)), near != 0, self._acting(broken)
         forces[on], rest = _non_negative((near[on, None] * self.kept.A[on]).T, gradient)
-        return forces, rest <= EXACT * (1.0 + norm(B.T @ c))
+        return forces, bool(rest <= EXACT * (1.0 + norm(B.T @ c)))
 
     def _balanced(self, z: Array, near: Array, excess: Array) -> tuple[Array, bool]:
         """Return multipliers of the kept rows, and whether missed rows balance, however small.
