@@ -17,7 +17,7 @@ MOST_HELD = 0.8  # share of the active rows: if more are at their side, the othe
 EXACT = 1e-10  # relative tolerance of the optimality conditions
 LITTLE = 1e-3  # rows violated by less are assumed to hold at a nearby minimiser
 LARGEST = 1e50  # entry: sums of products of four stay finite; beyond, backends run for minutes
-FAINT = 1e-15  # entry of a row over its norm: rounding
+ROUNDING = 1e-15  # entry of a row over its norm: rounding
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
@@ -49,7 +49,7 @@ class Rows:
         """Return the same rows for the unknown z of N z, with zeros for rows dependent on N."""
         A, sizes = self.A @ N, lengths(self.A)
         A[lengths(A) <= rank_tolerance * sizes] = 0.0
-        A[abs(A) <= FAINT * sizes[:, None]] = 0.0
+        A[abs(A) <= ROUNDING * sizes[:, None]] = 0.0
         return Rows(A, self.lower, self.upper)
 
     def normalised(self) -> Rows:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
+from solvers.kernels.tolerances import NEGLIGIBLE
 from solvers.qp.backends import backend_of
 from solvers.qp.programs import null_space_program, slack_program
 from solvers.qp.refinement import EXACT, Rows, below_largest, least, lengths, refined, split
@@ -19,7 +20,6 @@ Mask = NDArray[np.bool_]
 _SHARE = 0.01  # of the declared accuracy: allowed error of one level, which lower levels magnify
 _BROKEN = 1e-4  # excess of a row that must hold, relative to 1 + its side
 _WIDER = (1.0, 100.0)  # multiples of `slack`, tried in turn
-_NEGLIGIBLE = 1e-13  # norm of a row over the largest of its level: rounding in the others
 
 
 @final
@@ -144,7 +144,7 @@ class _Cascade:
         scale, equal = float(abs(A).max()), lower == upper
         rows = Rows(A / scale, lower / scale, upper / scale)
         sizes = lengths(rows.A)
-        rows.A[sizes <= _NEGLIGIBLE * sizes.max()] = 0.0
+        rows.A[sizes <= NEGLIGIBLE * sizes.max()] = 0.0
         own, free = self._split(rows.A[equal])
         fixed = equal.copy()
         fixed[~equal] = self._advance(rows, equal, own, scale) != 0
