@@ -13,6 +13,7 @@ import pytest
 from hand_made import recording
 
 from scenarios import compare, load, load_run, simulate
+from scenarios.cli import doctor
 from scenarios.cli.main import _with_its_file, app
 from scenarios.files import OutputError, claim, slug
 from scenarios.measure import run_folder
@@ -186,9 +187,15 @@ doctor.doctor_command = broken
     assert (done.returncode, done.stderr) == (130, "hierarchy: interrupted\n")
 
 
+def test_the_doctor_finds_all_well_here(command):
+    out = command("doctor").out
+    for line in ("No problems found.", "  ok  python ", "20 of 20 answers", "200 ticks of ellipse"):
+        assert line in out
+
+
 def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, command):
     broken = mock.Mock(side_effect=RuntimeError("no such kernel"))
-    monkeypatch.setattr("scenarios.cli.doctor._resolvers_agree", broken)
+    monkeypatch.setattr(doctor, "_resolvers_agree", broken)
     said = json.loads(command("doctor --json", code=1).out)
     assert said["well"] is False
     bad = [one for one in said["findings"] if one["well"] is False]

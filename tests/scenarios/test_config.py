@@ -15,8 +15,10 @@ from scenarios import compare
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, load, members, shipped
 from scenarios.config.reference import keys_of, sections
+from scenarios.config.resolvers import default_resolvers
 from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run
+from solvers.qp import backends
 
 
 @pytest.mark.parametrize("name", shipped())
@@ -164,3 +166,12 @@ def test_resolvers_that_are_not_strict_need_not_agree():
     """Neither as the one compared with, nor as the one compared."""
     runs = [run_of("tpm-published"), run_of("recursive"), run_of("augmented", away_from(1))]
     assert partings(runs) == []
+
+
+def test_a_backend_that_is_not_installed_leaves_the_default_comparison_and_is_named(monkeypatch):
+    everything, nothing = default_resolvers()
+    assert not nothing
+    monkeypatch.setattr(backends, "installed", lambda name: name != "daqp")
+    rest, missing = default_resolvers()
+    assert set(everything) - set(rest) == {"hqp:backend=daqp"}
+    assert missing == {"hqp:backend=daqp": "pip install 'task-hierarchy[qp]'"}

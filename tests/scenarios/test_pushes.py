@@ -18,7 +18,8 @@ from scenarios.recording.fate import Fate, levels_at
 from scenarios.scene import scene
 from scenarios.scene.pushes import pushes
 
-FACTS = facts_of(load("stand-push"), Robot.named("humanoid"))
+STANDING = load("stand-push")
+FACTS = facts_of(STANDING, Robot.named("humanoid"))
 
 
 def drawn(contacts, forces, com=None):
@@ -56,6 +57,22 @@ def test_a_cross_on_the_floor_is_below_the_centre_of_mass():
     found = drawn({"sole": [(0.0, 0.0, 0.0)]}, np.zeros((1, 1, 3)), np.array([[0.1, 0.2, 0.8]]))
     np.testing.assert_allclose(found.centre.mean(axis=1), [[0.1, 0.2, FACTS.robot.floor]] * 2)
     assert drawn({"sole": [(0.0, 0.0, 0.0)]}, np.zeros((1, 1, 3))).centre.size == 0
+
+
+def test_an_arrow_goes_to_the_middle_of_a_pushed_body_while_it_is_pushed():
+    scenario = STANDING.with_changes({"plant.pushes.0": {
+        "joint": "trunk_pitch", "force": 100.0, "direction": 90.0, "at": 0.2, "duration": 0.1}})
+    t = np.array([0.199, 0.2, 0.299, 0.3])
+    rest = FACTS.robot.placements(np.array(FACTS.robot.rest))
+    found = pushes(FACTS, scenario, t, np.tile(rest, (4, 1, 1)), np.zeros((4, 8, 3)))
+    assert [len(found.at(f).push) for f in range(4)] == [0, 5, 5, 0]
+    shaft, *head = found.at(1).push
+    np.testing.assert_allclose(shaft[1] - shaft[0], [0.0, 0.2, 0.0], atol=1e-12)
+    assert all((barb[1] == shaft[1]).all() and barb[0, 1] < shaft[1, 1] for barb in head)
+    sideways = np.linalg.norm(np.subtract(*np.swapaxes(head, 0, 1))[:, ::2], axis=1)
+    np.testing.assert_allclose(sideways, 0.4 * (shaft[1, 1] - np.array(head)[:, 0, 1]))
+    assert abs(shaft[1, 1]) < 1e-9
+    assert shaft[1, 2] > rest[:, 11].mean()  # in the trunk
 
 
 @pytest.mark.parametrize("name", ["reach-torque", "stand-momentum", "wipe", "step", "crawl"])

@@ -14,6 +14,7 @@ from hierarchy import HierarchyError
 from scenarios import load, save, simulate
 from scenarios.config.kinds import ListedPosition
 from scenarios.draw.figures import letter, palette, panels
+from scenarios.draw.figures.timeline import timeline
 from scenarios.measure.comparison import Comparison
 from scenarios.measure.runs import Run, table
 from scenarios.recording.recording import Event
@@ -173,6 +174,25 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, 
     assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
     with pytest.raises(HierarchyError, match="unknown style 'papr'; did you mean 'paper'"):
         letter.redraw([run_folder], "papr")
+
+
+def test_tick_times_are_drawn_in_microseconds_beside_the_period():
+    (ax,) = letter.tick_times(recording(time_tick=[4e-6, 4e-6, 4e-6, 4e-6, 2e-3])).axes
+    few, one = (bar for bar in ax.patches if bar.get_height() > 0.0)
+    assert (few.get_height(), one.get_height()) == (4.0, 1.0)
+    for bar, time in ((few, 4.0), (one, 2000.0)):
+        assert bar.get_x() <= time * (1.0 + 1e-9) <= bar.get_x() + bar.get_width()
+    assert ax.lines[0].get_xdata()[0] == pytest.approx(1000.0)
+
+
+def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event():
+    run = dataclasses.replace(recording(orders=("a > b", "b"), order=[0, 0, 1, 1, 0]),
+                              fault="stopped", events=(Event(2, "overrun", "use"),))
+    (ax,) = timeline(run).axes
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["1", "2", "overrun: use"]
+    assert ax.get_title(loc="left") == "Place in the stack, 2 changes"
+    assert ax.get_ylim() == (2.5, -0.5)  # half a row around the three
+    assert "fault" in [text.get_text() for text in ax.texts]
 
 
 def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
