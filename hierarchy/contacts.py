@@ -20,7 +20,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, UnknownNameError, expect, expect_each, number, refuse
+from hierarchy.errors import (
+    HierarchyError,
+    UnknownNameError,
+    expect,
+    expect_each,
+    finite_numbers,
+    is_one_of,
+    number,
+    refuse,
+)
 from hierarchy.gate import array_of
 from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
@@ -70,6 +79,8 @@ class Contact:
 
     def __post_init__(self) -> None:
         expect("contact: frame", self.frame, Frame, "give robot.frame(name)")
+        expect("contact: name", self.name, str, "give a text")
+        expect("contact: slides", self.slides, bool, "give True or False")
         set_frozen(self, name=self.name or self.frame.name)
         points = array_of(f"contact {self.name!r}: points", self.points)
         refuse(points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all(),
@@ -161,7 +172,7 @@ class Contacts:
         return blocks
 
     def __getitem__(self, name: str) -> Contact:
-        if name not in self.names:
+        if not is_one_of(name, self.names):
             raise UnknownNameError("contact", name, self.names)
         return self.contacts[self.names.index(name)]
 
@@ -229,10 +240,11 @@ def corners(x: tuple[float, float], y: tuple[float, float], up: Vector = (0.0, 0
     """Return the corners (4, 3) [m] of a sole from its sides `x` and `y` (2,) [m] across `up` (3,).
 
     x is the frame's x axis as seen along `up`, its y axis for `up` along x, and y is across both.
-    Raises HierarchyError if `up` is no direction.
+    Raises HierarchyError unless the sides are two numbers each and `up` is a direction.
     """
-    around = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])]
-    return np.asarray(np.array(around, dtype=float) @ _axes(up, "sole: up")[:2])
+    sides = finite_numbers("sole: x [m]", x, 2), finite_numbers("sole: y [m]", y, 2)
+    around = np.array([sides[0][[0, 1, 1, 0]], sides[1][[0, 0, 1, 1]]])
+    return np.asarray(around.T @ _axes(up, "sole: up")[:2])
 
 
 def _axes(normal: Vector, what: str) -> Array:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Container, Iterable, Sequence
-from math import inf, isfinite
-from numbers import Real
+from collections.abc import Collection, Container, Iterable, Sequence
+from math import copysign, inf, isfinite, isnan, nan
+from numbers import Integral, Real
 from pathlib import Path
 
 import numpy as np
@@ -61,8 +61,11 @@ def refuse(wrong: object, said: str) -> None:
 
 
 def expect(what: str, value: object, kind: type, remedy: str) -> None:
-    """Raise a HierarchyError that says what was given and what is expected, or return None."""
-    if not isinstance(value, kind):
+    """Raise a HierarchyError that says what was given and what is expected, or return None.
+
+    An array without dimensions, which numpy calls iterable and sized, is neither.
+    """
+    if not isinstance(value, kind) or (isinstance(value, np.ndarray) and not value.ndim):
         article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
         raise HierarchyError(f"{what}: expected {article} {kind.__name__}, got {brief(value)}; "
                              f"{remedy}")
@@ -81,14 +84,48 @@ def number(what: str, value: object, least: float = -inf, largest: float = inf) 
 
     True and False are no numbers here.
     """
-    if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
-        found = float(value)
-        if isfinite(found) and least <= found <= largest:
+    found = as_float(value)
+    if isfinite(found) and least <= found <= largest:
+        return found
+    shown = repr(value) if isnan(found) else f"{found:g}"
+    raise HierarchyError(f"{what} = {shown}: expected a finite number{_between(least, largest)}")
+
+
+def real(what: str, value: object) -> float:
+    """Return a number, which may be infinite; raise a HierarchyError for anything else."""
+    found = as_float(value)
+    refuse(isnan(found), f"{what} = {value!r}: expected a number")
+    return found
+
+
+def whole(what: str, value: object, least: int = 0, largest: int = 2**31 - 1) -> int:
+    """Return a whole number from `least` to `largest`; raise a HierarchyError for anything else."""
+    if isinstance(value, Integral) and not isinstance(value, bool):
+        found = int(value)
+        if least <= found <= largest:
             return found
-    between = (f" from {least:g} to {largest:g}" if isfinite(largest) else
-               f" from {least:g} on" if isfinite(least) else "")
-    shown = f"{value:g}" if isinstance(value, Real) else repr(value)
-    raise HierarchyError(f"{what} = {shown}: expected a finite number{between}")
+    raise HierarchyError(f"{what} = {value!r}: expected a whole number{_between(least, largest)}")
+
+
+def check_choice(what: str, value: object, known: Collection[str | int]) -> None:
+    """Raise a HierarchyError unless a text or a whole number is one of those known."""
+    refuse(type(value) not in (str, int) or value not in known, f"{what} = {value!r}: expected "
+           f"one of {', '.join(map(repr, known))}")
+
+
+def as_float(value: object) -> float:
+    """Return a number, infinite if it is too large for one, and NaN for what is no number."""
+    if not isinstance(value, Real) or isinstance(value, bool | np.bool_):
+        return nan
+    try:
+        return float(value)
+    except OverflowError:
+        return copysign(inf, value)
+
+
+def _between(least: float, largest: float) -> str:
+    return (f" from {least:g} to {largest:g}" if largest < 2**31 - 1 else
+            f" from {least:g} on" if isfinite(least) else "")
 
 
 def finite_numbers(what: str, values: object, size: int | None = None) -> NDArray[np.float64]:

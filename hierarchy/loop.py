@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import ReadingError, UnknownNameError, brief, number, refuse
+from hierarchy.errors import ReadingError, UnknownNameError, brief, is_one_of, number, refuse
 from hierarchy.problem import Array
 
 
@@ -185,7 +185,7 @@ class Loop:
                  watchdog: float | None = None, spin: float = 0.0, priority: int | None = None,
                  pause_gc: bool = True, clock: Callable[[], float] = time.monotonic,
                  sleep: Callable[[float], object] = time.sleep) -> None:
-        if overrun not in OVERRUNS:
+        if not is_one_of(overrun, OVERRUNS):
             raise UnknownNameError("overrun policy", overrun, OVERRUNS)
         for name, value in (("period", period), ("behind", behind), ("spin", spin),
                             ("watchdog", period if watchdog is None else watchdog)):

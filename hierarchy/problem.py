@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy import gate
-from hierarchy.errors import HierarchyError, brief, expect, refuse
+from hierarchy.errors import HierarchyError, brief, expect, refuse, whole
 from hierarchy.gate import Array as Array
 from hierarchy.gate import Sizes
 from hierarchy.notebook import html_table
@@ -240,9 +240,7 @@ class Hierarchy:
         another count or shape.
         """
         A, lower, upper, sizes = self.rows
-        whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
-        if not whole or not 0 <= count <= len(sizes):
-            raise HierarchyError(f"upper_part: count = {brief(count)}: expected 0 to {len(sizes)}")
+        whole("upper_part: count", count, largest=len(sizes))
         if sides is not None:
             lower, upper = (gate.shaped("upper_part: sides", side, (self.m,)) for side in sides)
         m = int(_layout(sizes.tobytes())[1][count])

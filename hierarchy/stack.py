@@ -133,9 +133,13 @@ class Stack:
 
     def row_names(self, order: Sequence[str] | None = None) -> tuple[str, ...]:
         """Return what each row of `hierarchy` is about, in its order; None for the stack's own."""
-        order = self._order if order is None else order
+        return tuple(name for task in self._named(order) for name in self[task].row_names)
+
+    def _named(self, order: Sequence[str] | None) -> tuple[str, ...]:
+        if order is None:
+            return self._order
         expect("order of a stack", order, Sequence, "give a list of names of tasks")
-        return tuple(name for task in order for name in self[task].row_names)
+        return tuple(order)
 
     def hierarchy(self, state: State, order: Sequence[str] | None = None) -> Hierarchy:
         """Write the tasks' rows at a state and return them as a Hierarchy.
@@ -145,7 +149,7 @@ class Stack:
         Raises ReadingError if the last `move` of the state was to positions that are not finite,
         and HierarchyError where the sides of a row cross.
         """
-        order = self._order if order is None else tuple(order)
+        order = self._named(order)
         prepared = self._prepared.get(order)
         if (prepared is None or prepared.state is not state
                 or prepared.seen is not state.measurement):

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from ast import literal_eval
 from collections.abc import Callable, Iterator
 from dataclasses import Field, fields, is_dataclass
 from functools import wraps
-from numbers import Integral, Real
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -15,10 +15,19 @@ from hierarchy.avoidance.body import pack_points
 from hierarchy.avoidance.laws import Barrier
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, brief, expect, is_one_of, refuse
+from hierarchy.errors import (
+    HierarchyError,
+    brief,
+    check_choice,
+    expect,
+    real,
+    refuse,
+    whole,
+)
 from hierarchy.gate import check_rows, shaped
 from hierarchy.paths import Path
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 
@@ -38,8 +47,7 @@ _PARTS: dict[str, tuple[type, str]] = {
     "Path": (Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
     "Contacts": (Contacts, "Contacts(robot, ...) of hierarchy.contacts"),
     "Barrier": (Barrier, "Barrier(distance) of hierarchy.avoidance")}
-_NUMBERS: dict[str, Any] = {"float": Real, "int": Integral, "float | None": Real | None,
-                            "int | None": Integral | None}
+_NUMBERS = {"float": real, "int": whole, "float | None": real, "int | None": whole}
 
 
 class Rows(NamedTuple):
@@ -232,8 +240,7 @@ def check_parts(task: Task) -> None:
     """
     refuse(not isinstance(task.name, str) or not task.name, f"{type(task).__name__}: name: "
            f"expected a text, got {brief(task.name)}")
-    refuse(not is_one_of(task.kind, get_args(Kind)), f"task {task.name!r}: kind must be 'equality' "
-           f"or 'inequality', got {task.kind!r}")
+    check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
     parts: tuple[Field[Any], ...] = fields(task) if is_dataclass(task) else ()
     for part in parts:
         named = part.type if isinstance(part.type, str) else part.type.__name__
@@ -246,9 +253,12 @@ def check_parts(task: Task) -> None:
             expect(f"task {task.name!r}: {part.name}", value, kind, f"give {remedy}")
         elif part.init and named in _NUMBERS and part.name not in _GAINS:
             value = getattr(task, part.name)
-            refuse(isinstance(value, bool) or not isinstance(value, _NUMBERS[named]),
-                   f"task {task.name!r}: {part.name} = {value!r}: expected a "
-                   f"{'whole ' * named.startswith('int')}number")
+            if value is not None or "None" not in named:
+                value = _NUMBERS[named](f"task {task.name!r}: {part.name}", value)
+                set_frozen(task, **{part.name: value})
+        elif part.init and named.startswith("Literal["):
+            check_choice(f"task {task.name!r}: {part.name}", getattr(task, part.name),
+                         literal_eval(named.removeprefix("Literal")))
         refuse(named == "Barrier" and task.kind != "inequality", f"task {task.name!r}: its rows "
                "are inequalities")
     if any(part.type == "Sequence[ControlPoint]" for part in parts) and not len(

@@ -57,6 +57,7 @@ class Factorization:
     def __init__(self, levels: Sequence[ArrayLike], names: Sequence[str] | None = None,
                  n: int | None = None, settings: Tpm | None = None) -> None:
         self._settings = Tpm() if settings is None else settings
+        expect("settings", self._settings, Tpm, "give make('tpm')")
         if self._settings.form != "staircase":
             raise HierarchyError("a factorization needs the staircase form of tpm, got form = "
                                  f"{self._settings.form!r}")

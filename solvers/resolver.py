@@ -13,7 +13,15 @@ from typing import Any, ClassVar, Literal, TypeVar
 import numpy as np
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError, UnknownNameError, brief, expect, is_one_of
+from hierarchy.errors import (
+    HierarchyError,
+    UnknownNameError,
+    as_float,
+    brief,
+    expect,
+    is_one_of,
+    whole,
+)
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
@@ -39,12 +47,12 @@ def number(default: Any = dataclasses.MISSING, low: float = 0.0, high: float = m
     def check(resolver: Resolver, name: str, value: Any) -> None:
         if value is None and default is None:
             return
-        known = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not known or not low <= value < high or (open_below and value == low):
+        found = as_float(value)
+        if not low <= found < high or (open_below and found == low):
             raise HierarchyError(f"{resolver.name}: {name} = {value!r}, expected a number "
                                  f"{'>' if open_below else '>='} {low:g} and < {high:g}")
         if type(value) is not float:
-            set_frozen(resolver, **{name: float(value)})
+            set_frozen(resolver, **{name: found})
 
     return dataclasses.field(default=default, metadata={_CHECK: check})
 
@@ -52,11 +60,8 @@ def number(default: Any = dataclasses.MISSING, low: float = 0.0, high: float = m
 def whole_number(default: int | None, least: int) -> Any:
     """Return a field: a setting that is a whole number >= least."""
     def check(resolver: Resolver, name: str, value: Any) -> None:
-        if value is None and default is None:
-            return
-        if not isinstance(value, int) or isinstance(value, bool) or not least <= value < 2**31:
-            raise HierarchyError(f"{resolver.name}: {name} = {value!r}, expected a whole number >= "
-                                 f"{least}")
+        if value is not None or default is not None:
+            set_frozen(resolver, **{name: whole(f"{resolver.name}: {name}", value, least)})
 
     return dataclasses.field(default=default, metadata={_CHECK: check})
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, sqrt
-from numbers import Integral
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.avoidance.laws import repulsion
 from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turning_off_obstacle
-from hierarchy.errors import expect, number, refuse
+from hierarchy.errors import number, refuse, whole
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import Readings, dot, place, plus
 from hierarchy.problem import Array
@@ -50,8 +49,7 @@ class Measurement:
                  "pairs", "points", "stamp")
 
     def __init__(self, control_points: int) -> None:
-        expect("Measurement: control_points", control_points, Integral, "give how many there are")
-        size = int(number("Measurement: control_points", control_points, 0.0)) + 1
+        size = whole("Measurement: control_points", control_points) + 1
         self.points, self.direction = np.zeros((size, 3)), np.zeros((size, 3))
         self.distance, self.magnitude = np.full(size, inf), np.zeros(size)
         self.nearest = np.full(size, -1, dtype=np.int64)

@@ -8,12 +8,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import cos, inf, sin
-from numbers import Integral
 from pathlib import Path as File
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, brief, expect, finite_numbers, number, refuse
+from hierarchy.errors import (
+    HierarchyError,
+    brief,
+    expect,
+    file_path,
+    finite_numbers,
+    number,
+    refuse,
+    whole,
+)
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -144,13 +152,11 @@ class Jittered(Path):
     _sines: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for name in ("amplitude", "rate", "seed"):
-            number(f"jitter: {name}", getattr(self, name))
+        number("jitter: amplitude", self.amplitude, 0.0)
+        refuse(not number("jitter: rate", self.rate) > 0.0, f"jitter: rate {self.rate} must be "
+               "positive")
         expect("jitter: path", self.path, Path, "see hierarchy.paths")
-        expect("jitter: seed", self.seed, Integral, "give a whole number")
-        refuse(not 0.0 <= self.amplitude or not 0.0 < self.rate or self.seed < 0,
-               f"jitter: amplitude {self.amplitude}, rate {self.rate}, seed {self.seed}, expected "
-               "numbers >= 0, > 0 and >= 0")
+        whole("jitter: seed", self.seed)
         random = np.random.default_rng(self.seed)
         speeds = 2.0 * np.pi * self.rate * random.uniform(0.5, 1.0, (3, 5))  # rad/s
         set_frozen(self, _sines=np.stack([speeds, random.uniform(0.0, 2.0 * np.pi, (3, 5))]))
@@ -327,7 +333,8 @@ def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: A
 
 def _lines(file: str | File) -> list[str]:
     try:
-        return [line_ for line_ in File(file).read_text(encoding="utf-8").splitlines() if line_]
+        text = file_path("recorded path: file", file).read_text(encoding="utf-8")
+        return [line_ for line_ in text.splitlines() if line_]
     except (OSError, UnicodeDecodeError) as error:
         raise HierarchyError(f"{file} cannot be read: {error}") from error
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy.avoidance.body import Capsule, Vector
+from hierarchy.errors import brief, number, refuse
 from hierarchy.problem import Array
 from hierarchy.robots.table import Table, TreeTable
 
@@ -105,6 +106,8 @@ def link_capsules(table: Table, foot: float = 0.0, base: int | None = None) -> t
     first capsule of an arm is a column from that far below the base frame up to it. Each touches
     the next. `base` is the index of the joint that moves the base, None for that of the table.
     """
+    refuse(not isinstance(table, Table), f"link_capsules: expected a table, got {brief(table)}")
+    number("link_capsules: foot [m]", foot)
     if isinstance(table, TreeTable):
         return _tree_capsules(table, int(table.base == "floating") if base is None else base)
     first = 1 + (base or 0)

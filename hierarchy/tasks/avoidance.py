@@ -88,10 +88,6 @@ class Avoidance(Measured):
     name: str = "avoidance"
     stiffness = gain = 1.0  # the error is the command at both levels
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.refuse(self.rows not in (1, 3), f"rows must be 1 or 3, got {self.rows}")
-
     @property
     def dimension(self) -> int:
         """One row or three."""

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import finite_numbers, is_one_of
+from hierarchy.errors import finite_numbers
 from hierarchy.jit import compiled
 from hierarchy.kinematics import carried, moving_point, place, plus, row_times, times
 from hierarchy.measured import Measure, Measured, measured
@@ -124,8 +124,6 @@ class Momentum(NamedRows, Measured):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(not is_one_of(self.part, _ROWS),
-                    f"part {self.part!r} is not one of {', '.join(_ROWS)}")
         if self.target is not None:
             finite_numbers(f"task {self.name!r}: target", self.target, self.dimension)
 

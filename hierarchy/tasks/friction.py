@@ -50,7 +50,6 @@ class Friction(FixedRows):
     def __post_init__(self) -> None:
         super().__post_init__()
         required(self.contacts, self.name)
-        self.refuse(self.faces not in (4, 8), f"{self.faces!r} faces, expected 4 or 8")
         self.refuse(not 0.0 <= self.least < self.largest, "no normal force is pushing and lies "
                     f"between least {self.least} N and largest {self.largest} N")
 

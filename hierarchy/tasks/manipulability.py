@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from hierarchy.errors import is_one_of, number
+from hierarchy.errors import number
 from hierarchy.kinematics import Kinematics, Placed, cross
 from hierarchy.measured import Measure, Measured, Motion, plain
 from hierarchy.problem import Array
@@ -47,8 +47,6 @@ class Manipulability(Measured):
     def __post_init__(self) -> None:
         super().__post_init__()
         number(f"task {self.name!r}: least", self.least, 0.0)
-        self.refuse(not is_one_of(self.part, ("position", "pose")), "part must be 'position' or "
-                    f"'pose', got {self.part!r}")
 
     @property
     def rows(self) -> int:

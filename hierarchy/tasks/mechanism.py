@@ -14,7 +14,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import number, refuse
+from hierarchy.errors import expect, number, refuse
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
@@ -42,6 +42,7 @@ def model_rows(robot: Robot, period: float = 0.001) -> list[Task]:
     accelerations keep the mechanism, and torques of all joints make them: the mechanism itself then
     transmits no force, and every joint needs a motor.
     """
+    expect("model_rows: robot", robot, Robot, "give Robot.load(NAME)")
     refuse(number("model_rows: period [s]", period) <= 0.0, f"model_rows: period {period} s "
            "must be positive")
     rate = min(_FASTEST, _PER_PERIOD / period)

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, expect, finite_numbers, is_one_of, number
+from hierarchy.errors import HierarchyError, expect, finite_numbers, number
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import row_times, write_identity
 from hierarchy.measured import Measure, Measured, measured
@@ -151,8 +151,6 @@ class JointDamping(JointTask):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(not is_one_of(self.weight, ("identity", "mass")), "weight must be 'identity' "
-                    f"or 'mass', got {self.weight!r}")
         number(f"task {self.name!r}: damping", self.damping, 0.0)
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
