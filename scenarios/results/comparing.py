@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import final
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError, brief, expect, file_path
+from hierarchy.errors import HierarchyError, brief, expect, file_path, whole
 from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.scenario import OWN
 from scenarios.files import OutputError, claim, make_folder, unlock, write_json, write_text
@@ -56,6 +56,7 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     HierarchyError : before any run: an unknown scenario, resolver or setting, a scenario that does
         not fit its robot, no resolver that can resolve any scenario, or an output folder in use.
     """
+    whole("compare: workers", workers, 1)
     planned, refused = _plan(scenarios, resolvers)
     folder = None if out is None else make_folder(claim(file_path("compare: out", out)))
     where = [] if out is None else ["--out", str(out)]

@@ -18,7 +18,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, expect
+from hierarchy.errors import HierarchyError, expect, whole
 from hierarchy.gate import checked_sizes, readable, shaped
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
@@ -141,19 +141,10 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     if not isinstance(resolver, Merged) and not (
             isinstance(resolver, (Tpm, Hcod)) and resolver.strict):
         raise HierarchyError(f"{resolver.label} resolves no batches; tpm, hcod and merged do")
-    if threads is not None and threads < 1:
-        raise HierarchyError(f"threads = {threads}, expected at least 1")
+    threads = cores() if threads is None else whole("threads", threads, 1)
     batch = replace(batch)  # numpy lets its holder change the shape of an array: through the gate
-    (_, m, n), levels = batch.A.shape, len(batch.sizes)
-    kernel: Callable[..., int] = batch_exact
-    size, warm = 3 * m + 3, resolver.damping == 0.0
-    if isinstance(resolver, Merged):
-        kernel, size, warm = batch_merged, record_size(n, m), True
-        settings = resolver._settings_for(tuple(f"level {k + 1}" for k in range(levels)))
-    else:
-        settings = resolver._settings
-    if isinstance(resolver, Tpm):
-        kernel, size = batch_within_bounds, n + levels + size
+    _, m, n = batch.A.shape
+    kernel, settings, size, warm = _way(resolver, m, n, len(batch.sizes))
     x, codes = np.zeros(batch.A.shape[::2]), np.zeros(len(batch), dtype=np.int64)
     record = np.zeros((len(batch), size))
     before = None if memory is None else readable("memory", memory)
@@ -161,7 +152,7 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
         record[:] = before
     problems = batch.A, batch.lower, batch.upper, batch.sizes, batch.reference
     _in_parallel(partial(run, kernel, problems, x, codes, record, settings), batch,
-                 cores() if threads is None else threads)
+                 threads)
     for p in np.flatnonzero(codes < 0)[:1]:
         if isinstance(resolver, Merged):
             refuse_safety_alone(resolver, batch[int(p)])
@@ -173,6 +164,18 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
         if not saturated.any():
             return BatchResolution(x, codes, steps.astype(np.int64), None)
     return BatchResolution(x, codes, steps.astype(np.int64), record)
+
+
+def _way(resolver: Tpm | Hcod | Merged, m: int, n: int, levels: int
+         ) -> tuple[Callable[..., int], Array, int, bool]:
+    """Return kernel and settings of a resolver, the size of a memory, and whether it is read."""
+    if isinstance(resolver, Merged):
+        names = tuple(f"level {k + 1}" for k in range(levels))
+        return batch_merged, resolver._settings_for(names), record_size(n, m), True
+    size, warm = 3 * m + 3, resolver.damping == 0.0
+    if isinstance(resolver, Tpm):
+        return batch_within_bounds, resolver._settings, n + levels + size, warm
+    return batch_exact, resolver._settings, size, warm
 
 
 def _in_parallel(call: Callable[[Indices], int], batch: Batch, threads: int) -> None:
