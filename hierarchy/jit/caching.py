@@ -1,8 +1,9 @@
 """Compiled kernels on disk: made when the package was built, or here when they were first needed.
 
 Ahead: object files, each with an index that has, for each kernel, the digest of the sources that it
-was made of and the types of arguments that there is code for. Any other call, and a kernel whose
-sources have changed since, is compiled when it is needed.
+was made of and the types of arguments that there is code for. Another processor makes its own, once,
+of the LLVM code beside. Any other call, and a kernel whose sources have changed since, is compiled
+when it is needed.
 
 Then: one file for a kernel, the types of its arguments, and a machine. numba's own cache does not
 notice when a helper in another file has changed. Here the name of a file carries a digest of
@@ -43,11 +44,12 @@ from hierarchy.jit.inside import (
     make_function,
     nrt_helpers,
 )
-from hierarchy.jit.linking import found
+from hierarchy.jit.linking import found, hide, machine, object_code
 from hierarchy.jit.saying import say
 from hierarchy.jit.sources import described, source_digest
 
 _CHECKSUM = 32  # [B] at the beginning of a file
+_DIGEST = 64    # [B] of the functions of C, at the beginning of LLVM code
 
 
 class KernelCache(NullCache):  # type: ignore[misc]
@@ -192,7 +194,7 @@ def _expect_blas() -> None:
 
 
 FOLDER = Path(__file__).with_name("objects")
-NATIVE = "TASK_HIERARCHY_NATIVE"  # set: every kernel is compiled for this very processor
+NATIVE = "TASK_HIERARCHY_NATIVE"  # set: code is made for this very processor
 PROCESSOR = "x86-64-v3"
 _FEATURES = ("avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt",
              "sahf", "sse3", "sse4.1", "sse4.2", "ssse3", "xsave")  # of x86-64-v3
@@ -253,11 +255,34 @@ class Part:
         register_symbols()
         if any(llvm.address_of_symbol(name) is None for name in self.externals):
             return None
+        try:
+            made = (llvm.ObjectFileRef.from_path(str(self.file)) if suits() else
+                    llvm.ObjectFileRef.from_data(self._made_here()))
+        except (OSError, RuntimeError):  # no LLVM code, or of a newer LLVM
+            return None
         target = llvm.Target.from_triple(llvm.get_process_triple())
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.create_target_machine())
-        engine.add_object_file(llvm.ObjectFileRef.from_path(str(self.file)))
+        engine.add_object_file(made)
         engine.finalize_object()
         return engine
+
+    def _made_here(self) -> bytes:
+        """Return the object file for another processor, made of the LLVM code once."""
+        code, here, folder = parts_of(self.file.with_suffix(".bc"))[1], machine(), cache_folder()
+        about = hashlib.sha256(code + repr((here, llvmlite.__version__)).encode()).hexdigest()
+        file = None if folder is None else folder / f"{self.file.stem}-{about[:32]}.o"
+        kept = None if file is None else _read(file)
+        if kept is not None:
+            return kept
+        say(f"making code for this processor, once: {self.file.stem} ...")
+        module = llvm.parse_bitcode(code)
+        hide(module, {name for one in self.entries.values()
+                      for name in (one.wrapper, one.environment)})
+        made = object_code(module, here)
+        with suppress(OSError):
+            if file is not None:
+                _write(file, made)
+        return made
 
     def function(self, entry: Code, kernel: Any) -> Any:
         """Return what Python calls; None if the object file cannot be loaded."""
@@ -285,11 +310,20 @@ def find(kernel: Any, kinds: tuple[Any, ...]) -> Any:
 
 @cache
 def parts() -> tuple[Part, ...]:
-    """Return the object files that this processor can run."""
-    files = sorted(FOLDER.glob("*.o"))
-    if not files or os.environ.get(NATIVE):
-        return ()
-    features, triple = llvm.get_host_cpu_features(), llvm.get_process_triple()
-    suits = triple.startswith("x86_64") and "linux" in triple and all(
-        features.get(name) for name in _FEATURES)
-    return tuple(filter(None, map(Part.read, files))) if suits else ()
+    """Return the object files of this kind of machine."""
+    triple = llvm.get_process_triple()
+    runs = triple.startswith("x86_64") and "linux" in triple
+    return tuple(filter(None, map(Part.read, sorted(FOLDER.glob("*.o"))))) if runs else ()
+
+
+@cache
+def suits() -> bool:
+    """Whether the object files are used as they are: this processor can run them."""
+    features = llvm.get_host_cpu_features()
+    return not os.environ.get(NATIVE) and all(features.get(name) for name in _FEATURES)
+
+
+def parts_of(file: Path) -> tuple[bytes, bytes]:
+    """Return the digest of the functions of C in a file of LLVM code, and the code."""
+    content = file.read_bytes()
+    return content[:_DIGEST], content[_DIGEST:]

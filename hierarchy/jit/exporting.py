@@ -19,26 +19,25 @@ import numpy as np
 from llvmlite import ir
 from numba.np import arrayobj
 
-from hierarchy.jit.caching import PROCESSOR, Code, Part
+from hierarchy.jit.caching import PROCESSOR, Code, Part, parts_of
 from hierarchy.jit.compiling import Cached
 from hierarchy.jit.inside import cgutils, compiler, global_compiler_lock, llvm, registry, types
-from hierarchy.jit.linking import Library, found, hide, linked, naming, stripped
+from hierarchy.jit.linking import (
+    Library,
+    found,
+    hide,
+    linked,
+    machine,
+    naming,
+    object_code,
+    stripped,
+)
 from hierarchy.jit.sources import Kernel, kinds_in, source_digest
 
 INTEGER, STATUS = types.int64, types.int32  # of arguments and results; a pointer is an INTEGER too
 
 _OPTIONS = {"nopython": True, "error_model": "numpy", "_nrt": False,
             "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-
-
-@final
-@dataclass(frozen=True)
-class Machine:
-    """What code is compiled for, in LLVM's words; empty features: those of the processor."""
-
-    triple: str
-    processor: str
-    features: str
 
 
 @final
@@ -56,11 +55,6 @@ class Entry:
     failed: int
 
 
-def machine() -> Machine:
-    """Return what this process compiles for: its own processor, or NUMBA_CPU_NAME."""
-    return Machine(*registry.cpu_target.target_context.codegen().magic_tuple())
-
-
 def compiles() -> bool:
     """Whether kernels are compiled at all; not with NUMBA_DISABLE_JIT."""
     return not numba.config.DISABLE_JIT
@@ -74,11 +68,12 @@ def lowered(entries: Mapping[str, Entry]) -> Any:
 
 def stored(file: Path, entries: Mapping[str, Entry]) -> Any:
     """Return the module of these and other entries that `build` wrote; None if it does not suit."""
-    digest = _digest(entries)
     with suppress(OSError, RuntimeError):  # missing, or of a newer LLVM
-        content = file.read_bytes()
-        if digest and content.startswith(digest):
-            return llvm.parse_bitcode(content[len(digest):])
+        digest, code = parts_of(file)
+        if digest and digest == _digest(entries):
+            module = llvm.parse_bitcode(code)
+            hide(module, set(entries))
+            return module
     return None
 
 
@@ -94,21 +89,6 @@ def _library(entries: Mapping[str, Entry]) -> Any:
         for name, entry in entries.items():
             _add(library, name, entry)
     return library
-
-
-def object_code(module: Any, machine: Machine) -> bytes:
-    """Return the object file of a module for a machine; it can be loaded anywhere in memory.
-
-    Raises
-    ------
-    RuntimeError : this llvmlite makes no code for the triple.
-    """
-    llvm.initialize_all_targets()
-    llvm.initialize_all_asmprinters()
-    target = llvm.Target.from_triple(machine.triple).create_target_machine(
-        cpu=machine.processor, features=machine.features, opt=3, reloc="pic", codemodel="default")
-    module.triple, module.data_layout = machine.triple, str(target.target_data)
-    return bytes(target.emit_object(module))
 
 
 def _add(library: Any, name: str, entry: Entry) -> None:
@@ -172,7 +152,8 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
     """Write an object file with these calls, whose list has the digest `of`.
 
     calls : each `name(types)`, as `described` writes types. say : takes the number compiled.
-    functions : of C; LLVM code of them, optimised with that of the calls, is for `stored`.
+    functions : of C. LLVM code of calls and functions is written too, for other processors and
+        for `stored`.
     """
     Library.running = Cached.kept = False
     entries, libraries = _compiled(calls, say)
@@ -180,15 +161,13 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
         libraries.append(_library(functions))
     names = {name for entry in entries.values() for name in (entry.wrapper, entry.environment)}
     whole = linked(libraries, {*names, *functions})
-    apart = whole.clone()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.with_suffix(".bc").write_bytes(_digest(functions) + stripped(whole.clone()).as_bitcode())
     hide(whole, names)
     code = object_code(whole, machine())
     externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)
                        if one.is_declaration and not one.name.startswith("llvm."))
     Part(file, of, entries, tuple(externals)).write(code)
-    if functions:
-        hide(apart, set(functions))
-        file.with_suffix(".bc").write_bytes(_digest(functions) + stripped(apart).as_bitcode())
 
 
 def _compiled(calls: Sequence[str], say: Callable[[int], None]

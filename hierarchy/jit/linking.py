@@ -8,10 +8,22 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, final
 
 from hierarchy.jit.inside import Codegen, CodeLibrary, CPUContext, llvm, registry
+
+
+@final
+@dataclass(frozen=True)
+class Machine:
+    """What code is compiled for, in LLVM's words; empty features: those of the processor."""
+
+    triple: str
+    processor: str
+    features: str
+
 
 Call = tuple[str, tuple[Any, ...]]  # the name of a kernel with its module, types of arguments
 
@@ -109,6 +121,26 @@ def found(name: str) -> Any:
     """Return the kernel with this name."""
     module, _, short = name.rpartition(".")
     return getattr(import_module(module), short)
+
+
+def machine() -> Machine:
+    """Return what this process compiles for: its own processor, or NUMBA_CPU_NAME."""
+    return Machine(*registry.cpu_target.target_context.codegen().magic_tuple())
+
+
+def object_code(module: Any, machine: Machine) -> bytes:
+    """Return the object file of a module for a machine; it can be loaded anywhere in memory.
+
+    Raises
+    ------
+    RuntimeError : this llvmlite makes no code for the triple.
+    """
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    target = llvm.Target.from_triple(machine.triple).create_target_machine(
+        cpu=machine.processor, features=machine.features, opt=3, reloc="pic", codemodel="default")
+    module.triple, module.data_layout = machine.triple, str(target.target_data)
+    return bytes(target.emit_object(module))
 
 
 def linked(libraries: Iterable[Any], visible: set[str]) -> Any:

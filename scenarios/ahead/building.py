@@ -1,6 +1,7 @@
 """Compile kernels ahead: `python -m scenarios.ahead` writes the object files of the package.
 
-With `solvers.o` it writes the LLVM code from which `hierarchy library` makes the C library.
+With each it writes LLVM code, from which other processors make their object files and `hierarchy
+library` the C library.
 With the name of a part it writes that one; `solvers` needs nothing but numba and scipy.
 
 `calls.txt` says what Python calls. `python -m scenarios.ahead record` writes it anew, of what JOBS

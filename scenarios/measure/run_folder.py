@@ -16,14 +16,16 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from hierarchy.archives import read_arrays
-from hierarchy.errors import HierarchyError, expect, file_path
+from hierarchy.errors import HierarchyError, expect, file_path, refuse
 from scenarios.config import load
 from scenarios.files import OutputError, whole, write_json
 from scenarios.measure import metrics
 from scenarios.measure.verdict import verdict
 from scenarios.recording.facts import Facts
 from scenarios.recording.recording import DepthView, Event, Recording
+from scenarios.recording.signals import check_shapes
 
+_ALWAYS = "t", "q", "v", "a", "command", "order", "status"
 _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 
 
@@ -85,15 +87,28 @@ def load_run(folder: str | Path) -> Recording:
         hint = f"; it holds runs, such as {inside[0]}" if inside else ""
         raise HierarchyError(f"{path} is not a run folder: it has no run.npz{hint}")
     scenario = load(str(path / "scenario.toml"))
-    signals = _arrays(path / "run.npz", "orders", "fault", "events")
+    facts = _facts(path / "facts.json")
+    signals = _arrays(path / "run.npz", *_ALWAYS, "orders", "fault", "events")
     orders, fault, events = (signals.pop(name) for name in ("orders", "fault", "events"))
     signals |= _arrays(path / "timings.npz")
+    ticks = signals["t"].size
+    try:
+        check_shapes(signals, T=ticks, nq=len(facts.robot.rest), n=len(facts.robot.velocity_names))
+        refuse(events.dtype != _EVENT or not _indices(events["tick"], ticks), "an event of no tick")
+        refuse(not _indices(signals["order"], orders.size), "signal 'order': no index into orders")
+    except HierarchyError as error:
+        raise HierarchyError(f"{path} cannot be read: {error}") from error
     depth = None
     if (path / "depth.npz").exists():
         seen: dict[str, Any] = _arrays(path / "depth.npz", *DepthView._fields)
         depth = DepthView(**{**seen, "t": float(seen["t"]), "active": int(seen["active"])})
-    return Recording(signals, tuple(map(str, orders)), scenario, _facts(path / "facts.json"),
-                     str(fault) or None, tuple(Event(*event) for event in events.tolist()), depth)
+    return Recording(signals, tuple(map(str, orders)), scenario, facts, str(fault) or None,
+                     tuple(Event(*event) for event in events.tolist()), depth)
+
+
+def _indices(values: NDArray[Any], count: int) -> bool:
+    """Whether values are whole numbers from 0 to count - 1."""
+    return values.dtype.kind in "iu" and bool(((values >= 0) & (values < count)).all())
 
 
 def _arrays(path: Path, *names: str) -> dict[str, NDArray[Any]]:

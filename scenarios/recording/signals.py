@@ -7,10 +7,15 @@ points, C contacts, H obstacles.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
 
 from hierarchy import plugins
-from hierarchy.errors import UnknownNameError
+from hierarchy.errors import UnknownNameError, refuse
 
 OTHER = "/other"  # the topic of what has no other
 
@@ -48,6 +53,22 @@ def check(name: str) -> None:
     """Raise an UnknownNameError with the nearest name unless a signal has this one."""
     if known(name) is None:
         raise UnknownNameError("signal", name, plugins.known("signals"))
+
+
+def check_shapes(signals: Mapping[str, NDArray[Any]], **sizes: int) -> None:
+    """Raise a HierarchyError for a signal that is not an array of numbers of its shape.
+
+    `sizes` are those of letters that are known; each other has one size in all signals, but m.
+    """
+    for name, values in signals.items():
+        of, given = known(name), values.shape
+        letters = re.findall(r"\w+", of.shape) if of else []
+        of_letter = dict(zip(letters, given, strict=False))
+        expected = tuple(int(letter) if letter.isdigit() else of_letter.get(letter, -1)
+                         if letter == "m" else sizes.setdefault(letter, of_letter.get(letter, -1))
+                         for letter in letters)
+        refuse(of and (given != expected or values.dtype.kind not in "biuf"), f"signal {name!r}: "
+               f"{values.dtype} of shape {given}, expected numbers of shape {expected}")
 
 
 def described() -> str:

@@ -61,8 +61,8 @@ def emitted(resolvers: Sequence[str], target: str, fix: Sequence[int] = ()) -> E
     check(resolvers, target, fix)
     import llvmlite.binding as llvm
 
-    from hierarchy.jit.exporting import compiles, object_code
-    from hierarchy.jit.linking import hide
+    from hierarchy.jit.exporting import compiles
+    from hierarchy.jit.linking import hide, object_code
     from solvers.library.entries import FUNCTIONS
 
     if not compiles():
@@ -112,8 +112,9 @@ def digest() -> str:
 def _code(functions: dict[str, Any], target: str) -> tuple[Any, Any]:
     """Return an LLVM module with functions, made ahead or now, and the machine that it is for."""
     from hierarchy.jit import announce_compilation
-    from hierarchy.jit.caching import FOLDER, PROCESSOR, parts
-    from hierarchy.jit.exporting import Machine, lowered, machine, stored
+    from hierarchy.jit.caching import FOLDER, PROCESSOR, parts, suits
+    from hierarchy.jit.exporting import lowered, stored
+    from hierarchy.jit.linking import Machine, machine
 
     module = stored(FOLDER / "solvers.bc", functions)
     if module is None:
@@ -122,7 +123,8 @@ def _code(functions: dict[str, Any], target: str) -> tuple[Any, Any]:
     if target != "native":
         return module, Machine(_TRIPLES[target], "generic", "")
     here = machine()
-    return module, Machine(here.triple, PROCESSOR, "") if parts() else here  # as Python runs it
+    as_python = parts() and suits()
+    return module, Machine(here.triple, PROCESSOR, "") if as_python else here
 
 
 def _fix(module: Any, sizes: Sequence[int]) -> None:
