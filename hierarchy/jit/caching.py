@@ -1,7 +1,7 @@
 """Compiled kernels on disk: made when the package was built, or here when they were first needed.
 
 Ahead: object files, each with an index that has, for each kernel, the digest of the sources that it
-was made of and the types of arguments that there is code for. Another processor makes its own, once,
+was made of and the types of arguments that there is code for. Another processor makes its own once,
 of the LLVM code beside. Any other call, and a kernel whose sources have changed since, is compiled
 when it is needed.
 

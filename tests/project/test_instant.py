@@ -23,12 +23,12 @@ def _objects():
         pytest.skip("the object files are not there, or older than the kernels: make set-up")
 
 
-def compiled(code, folder):
+def compiled(code, folder, **settings):
     """What a program, in a new process, and all that it starts compile: it is kept in a cache."""
     done = subprocess.run(
         [sys.executable, "-c", code], text=True, capture_output=True, cwd=folder, check=False,
         env={**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(folder / "cache"),
-             "NUMBA_CACHE_DIR": ""})
+             "NUMBA_CACHE_DIR": "", **settings})
     assert done.returncode == 0, done.stderr
     kept = folder / "cache" / "task-hierarchy"
     return sorted(path.name for path in kept.rglob("*") if path.is_file())
@@ -52,6 +52,16 @@ def test_commands_compile_nothing(tmp_path):
     code = ("from scenarios.cli.main import run_command\n"
             f"assert max(map(run_command, {words})) < 2")
     assert compiled(code, tmp_path) == []
+
+
+def test_another_processor_makes_code_once_and_compiles_nothing(tmp_path):
+    code = ("import numpy as np\nfrom hierarchy import Hierarchy\nfrom solvers import make\n"
+            "box = np.eye(2), [-1.0] * 2, [1.0] * 2\n"
+            "x = make('hcod').solve(Hierarchy.from_levels([box, ([[1.0, 2.0]], [4.0])])).x\n"
+            "assert np.abs(x - 1.0).max() < 1e-12")
+    for _ in range(2):
+        [name] = compiled(code, tmp_path, TASK_HIERARCHY_NATIVE="1", NUMBA_CPU_NAME="nehalem")
+        assert re.fullmatch(r"solvers-\w+\.o", name)
 
 
 def test_a_call_with_other_types_is_compiled_and_right(tmp_path):
