@@ -24,6 +24,7 @@ from scenarios.measure.verdict import verdict
 from scenarios.recording.facts import Facts
 from scenarios.recording.recording import DepthView, Event, Recording
 from scenarios.recording.signals import check_shapes
+from solvers.status import Status
 
 _ALWAYS = "t", "q", "v", "a", "command", "order", "status"
 _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
@@ -96,6 +97,7 @@ def load_run(folder: str | Path) -> Recording:
         check_shapes(signals, T=ticks, nq=len(facts.robot.rest), n=len(facts.robot.velocity_names))
         refuse(events.dtype != _EVENT or not _indices(events["tick"], ticks), "an event of no tick")
         refuse(not _indices(signals["order"], orders.size), "signal 'order': no index into orders")
+        refuse(not {*signals["status"].tolist()} <= {*Status}, "signal 'status': no Status")
     except HierarchyError as error:
         raise HierarchyError(f"{path} cannot be read: {error}") from error
     depth = None

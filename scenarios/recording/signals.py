@@ -67,7 +67,8 @@ def check_shapes(signals: Mapping[str, NDArray[Any]], **sizes: int) -> None:
         expected = tuple(int(letter) if letter.isdigit() else of_letter.get(letter, -1)
                          if letter == "m" else sizes.setdefault(letter, of_letter.get(letter, -1))
                          for letter in letters)
-        refuse(of and (given != expected or values.dtype.kind not in "biuf"), f"signal {name!r}: "
+        kinds = "iuf" if of and of.unit else "biuf"
+        refuse(of and (given != expected or values.dtype.kind not in kinds), f"signal {name!r}: "
                f"{values.dtype} of shape {given}, expected numbers of shape {expected}")
 
 

@@ -18,6 +18,7 @@ from scenarios.draw.figures.palette import looks
 from scenarios.draw.figures.panels import Panel
 from scenarios.export.mcap import grouped
 from scenarios.files import OutputError, claim, next_free, whole
+from scenarios.measure import run_folder
 from scenarios.measure.metrics import Metric
 from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
@@ -59,6 +60,20 @@ def test_a_file_that_is_cut_off_or_has_wrong_bits_is_named(tmp_path):
         except HierarchyError as error:
             named += "run.npz" in str(error)
     assert named > 100
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"q": np.zeros((5, 6))}, "signal 'q': float64 of shape (5, 6), expected numbers of shape"),
+    ({"v": np.zeros((4, 7))}, "signal 'v': float64 of shape (4, 7)"),
+    ({"t": np.array(["a"] * 5)}, "signal 't': <U1 of shape (5,)"),
+    ({"order": np.full(5, 2)}, "signal 'order': no index into orders"),
+    ({"status": np.full(5, 77)}, "signal 'status': no Status"),
+    ({"events": np.array([(5, "late", "brake")], run_folder._EVENT)}, "an event of no tick")])
+def test_a_signal_of_another_shape_or_meaning_is_named(tmp_path, change, said):
+    save(recording(), tmp_path)
+    with np.load(tmp_path / "run.npz") as arrays:
+        np.savez(tmp_path / "run.npz", **{**arrays, **change})
+    refused(f"{tmp_path} cannot be read: {said}", load_run, tmp_path)
 
 
 def write(folder, error=None):
