@@ -18,7 +18,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import ReadingError, UnknownNameError, brief, is_one_of, number, refuse
+from hierarchy.errors import (
+    ReadingError,
+    UnknownNameError,
+    brief,
+    is_one_of,
+    number,
+    refuse,
+    whole,
+)
 from hierarchy.problem import Array
 
 
@@ -190,6 +198,8 @@ class Loop:
         for name, value in (("period", period), ("behind", behind), ("spin", spin),
                             ("watchdog", period if watchdog is None else watchdog)):
             number(f"loop: {name}", value)
+        if priority is not None:
+            whole("loop: priority", priority)
         refuse(not period > 0.0, f"loop: period {period} s must be positive")
         refuse(not behind >= 1, f"loop: behind = {behind}, expected 1 or more ticks")
         refuse(not spin >= 0.0, f"loop: spin {spin} s must not be negative")

@@ -47,7 +47,7 @@ _PARTS: dict[str, tuple[type, str]] = {
     "Path": (Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
     "Contacts": (Contacts, "Contacts(robot, ...) of hierarchy.contacts"),
     "Barrier": (Barrier, "Barrier(distance) of hierarchy.avoidance")}
-_NUMBERS = {"float": real, "int": whole, "float | None": real, "int | None": whole}
+_NUMBERS = {"float": real, "int": whole}
 
 
 class Rows(NamedTuple):
@@ -243,21 +243,21 @@ def check_parts(task: Task) -> None:
     check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
     parts: tuple[Field[Any], ...] = fields(task) if is_dataclass(task) else ()
     for part in parts:
-        named = part.type if isinstance(part.type, str) else part.type.__name__
-        if part.init and named in _PARTS:
+        written = part.type if isinstance(part.type, str) else part.type.__name__
+        named, value = written.removesuffix(" | None"), getattr(task, part.name, None)
+        if not part.init or (value is None and named != written):
+            continue
+        if named in _PARTS:
             kind, remedy = _PARTS[named]
-            value = getattr(task, part.name)
             if isinstance(value, str) and "NAME" in remedy:
                 raise HierarchyError(f"task {task.name!r}: {part.name} is the name {value!r}; "
                                      f"give {remedy.replace('NAME', repr(value))}")
             expect(f"task {task.name!r}: {part.name}", value, kind, f"give {remedy}")
-        elif part.init and named in _NUMBERS and part.name not in _GAINS:
-            value = getattr(task, part.name)
-            if value is not None or "None" not in named:
-                value = _NUMBERS[named](f"task {task.name!r}: {part.name}", value)
-                set_frozen(task, **{part.name: value})
-        elif part.init and named.startswith("Literal["):
-            check_choice(f"task {task.name!r}: {part.name}", getattr(task, part.name),
+        elif named in _NUMBERS and part.name not in _GAINS:
+            value = _NUMBERS[named](f"task {task.name!r}: {part.name}", value)
+            set_frozen(task, **{part.name: value})
+        elif named.startswith("Literal["):
+            check_choice(f"task {task.name!r}: {part.name}", value,
                          literal_eval(named.removeprefix("Literal")))
         refuse(named == "Barrier" and task.kind != "inequality", f"task {task.name!r}: its rows "
                "are inequalities")

@@ -10,7 +10,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import expect_each, finite_numbers, number
+from hierarchy.errors import expect_each, finite_numbers, number, whole
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import dot, less, place, plus, times, turned
 from hierarchy.problem import Array
@@ -53,6 +53,7 @@ class Capsule:
     radius: float
 
     def __post_init__(self) -> None:
+        whole(f"capsule {self.name!r}: joint", self.joint)
         number(f"capsule {self.name!r}: radius [m]", self.radius, 0.0)
         for name in ("start", "end"):
             finite_numbers(f"capsule {self.name!r}: {name} [m]", getattr(self, name), 3)

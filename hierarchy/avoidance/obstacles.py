@@ -9,7 +9,14 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import UnknownNameError, expect_each, finite_numbers, is_one_of, refuse
+from hierarchy.errors import (
+    UnknownNameError,
+    expect,
+    expect_each,
+    finite_numbers,
+    is_one_of,
+    refuse,
+)
 from hierarchy.gate import array_of, check_rotation
 from hierarchy.jit import inlined, internal
 from hierarchy.kinematics import dot, less
@@ -49,6 +56,8 @@ class Obstacle:
                f"{size.tolist()}")
         finite_numbers(f"{self.name}: centre", self.centre, 3)
         check_rotation(f"{self.name}: rotation", self.rotation)
+        if self.path is not None:
+            expect(f"{self.name}: path", self.path, Path, "see hierarchy.paths")
 
     def packed(self) -> Array:
         """The obstacle as one row (16,) of the table for the kernels."""
