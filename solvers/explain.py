@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError, brief, expect, number
 from hierarchy.problem import Array, Hierarchy
@@ -141,15 +142,41 @@ def nowhere(h: Hierarchy, k: int, names: Sequence[str], x: Array) -> str:
 
 def held_back_by(h: Hierarchy, resolution: ActiveSetResolution, k: int,
                  rows: Sequence[str]) -> list[str]:
-    """Return what holds level k back: rows at a side, by their names, and levels of equalities."""
-    said = []
-    for i in np.flatnonzero(resolution.holds_back[:h.offsets[k]] == k).tolist():
-        level = _level_of(h, i)
+    """Return what holds level k back: rows at a side, by their names, and levels.
+
+    A row that is at its side for another level above stands for that level.
+    """
+    said, levels = [], set[int]()
+    for i in holders(h, resolution, k).tolist():
+        level, held = _level_of(h, i), int(resolution.holds_back[i])
+        if held != k:
+            levels.add(level if resolution.active[i] == EQUAL else held)
+            continue
         row = f"{h.names[level]} {rows[i]}" if h.sizes[level] > 1 else h.names[level]
         side = f" at its {'upper' if resolution.active[i] > 0 else 'lower'} side"
         gives = h.give is not None and h.give[i] > 0.0
         said.append(row + (" (gives no more)" if gives else side))
-    return said + _equalities(h, resolution, k)
+    return said + [h.names[level] for level in sorted(levels)]
+
+
+def holders(h: Hierarchy, resolution: ActiveSetResolution, k: int) -> NDArray[np.int64]:
+    """Return the rows of levels above whose forces carry the pull of level k.
+
+    These are equalities, and inequalities at a side that hold back this level or, before it,
+    another: the latter cannot leave their side without a loss there.
+    """
+    first, last = h.offsets[k:k + 2]
+    state, held = resolution.active[:first], resolution.holds_back[:first]
+    sizes = np.linalg.norm(h.A[:first], axis=1)
+    own = held == k
+    acting = np.flatnonzero(((state == EQUAL) | ((held >= 0) & (held < k))) & (sizes > 0.0))
+    pull = h.A[first:last].T @ h.slacks(resolution.x)[first:last]
+    if len(acting) and pull.any():
+        left = pull + h.A[:first][own].T @ resolution.multipliers[:first][own]
+        unit = h.A[acting] / sizes[acting, None]
+        forces = np.linalg.lstsq(unit.T, left, rcond=1e-10)[0]
+        own[acting[np.abs(forces) > _MATTERS * np.linalg.norm(pull)]] = True
+    return np.flatnonzero(own)
 
 
 def _said_once(blocking: Sequence[str], levels: Sequence[str]) -> list[str]:
@@ -158,17 +185,3 @@ def _said_once(blocking: Sequence[str], levels: Sequence[str]) -> list[str]:
               default=name) for name in blocking]
     return [name.removeprefix(level) if level == before else name
             for name, level, before in zip(blocking, of, ["", *of], strict=False)]
-
-
-def _equalities(h: Hierarchy, resolution: ActiveSetResolution, k: int) -> list[str]:
-    """Name the levels above whose equality rows carry part of level k's pull."""
-    first, last = h.offsets[k:k + 2]
-    acting = np.flatnonzero(resolution.active[:first] != 0)
-    pull = h.A[first:last].T @ h.slacks(resolution.x)[first:last]
-    if not len(acting) or not pull.any():
-        return []
-    forces = np.linalg.lstsq(h.A[acting].T, -pull, rcond=1e-10)[0]
-    shares = np.abs(forces) * np.linalg.norm(h.A[acting], axis=1) / np.linalg.norm(pull)
-    matters = (resolution.active[acting] == EQUAL) & (shares > _MATTERS)
-    levels = np.searchsorted(h.offsets, acting[matters], side="right") - 1
-    return [h.names[level] for level in np.unique(levels)]

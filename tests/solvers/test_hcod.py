@@ -1,12 +1,16 @@
 """`hcod`: answers by hand, words for what holds back, its own check, rows of any size."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from rank_cases import family, solved
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, explain, make
+from solvers.explain import holders, is_missed
 from solvers.problems import structured
+from solvers.status import EQUAL
 
 HCOD = make("hcod")
 
@@ -95,6 +99,11 @@ EXPLAINED = {
     "a level that carries a little": (
         [X, Y, ([[1e-4, 1.0]], [1.0])],
         [..., ..., "level 3 is missed by 1: held back by level 1 and level 2."]),
+    "a row at its side for a level above": (
+        [(np.eye(2)[:1], [-np.inf], [1.0]), ([[1.0, 1.0]], [3.0]), ([[1.0, 0.0]], [5.0]),
+         ([[1.0, 0.2]], [9.0])],
+        [..., "level 2 is met.", "level 3 is missed by 4: held back by level 1 at its upper side.",
+         "level 4 is missed by 7.6: held back by level 2 and level 3."]),
     "no joint moves it: singular": (
         [([[0.0, 0.0], [0.6, 0.3], [0.8, 0.4]], [-0.5, 0.6, 0.8])],  # x, y, z of a straight arm
         ["level 1 is missed by 0.5: singular here: no joint moves level 1 along row 0."])}
@@ -107,6 +116,24 @@ def test_explain_says_what_holds_a_level_back(case):
     lines = explain(h, HCOD.solve(h)).splitlines()
     assert lines == [line if words is ... else words
                      for line, words in zip(lines, said, strict=True)]
+
+
+@pytest.mark.parametrize("kind", ["contacts", "fifteen_levels", "integers", "opposed", "signs"])
+def test_what_is_named_alone_holds_a_level_back(kind):
+    for h in (structured(seed, [kind]) for seed in range(910, 920)):
+        res = solved(HCOD, h)
+        value, violations = h.A @ res.x, h.violations(res.x)
+        for k, (i, j) in enumerate(pairwise(h.offsets)):
+            if is_missed(h, res.x, k, 1e-7):
+                rows = holders(h, res, k)
+                free = (res.active[rows] != EQUAL) & (res.holds_back[rows] == k)
+                lower, upper = value[rows].copy(), value[rows].copy()
+                lower[free & (res.active[rows] > 0)] = -np.inf
+                upper[free & (res.active[rows] < 0)] = np.inf
+                alone = Hierarchy.from_levels([(h.A[rows], lower, upper),
+                                               (h.A[i:j], h.lower[i:j], h.upper[i:j])])
+                assert alone.violations(solved(HCOD, alone).x)[1] == pytest.approx(
+                    violations[k], rel=1e-6)
 
 
 def test_a_level_that_is_rounding_beside_others_counts_where_limits_hold_x():
