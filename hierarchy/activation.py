@@ -15,7 +15,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import refuse
+from hierarchy.errors import positive
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.state import State
 from hierarchy.task import Task
@@ -41,8 +41,7 @@ class Activation:
 
     def __init__(self, state: State, tasks: Sequence[Task], buffers: Mapping[str, float]) -> None:
         for name, width in buffers.items():
-            refuse(not 0.0 < width < np.inf, f"task {name!r}: buffer {width} must be positive and "
-                   "finite")
+            positive(f"task {name!r}: buffer", width)
         self._state, self._buffers = state, dict(buffers)
         self._tasks = [(task, np.ones(task.dimension)) for task in tasks]
 

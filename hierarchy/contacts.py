@@ -28,6 +28,7 @@ from hierarchy.errors import (
     finite_numbers,
     is_one_of,
     number,
+    positive,
     refuse,
 )
 from hierarchy.gate import array_of
@@ -88,8 +89,7 @@ class Contact:
         refuse(len(points) != 1 and np.linalg.matrix_rank(points - points.mean(0), tol=1e-6) < 2,
                f"contact {self.name!r}: {len(points)} points on one line; a contact has one "
                "point, or at least three of a surface")
-        refuse(number(f"contact {self.name!r}: friction", self.friction) <= 0.0,
-               f"contact {self.name!r}: friction {self.friction} must be positive")
+        positive(f"contact {self.name!r}: friction", self.friction)
         axes, sole = (_axes(direction, f"contact {self.name!r}: {key}")
                       for key, direction in (("normal", self.normal), ("up", self.up)))
         spans = array_of(f"contact {self.name!r}: open", self.open)

@@ -91,6 +91,13 @@ def number(what: str, value: object, least: float = -inf, largest: float = inf) 
     raise HierarchyError(f"{what} = {shown}: expected a finite number{_between(least, largest)}")
 
 
+def positive(what: str, value: object) -> float:
+    """Return a finite number > 0; raise a HierarchyError for anything else."""
+    found = number(what, value)
+    refuse(found <= 0.0, f"{what} = {found:g}: expected a number > 0")
+    return found
+
+
 def real(what: str, value: object) -> float:
     """Return a number, which may be infinite; raise a HierarchyError for anything else."""
     found = as_float(value)

@@ -51,7 +51,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, number, refuse
+from hierarchy.errors import HierarchyError, number, positive, refuse
 from hierarchy.gate import array_of
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
@@ -94,8 +94,7 @@ class Limits:
         _refuse(~(velocity > 0.0), "velocity must be positive", velocity)
         _refuse(~((acceleration > 0.0) & (acceleration < np.inf)),
                 "acceleration must be positive and finite", acceleration)
-        refuse(not 0.0 < number("limits: period [s]", self.period), "limits: period "
-               f"{self.period} s must be positive and finite")
+        positive("limits: period [s]", self.period)
         number("limits: horizon [s]", self.horizon, 0.0)
         times = [np.full(len(lower), time) for time in (self.period, self.horizon)]
         set_frozen(self, packed=np.array([*rows, *times]))

@@ -24,6 +24,7 @@ from hierarchy.errors import (
     brief,
     is_one_of,
     number,
+    positive,
     refuse,
     whole,
 )
@@ -195,15 +196,12 @@ class Loop:
                  sleep: Callable[[float], object] = time.sleep) -> None:
         if not is_one_of(overrun, OVERRUNS):
             raise UnknownNameError("overrun policy", overrun, OVERRUNS)
-        for name, value in (("period", period), ("behind", behind), ("spin", spin),
-                            ("watchdog", period if watchdog is None else watchdog)):
-            number(f"loop: {name}", value)
+        positive("loop: period [s]", period)
+        number("loop: behind", behind, 1.0)
+        number("loop: spin [s]", spin, 0.0)
         if priority is not None:
             whole("loop: priority", priority)
-        refuse(not period > 0.0, f"loop: period {period} s must be positive")
-        refuse(not behind >= 1, f"loop: behind = {behind}, expected 1 or more ticks")
-        refuse(not spin >= 0.0, f"loop: spin {spin} s must not be negative")
-        refuse(not (watchdog is None or watchdog > period),
+        refuse(watchdog is not None and number("loop: watchdog [s]", watchdog) <= period,
                f"loop: watchdog {watchdog} s must be longer than the period {period} s")
         self.period, self.overrun, self.behind = period, overrun, behind
         self.watchdog, self.spin, self.priority, self.pause_gc = watchdog, spin, priority, pause_gc
@@ -226,8 +224,7 @@ class Loop:
         it and a command may have been sent since. An exception in any of the functions, or Ctrl-C,
         then propagates to the caller.
         """
-        refuse(not number("loop: duration", duration) > 0.0,
-               f"loop: duration {duration} s must be positive")
+        positive("loop: duration [s]", duration)
         for name, function in (("step", step), ("safe_stop", safe_stop), ("send", send)):
             refuse(not (callable(function) or (name == "send" and function is None)),
                    f"loop: {name}: expected a function, got {brief(function)}")

@@ -11,7 +11,7 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, brief, expect, expect_each, number
+from hierarchy.errors import HierarchyError, brief, expect, expect_each, number, positive
 from hierarchy.notebook import numbers
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Robot
@@ -93,8 +93,7 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     """
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
     expect_each("solve_ik: tasks", tasks, Task, "give a list of tasks")
-    if number("solve_ik: dt [s]", dt) <= 0.0:
-        raise HierarchyError(f"solve_ik: dt = {dt} s must be positive and finite")
+    positive("solve_ik: dt [s]", dt)
     if not isinstance(limits, bool | Task):
         raise HierarchyError("solve_ik: limits: expected True, False or a task, got "
                              f"{brief(limits)}")

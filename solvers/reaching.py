@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, number
+from hierarchy.errors import HierarchyError, positive
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Robot
 from hierarchy.stack import Stack
@@ -65,8 +65,7 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
 
     Raises HierarchyError as `solve_ik` does, and if no task decides.
     """
-    if not number("solve_ik: until", until) > 0.0:
-        raise HierarchyError(f"solve_ik: until = {until:g} must be positive")
+    positive("solve_ik: until", until)
     search = _Search(robot, tasks, until, limits, resolver, damping, t)
     rng, start = np.random.default_rng(0), State.at(robot, q, t=t).q.copy()
     best = search.descend(start, resolver)

@@ -23,7 +23,7 @@ from math import exp
 
 import numpy as np
 
-from hierarchy.errors import number, refuse
+from hierarchy.errors import number, positive, refuse
 from hierarchy.jit import compiled, inlined, internal
 from hierarchy.problem import Array
 
@@ -104,8 +104,7 @@ class Repulsion:
 
     def __post_init__(self) -> None:
         for name in ("maximum", "reach", "shape", "scale"):
-            value = number(f"repulsion {name}", getattr(self, name))
-            refuse(value <= 0.0, f"repulsion {name} must be positive, got {value}")
+            positive(f"repulsion: {name}", getattr(self, name))
 
     def __call__(self, distance: float) -> float:
         """Magnitude at a distance [m]."""

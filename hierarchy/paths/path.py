@@ -19,6 +19,7 @@ from hierarchy.errors import (
     file_path,
     finite_numbers,
     number,
+    positive,
     refuse,
     whole,
 )
@@ -153,8 +154,7 @@ class Jittered(Path):
 
     def __post_init__(self) -> None:
         number("jitter: amplitude", self.amplitude, 0.0)
-        refuse(not number("jitter: rate", self.rate) > 0.0, f"jitter: rate {self.rate} must be "
-               "positive")
+        positive("jitter: rate [Hz]", self.rate)
         expect("jitter: path", self.path, Path, "see hierarchy.paths")
         whole("jitter: seed", self.seed)
         random = np.random.default_rng(self.seed)
@@ -186,8 +186,7 @@ def line(start: Vector, end: Vector, duration: float, begin: float = 0.0) -> Way
 
     It is quintic in time and rests before and after.
     """
-    refuse(number("line: duration [s]", duration) <= 0.0, f"line: duration {duration} s must be "
-           "positive")
+    positive("line: duration [s]", duration)
     number("line: begin [s]", begin)
     return Waypoints((begin, begin + duration), (start, end))
 

@@ -33,7 +33,7 @@ import numpy as np
 
 from hierarchy.avoidance.body import ControlPoint, pack_points
 from hierarchy.avoidance.laws import Repulsion, repulsion
-from hierarchy.errors import HierarchyError, expect
+from hierarchy.errors import HierarchyError, expect, positive
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
@@ -123,7 +123,7 @@ class CumulatedRepulsion(JointTask):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(not self.lever > 0.0, f"lever {self.lever} m must be positive")
+        positive(f"task {self.name!r}: lever [m]", self.lever)
         if self.base is not None:
             expect(f"task {self.name!r}: base", self.base, Task, "give a task such as Posture")
             self.refuse(self.base.dimension != self.joints, f"{self.base.name!r} has "

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from hierarchy.contacts import Contacts, Points, write_dynamics, zero_while_open
-from hierarchy.errors import HierarchyError, finite_numbers, number
+from hierarchy.errors import HierarchyError, finite_numbers, number, positive
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import less, place
 from hierarchy.problem import Array
@@ -243,8 +243,7 @@ class TorqueStep(TorqueRows):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(number(f"task {self.name!r}: step", self.step) <= 0.0,
-                    f"step {self.step} must be positive")
+        positive(f"task {self.name!r}: step", self.step)
 
     def bounds(self, state: State) -> tuple[Array, Array]:
         """The commanded torques less and plus the step."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, finite_numbers, number
+from hierarchy.errors import HierarchyError, finite_numbers, number, positive
 from hierarchy.gate import array_of
 from hierarchy.jit import bind
 from hierarchy.kinematics import write_identity
@@ -180,8 +180,7 @@ class StepLimits(JointRows):
     first = 0
 
     def __post_init__(self) -> None:
-        self.refuse(not number(f"task {self.name!r}: period [s]", self.period) > 0.0,
-                    f"period {self.period} s must be positive")
+        positive(f"task {self.name!r}: period [s]", self.period)
         gain = APPROACH / self.period if self.gain is None else self.gain
         number(f"task {self.name!r}: gain [1/s]", gain, 0.0, 1.0 / self.period)
         set_frozen(self, gain=gain)

@@ -14,7 +14,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import expect, number, refuse
+from hierarchy.errors import expect, positive
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
@@ -43,9 +43,7 @@ def model_rows(robot: Robot, period: float = 0.001) -> list[Task]:
     transmits no force, and every joint needs a motor.
     """
     expect("model_rows: robot", robot, Robot, "give Robot.load(NAME)")
-    refuse(number("model_rows: period [s]", period) <= 0.0, f"model_rows: period {period} s "
-           "must be positive")
-    rate = min(_FASTEST, _PER_PERIOD / period)
+    rate = min(_FASTEST, _PER_PERIOD / positive("model_rows: period [s]", period))
     gains = rate**2, 2.0 * rate, rate
     parts: list[Task] = []
     if robot.coupled:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hierarchy import HierarchyError
 from hierarchy.avoidance import Measurement, Obstacles
 from hierarchy.avoidance.measurement import exact_measurer
+from hierarchy.errors import positive
 from hierarchy.problem import Array
 from scenarios.cell.sensors.sensor import make_obstacles, packed_laws
 from scenarios.recording import listed
@@ -125,8 +126,7 @@ def scene(recording: Recording, rate: float = 30.0) -> Scene:
 
     Raises HierarchyError if nothing was recorded or `rate` is not positive and finite.
     """
-    if not 0.0 < rate < np.inf:
-        raise HierarchyError(f"rate = {rate} Hz must be positive and finite")
+    positive("rate [Hz]", rate)
     ticks = _frames(recording, rate)
     fixed, t = stage(recording.facts.robot, recording.scenario), recording["t"][ticks]
     order = recording["order"].astype(np.int64)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, positive
 from hierarchy.gate import Sizes, array_of, check_rows
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
@@ -104,8 +104,7 @@ class Packed:
     def __init__(self, configuration: object, joints: Names, n: int, period: float,
                  limits: Sequence[Limit], constraints: Sequence[Task], tasks: Tasks,
                  pull: Pull | None = None, *, solve: Solve | None = None) -> None:
-        if not 0.0 < period < np.inf:
-            raise HierarchyError(f"period {period} s must be positive and finite")
+        positive("period [s]", period)
         self.n, self.joints, self.period, self.pull = n, joints, period, pull
         entries = [constraints, *(one if isinstance(one, Sequence) else (one,) for one in tasks)]
         self.limits, self.read = limits, [[

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, positive
 from hierarchy.gate import check_rows
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
@@ -49,9 +49,7 @@ class PinkTask(Task):
     def __post_init__(self) -> None:
         if not self.name:
             set_frozen(self, name=displacements.label(self.task))
-        if not 0.0 < self.period < np.inf:
-            raise HierarchyError(f"task {self.name!r}: period {self.period} s must be positive "
-                                 "and finite")
+        positive(f"task {self.name!r}: period [s]", self.period)
         set_frozen(self, rows=len(displacements.residual(self.task, self.configuration)[1]))
 
     @property

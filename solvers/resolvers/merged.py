@@ -8,7 +8,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, positive
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.kernels.merged import BY_RULE, NOTHING, merged, record_size, write_levels
@@ -144,8 +144,5 @@ def _checked(scales: Mapping[str, float] | tuple[tuple[str, float], ...]
     except (TypeError, ValueError) as error:
         raise HierarchyError(f"merged: scales = {scales!r}, expected numbers > 0 by a level's name"
                              ) from error
-    for name, scale in pairs.items():
-        number = isinstance(scale, (int, float)) and not isinstance(scale, bool)
-        if not number or not 0.0 < scale < np.inf:
-            raise HierarchyError(f"merged: scales: {name!r} = {scale!r}, expected a number > 0")
-    return tuple((name, float(scale)) for name, scale in pairs.items())
+    return tuple((name, positive(f"merged: scales: {name!r}", scale))
+                 for name, scale in pairs.items())

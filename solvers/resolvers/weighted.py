@@ -10,7 +10,7 @@ from typing import ClassVar, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, as_float, refuse
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.kernels.merged import TOP_LIMITS, count_strict
@@ -116,7 +116,7 @@ def lexicographic_weights(violations: ArrayLike, tolerance: float, regularised: 
 
 
 def _checked(weights: Sequence[float]) -> tuple[float, ...]:
-    plain = isinstance(weights, (list, tuple, np.ndarray))
-    if not plain or not all(isinstance(w, (int, float)) and 0.0 < w < np.inf for w in weights):
-        raise HierarchyError(f"weighted: weights = {weights!r}, expected numbers > 0")
-    return tuple(float(w) for w in weights)
+    plain = isinstance(weights, list | tuple | np.ndarray)
+    refuse(not plain or not all(0.0 < as_float(w) < np.inf for w in weights),
+           f"weighted: weights = {weights!r}: expected numbers > 0")
+    return tuple(map(float, weights))

@@ -131,7 +131,7 @@ def test_jitter_delays_each_frame_by_less_than_its_most_and_by_the_seed():
 
 
 @pytest.mark.parametrize(("make", "said"), [
-    (lambda: Pinhole(width=0), "width = 0 px"), (lambda: Pinhole(fx=np.nan), "fx = nan px"),
+    (lambda: Pinhole(width=0), "width [px] = 0"), (lambda: Pinhole(fx=np.nan), "fx [px] = nan"),
     (lambda: Pinhole(rotation=np.eye(3) * 1.1), "rotation"),
     (lambda: Pinhole(rotation=np.diag([1, 1, -1])), "rotation"),
     (lambda: Pinhole(position=(0, np.inf, 0)), "position"),

@@ -94,7 +94,7 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: solve_ik("kuka_lwr", Q, []), "solve_ik: robot: expected a Robot, got str 'kuka_lwr'"),
     (lambda: solve_ik(ROBOT, Q, HAND), "solve_ik: tasks: expected a Sequence"),
     (lambda: solve_ik(ROBOT, Q, ["hand"]), "solve_ik: tasks[0]: expected a Task, got str 'hand'"),
-    (lambda: solve_ik(ROBOT, Q, [HAND], dt=0.0), "dt = 0.0 s must be positive"),
+    (lambda: solve_ik(ROBOT, Q, [HAND], dt=0.0), "dt [s] = 0: expected a number > 0"),
     (lambda: solve_ik(ROBOT, Q, [HAND], memory="last"),
      "solve_ik: memory: expected a Memory, got str 'last'"),
     (lambda: solve_ik(ROBOT, Q, [replace(HAND, gain=201.0)], dt=0.01),

@@ -190,7 +190,7 @@ def rows_at(robot, configuration, level):
      "unknown setting of hcod 'guess'"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, damping=-1), "damping -1 must not be neg"),
     (lambda c, r: solve_ik(c, [posture_task(np.full(7, np.nan))], DT), "PostureTask"),
-    (lambda c, r: solve_ik(c, [posture_task(Q)], 0.0), "period 0"),
+    (lambda c, r: solve_ik(c, [posture_task(Q)], 0.0), "period [s] = 0: expected"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, limits=[limit((0, np.nan, 1.0))]),
      "SimpleNamespace, row 0"),
     (lambda c, r: pink_hierarchy(c, arm_scene(c, lm_damping=1.0)[1], DT),

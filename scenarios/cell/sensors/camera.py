@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule, Obstacles
 from hierarchy.avoidance.body import pack_capsules
-from hierarchy.errors import UnknownNameError
+from hierarchy.errors import UnknownNameError, positive
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled, internal
 from hierarchy.problem import Array
@@ -56,8 +56,7 @@ class Pinhole:
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "fx", "fy"):
-            if not 0 < getattr(self, name) < inf:
-                raise HierarchyError(f"camera: {name} = {getattr(self, name)} px must be positive")
+            positive(f"camera: {name} [px]", getattr(self, name))
         for name, size in (("cx", self.width), ("cy", self.height)):
             if getattr(self, name) is None:
                 set_frozen(self, **{name: (size - 1) / 2})
