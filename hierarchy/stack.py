@@ -138,6 +138,8 @@ class Stack:
     def _named(self, order: Sequence[str] | None) -> tuple[str, ...]:
         if order is None:
             return self._order
+        if type(order) is tuple:  # as in a tick, which has no time for checks
+            return order
         expect("order of a stack", order, Sequence, "give a list of names of tasks")
         return tuple(order)
 
