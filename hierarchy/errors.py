@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Collection, Container, Iterable, Sequence
+from errno import ENAMETOOLONG
 from math import copysign, inf, isfinite, isnan, nan
 from numbers import Integral, Real
 from pathlib import Path
@@ -152,9 +153,14 @@ def finite_numbers(what: str, values: object, size: int | None = None) -> NDArra
 
 
 def file_path(what: str, value: object) -> Path:
-    """Return a path; raise a HierarchyError unless it is a text or a path."""
+    """Return a path; raise a HierarchyError unless it is a text or a path that a file can have."""
     if not isinstance(value, str | os.PathLike) or not str(value).strip():
         raise HierarchyError(f"{what}: expected a path, got {brief(value)}")
+    try:
+        os.lstat(value)
+    except (OSError, ValueError) as error:
+        refuse(isinstance(error, ValueError) or getattr(error, "errno", 0) == ENAMETOOLONG,
+               f"{what}: no file can be called {str(value)[:60]!r}")
     return Path(value)
 
 

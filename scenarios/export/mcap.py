@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, file_path
 from scenarios.export import foxglove
 from scenarios.files import OutputError, named, write_text, written
 from scenarios.recording.recording import Recording
@@ -38,7 +38,7 @@ def export(recording: Recording, path: str | Path) -> list[Path]:
     OutputError : a file exists or cannot be written.
     HierarchyError : the suffix is another one, or the package mcap is not installed.
     """
-    path = Path(path)
+    path = file_path("export", path)
     if path.suffix != ".mcap":
         raise HierarchyError(f"{path} is no .mcap file; for CSV, Parquet and other tables: "
                              "scenarios.load_run(folder).to_dataframe()")

@@ -14,7 +14,7 @@ from typing import final
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, is_one_of
 from hierarchy.problem import Hierarchy
 from scenarios.problems import others, postures, recorded
 from scenarios.problems import reference as stored
@@ -64,7 +64,7 @@ class Family:
 
 def family(name: str) -> Family:
     """Return a family by name; raises UnknownNameError."""
-    if name not in FAMILIES:
+    if not is_one_of(name, FAMILIES):
         raise UnknownNameError("family of problems", name, list(FAMILIES))
     return FAMILIES[name]
 

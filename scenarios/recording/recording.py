@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, is_one_of
 from hierarchy.notebook import html_table
 from hierarchy.problem import Array
 from scenarios.config import Scenario
@@ -84,9 +84,10 @@ class Recording:
         return self.signals[name]
 
     def __contains__(self, name: str) -> bool:
-        if name not in self.signals:
+        if not is_one_of(name, self.signals):
             check(name)
-        return name in self.signals
+            return False
+        return True
 
     def get(self, name: str, default: NDArray[Any]) -> NDArray[Any]:
         """Return a signal, or `default` where the run does not have it."""

@@ -51,7 +51,7 @@ def known(name: str) -> Signal | None:
 
 def check(name: str) -> None:
     """Raise an UnknownNameError with the nearest name unless a signal has this one."""
-    if known(name) is None:
+    if not isinstance(name, str) or known(name) is None:
         raise UnknownNameError("signal", name, plugins.known("signals"))
 
 

@@ -11,7 +11,7 @@ from typing import Annotated
 from pydantic import Field
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, file_path
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, is_shipped, load
 from scenarios.config.distributions import Parameters
@@ -54,8 +54,8 @@ def shipped_sweeps() -> tuple[str, ...]:
 
 def find(name_or_path: str | Path) -> Path:
     """Return the file of a shipped sweep by name, or the given path; raises UnknownNameError."""
-    if Path(name_or_path).suffix == ".toml":
-        return Path(name_or_path)
+    if (path := file_path("sweep", name_or_path)).suffix == ".toml":
+        return path
     if str(name_or_path) not in shipped_sweeps():
         scenario = (f"{str(name_or_path)!r} is a scenario, for `hierarchy run` and `hierarchy "
                     "compare`.") if is_shipped(str(name_or_path)) else ""

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect_each, file_path
 from hierarchy.words import listed
 from scenarios.config import Scenario, load
 from scenarios.files import finite, write_text
@@ -74,7 +74,7 @@ def sweep(name_or_path: str | Path, out: str | Path, workers: Workers | None = N
     """
     text = find(name_or_path).read_text(encoding="utf-8")
     said = command or shlex.join(["hierarchy", "sweep", str(name_or_path), "--out", str(out)])
-    return _made(plan(load_sweep(name_or_path)), Path(out), (said, text), workers or Workers(),
+    return _made(plan(load_sweep(name_or_path)), out, (said, text), workers or Workers(),
                  progress)
 
 
@@ -91,6 +91,7 @@ def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str]
     starts, seed : number of samples, and the seed from which they are drawn.
     """
     chosen = [load(one) if isinstance(one, str) else one for one in scenarios]
+    expect_each("compare_starts", chosen, Scenario, "give names, or what `load` returns")
     asked = Sweep(name="-".join(one.name for one in chosen)[:80], samples=starts, seed=seed,
                   scenarios=tuple(one.name for one in chosen), resolvers=tuple(resolvers or ()),
                   title=f"{listed([one.name for one in chosen])} from {starts} sampled starts",
@@ -98,16 +99,16 @@ def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str]
     said = command or shlex.join(
         ["hierarchy", "compare", *asked.scenarios, "--resolvers", ",".join(asked.resolvers),
          "--starts", str(starts), "--seed", str(seed), "--out", str(out)])
-    return _made(plan(asked, chosen), Path(out), (said, ""), workers or Workers(), progress)
+    return _made(plan(asked, chosen), out, (said, ""), workers or Workers(), progress)
 
 
-def _made(planned: Plan, out: Path, source: tuple[str, str], workers: Workers,
+def _made(planned: Plan, out: str | Path, source: tuple[str, str], workers: Workers,
           progress: Progress | None) -> Finished:
     """Make the runs of a plan that a folder does not have, and write the results of all."""
     i, count = workers.part or (1, 1)
     if not 1 <= i <= count:
         raise HierarchyError(f"part {i}/{count}: give 1/{count} to {count}/{count}")
-    store = Store(out, f"part-{i}-of-{count}" if workers.part else "all")
+    store = Store(file_path("out", out), f"part-{i}-of-{count}" if workers.part else "all")
     with store.opened():
         made = complete(planned.runs[i - 1::count], store, workers, planned.sweep.name, progress)
         found = {} if workers.part else _written(planned, store, source)

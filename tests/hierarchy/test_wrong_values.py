@@ -114,6 +114,8 @@ def limits(**settings):
     (lambda: Stack([tasks.Friction(feet())], "torque", contacts=CONTACTS), "not those of the st"),
     (lambda: circle((0, 0, 0), "big"), "circle: radius [m] = 'big'"),
     (lambda: read_bvh(None), "read_bvh: file: expected a path, got NoneType"),
+    *((lambda name=name: read_bvh(name), "read_bvh: file: no file can be called 'a")
+      for name in ("a" * 5000, "a\0b", "a\ud800")),
     # values out of their range
     (lambda: Obstacle("cone", (0, 0, 0)), "unknown obstacle shape 'cone'"),
     (lambda: Obstacle("point", (0, NAN, 0)), "obstacle: centre: expected 3 finite numbers"),
