@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from math import isfinite
 from operator import itemgetter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hierarchy import Robot, State, plugins
-from hierarchy.errors import UnknownNameError
+from hierarchy.errors import UnknownNameError, file_path
 from hierarchy.robots import TABLES
 from hierarchy.robots.found import remarks
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
@@ -42,7 +41,8 @@ def is_robot(text: str) -> bool:
 
     Raises a HierarchyError for what is neither.
     """
-    if Path(text).is_dir() or Path(text).suffix == ".py":
+    path = file_path("check", text)
+    if path.is_dir() or path.suffix == ".py":
         raise no_scenario(text)
     if text.endswith(".toml") or ".toml:" in text or is_shipped(text) or text in shipped_groups():
         return False
