@@ -1,8 +1,8 @@
 """The signals of a run: arrays by name, in SI units, row k from tick k.
 
 Row k of `q` and `v` is the state before the command of tick k, so row 0 is the start; `a` is the
-acceleration that this command means. T ticks, n velocities, K control points, N tasks, P contact
-points, C contacts, H obstacles.
+acceleration that this command means. T ticks, n velocities, A of them commanded, K control points,
+N tasks, P contact points, C contacts, H obstacles.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ _TABLE = (
     Signal("q", "joint", "(T, nq)", "positions as the controller knew them", _JOINTS),
     Signal("v", "joint/s", "(T, n)", "velocities as the controller knew them", _JOINTS),
     Signal("a", "joint/s^2", "(T, n)", "accelerations that the command means", _JOINTS),
-    Signal("command", "command", "(T, n)", "as sent: velocities or accelerations, or at level "
+    Signal("command", "command", "(T, A)", "as sent: velocities or accelerations, or at level "
            "\"torque\" the torques of the actuated joints", _JOINTS),
     Signal("true_q", "joint", "(T, nq)", "true positions, where measurement or physics make them "
            "differ from q", _JOINTS),
@@ -156,7 +156,7 @@ _TABLE = (
     Signal("joint_lower", "", "(nq,)", "limit of the robot, infinite where it has none"),
     Signal("joint_upper", "", "(nq,)", "limit of the robot, infinite where it has none"),
     Signal("velocity_limit", "", "(n,)", "limit in use, infinite where there is none"),
-    Signal("torque_limit", "", "(n,)", "limit in use of the actuated joints, at level \"torque\""),
+    Signal("torque_limit", "", "(A,)", "limit in use of the actuated joints, at level \"torque\""),
 )
 for _signal in _TABLE:
     plugins.register("signals", _signal.name, shipped=True)(_signal)
