@@ -180,7 +180,7 @@ def adapted():
 
 
 def defaults():
-    """Defaults of what each module calls public: of functions, classes and their methods."""
+    """Defaults of what each module calls public, and settings of resolvers that are refused."""
     found, plain = {}, (int, float, str, tuple)
     for package in (hierarchy, solvers, scenarios):
         for _, name, _ in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
@@ -194,8 +194,15 @@ def defaults():
                        if part[0] != "_"]
             for key, one in (*public, *methods):
                 with contextlib.suppress(TypeError, ValueError):  # nothing that can be called
-                    found[key] = [f"{of} = {given.default!r}" for of, given in inspect.signature(
-                        one).parameters.items() if isinstance(given.default, plain)]
+                    found[key] = [f"{given.kind.name} {of} = {given.default!r}"
+                                  for of, given in inspect.signature(one).parameters.items()
+                                  if isinstance(given.default, plain)]
+    for name, value in itertools.product(solvers.names(), (-2, -1, 0, 1e-3, 1, 1e6, "none", None)):
+        for field in dataclasses.fields(make(name)):
+            try:
+                make(name, **{field.name: value})
+            except HierarchyError as error:
+                found[f"{name} {field.name} {value}"] = [str(error)]
     return {key: given for key, given in found.items() if given}
 
 
@@ -228,7 +235,8 @@ def solved():
             step = solve_ik(ROBOT, q, asked, **settings)
             found.append([step.v, step.status.name, repr(step)])
         reached = solve_ik(ROBOT, q, asked[:1], until=1e-6)
-        found.append([reached.verdict, reached.met, reached.errors, reached.status.name])
+        found.append([reached.verdict, reached.met, reached.errors, reached.status.name,
+                      reached.starts, reached.met and reached.iterations])
     state = moving_state(5)
     stack = standing_stack(state, CONTACTS, (0.05, 0.0, 0.0), 0.8, 8)
     h = stack.hierarchy(state)

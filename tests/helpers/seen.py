@@ -45,6 +45,7 @@ from scenarios.measure.metrics import measure
 from scenarios.measure.verdict import verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
 from scenarios.recording.facts import capsules as links
+from scenarios.recording.signals import described
 from scenarios.results import comparing, page, pool, sampled, sampled_page, sections
 from scenarios.results import run as table
 from scenarios.scene.drawn import scene
@@ -106,6 +107,7 @@ def seen_of_keys():
                              if one.default is not dataclasses.MISSING}
                       for name, kind in vars(tasks).items() if dataclasses.is_dataclass(kind)},
             "labels": [make("weighted", strict_levels=count).label for count in (-1, 0, 2)],
+            "signals": described().splitlines(),
             "sampling": [str(Distribution(**given)) for given in (
                 {"uniform": [1, 2]}, {"normal": [1, 2]}, {"choice": [1, 2]}, {"integers": [1, 2]},
                 {"around": 1}, {"around": [1, 2]})]}
