@@ -17,6 +17,7 @@ import os
 import re
 import shlex
 import tempfile
+import zipfile
 from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
@@ -240,6 +241,8 @@ def _written(file):
         found = json.loads(file.read_text())
         del found["robot"]["model"], found["robot"]["digest"]  # which have the path of its file
         return condensed(found)
+    if file.suffix == ".npz" and len(file.parts) == 2 and file.parts[0] in "pq":
+        return [[one.filename, *one.date_time] for one in zipfile.ZipFile(file).infolist()]
     if file.suffix == ".json":
         return json.loads(file.read_text())
     if file.suffix not in (".html", ".csv", ".toml") or file.parent.name == "runs":
