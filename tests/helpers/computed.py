@@ -9,6 +9,7 @@ import pkgutil
 from types import SimpleNamespace
 
 import numpy as np
+from hand_made import recording
 from mechanisms import four_bar
 from rank_cases import CASES, boxed, build
 from scene import FRAME, PATH, ROBOT, TASKS, state_at, states
@@ -21,6 +22,8 @@ import solvers
 from hierarchy import Hierarchy, HierarchyError, State, paths, tasks
 from hierarchy.loop import Loop
 from hierarchy.tasks.mechanism import Mechanism, model_rows
+from scenarios.measure.goals import goals
+from scenarios.measure.metrics import measure
 from solvers import Resolution, certify, make, solve_ik
 from solvers.adapters.displacements import Packed, Pull
 from solvers.adapters.drop_in import answer
@@ -263,7 +266,25 @@ def looped():
     return found
 
 
+def measured():
+    """Metrics and goals of runs whose signals come to each threshold and pass it."""
+    found, steps = {}, np.geomspace(1e-12, 1.0, 25)
+    along = np.outer(steps, np.eye(7)[2])
+    for name, sign in itertools.product(("ellipse", "ellipse-hqp", "singular"), (1.0, -1.0)):
+        near = 0.05 - sign * steps
+        run = recording(
+            scenarios.load(name), t=0.5 * np.arange(25), status=np.arange(25) % 3,
+            q=sign * (along + 2.0), v=sign * along, a=100.0 * along, command=1e3 * along,
+            velocity_limit=np.full(7, 0.02), pointing_error=sign * steps, time_tick=steps,
+            position_error=along[:, :3], desired_position=sign * along[:, :3], ee_distance=near,
+            control_point_distance=near[:, None] + np.zeros(8), minimal_distance=near,
+            active_control_point=np.arange(25) % 4)
+        found[f"{name} {sign}"] = [*map(str, goals(run)), *(
+            [key, one.value, one.note] for key, one in measure(run).items())]
+    return found
+
+
 COMPUTED = {"rows": rows, "derived": derived, "adapted": adapted, "defaults": defaults,
             "mechanism": mechanism, "certificates": certificates, "programs": programs,
-            "edited": edited, "solved": solved, "looped": looped,
+            "edited": edited, "solved": solved, "looped": looped, "measured": measured,
             "paths": lambda: [[path(t) for t in np.linspace(-0.2, 4.4, 24)] for path in PATHS]}

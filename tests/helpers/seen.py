@@ -178,7 +178,6 @@ def steadily():
                 [re.sub(NUMBER, "#", one), condensed([*map(float, re.findall(NUMBER, one))])]
                 for one in text.split("><")])
             return text
-
         return made
 
     with contextlib.ExitStack() as stack:
