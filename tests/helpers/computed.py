@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import gc
 import importlib
 import inspect
 import itertools
@@ -257,11 +258,11 @@ def looped():
 
         def step(t, now=now, late=late):
             now[0] += late if t == 0.5 else 0.125
-            return np.array([t, -t])
+            return np.array([t, -t, gc.isenabled()])
 
         loop = Loop(0.25, overrun=overrun, behind=3, pause_gc=False, sleep=sleep,
                     clock=lambda now=now: now[0])
-        log = loop.run(step, lambda: None, 2.0, lambda x: None, record=2)
+        log = loop.run(step, lambda: None, 2.0, lambda x: None, record=3)
         found.append([str(log), log.arrays(), log.summary(), log.overruns, log.skipped, log.due])
     return found
 
