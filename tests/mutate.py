@@ -272,7 +272,7 @@ def tests_of(mutant: Mutant) -> list[tuple[str, ...]]:
     keys = (f"{SEEN}::test_what_is_seen_is_as_it_was[computed defaults]",
             "tests/scenarios/test_config.py")[:1 + mutant.module.startswith("scenarios/config/")]
     if "frozen=" in line:
-        return [records]
+        return [(*records, keys[0])]
     lines = lines_of(mutant.module)
     default = not lines.get(mutant.line)
     seen, order = Counter[str](), dict[str, tuple[int, int]]()

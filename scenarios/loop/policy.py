@@ -44,7 +44,6 @@ class Policy:
         self._section, self._clamp, self._period = section, clamp, period
         self._acceleration, self._damping = level == "acceleration", damping
         self._good: Array | None = None
-        self._held = 0
 
     def choose(self, t: float, troubles: Sequence[str], x: Array, v: Array) -> Array:
         """Return the command (n,) to send at time t [s].

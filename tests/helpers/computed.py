@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import gc
 import importlib
 import inspect
 import itertools
@@ -9,6 +10,7 @@ import pkgutil
 from types import SimpleNamespace
 
 import numpy as np
+from hand_made import recording
 from mechanisms import four_bar
 from rank_cases import CASES, boxed, build
 from scene import FRAME, PATH, ROBOT, TASKS, state_at, states
@@ -21,6 +23,8 @@ import solvers
 from hierarchy import Hierarchy, HierarchyError, State, paths, tasks
 from hierarchy.loop import Loop
 from hierarchy.tasks.mechanism import Mechanism, model_rows
+from scenarios.measure.goals import goals
+from scenarios.measure.metrics import measure
 from solvers import Resolution, certify, make, solve_ik
 from solvers.adapters.displacements import Packed, Pull
 from solvers.adapters.drop_in import answer
@@ -180,7 +184,7 @@ def adapted():
 
 
 def defaults():
-    """Defaults of what each module calls public: of functions, classes and their methods."""
+    """Defaults of what each module calls public, and settings of resolvers that are refused."""
     found, plain = {}, (int, float, str, tuple)
     for package in (hierarchy, solvers, scenarios):
         for _, name, _ in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
@@ -194,8 +198,15 @@ def defaults():
                        if part[0] != "_"]
             for key, one in (*public, *methods):
                 with contextlib.suppress(TypeError, ValueError):  # nothing that can be called
-                    found[key] = [f"{of} = {given.default!r}" for of, given in inspect.signature(
-                        one).parameters.items() if isinstance(given.default, plain)]
+                    found[key] = [f"{given.kind.name} {of} = {given.default!r}"
+                                  for of, given in inspect.signature(one).parameters.items()
+                                  if isinstance(given.default, plain)]
+    for name, value in itertools.product(solvers.names(), (-2, -1, 0, 1e-3, 1, 1e6, "none", None)):
+        for field in dataclasses.fields(make(name)):
+            try:
+                make(name, **{field.name: value})
+            except HierarchyError as error:
+                found[f"{name} {field.name} {value}"] = [str(error)]
     return {key: given for key, given in found.items() if given}
 
 
@@ -228,7 +239,8 @@ def solved():
             step = solve_ik(ROBOT, q, asked, **settings)
             found.append([step.v, step.status.name, repr(step)])
         reached = solve_ik(ROBOT, q, asked[:1], until=1e-6)
-        found.append([reached.verdict, reached.met, reached.errors, reached.status.name])
+        found.append([reached.verdict, reached.met, reached.errors, reached.status.name,
+                      reached.starts, reached.met and reached.iterations])
     state = moving_state(5)
     stack = standing_stack(state, CONTACTS, (0.05, 0.0, 0.0), 0.8, 8)
     h = stack.hierarchy(state)
@@ -246,16 +258,34 @@ def looped():
 
         def step(t, now=now, late=late):
             now[0] += late if t == 0.5 else 0.125
-            return np.array([t, -t])
+            return np.array([t, -t, gc.isenabled()])
 
         loop = Loop(0.25, overrun=overrun, behind=3, pause_gc=False, sleep=sleep,
                     clock=lambda now=now: now[0])
-        log = loop.run(step, lambda: None, 2.0, lambda x: None, record=2)
+        log = loop.run(step, lambda: None, 2.0, lambda x: None, record=3)
         found.append([str(log), log.arrays(), log.summary(), log.overruns, log.skipped, log.due])
+    return found
+
+
+def measured():
+    """Metrics and goals of runs whose signals come to each threshold and pass it."""
+    found, steps = {}, np.geomspace(1e-12, 1.0, 25)
+    along = np.outer(steps, np.eye(7)[2])
+    for name, sign in itertools.product(("ellipse", "ellipse-hqp", "singular"), (1.0, -1.0)):
+        near = 0.05 - sign * steps
+        run = recording(
+            scenarios.load(name), t=0.5 * np.arange(25), status=np.arange(25) % 3,
+            q=sign * (along + 2.0), v=sign * along, a=100.0 * along, command=1e3 * along,
+            velocity_limit=np.full(7, 0.02), pointing_error=sign * steps, time_tick=steps,
+            position_error=along[:, :3], desired_position=sign * along[:, :3], ee_distance=near,
+            control_point_distance=near[:, None] + np.zeros(8), minimal_distance=near,
+            active_control_point=np.arange(25) % 4)
+        found[f"{name} {sign}"] = [*map(str, goals(run)), *(
+            [key, one.value, one.note] for key, one in measure(run).items())]
     return found
 
 
 COMPUTED = {"rows": rows, "derived": derived, "adapted": adapted, "defaults": defaults,
             "mechanism": mechanism, "certificates": certificates, "programs": programs,
-            "edited": edited, "solved": solved, "looped": looped,
+            "edited": edited, "solved": solved, "looped": looped, "measured": measured,
             "paths": lambda: [[path(t) for t in np.linspace(-0.2, 4.4, 24)] for path in PATHS]}

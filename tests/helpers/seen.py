@@ -17,6 +17,7 @@ import os
 import re
 import shlex
 import tempfile
+import zipfile
 from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
@@ -31,6 +32,7 @@ from pinned import FOLDER, robot_facts
 
 from hierarchy import HierarchyError, Robot, jit, tasks
 from scenarios import Scenario, load, load_run, shipped, simulate
+from scenarios.cell.plants import physics, torque
 from scenarios.cell.sensors import depth_sensor
 from scenarios.cli import doctor, runs
 from scenarios.cli.main import run_command
@@ -45,11 +47,12 @@ from scenarios.measure.metrics import measure
 from scenarios.measure.verdict import verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
 from scenarios.recording.facts import capsules as links
+from scenarios.recording.signals import described
 from scenarios.results import comparing, page, pool, sampled, sampled_page, sections
 from scenarios.results import run as table
 from scenarios.scene.drawn import scene
 from solvers import certify, explain, make, names
-from solvers.problems import ANY, generate, structured
+from solvers.problems import Recipe, bounded, generate, structured
 from solvers.qp import backends
 
 ROOT = FOLDER.parents[2]
@@ -106,6 +109,7 @@ def seen_of_keys():
                              if one.default is not dataclasses.MISSING}
                       for name, kind in vars(tasks).items() if dataclasses.is_dataclass(kind)},
             "labels": [make("weighted", strict_levels=count).label for count in (-1, 0, 2)],
+            "signals": described().splitlines(),
             "sampling": [str(Distribution(**given)) for given in (
                 {"uniform": [1, 2]}, {"normal": [1, 2]}, {"choice": [1, 2]}, {"integers": [1, 2]},
                 {"around": 1}, {"around": [1, 2]})]}
@@ -130,18 +134,25 @@ def seen_of_live_page(name):
 
 def seen_of_answers():
     """Of what each resolver but `hqp` says of generated problems: answers and explanations."""
-    problems = [generate(seed, ANY) for seed in range(12)] + [structured(s) for s in range(12)]
+    equal = partial(generate, recipe=Recipe(
+        joints=(2, 12), levels=(1, 6), rows=(0, 5), equalities_only=True, near_parallel=0.0))
+    problems = [made(seed) for made in (generate, structured, equal, lambda seed: bounded(
+        equal(seed), seed)) for seed in range(12)]
     found = {}
     for name in sorted({*names()} - {"hqp"}):
         for damping in (0.0, 0.05):
             resolver = make(name, damping=damping)
             for k, h in enumerate(problems):
                 with contextlib.suppress(HierarchyError):  # of rows that it does not handle
-                    res = resolver.solve(h)
+                    res, rows = resolver.solve(h), [f"r{i}" for i in range(h.m)]
                     found[f"{resolver.label} {damping} {k}"] = [
-                        res.status.name, condensed(res.x), str(explain(h, res)),
-                        certify(h, res.x).certified]
+                        res.status.name, condensed(res.x), name == "hcod" and [
+                            certify(h, res.x).certified,
+                            str(explain(h, res, rows=rows if k % 2 else None))]]
     return found
+
+
+SCENES = ((physics, physics.scene), (torque, torque.on_floor))
 
 
 @contextlib.contextmanager
@@ -160,8 +171,18 @@ def steadily():
         drawn[f"{len(drawn)} {Path(stem).name}"] = figure_facts(fig)
         Path(f"{stem}.svg").touch()
 
+    def noted(scene):
+        def made(*given):
+            text = scene(*given)
+            drawn.setdefault(f"MJCF of {given[0].name}, {text.count('<')}", [
+                [re.sub(NUMBER, "#", one), condensed([*map(float, re.findall(NUMBER, one))])]
+                for one in text.split("><")])
+            return text
+        return made
+
     with contextlib.ExitStack() as stack:
         for name, instead, modules in (
+                *((scene.__name__, noted(scene), (module,)) for module, scene in SCENES),
                 ("perf_counter", clock, (controller, faults, depth_sensor, doctor, runs, table)),
                 ("requires", lambda _: REQUIRED, (doctor,)), ("__file__", "csv.py", (csv,)),
                 ("version", lambda name: INSTALLED.get(name) or version("none"), (doctor,)),
@@ -219,6 +240,8 @@ def _written(file):
         found = json.loads(file.read_text())
         del found["robot"]["model"], found["robot"]["digest"]  # which have the path of its file
         return condensed(found)
+    if file.suffix == ".npz" and len(file.parts) == 2 and file.parts[0] in "pq":
+        return [[one.filename, *one.date_time] for one in zipfile.ZipFile(file).infolist()]
     if file.suffix == ".json":
         return json.loads(file.read_text())
     if file.suffix not in (".html", ".csv", ".toml") or file.parent.name == "runs":

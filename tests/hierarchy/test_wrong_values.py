@@ -186,7 +186,9 @@ def limits(**settings):
      "floating base"),
     (lambda: Activation(None, (), {"wall": 0.0}), "task 'wall': buffer = 0: expected"),
     (lambda: check_rotation("R", np.diag([1.0, 1.0, -1.0])), "a reflection, of determinant -1"),
-    (lambda: check_rotation("R", np.eye(3) + 1e-5 * np.eye(3, k=1)), "is 1e-05 from the identity"),
+    *((lambda off=off: check_rotation("R", np.eye(3) + off * np.eye(3, k=1)),
+       f"is {off:g} from the identity, at most 1e-06 is allowed{mend}; got list")
+      for off, mend in ((1e-5, ": write it with 8 digits"), (0.1, ""))),
     (lambda: Robot.load("nowhere.SDF"), "does not exist"),
     (lambda: Robot.load("/"), "is a folder")])
 def test_a_wrong_value_is_refused_and_named(make, said):

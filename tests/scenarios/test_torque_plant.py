@@ -122,9 +122,11 @@ def from_tick(tick, value, shape=(500, 2)):
 @pytest.mark.parametrize(("changes", "stands"), [
     ({}, True), ({"v": from_tick(100, 0.3) - from_tick(101, 0.3)}, True),
     ({"v": from_tick(400, 0.3) - from_tick(401, 0.3)}, False),
-    ({"q": from_tick(0, 1.1)}, False), ({"support_margin": from_tick(0, np.nan, 500)}, False),
+    *(({"q": from_tick(0, sign * far)}, far < 1.01) for sign in (-1, 1) for far in (1.005, 1.1)),
+    ({"support_margin": from_tick(0, np.nan, 500)}, False),
     ({"com": from_tick(0, [0.0, 0.0, 0.8], (500, 3)) - from_tick(1, [0, 0, 0.1], (500, 3))},
      False), ({"fault": "the robot has fallen"}, False),
+    ({"pushes": (SimpleNamespace(at=2.75, duration=0.25),)}, True),
     ({"pushes": (SimpleNamespace(at=2.9, duration=0.2),)}, None)])
 def test_a_robot_stands_only_at_rest_upright_and_within_its_limits_until_the_end(changes, stands):
     assert standing(recorded(**changes)) is stands

@@ -59,7 +59,9 @@ def test_obstacles_are_reached_by_number_or_all_at_once():
     ('extends = "ellipse"\nreplaces = "avoidance"', "expected a list of sections"),
     ('extends = "ellipse"\n[position]\npath = { kind = "still", point = [0.5, 0.0, 0.5] }',
      "did you mean 'position.path.position'"),
-    ('replaces = ["avoidance"]', "goes with extends")])
+    ('replaces = ["avoidance"]', "goes with extends"),
+    *((f'extends = "ellipse"\n{variants}', "variants: expected a table of tables")
+      for variants in ("variants = 3", "[variants]\nwide = 3"))])
 def test_a_file_that_cannot_be_read_is_named(text, said, tmp_path):
     path = tmp_path / "bad.toml"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
