@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _NEAR = 0.6   # similarity of two names, 0 to 1, from which one is suggested
+_LARGEST = 2**31 - 1  # whole number, where no other is said
 _LISTED = 15  # known names that a message lists; of more it has the nearest
 
 
@@ -106,7 +107,7 @@ def real(what: str, value: object) -> float:
     return found
 
 
-def whole(what: str, value: object, least: int = 0, largest: int = 2**31 - 1) -> int:
+def whole(what: str, value: object, least: int = 0, largest: int = _LARGEST) -> int:
     """Return a whole number from `least` to `largest`; raise a HierarchyError for anything else."""
     if isinstance(value, Integral) and not isinstance(value, bool):
         found = int(value)
@@ -132,7 +133,7 @@ def as_float(value: object) -> float:
 
 
 def _between(least: float, largest: float) -> str:
-    return (f" from {least:g} to {largest:g}" if largest < 2**31 - 1 else
+    return (f" from {least:g} to {largest:g}" if isfinite(largest) and largest != _LARGEST else
             f" from {least:g} on" if isfinite(least) else "")
 
 

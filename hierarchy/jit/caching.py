@@ -268,7 +268,7 @@ class Part:
 
     def _made_here(self) -> bytes:
         """Return the object file for another processor, made of the LLVM code once."""
-        code, here, folder = parts_of(self.file.with_suffix(".bc"))[1], machine(), cache_folder()
+        code, here, folder = read_code(self.file.with_suffix(".bc"))[1], machine(), cache_folder()
         about = hashlib.sha256(code + repr((here, llvmlite.__version__)).encode()).hexdigest()
         file = None if folder is None else folder / f"{self.file.stem}-{about[:32]}.o"
         kept = None if file is None else _read(file)
@@ -288,14 +288,17 @@ class Part:
         """Return what Python calls; None if the object file cannot be loaded."""
         if self.engine is None:
             return None
-        module, address = import_module(kernel.__module__), self.engine.get_function_address
+        start = self.engine.get_function_address(entry.wrapper)
+        place = self.engine.get_global_value_address(entry.environment)
+        if not (start and place):  # LLVM code of an earlier build
+            return None
+        module = import_module(kernel.__module__)
         environment = Environment(vars(module))
         environment.env_name = entry.environment
         environment.consts.extend(map(np.dtype, entry.constants))
-        place = self.engine.get_global_value_address(entry.environment)
         ctypes.c_void_p.from_address(place).value = id(environment)
-        return make_function(module, kernel.__name__, kernel.__doc__ or "",
-                                      address(entry.wrapper), environment, (self.engine,))
+        return make_function(module, kernel.__name__, kernel.__doc__ or "", start, environment,
+                             (self.engine,))
 
 
 def find(kernel: Any, kinds: tuple[Any, ...]) -> Any:
@@ -323,7 +326,7 @@ def suits() -> bool:
     return not os.environ.get(NATIVE) and all(features.get(name) for name in _FEATURES)
 
 
-def parts_of(file: Path) -> tuple[bytes, bytes]:
+def read_code(file: Path) -> tuple[bytes, bytes]:
     """Return the digest of the functions of C in a file of LLVM code, and the code."""
     content = file.read_bytes()
     return content[:_DIGEST], content[_DIGEST:]

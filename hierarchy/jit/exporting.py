@@ -19,7 +19,7 @@ import numpy as np
 from llvmlite import ir
 from numba.np import arrayobj
 
-from hierarchy.jit.caching import PROCESSOR, Code, Part, parts_of
+from hierarchy.jit.caching import PROCESSOR, Code, Part, read_code
 from hierarchy.jit.compiling import Cached
 from hierarchy.jit.inside import cgutils, compiler, global_compiler_lock, llvm, registry, types
 from hierarchy.jit.linking import (
@@ -69,11 +69,9 @@ def lowered(entries: Mapping[str, Entry]) -> Any:
 def stored(file: Path, entries: Mapping[str, Entry]) -> Any:
     """Return the module of these and other entries that `build` wrote; None if it does not suit."""
     with suppress(OSError, RuntimeError):  # missing, or of a newer LLVM
-        digest, code = parts_of(file)
+        digest, code = read_code(file)
         if digest and digest == _digest(entries):
-            module = llvm.parse_bitcode(code)
-            hide(module, set(entries))
-            return module
+            return llvm.parse_bitcode(code)
     return None
 
 

@@ -1,8 +1,8 @@
 """Compile kernels ahead: `python -m scenarios.ahead` writes the object files of the package.
 
 With each it writes LLVM code, from which other processors make their object files and `hierarchy
-library` the C library.
-With the name of a part it writes that one; `solvers` needs nothing but numba and scipy.
+library` the C library. With the name of a part it writes that one; `solvers` needs nothing but
+numba and scipy.
 
 `calls.txt` says what Python calls. `python -m scenarios.ahead record` writes it anew, of what JOBS
 call: each kind of call of the documents, once.
@@ -59,8 +59,8 @@ def is_current(part: str) -> bool:
     from hierarchy.jit.caching import FOLDER
 
     file, functions = FOLDER / f"{part}.o", _functions(part)
-    return exporting.is_current(file, _listed()) and (
-        not functions or exporting.stored(file.with_suffix(".bc"), functions) is not None)
+    return (exporting.is_current(file, _listed())
+            and exporting.stored(file.with_suffix(".bc"), functions) is not None)
 
 
 def record(job: str) -> list[str]:
