@@ -172,7 +172,7 @@ def _balances(s, p, reach, factored):
     left = length_of(s.number[GRADIENT, :s.x.size])
     error = SIGN_MARGIN * (left + rounding) / s.scalar[PIVOT]
     cut = SIGN_MARGIN * turned / s.scalar[PIVOT]
-    if holds and _signs_hold(s, level, error + cut, reach, allowed):
+    if holds and _signs_hold(s, level, error + cut, reach, allowed, met):
         if level.missed > CLEAR_MISS * s.scalar[TOLERANCE] * reach:
             # What is cut from a row lies beyond the columns of those that act: no pivot there
             # makes it larger.
@@ -253,7 +253,7 @@ def _beyond_rounding(s):
 
 
 @inlined
-def _signs_hold(s, level, unsure, reach, allowed):
+def _signs_hold(s, level, unsure, reach, allowed, met):
     """Whether no multiplier of level p points inward for a row that nothing has decided.
 
     unsure: those below it decide weakly. allowed: what may remain of the gradient, also where an
@@ -266,7 +266,7 @@ def _signs_hold(s, level, unsure, reach, allowed):
                 _is_rounding(s, level, i, reach) and pull <= allowed):
             decided = s.index[CHANGE, i]
             if decided == OPEN or (decided == WEAKLY and pull > unsure):
-                s.index[CHANGE, i], holds = REFUTED, False
+                s.index[CHANGE, i], holds = decided if met else REFUTED, False
     return holds
 
 

@@ -102,7 +102,7 @@ def test_numbers_that_overflow_when_squared_do_not_end_the_process(backend):
     ("hqp", "near_ties", (4, 11, 13)),  # more rows were taken to act than can be met at once
     ("hcod", "nearly_parallel", (
         261332389, 261339979, 261346471, 262321952, 271003400, 271018875, 271020795, 271025782,
-        271041751, 273008558)),
+        271041751, 273008558, 360061111)),
     # In a violated level, the rounding of rows of 1 to 1e6 was the force of rows of 1e-12 to 1e-2.
     ("hcod", "near_singular_arm", (
         900000413, 900001267, 900001697, 900006110, 900006261, 900006637, 900008214, 900009317)),
