@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.notebook import html_table, numbers
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.exact import verify_answer
+from solvers.kernels.active_set.exact import verify_answer
 from solvers.status import SOLVED, Status
 from solvers.workspace import run
 

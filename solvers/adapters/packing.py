@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled, inlined
-from solvers.kernels.tableau import reflect_columns
+from solvers.kernels.active_set.tableau import reflect_columns
 
 GIVEN = 4        # columns of the table after those of the unknowns
 ODD = -1         # returned for rows with numbers that are not finite, apart from missing limits

@@ -9,10 +9,10 @@ solves anything if `work` is too small.
 from __future__ import annotations
 
 from hierarchy.jit import unlocked
+from solvers.kernels.active_set.exact import DAMPING, solve, work_size
 from solvers.kernels.bounds import solve_within_bounds
-from solvers.kernels.exact import DAMPING, solve, work_size
+from solvers.kernels.linalg.space import assign
 from solvers.kernels.merged import merged
-from solvers.kernels.space import assign
 from solvers.status import SOLVED, TOO_SMALL
 
 

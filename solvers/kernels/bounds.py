@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, internal
-from solvers.kernels.exact import DAMPING, solve, work_size
-from solvers.kernels.rows import ZERO, all_equal, finish
-from solvers.kernels.space import View, fill, vector
+from solvers.kernels.active_set.exact import DAMPING, solve, work_size
+from solvers.kernels.linalg.rows import ZERO, all_equal, finish
+from solvers.kernels.linalg.space import View, fill, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL, UNPROVED

@@ -18,8 +18,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hierarchy.jit import add_multiple, inlined, inner_product, internal
-from solvers.kernels.block import level_damping
-from solvers.kernels.rows import (
+from solvers.kernels.linalg.block import level_damping
+from solvers.kernels.linalg.rows import (
     NO,
     YES,
     ZERO,
@@ -28,7 +28,7 @@ from solvers.kernels.rows import (
     reflect,
     reflect_back,
 )
-from solvers.kernels.space import Block, View, integers, matrix, shared, vector
+from solvers.kernels.linalg.space import Block, View, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET, SATURATES
 from solvers.status import NUMERICAL_FAILURE

@@ -9,10 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hierarchy.jit import as_matrix, compiled, inlined, inner_product
-from solvers.kernels.exact import answer, exact_size, open_working_set
-from solvers.kernels.rows import ZERO, finish, length_of
-from solvers.kernels.space import View, assign, fill
-from solvers.kernels.working_set import (
+from solvers.kernels.active_set.exact import answer, exact_size, open_working_set
+from solvers.kernels.active_set.working_set import (
     FACTORED,
     FIRST,
     LOWER,
@@ -23,6 +21,8 @@ from solvers.kernels.working_set import (
     restore,
     start_from,
 )
+from solvers.kernels.linalg.rows import ZERO, finish, length_of
+from solvers.kernels.linalg.space import View, assign, fill
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 _ROUNDING = 1e-10  # of a violation, relative to |a| (1 + |x|)

@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product, internal
-from solvers.kernels.exact import DAMPING, solve, work_size
-from solvers.kernels.rows import ZERO
-from solvers.kernels.space import View, assign, fill, integers, matrix, vector
+from solvers.kernels.active_set.exact import DAMPING, solve, work_size
+from solvers.kernels.linalg.rows import ZERO
+from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, vector
 from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
 
 NOTHING = -1     # code: every level is strict

@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, inner_product
-from solvers.kernels.rows import ZERO, all_equal, factor_level, length_of, reflect, reflect_back
-from solvers.kernels.space import Rows, assign
+from solvers.kernels.linalg.rows import (
+    ZERO,
+    all_equal,
+    factor_level,
+    length_of,
+    reflect,
+    reflect_back,
+)
+from solvers.kernels.linalg.space import Rows, assign
 
 _PIVOT = 1e-6  # of the norm of a row: a smaller one depends on others
 

@@ -12,9 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined, inner_product, internal
-from solvers.kernels.block import invert_triangle, orthogonalise_rows, smallest_square
-from solvers.kernels.rows import ZERO, finish, load_rows, make_reflector, reflect, reflect_back
-from solvers.kernels.space import View, assign, fill, integers, matrix, shared, vector
+from solvers.kernels.linalg.block import invert_triangle, orthogonalise_rows, smallest_square
+from solvers.kernels.linalg.rows import (
+    ZERO,
+    finish,
+    load_rows,
+    make_reflector,
+    reflect,
+    reflect_back,
+)
+from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import SOLVED, TOO_SMALL
 

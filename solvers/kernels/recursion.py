@@ -14,14 +14,22 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product, internal
-from solvers.kernels.block import (
+from solvers.kernels.linalg.block import (
     orthogonalise_rows,
     smallest_square,
     solve_damped_level,
     solve_level,
 )
-from solvers.kernels.rows import ZERO, finish, largest_row, length_of, load_rows, swap, swap_rows
-from solvers.kernels.space import Block, View, assign, fill, matrix, shared, vector
+from solvers.kernels.linalg.rows import (
+    ZERO,
+    finish,
+    largest_row,
+    length_of,
+    load_rows,
+    swap,
+    swap_rows,
+)
+from solvers.kernels.linalg.space import Block, View, assign, fill, matrix, shared, vector
 from solvers.status import SOLVED, TOO_SMALL
 
 LEVEL, NAKAMURA, CHIAVERINI, SELECTIVE = 0.0, 1.0, 2.0, 3.0  # methods of `Recursive`, in order

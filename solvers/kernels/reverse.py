@@ -12,8 +12,8 @@ staircase finds it at any rank, and no pseudoinverse is formed.
 from __future__ import annotations
 
 from hierarchy.jit import compiled, inlined, inner_product
-from solvers.kernels.rows import finish
-from solvers.kernels.space import assign, fill, integers, vector
+from solvers.kernels.linalg.rows import finish
+from solvers.kernels.linalg.space import assign, fill, integers, vector
 from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 

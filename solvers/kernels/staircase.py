@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, inner_product, internal
-from solvers.kernels.block import solve_level
-from solvers.kernels.rows import (
+from solvers.kernels.linalg.block import solve_level
+from solvers.kernels.linalg.rows import (
     ZERO,
     factor_level,
     finish,
@@ -24,7 +24,16 @@ from solvers.kernels.rows import (
     reflect,
     reflect_back,
 )
-from solvers.kernels.space import Block, Rows, View, assign, carve_rows, matrix, shared, vector
+from solvers.kernels.linalg.space import (
+    Block,
+    Rows,
+    View,
+    assign,
+    carve_rows,
+    matrix,
+    shared,
+    vector,
+)
 from solvers.kernels.tolerances import FAR_LIGHTER, LIGHT_ROW, UNCLEAR_CUT, UNCLEAR_PIVOT
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 

@@ -15,15 +15,15 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined
 from hierarchy.jit.exporting import INTEGER, STATUS, Entry, integers_at, numbers_at
+from solvers.kernels.active_set.exact import keep_staircase, solve, verify_answer
+from solvers.kernels.active_set.exact import work_size as exact_size
 from solvers.kernels.bounds import solve_within_bounds
-from solvers.kernels.exact import keep_staircase, solve, verify_answer
-from solvers.kernels.exact import work_size as exact_size
+from solvers.kernels.linalg.rows import ZERO, all_equal
+from solvers.kernels.linalg.space import View, fill
 from solvers.kernels.merged import BY_RULE, OWN, merged, merged_size, write_levels
 from solvers.kernels.merged import record_size as merged_record
 from solvers.kernels.recursion import recursion
-from solvers.kernels.rows import ZERO, all_equal
 from solvers.kernels.sns import sns
-from solvers.kernels.space import View, fill
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.resolvers.hcod import Hcod
 from solvers.resolvers.merged import Merged

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.exact import DAMPING, solve_damped, solve_hierarchy
+from solvers.kernels.active_set.exact import DAMPING, solve_damped, solve_hierarchy
 from solvers.kernels.give import solve_giving
 from solvers.resolver import Handles, Resolution, Resolver, number, register, whole_number
 from solvers.status import SOLVED, TOO_SMALL, Status

@@ -10,9 +10,9 @@ import pytest
 from refusals import refused
 
 from hierarchy.jit.sources import source_digest
-from solvers.kernels.exact import solve_hierarchy
-from solvers.kernels.rows import swap
-from solvers.kernels.working_set import meet
+from solvers.kernels.active_set.exact import solve_hierarchy
+from solvers.kernels.active_set.working_set import meet
+from solvers.kernels.linalg.rows import swap
 
 MODULES = {"numbers_here.py": "ONE = 1.0\n", "helper.py": """
 from hierarchy.jit import compiled

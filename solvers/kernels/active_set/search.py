@@ -15,19 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import inlined, internal
-from solvers.kernels.multipliers import INWARD, UNDECIDED, write_multipliers
-from solvers.kernels.rows import YES, ZERO, length_of
-from solvers.kernels.space import View, assign
-from solvers.kernels.tolerances import (
-    MET,
-    RECURRENCES,
-    RELEASED,
-    RESTORED,
-    SHADOW,
-    VIOLATED,
-)
-from solvers.kernels.verification import REFUTED, verify
-from solvers.kernels.working_set import (
+from solvers.kernels.active_set.multipliers import INWARD, UNDECIDED, write_multipliers
+from solvers.kernels.active_set.verification import REFUTED, verify
+from solvers.kernels.active_set.working_set import (
     BEGIN,
     CHANGE,
     DIRTY,
@@ -52,6 +42,16 @@ from solvers.kernels.working_set import (
     meet,
     restore,
     value_at,
+)
+from solvers.kernels.linalg.rows import YES, ZERO, length_of
+from solvers.kernels.linalg.space import View, assign
+from solvers.kernels.tolerances import (
+    MET,
+    RECURRENCES,
+    RELEASED,
+    RESTORED,
+    SHADOW,
+    VIOLATED,
 )
 from solvers.status import FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import inlined, internal
-from solvers.kernels.rows import length_of, reflect_by
-from solvers.kernels.space import fill
+from solvers.kernels.linalg.rows import length_of, reflect_by
+from solvers.kernels.linalg.space import fill
 
 
 @internal

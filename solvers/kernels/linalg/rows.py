@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import add_multiple, inlined, inner_product, internal
-from solvers.kernels.space import fill
+from solvers.kernels.linalg.space import fill
 from solvers.kernels.tolerances import LEAST_SQUARE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 

@@ -12,32 +12,12 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, internal
-from solvers.kernels.damping import (
-    carve_damped,
-    damp_level,
-    damped_size,
-    keep_reached,
-    open_damped,
-)
-from solvers.kernels.levels import pass_through_levels
-from solvers.kernels.multipliers import write_multipliers
-from solvers.kernels.rows import NO, YES, ZERO, all_equal, finish, length_of
-from solvers.kernels.search import pivot_in_blocks, pivot_one_by_one, save
-from solvers.kernels.space import assign, matrix, vector
-from solvers.kernels.staircase import solve_by_staircase
-from solvers.kernels.tableau import STEPS, carve_tableau, tableau_size
-from solvers.kernels.tolerances import (
-    BAND,
-    DEARER,
-    INDEPENDENT,
-    LARGER,
-    MET,
-    PASS_STEPS,
-    PATIENCE,
-    SOLVE_STEPS,
-)
-from solvers.kernels.verification import neglects, verify
-from solvers.kernels.working_set import (
+from solvers.kernels.active_set.levels import pass_through_levels
+from solvers.kernels.active_set.multipliers import write_multipliers
+from solvers.kernels.active_set.search import pivot_in_blocks, pivot_one_by_one, save
+from solvers.kernels.active_set.tableau import STEPS, carve_tableau, tableau_size
+from solvers.kernels.active_set.verification import neglects, verify
+from solvers.kernels.active_set.working_set import (
     CUT,
     FINISHED,
     FIRST,
@@ -59,7 +39,27 @@ from solvers.kernels.working_set import (
     take_up,
     working_set_size,
 )
-from solvers.kernels.working_set import TOLERANCE as RANK
+from solvers.kernels.active_set.working_set import TOLERANCE as RANK
+from solvers.kernels.damping import (
+    carve_damped,
+    damp_level,
+    damped_size,
+    keep_reached,
+    open_damped,
+)
+from solvers.kernels.linalg.rows import NO, YES, ZERO, all_equal, finish, length_of
+from solvers.kernels.linalg.space import assign, matrix, vector
+from solvers.kernels.staircase import solve_by_staircase
+from solvers.kernels.tolerances import (
+    BAND,
+    DEARER,
+    INDEPENDENT,
+    LARGER,
+    MET,
+    PASS_STEPS,
+    PATIENCE,
+    SOLVE_STEPS,
+)
 from solvers.status import (
     EQUAL,
     FREE,

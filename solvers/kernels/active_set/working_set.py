@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import as_matrix, inlined, inner_product, internal
-from solvers.kernels.least_squares import substitute_back, triangularise, turn
-from solvers.kernels.rows import ZERO, factor_level, reflect, swap
-from solvers.kernels.space import Rows, View, integers, matrix, vector
+from solvers.kernels.linalg.least_squares import substitute_back, triangularise, turn
+from solvers.kernels.linalg.rows import ZERO, factor_level, reflect, swap
+from solvers.kernels.linalg.space import Rows, View, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE, SPARED
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 

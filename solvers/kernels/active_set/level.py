@@ -8,8 +8,7 @@ by back substitution in sum_t lambda_t a_t = -A_k^T w_k, says whether that row h
 from __future__ import annotations
 
 from hierarchy.jit import as_matrix, inlined
-from solvers.kernels.least_squares import least_squares
-from solvers.kernels.tableau import (
+from solvers.kernels.active_set.tableau import (
     COLUMN,
     FORCE,
     LIST,
@@ -29,8 +28,9 @@ from solvers.kernels.tableau import (
     entry_of,
     left_of,
 )
+from solvers.kernels.active_set.working_set import NORM, TOLERANCE, side_at
+from solvers.kernels.linalg.least_squares import least_squares
 from solvers.kernels.tolerances import CANCELLED, EPSILON, FAINT
-from solvers.kernels.working_set import NORM, TOLERANCE, side_at
 
 
 @inlined

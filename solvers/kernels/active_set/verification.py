@@ -21,27 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import inlined, internal
-from solvers.kernels.multipliers import refine
-from solvers.kernels.rows import length_of
-from solvers.kernels.tolerances import (
-    BAND,
-    CANCELLED,
-    CLEAR_MISS,
-    CUT_BALANCE,
-    CUT_OVER_PIVOT,
-    EPSILON,
-    FREE_ROWS,
-    HEAVIER,
-    KNOWN_MULTIPLIER,
-    NEGLIGIBLE,
-    PIVOT_PRODUCT,
-    RANK_MARGIN,
-    REMAINDER,
-    ROUNDING_BALANCE,
-    SIGN_MARGIN,
-    SIGN_ROUNDING,
-)
-from solvers.kernels.working_set import (
+from solvers.kernels.active_set.multipliers import refine
+from solvers.kernels.active_set.working_set import (
     BEGIN,
     CHANGE,
     CUT,
@@ -62,6 +43,25 @@ from solvers.kernels.working_set import (
     UPPER,
     WHOLE,
     row_times_x,
+)
+from solvers.kernels.linalg.rows import length_of
+from solvers.kernels.tolerances import (
+    BAND,
+    CANCELLED,
+    CLEAR_MISS,
+    CUT_BALANCE,
+    CUT_OVER_PIVOT,
+    EPSILON,
+    FREE_ROWS,
+    HEAVIER,
+    KNOWN_MULTIPLIER,
+    NEGLIGIBLE,
+    PIVOT_PRODUCT,
+    RANK_MARGIN,
+    REMAINDER,
+    ROUNDING_BALANCE,
+    SIGN_MARGIN,
+    SIGN_ROUNDING,
 )
 from solvers.status import EQUAL, FREE
 

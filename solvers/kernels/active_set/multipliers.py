@@ -16,11 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import inlined, internal
-from solvers.kernels.least_squares import turn
-from solvers.kernels.rows import length_of, reflect
-from solvers.kernels.space import matrix
-from solvers.kernels.tolerances import CANCELLED, EPSILON, FAINT, NEGLIGIBLE, SHADOW
-from solvers.kernels.working_set import (
+from solvers.kernels.active_set.working_set import (
     BEGIN,
     DIAGONAL,
     FIRST,
@@ -44,9 +40,13 @@ from solvers.kernels.working_set import (
     side_at,
     value_at,
 )
-from solvers.kernels.working_set import (
+from solvers.kernels.active_set.working_set import (
     ZEROED as FORCE,
 )
+from solvers.kernels.linalg.least_squares import turn
+from solvers.kernels.linalg.rows import length_of, reflect
+from solvers.kernels.linalg.space import matrix
+from solvers.kernels.tolerances import CANCELLED, EPSILON, FAINT, NEGLIGIBLE, SHADOW
 from solvers.status import EQUAL
 
 OUTWARD, UNDECIDED, INWARD = 1, 0, -1

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inner_product, internal
-from solvers.kernels.least_squares import least_squares
-from solvers.kernels.rows import ZERO
-from solvers.kernels.space import matrix
+from solvers.kernels.linalg.least_squares import least_squares
+from solvers.kernels.linalg.rows import ZERO
+from solvers.kernels.linalg.space import matrix
 from solvers.kernels.tolerances import ORTHOGONAL, SWEEPS
 
 

@@ -21,9 +21,14 @@ from __future__ import annotations
 import numpy as np
 
 from hierarchy.jit import add_multiple, inlined, internal
-from solvers.kernels.level import balance, pull_of_rows, push_by, step_of_rows, weigh_rows
-from solvers.kernels.rows import ZERO, length_of
-from solvers.kernels.tableau import (
+from solvers.kernels.active_set.level import (
+    balance,
+    pull_of_rows,
+    push_by,
+    step_of_rows,
+    weigh_rows,
+)
+from solvers.kernels.active_set.tableau import (
     BASE,
     FIX,
     FORCE,
@@ -64,12 +69,7 @@ from solvers.kernels.tableau import (
     pivot_rows,
     turn_to,
 )
-from solvers.kernels.tolerances import (
-    CANCELLED,
-    FLOOR,
-    REPIVOT,
-)
-from solvers.kernels.working_set import (
+from solvers.kernels.active_set.working_set import (
     ACTED,
     ENTRY,
     FACTORED,
@@ -88,6 +88,12 @@ from solvers.kernels.working_set import (
     product_with,
     row_times_x,
     side_at,
+)
+from solvers.kernels.linalg.rows import ZERO, length_of
+from solvers.kernels.tolerances import (
+    CANCELLED,
+    FLOOR,
+    REPIVOT,
 )
 from solvers.status import EQUAL, FREE, SOLVED, UNPROVED
 

@@ -19,10 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import add_multiple, inlined, inner_product, internal
-from solvers.kernels.rows import ZERO, swap
-from solvers.kernels.space import View, assign, integers, matrix, vector
-from solvers.kernels.tolerances import CLEAR_SQUARE, FLOOR, NEGLIGIBLE
-from solvers.kernels.working_set import (
+from solvers.kernels.active_set.working_set import (
     CUT,
     ENTRY,
     FIRST,
@@ -35,6 +32,9 @@ from solvers.kernels.working_set import (
     UPPER,
     note_pivot,
 )
+from solvers.kernels.linalg.rows import ZERO, swap
+from solvers.kernels.linalg.space import View, assign, integers, matrix, vector
+from solvers.kernels.tolerances import CLEAR_SQUARE, FLOOR, NEGLIGIBLE
 from solvers.status import EQUAL
 
 # Rows of `number` after those of the data. Per row of A: its value and the rate of that; its

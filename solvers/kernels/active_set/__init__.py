@@ -1,0 +1,1 @@
+"""The exact engine: a working set found level by level, searched on from there, and verified."""
