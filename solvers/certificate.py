@@ -54,15 +54,11 @@ PARALLEL = 1e-8
 _EITHER = 0.25, 4.0, 0.1   # times `parallel`: up to these angles rows may count as dependent too
 _EXACTLY = 1e-4     # times `parallel`: the same for rows made exactly dependent
 _DUST = 1e-13       # norm of a row relative to the largest of its level: smaller ones are dust
-_SMALLEST = 1e-30   # norm of a row relative to the largest of its level: lower bound
-_CLEAR = 0.1        # relative pivot: smaller ones do not add to the uncertainty of parallel rows
-_SPAN = 4.0         # turn of a span over the angle of a dropped row, per smallest pivot, at most
 _UNSEEN = 1e4       # weight of directions that no row of a level sees, relative to the weakest seen
 _BLOCK = 32         # columns that LAPACK reflects at a time
 _LARGEST = 1e150    # length: its square stays finite
 _SMALL = 1e-15      # relative: smaller steps and pivots are rounding
 _ROUNDING = 64 * float(np.finfo(float).eps)
-_OF_BASIS = 0.125   # of the rounding of a term: that of a basis of the freedom, per smallest pivot
 
 Mask = NDArray[np.bool_]
 
@@ -349,7 +345,7 @@ def _residual(cone: _NormalCone, level: _Rows, enough: float) -> tuple[float, _R
     whole = _length(level.t)
     if whole <= enough:  # a change to no violation at all is small enough
         return whole, level
-    size = np.exp(np.maximum(level.size - level.size.max(), np.log(_SMALLEST)))
+    size = np.exp(level.size - level.size.max())
     judged = level.fixed & (size > _DUST)
     dust = level.fixed & ~judged
     if not judged.any():  # here too: each row is on its side
@@ -428,14 +424,13 @@ def _on_sides(level: _Rows, size: Array) -> tuple[Array, Array, Array]:
 def _projected(gap: Array, cone: _NormalCone, enough: float) -> float:
     """Return the length of the projection of -gap (n,) on the polar cone, in coordinates of Z."""
     C, f = cone.rows.T, cone.Z.T @ gap
-    size = max(norm(f), norm(gap) * (_OF_BASIS if cone.angle == 0.0 else 1.0))
-    return _balanced(C, np.ones_like(C), f, np.full(len(f), size),
+    return _balanced(C, np.ones_like(C), f, np.full(len(f), norm(gap)),
                      _unknown(cone.thinnest, cone.angle), 1e-3 * enough)
 
 
 def _unknown(thinnest: float, angle: float) -> float:
     """Return the share of a term that rounding or rows counted as parallel may explain."""
-    return _ROUNDING / thinnest + _SPAN * angle / max(thinnest, _CLEAR)
+    return _ROUNDING / thinnest + angle
 
 
 def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: Array | float,

@@ -210,8 +210,8 @@ def pivot_one_by_one(s, current, saved, limit, level):
         elif last < levels:
             save(s, saved, last)
             last, newest, fresh = _next_level(s, last), ZERO - 1, True
-        elif s.count[DIRTY] == 1 and clean < RESTORED:  # free of what other working sets cut
-            restore(s)
+        elif s.count[DIRTY] == 1 and clean < RESTORED and not verify(s, YES):
+            restore(s)  # free of what other working sets cut
             newest, fresh, clean, recurred = ZERO - 1, True, clean + 1, ZERO
         else:
             return ZERO + SOLVED, tries, last - 1
