@@ -24,7 +24,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, naming
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -149,10 +149,8 @@ def _load(point: EntryPoint, group: Group) -> None:
     if point.name not in _registered[group]:
         _import(point.module, what)
     if point.name not in _registered[group]:  # unless the module registers it itself
-        try:
+        with naming(what, of=AttributeError):
             register(group, point.name)(point.load())
-        except AttributeError as error:
-            raise HierarchyError(f"{what}: {error}") from error
     _loaded.setdefault(point.module)
 
 

@@ -21,6 +21,7 @@ from hierarchy.errors import (
     file_path,
     finite_numbers,
     is_one_of,
+    naming,
 )
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
@@ -202,10 +203,9 @@ class Robot:
     def of_text(cls, text: str, name: str) -> Robot:
         """Build a robot of `robot.model.saveToString()`; a damaged text raises RobotError."""
         model = pin.Model()
-        try:
+        with naming(f"robot {name!r}: its model cannot be read", RobotError,
+                    (RuntimeError, MemoryError, ValueError, TypeError)):
             model.loadFromString(text)
-        except (RuntimeError, MemoryError, ValueError, TypeError) as error:
-            raise RobotError(f"robot {name!r}: its model cannot be read: {error}") from error
         return cls(model, name)
 
     @property

@@ -11,7 +11,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.avoidance.measurement import Measurement
-from hierarchy.errors import HierarchyError, RobotError, brief, expect, number, refuse
+from hierarchy.errors import RobotError, brief, expect, naming, number, refuse
 from hierarchy.gate import array_of
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import Kinematics
@@ -285,10 +285,8 @@ def _supports(model: Any) -> NDArray[np.bool_]:
 
 
 def _checked(robot: Robot, what: str, value: ArrayLike, names: Sequence[str]) -> Array:
-    try:
-        vector = array_of(f"robot {robot.name!r}: {what}", value)
-    except HierarchyError as error:
-        raise RobotError(str(error)) from None
+    with naming(f"robot {robot.name!r}", RobotError):
+        vector = array_of(what, value)
     if vector.shape != (len(names),):
         more = ("; robot.configuration makes one of the values of joints"
                 if what == "q" and robot.nq != robot.n else "")

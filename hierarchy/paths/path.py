@@ -13,11 +13,11 @@ from pathlib import Path as File
 import numpy as np
 
 from hierarchy.errors import (
-    HierarchyError,
     brief,
     expect,
     file_path,
     finite_numbers,
+    naming,
     number,
     positive,
     refuse,
@@ -282,10 +282,8 @@ class Recorded(Path):
                 numbers = []
             refuse(len(numbers) != 4, f"{file}, line {count}: expected t, x, y, z, got {line_!r}")
             rows.append(numbers)
-        try:
+        with naming(str(file)):
             return cls([row[0] for row in rows], [row[1:] for row in rows])
-        except HierarchyError as error:
-            raise HierarchyError(f"{file}: {error}") from error
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -313,11 +311,9 @@ def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: A
 
 
 def _lines(file: str | File) -> list[str]:
-    try:
+    with naming(f"{file} cannot be read", of=(OSError, UnicodeDecodeError)):
         text = file_path("recorded path: file", file).read_text(encoding="utf-8")
         return [line_ for line_ in text.splitlines() if line_]
-    except (OSError, UnicodeDecodeError) as error:
-        raise HierarchyError(f"{file} cannot be read: {error}") from error
 
 
 def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, RobotError, UnknownNameError
+from hierarchy.errors import RobotError, UnknownNameError, naming
 from hierarchy.problem import Array
 from hierarchy.robots.joints import Part as JointPart
 from hierarchy.robots.joints import set_joint
@@ -210,10 +210,8 @@ def _lock(file: Compiled, joints: Sequence[int], held: Array, name: str,
     sizes = SIZES[file.kind(j)]
     q, here = np.zeros(sum(sizes)), file.model.jnt_qposadr[j]
     own = [JointPart(j, sum(sizes[:i]), 0, size) for i, size in enumerate(sizes)]
-    try:
+    with naming(f"robot file {file.file!r}: locked", RobotError):
         set_joint(own, q, j, name, value)
-    except HierarchyError as error:
-        raise file.error(f"locked: {error}") from error
     held[here:here + len(q)] = rolled(q, 1)
     return j
 
