@@ -67,6 +67,12 @@ def is_one_of(value: object, known: Container[str]) -> bool:
     return isinstance(value, str) and value in known
 
 
+def check_name(what: str, name: object, known: Collection[str]) -> None:
+    """Raise an UnknownNameError unless a name is a text, and one of those known."""
+    if not is_one_of(name, known):
+        raise UnknownNameError(what, name, known)
+
+
 def refuse(wrong: object, said: str) -> None:
     """Raise a HierarchyError with what is said if something is wrong, or return None."""
     if wrong:

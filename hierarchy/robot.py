@@ -16,6 +16,7 @@ from hierarchy.avoidance.body import ControlPoint
 from hierarchy.errors import (
     RobotError,
     UnknownNameError,
+    check_name,
     expect,
     expect_each,
     file_path,
@@ -236,14 +237,12 @@ class Robot:
 
     def start(self, name: str) -> Array:
         """Return a copy of the configuration (nq,) that the file calls `name`; UnknownNameError."""
-        if not is_one_of(name, self.starts):
-            raise UnknownNameError("keyframe", name, self.starts)
+        check_name("keyframe", name, self.starts)
         return self.starts[name].copy()
 
     def joint(self, name: str) -> int:
         """Index of the joint called `name`, as used by frames and control points."""
-        if not is_one_of(name, self.joint_names):
-            raise UnknownNameError("joint", name, self.joint_names)
+        check_name("joint", name, self.joint_names)
         return self.joint_names.index(name) + 1
 
     def coordinate(self, name: str) -> int:
