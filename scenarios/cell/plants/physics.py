@@ -1,7 +1,5 @@
 """An arm in MuJoCo with position servos, commanded in joint positions as through KUKA's FRI."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from math import ceil

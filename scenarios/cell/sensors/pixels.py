@@ -6,8 +6,6 @@ Source: Flacco, Kroeger, De Luca, Khatib, "A depth space approach to human-robot
 avoidance", ICRA 2012 (the letter's [8]); equation numbers are those of the letter.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from math import sqrt
