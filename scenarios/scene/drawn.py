@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from hierarchy import HierarchyError
 from hierarchy.avoidance import Measurement, Obstacles
-from hierarchy.avoidance.measurement import exact_measurer
+from hierarchy.avoidance.measurement import measure_exactly
 from hierarchy.errors import positive
+from hierarchy.jit import bind
 from hierarchy.problem import Array
 from scenarios.cell.sensors.sensor import make_obstacles, packed_laws
 from scenarios.recording import listed
@@ -181,9 +182,9 @@ def _distances(fixed: Stage, recording: Recording, ticks: NDArray[np.int64],
                placements: Array) -> dict[str, Array]:
     """Return points, distances, nearest points and the obstacles' centres, frame by frame."""
     seen, now = Measurement(len(fixed.robot.points) - 1), np.empty(placements.shape[1:])
-    measure = exact_measurer(seen, now, np.array([point.joint for point in fixed.robot.points]),
-                             np.array([point.offset for point in fixed.robot.points]),
-                             fixed.obstacles.table, packed_laws(), np.zeros(2))
+    measure = bind(measure_exactly, now, np.array([point.joint for point in fixed.robot.points]),
+                   np.array([point.offset for point in fixed.robot.points]),
+                   fixed.obstacles.table, packed_laws(), np.zeros(2), seen.arrays)
     frames: dict[str, list[Array]] = {name: [] for name in (
         "points", "nearest", "distance", "centres")}
     offsets = recording.get("obstacle_offset", np.empty((recording.ticks, 0, 3)))

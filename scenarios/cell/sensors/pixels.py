@@ -40,7 +40,7 @@ class Space(NamedTuple):
     """What is measured, and how; see `DepthSpace`.
 
     joints (P,), offsets (P, 3) of the control points, the end effector last; region, thin [m]; mean
-    (2,) is its mean_within; laws (2, 4) of `repulsion.laws`.
+    (2,) is its mean_within; laws (2, 4) of `packed_laws`.
     """
 
     joints: NDArray[np.int64]
