@@ -86,9 +86,7 @@ def _shape(mj: Any, geom: int, kind: int) -> Any:
         return coal.Sphere(size[0])
     if kind in (_CAPSULE, _CYLINDER):
         return (coal.Capsule if kind == _CAPSULE else coal.Cylinder)(size[0], 2 * size[1])
-    if kind == _ELLIPSOID:
-        return coal.Ellipsoid(*size)
-    if kind == _BOX:
+    if kind in (_ELLIPSOID, _BOX):  # of an ellipsoid the box around it
         return coal.Box(*(2 * size))
     mesh = mj.geom_dataid[geom]
     first = mj.mesh_vertadr[mesh]
