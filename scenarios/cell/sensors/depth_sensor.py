@@ -112,7 +112,6 @@ class DepthSensor:
         self.stopped = self.covered = False
         self.outside = 0.0
         self._coming: deque[tuple[float, ObstacleImage]] = deque()
-        self._frame, self._now = -1, -inf
         self._forget()
 
     def measure(self, state: State) -> Measurement:

@@ -75,19 +75,16 @@ class ExactDistances:
     def measure(self, state: State) -> Measurement:
         """Measure at a state and attach the measurement to it; valid until the next call."""
         if state is not self._followed:
-            self._follow(state)
+            self._followed = state
+            self._measure = bind(measure_exactly, state.placements, self._joints, self._offsets,
+                                 self.obstacles.table, self._laws, self._mean_within,
+                                 self.measurement.arrays)
         self.obstacles.at(state.t)
         self._measure()
         if self.measurement.pairs is not None:
             measure_pairs(self.measurement.pairs, self.measurement.points, self.obstacles)
         state.measurement = self.measurement
         return self.measurement
-
-    def _follow(self, state: State) -> None:
-        self._followed = state
-        self._measure = bind(measure_exactly, state.placements, self._joints, self._offsets,
-                             self.obstacles.table, self._laws, self._mean_within,
-                             self.measurement.arrays)
 
     def check_start(self, state: State) -> None:
         """Raise a HierarchyError if an obstacle lies at a control point, or a point inside one."""
