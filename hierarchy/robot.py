@@ -388,8 +388,6 @@ class Robot:
         """
         q = self.normalised(q)
         step = finite_numbers(f"robot {self.name!r}: step", step, self.n)
-        if self.nq == self.n:
-            return q + step
         return np.asarray(pin.integrate(self.model, q, step))
 
     def difference(self, q: ArrayLike, to: ArrayLike) -> Array:
@@ -398,7 +396,7 @@ class Robot:
         The shortest way around: angles are at most pi. Raises what `normalised` raises.
         """
         q, to = self.normalised(q), self.normalised(to)
-        return to - q if self.nq == self.n else np.asarray(pin.difference(self.model, q, to))
+        return np.asarray(pin.difference(self.model, q, to))
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, n={self.n})"
