@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, naming
 
 LARGEST = 1 << 30  # bytes that an archive may unpack to, if it takes less on disk
 
@@ -46,7 +46,7 @@ def array_in(name: str, content: bytes) -> NDArray[Any]:
 
     numpy makes an array of the shape that the header says before it reads a number.
     """
-    try:
+    with naming(name, of=Exception):  # whatever numpy makes of a damaged header
         stream = io.BytesIO(content)
         shape, _, kind = _HEADERS[np.lib.format.read_magic(stream)](stream)
         size = math.prod(shape) * kind.itemsize
@@ -54,5 +54,3 @@ def array_in(name: str, content: bytes) -> NDArray[Any]:
         if size > left:
             raise HierarchyError(f"its header says {size} bytes, and {left} follow")
         return np.lib.format.read_array(io.BytesIO(content), allow_pickle=False)
-    except Exception as error:  # whatever numpy makes of a damaged header
-        raise HierarchyError(f"{name}: {error}") from error

@@ -22,11 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import (
     HierarchyError,
-    UnknownNameError,
+    check_name,
     expect,
     expect_each,
     finite_numbers,
-    is_one_of,
     number,
     positive,
     refuse,
@@ -172,8 +171,7 @@ class Contacts:
         return blocks
 
     def __getitem__(self, name: str) -> Contact:
-        if not is_one_of(name, self.names):
-            raise UnknownNameError("contact", name, self.names)
+        check_name("contact", name, self.names)
         return self.contacts[self.names.index(name)]
 
     def accelerations(self, x: ArrayLike) -> Array:

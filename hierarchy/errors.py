@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Collection, Container, Iterable, Sequence
+from collections.abc import Collection, Container, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from errno import ENAMETOOLONG
 from math import copysign, inf, isfinite, isnan, nan
 from numbers import Integral, Real
@@ -20,6 +21,16 @@ _LISTED = 15  # known names that a message lists; of more it has the nearest
 
 class HierarchyError(ValueError):
     """A caller's mistake; the text names the task or level, the row and the value."""
+
+
+@contextmanager
+def naming(what: str, error: type[HierarchyError] = HierarchyError,
+           of: type[Exception] | tuple[type[Exception], ...] = HierarchyError) -> Iterator[None]:
+    """Put what is wrong in front of an error raised within, `of` these kinds; raise an `error`."""
+    try:
+        yield
+    except of as found:
+        raise error(f"{what}: {found}") from found
 
 
 class UnknownNameError(HierarchyError):
@@ -54,6 +65,12 @@ def nearest(name: object, known: Iterable[str], most: int = 5, similarity: float
 def is_one_of(value: object, known: Container[str]) -> bool:
     """Whether a value is a text, and one of those known; an array or a list is no text."""
     return isinstance(value, str) and value in known
+
+
+def check_name(what: str, name: object, known: Collection[str]) -> None:
+    """Raise an UnknownNameError unless a name is a text, and one of those known."""
+    if not is_one_of(name, known):
+        raise UnknownNameError(what, name, known)
 
 
 def refuse(wrong: object, said: str) -> None:

@@ -41,8 +41,6 @@ rounding:
   than `velocity`; within a distance `ROUNDING` of the limit counts as back.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from dataclasses import dataclass, field

@@ -18,16 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import (
-    ReadingError,
-    UnknownNameError,
-    brief,
-    is_one_of,
-    number,
-    positive,
-    refuse,
-    whole,
-)
+from hierarchy.errors import ReadingError, brief, check_name, number, positive, refuse, whole
 from hierarchy.problem import Array
 
 
@@ -194,8 +185,7 @@ class Loop:
                  watchdog: float | None = None, spin: float = 0.0, priority: int | None = None,
                  pause_gc: bool = True, clock: Callable[[], float] = time.monotonic,
                  sleep: Callable[[float], object] = time.sleep) -> None:
-        if not is_one_of(overrun, OVERRUNS):
-            raise UnknownNameError("overrun policy", overrun, OVERRUNS)
+        check_name("overrun policy", overrun, OVERRUNS)
         positive("loop: period [s]", period)
         number("loop: behind", behind, 1.0)
         number("loop: spin [s]", spin, 0.0)

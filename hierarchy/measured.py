@@ -86,7 +86,8 @@ class Measured(Task):
 
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
         """Return a function of t [s] that moves `goal`; None where it rests."""
-        return None if self.path is None else self.path.writer(goal)
+        path = self.path
+        return None if path is None else lambda t: path.write(t, goal)
 
     def error(self, state: State) -> Array:
         """Error p_d - p at a state: (m,), in the task's unit."""

@@ -24,7 +24,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, check_name, naming
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -47,8 +47,7 @@ def register(group: Group, name: str, *, shipped: bool = False) -> Callable[[_Th
     `shipped` is for what this package brings. Raises UnknownNameError for an unknown group,
     HierarchyError if the name is taken.
     """
-    if group not in GROUPS:
-        raise UnknownNameError("group", group, GROUPS)
+    check_name("group", group, GROUPS)
 
     def keep(thing: _Thing) -> _Thing:
         before = _shipped[group].get(name, _registered[group].get(name, thing))
@@ -149,10 +148,8 @@ def _load(point: EntryPoint, group: Group) -> None:
     if point.name not in _registered[group]:
         _import(point.module, what)
     if point.name not in _registered[group]:  # unless the module registers it itself
-        try:
+        with naming(what, of=AttributeError):
             register(group, point.name)(point.load())
-        except AttributeError as error:
-            raise HierarchyError(f"{what}: {error}") from error
     _loaded.setdefault(point.module)
 
 

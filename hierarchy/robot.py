@@ -16,11 +16,13 @@ from hierarchy.avoidance.body import ControlPoint
 from hierarchy.errors import (
     RobotError,
     UnknownNameError,
+    check_name,
     expect,
     expect_each,
     file_path,
     finite_numbers,
     is_one_of,
+    naming,
 )
 from hierarchy.problem import Array
 from hierarchy.robots import TABLES
@@ -202,10 +204,9 @@ class Robot:
     def of_text(cls, text: str, name: str) -> Robot:
         """Build a robot of `robot.model.saveToString()`; a damaged text raises RobotError."""
         model = pin.Model()
-        try:
+        with naming(f"robot {name!r}: its model cannot be read", RobotError,
+                    (RuntimeError, MemoryError, ValueError, TypeError)):
             model.loadFromString(text)
-        except (RuntimeError, MemoryError, ValueError, TypeError) as error:
-            raise RobotError(f"robot {name!r}: its model cannot be read: {error}") from error
         return cls(model, name)
 
     @property
@@ -236,14 +237,12 @@ class Robot:
 
     def start(self, name: str) -> Array:
         """Return a copy of the configuration (nq,) that the file calls `name`; UnknownNameError."""
-        if not is_one_of(name, self.starts):
-            raise UnknownNameError("keyframe", name, self.starts)
+        check_name("keyframe", name, self.starts)
         return self.starts[name].copy()
 
     def joint(self, name: str) -> int:
         """Index of the joint called `name`, as used by frames and control points."""
-        if not is_one_of(name, self.joint_names):
-            raise UnknownNameError("joint", name, self.joint_names)
+        check_name("joint", name, self.joint_names)
         return self.joint_names.index(name) + 1
 
     def coordinate(self, name: str) -> int:
@@ -389,8 +388,6 @@ class Robot:
         """
         q = self.normalised(q)
         step = finite_numbers(f"robot {self.name!r}: step", step, self.n)
-        if self.nq == self.n:
-            return q + step
         return np.asarray(pin.integrate(self.model, q, step))
 
     def difference(self, q: ArrayLike, to: ArrayLike) -> Array:
@@ -399,7 +396,7 @@ class Robot:
         The shortest way around: angles are at most pi. Raises what `normalised` raises.
         """
         q, to = self.normalised(q), self.normalised(to)
-        return to - q if self.nq == self.n else np.asarray(pin.difference(self.model, q, to))
+        return np.asarray(pin.difference(self.model, q, to))
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, n={self.n})"

@@ -11,14 +11,7 @@ from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import (
-    HierarchyError,
-    ReadingError,
-    UnknownNameError,
-    expect,
-    is_one_of,
-    refuse,
-)
+from hierarchy.errors import HierarchyError, ReadingError, check_name, expect, is_one_of, refuse
 from hierarchy.gate import checked_give, checked_metric
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array, Hierarchy
@@ -93,8 +86,7 @@ class Stack:
         return f"Stack({' > '.join(self._order)}; {self.level} level)"
 
     def __getitem__(self, name: str) -> Task:
-        if not is_one_of(name, self._tasks):
-            raise UnknownNameError("task", name, self._tasks)
+        check_name("task", name, self._tasks)
         return self._tasks[name]
 
     def insert(self, task: Task, index: int | None = None) -> None:

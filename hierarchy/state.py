@@ -11,7 +11,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.avoidance.measurement import Measurement
-from hierarchy.errors import HierarchyError, RobotError, brief, expect, number, refuse
+from hierarchy.errors import RobotError, brief, expect, naming, number, refuse
 from hierarchy.gate import array_of
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import Kinematics
@@ -177,7 +177,7 @@ class State:
             compute()
 
     def _keep_kinematics(self) -> None:
-        _copy_kinematics(self.J, self.placements, self.previous_J, self.previous_placements)
+        self.previous_J[:], self.previous_placements[:] = self.J, self.placements
 
     def mass_matrix(self) -> Array:
         """Joint-space inertia matrix M(q) (n, n) [kg m^2]."""
@@ -247,16 +247,6 @@ def _square(q, start, size):
     return total
 
 
-@compiled
-def _copy_kinematics(J, placements, previous_J, previous_placements):
-    for c in range(J.shape[1]):
-        for i in range(6):
-            previous_J[i, c] = J[i, c]
-    for i in range(placements.shape[0]):
-        for k in range(12):
-            previous_placements[i, k] = placements[i, k]
-
-
 def _placements_view(data: Any, joints: int) -> Array:
     """One (joints, 12) view over pinocchio's contiguous vector of placements."""
     first = data.oMi[0].rotation
@@ -285,10 +275,8 @@ def _supports(model: Any) -> NDArray[np.bool_]:
 
 
 def _checked(robot: Robot, what: str, value: ArrayLike, names: Sequence[str]) -> Array:
-    try:
-        vector = array_of(f"robot {robot.name!r}: {what}", value)
-    except HierarchyError as error:
-        raise RobotError(str(error)) from None
+    with naming(f"robot {robot.name!r}", RobotError):
+        vector = array_of(what, value)
     if vector.shape != (len(names),):
         more = ("; robot.configuration makes one of the values of joints"
                 if what == "q" and robot.nq != robot.n else "")

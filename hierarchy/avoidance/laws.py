@@ -122,8 +122,3 @@ def repulsion(D, r_max, rho, gamma, scale):
     if exponent > 700.0:  # exp would overflow; r is zero to rounding long before
         return 0.0
     return r_max / (1.0 + exp(exponent))  # (23)
-
-
-def laws(body: Repulsion, end_effector: Repulsion) -> Array:
-    """Both laws as one (2, 4) array: row 0 for the body, row 1 for the end effector."""
-    return np.array([body.packed(), end_effector.packed()])

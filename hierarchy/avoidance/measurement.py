@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.avoidance.laws import repulsion
 from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turning_off_obstacle
 from hierarchy.errors import number, refuse, whole
-from hierarchy.jit import bind, compiled
+from hierarchy.jit import compiled
 from hierarchy.kinematics import Readings, dot, place, plus
 from hierarchy.problem import Array
 
@@ -79,23 +77,16 @@ class Measurement:
         return float(self.distance.item(-1))
 
 
-def exact_measurer(measurement: Measurement, placements: Array, joints: NDArray[np.int64],
-                   offsets: Array, obstacles: Array, laws: Array,
-                   mean_within: Array) -> Callable[[], object]:
-    """Return a function that fills a Measurement from known geometry at each call.
+@compiled
+def measure_exactly(placements, joints, offsets, obstacles, laws, mean_within, seen):
+    """Fill the arrays `seen` of a Measurement from known geometry.
 
     placements (joints + 1, 12) of a State; joints (K + 1,), offsets (K + 1, 3) of the control
-    points and the end effector; obstacles (H, 16) a table of `Obstacles`; laws (2, 4) of
-    `repulsion.laws`. The direction is that of the nearest obstacle, or the mean
-    (25)-(26) over the obstacles nearer than `mean_within` (2,) [m], for control points and end
-    effector, if there are any.
+    points and the end effector; obstacles (H, 16) a table of `Obstacles`; laws (2, 4) those of the
+    body and of the end effector, see `Repulsion.packed`. The direction is that of the nearest
+    obstacle, or the mean (25)-(26) over the obstacles nearer than `mean_within` (2,) [m], for
+    control points and end effector, if there are any.
     """
-    return bind(_measure, placements, joints, offsets, obstacles, laws, mean_within,
-                measurement.arrays)
-
-
-@compiled
-def _measure(placements, joints, offsets, obstacles, laws, mean_within, seen):
     points, distance, direction, magnitude, nearest, chosen = seen
     count = len(joints)
     active, D_minimal = -1, np.inf

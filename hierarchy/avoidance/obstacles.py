@@ -9,14 +9,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import (
-    UnknownNameError,
-    expect,
-    expect_each,
-    finite_numbers,
-    is_one_of,
-    refuse,
-)
+from hierarchy.errors import check_name, expect, expect_each, finite_numbers, refuse
 from hierarchy.gate import array_of, check_rotation
 from hierarchy.jit import inlined, internal
 from hierarchy.kinematics import dot, less
@@ -48,8 +41,7 @@ class Obstacle:
     name: str = "obstacle"
 
     def __post_init__(self) -> None:
-        if not is_one_of(self.shape, SHAPES):
-            raise UnknownNameError("obstacle shape", self.shape, SHAPES)
+        check_name("obstacle shape", self.shape, SHAPES)
         expected, size = SHAPES[self.shape], array_of(f"{self.name}: size", self.size)
         refuse(size.shape != (expected,) or not ((size > 0.0) & (size < inf)).all(),
                f"{self.name}: a {self.shape} takes {expected} positive size(s), got "

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, file_path, refuse
+from hierarchy.errors import HierarchyError, file_path, naming, refuse
 from hierarchy.problem import Array
 
 _CHANNELS = tuple(axis + kind for kind in ("position", "rotation") for axis in "xyz")
@@ -34,10 +34,8 @@ class _Joint(NamedTuple):
 
 def read_bvh(file: str | File) -> Motion:
     """Read a BVH file; raises HierarchyError, naming the file, if it is none."""
-    try:
+    with naming(f"{file} cannot be read", of=(OSError, UnicodeDecodeError)):
         words = file_path("read_bvh: file", file).read_text(encoding="utf-8").split()
-    except (OSError, UnicodeDecodeError) as error:
-        raise HierarchyError(f"{file} cannot be read: {error}") from error
     try:
         at = words.index("MOTION")
         joints = _skeleton(iter(words[1:at]))

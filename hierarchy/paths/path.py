@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import cos, inf, sin
@@ -13,17 +13,17 @@ from pathlib import Path as File
 import numpy as np
 
 from hierarchy.errors import (
-    HierarchyError,
     brief,
     expect,
     file_path,
     finite_numbers,
+    naming,
     number,
     positive,
     refuse,
     whole,
 )
-from hierarchy.jit import bind, compiled
+from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 
@@ -36,10 +36,6 @@ class Path(ABC):
     @abstractmethod
     def write(self, t: float, out: Array) -> None:
         """Write position [m], velocity [m/s], acceleration [m/s^2] at t [s] as rows of (3, 3)."""
-
-    def writer(self, out: Array) -> Callable[[float], object]:
-        """Return a function of t [s] that does `write` into `out` (3, 3)."""
-        return lambda t: self.write(t, out)
 
     def __call__(self, t: float) -> Array:
         """Position, velocity and acceleration at t [s] as rows of a new (3, 3) array."""
@@ -83,10 +79,6 @@ class Ellipse(Path):
         """See `Path.write`."""
         _write_ellipse(self._packed, self.rate, out, t)
 
-    def writer(self, out: Array) -> Callable[[float], object]:
-        """See `Path.writer`."""
-        return bind(_write_ellipse, self._packed, self.rate, out, then=(0.0,))
-
 
 def circle(centre: Vector, radius: float, normal: Vector = (0.0, 0.0, 1.0), rate: float = 1.0,
            phase: float = 0.0) -> Ellipse:
@@ -124,16 +116,6 @@ class Shifted(Path):
         """See `Path.write`."""
         self.path.write(t, out)
         out[0] += self.offset
-
-    def writer(self, out: Array) -> Callable[[float], object]:
-        """See `Path.writer`."""
-        follow, offset = self.path.writer(out), np.asarray(self.offset, dtype=float)
-
-        def write(t: float) -> None:
-            follow(t)
-            out[0] += offset
-
-        return write
 
 
 @dataclass(frozen=True)
@@ -300,10 +282,8 @@ class Recorded(Path):
                 numbers = []
             refuse(len(numbers) != 4, f"{file}, line {count}: expected t, x, y, z, got {line_!r}")
             rows.append(numbers)
-        try:
+        with naming(str(file)):
             return cls([row[0] for row in rows], [row[1:] for row in rows])
-        except HierarchyError as error:
-            raise HierarchyError(f"{file}: {error}") from error
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -331,11 +311,9 @@ def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: A
 
 
 def _lines(file: str | File) -> list[str]:
-    try:
+    with naming(f"{file} cannot be read", of=(OSError, UnicodeDecodeError)):
         text = file_path("recorded path: file", file).read_text(encoding="utf-8")
         return [line_ for line_ in text.splitlines() if line_]
-    except (OSError, UnicodeDecodeError) as error:
-        raise HierarchyError(f"{file} cannot be read: {error}") from error
 
 
 def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -> None:

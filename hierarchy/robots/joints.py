@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, RobotError, UnknownNameError, finite_numbers
+from hierarchy.errors import RobotError, check_name, finite_numbers, naming
 from hierarchy.problem import Array
 from hierarchy.robots.found import Coupled
 from hierarchy.robots.library import pin
@@ -144,12 +144,9 @@ def without(model: Any, coupled: tuple[Coupled, ...], locked: Mapping[str, Array
         return model, coupled
     q, parts, names = np.array(pin.neutral(model)), parts_of(model), list(model.names)
     for name, value in locked.items():
-        if name not in names[1:]:
-            raise UnknownNameError("joint", name, names[1:])
-        try:
+        check_name("joint", name, names[1:])
+        with naming(f"robot file {file!r}: locked", RobotError):
             set_joint(parts, q, names.index(name), name, value)
-        except HierarchyError as error:
-            raise RobotError(f"robot file {file!r}: locked: {error}") from error
     values = values_of(parts, q)
     left = tuple(one if one.other not in locked else Coupled(one.joint, "", (float(np.polyval(
         one.coefficients[::-1], values[model.joints[names.index(one.other)].idx_v])),))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hierarchy import plugins
-from hierarchy.errors import RobotError, UnknownNameError, nearest
+from hierarchy.errors import RobotError, UnknownNameError, check_name, nearest
 
 PACKAGES = ("example_robot_data", "robot_descriptions")
 _SUFFIXES = (".urdf", ".xml", ".mjcf",  # and those that are refused with what to give instead
@@ -70,8 +70,7 @@ def file_of(model: str) -> Path:
     not installed or its file is not available, and UnknownNameError for an unknown name.
     """
     package, _, name = model.partition(":")
-    if package not in PACKAGES:
-        raise UnknownNameError("package of robots", package, PACKAGES)
+    check_name("package of robots", package, PACKAGES)
     of_files = package == "example_robot_data"
     try:
         known = _NAMES[package]()

@@ -33,7 +33,7 @@ import numpy as np
 
 from hierarchy.avoidance.body import ControlPoint, pack_points
 from hierarchy.avoidance.laws import Repulsion, repulsion
-from hierarchy.errors import HierarchyError, expect, positive
+from hierarchy.errors import HierarchyError, expect, naming, positive
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
@@ -199,10 +199,8 @@ class DangerBounds(NamedRows, Written):
         for (i,) in np.argwhere(~np.isfinite(self.limits.robot.velocity_limit))[:1]:
             raise HierarchyError(f"task {self.name!r}: joint {self.limits.robot.velocity_names[i]} "
                                  "has no velocity limit to scale")
-        try:
+        with naming(f"task {self.name!r}"):
             Repulsion(1.0, self.reach, self.shape)
-        except HierarchyError as error:
-            raise HierarchyError(f"task {self.name!r}: {error}") from error
 
     @property
     def row_names(self) -> tuple[str, ...]:

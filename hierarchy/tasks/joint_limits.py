@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, finite_numbers, number, positive
+from hierarchy.errors import HierarchyError, finite_numbers, naming, number, positive
 from hierarchy.gate import array_of
 from hierarchy.jit import bind
 from hierarchy.kinematics import write_identity
@@ -87,12 +87,9 @@ class JointLimits(JointRows):
             speed[:6] = self._of_base("base_speed", speed[:6])
             rate[:6] = self._of_base("base_acceleration", np.full(6, acceleration.max()))
         of = slice(self.first, robot.n)
-        try:
-            limits = Limits(lower[of] + self.margin, upper[of] - self.margin, speed[of], rate[of],
-                            self.period, self.horizon)
-        except HierarchyError as error:
-            raise HierarchyError(f"task {self.name!r}: {error}") from error
-        set_frozen(self, limits=limits)
+        with naming(f"task {self.name!r}"):
+            set_frozen(self, limits=Limits(lower[of] + self.margin, upper[of] - self.margin,
+                                           speed[of], rate[of], self.period, self.horizon))
 
     @property
     def first(self) -> int:

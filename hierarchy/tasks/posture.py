@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, expect, finite_numbers, number
+from hierarchy.errors import expect, finite_numbers, naming, number
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import row_times, write_identity
 from hierarchy.measured import Measure, Measured, measured
@@ -74,10 +74,8 @@ class Posture(Measured):
             finite_numbers(f"task {self.name!r}: target", self.target)
         if self.robot is not None:
             expect(f"task {self.name!r}: robot", self.robot, Robot, "give Robot.load(NAME)")
-            try:
+            with naming(f"task {self.name!r}"):
                 set_frozen(self, rest=self.robot.configuration(self.target))
-            except HierarchyError as error:
-                raise HierarchyError(f"task {self.name!r}: {error}") from error
 
     def on(self, robot: Robot) -> Posture:
         """Return the posture of a robot."""

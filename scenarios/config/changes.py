@@ -11,7 +11,7 @@ from typing import Any
 
 from hierarchy.errors import UnknownNameError, brief, expect
 from scenarios.config.distributions import flat
-from scenarios.config.sections import ScenarioError, Section
+from scenarios.config.sections import ScenarioError, Section, naming
 from scenarios.config.validation import Tag, tag_at
 from scenarios.toml_text import parse
 
@@ -54,10 +54,8 @@ def change_all(data: dict[str, Any], changes: Mapping[str, Any], root: type[Sect
         tag = tag_at(root, path)
         tags[key] = tag if tag is not None and tag.key == last else None
     for key in sorted(changes, key=lambda key: tags[key] is None):  # kinds first, else as given
-        try:
+        with naming(key, of=ValueError):
             _change(data, key, changes[key], tags[key])
-        except ValueError as error:
-            raise ScenarioError(f"{key}: {error}") from None
 
 
 def _change(data: dict[str, Any], dotted: str, value: Any, tag: Tag | None) -> None:

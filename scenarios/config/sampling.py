@@ -10,7 +10,7 @@ import numpy as np
 from scenarios.config.changes import matching, place
 from scenarios.config.distributions import Distribution, Value
 from scenarios.config.scenario import Scenario
-from scenarios.config.sections import ScenarioError
+from scenarios.config.sections import naming
 
 
 def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int, index: int,
@@ -28,13 +28,10 @@ def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int,
     own = scenario.model_dump(mode="json")
     values = {}
     for pattern, distribution in parameters.items():
-        try:
+        with naming(f"{what}.{pattern}: scenario {scenario.name!r}", of=ValueError):
             for key in matching(own, pattern):
                 table, last = place(own, key)
                 values[key] = distribution.draw(_chance(seed, index, key), table[last])
-        except ValueError as error:
-            raise ScenarioError(f"{what}.{pattern}: scenario {scenario.name!r}: {error}"
-                                ) from error
     return values
 
 

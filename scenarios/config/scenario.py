@@ -16,13 +16,12 @@ from hierarchy import plugins
 from hierarchy.errors import expect
 from scenarios.config.avoidance import AvoidanceKind
 from scenarios.config.changes import change_all, parse_changes, without_none
-from scenarios.config.control import ControlSection, FaultSection
+from scenarios.config.control import RIVALS, ControlSection, FaultSection, unfit
 from scenarios.config.distributions import Parameters
 from scenarios.config.plant import KinematicSection, PlantKind
 from scenarios.config.robot import ContactSection, ForcesSection, RobotSection, StartSection
 from scenarios.config.sections import Name, Section
 from scenarios.config.sensor import ExactSection, SensorKind
-from scenarios.config.stacks import RIVALS, unfit
 from scenarios.config.tasks import (
     DampingSection,
     LimitsSection,

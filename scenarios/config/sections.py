@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, ClassVar, Self, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError, core_schema
 
-from hierarchy import plugins
+from hierarchy import errors, plugins
 from hierarchy.errors import HierarchyError, UnknownNameError
 from hierarchy.words import listed
 
@@ -20,13 +20,7 @@ class ScenarioError(HierarchyError):
     """An invalid scenario file or change; the message names the file and the key."""
 
 
-@contextmanager
-def naming(what: str) -> Iterator[None]:
-    """Put a key or a file in front of the errors raised within, which become ScenarioErrors."""
-    try:
-        yield
-    except HierarchyError as error:
-        raise ScenarioError(f"{what}: {error}") from error
+naming = partial(errors.naming, error=ScenarioError)  # of a key or a file
 
 
 @dataclass(frozen=True)

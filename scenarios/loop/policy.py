@@ -1,7 +1,5 @@
 """What is sent in a tick with trouble, and the guard that every command passes through."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Writes one row per tick while the loop runs; nothing is computed from it there."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections.abc import Sequence

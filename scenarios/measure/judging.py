@@ -1,7 +1,5 @@
 """The fate of each level: the rows of every tick, and the command that was sent judged by them."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from dataclasses import replace

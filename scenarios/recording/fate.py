@@ -66,11 +66,6 @@ class Levels:
     violation: Array
     saturated: NDArray[np.int8]
 
-    @property
-    def known(self) -> NDArray[np.bool_]:
-        """Whether every fate in a tick is known: (F,)."""
-        return np.asarray(~(self.fate == Fate.UNKNOWN).any(axis=1))
-
 
 def levels_at(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) -> Levels:
     """Return the recorded fates of the levels in some ticks; UNKNOWN if none were recorded."""

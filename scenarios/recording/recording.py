@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, UnknownNameError, is_one_of
+from hierarchy.errors import HierarchyError, UnknownNameError, check_name, is_one_of
 from hierarchy.notebook import html_table
 from hierarchy.problem import Array
 from scenarios.config import Scenario
@@ -117,8 +117,7 @@ class Recording:
         drawn = {name: signal for name, signal in self.of_ticks().items()
                  if signal.dtype.kind in "bif" and name != "t"}
         for name in names:
-            if name not in drawn:
-                raise UnknownNameError("signal", name, drawn)
+            check_name("signal", name, drawn)
         asked = names or [name for name in _USUAL if name in drawn]
         figure = _shown_figure(figsize=(8.0, 1.0 + 1.8 * len(asked)), layout="constrained")
         axes = figure.subplots(len(asked), 1, sharex=True, squeeze=False)[:, 0]
@@ -139,8 +138,8 @@ class Recording:
         `library` is "pandas", which has the units in `attrs`, or "polars"; None takes the first
         that is installed. Raises HierarchyError, saying what to install, where none is.
         """
-        if library is not None and library not in _LIBRARIES:
-            raise UnknownNameError("library", library, _LIBRARIES)
+        if library is not None:
+            check_name("library", library, _LIBRARIES)
         columns = list(self.columns())
         for name in _LIBRARIES if library is None else (library,):
             try:

@@ -72,8 +72,6 @@ def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
 
 def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
     """Yield the errors of listed tasks, one series per unit."""
-    if not getattr(recording.scenario, "tasks", ()):
-        return
     found: dict[str, dict[str, Array]] = {}
     for section, unit, error in listed.errors(recording):
         found.setdefault(unit, {})[section.title] = error

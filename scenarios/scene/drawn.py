@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from hierarchy import HierarchyError
 from hierarchy.avoidance import Measurement, Obstacles
-from hierarchy.avoidance.measurement import exact_measurer
+from hierarchy.avoidance.measurement import measure_exactly
 from hierarchy.errors import positive
+from hierarchy.jit import bind
 from hierarchy.problem import Array
 from scenarios.cell.sensors.sensor import make_obstacles, packed_laws
 from scenarios.recording import listed
@@ -181,11 +182,10 @@ def _distances(fixed: Stage, recording: Recording, ticks: NDArray[np.int64],
                placements: Array) -> dict[str, Array]:
     """Return points, distances, nearest points and the obstacles' centres, frame by frame."""
     seen, now = Measurement(len(fixed.robot.points) - 1), np.empty(placements.shape[1:])
-    measure = exact_measurer(seen, now, np.array([point.joint for point in fixed.robot.points]),
-                             np.array([point.offset for point in fixed.robot.points]),
-                             fixed.obstacles.table, packed_laws(), np.zeros(2))
-    frames: dict[str, list[Array]] = {name: [] for name in (
-        "points", "nearest", "distance", "centres")}
+    measure = bind(measure_exactly, now, np.array([point.joint for point in fixed.robot.points]),
+                   np.array([point.offset for point in fixed.robot.points]),
+                   fixed.obstacles.table, packed_laws(), np.zeros(2), seen.arrays)
+    frames = []
     offsets = recording.get("obstacle_offset", np.empty((recording.ticks, 0, 3)))
     for k, placed in zip(ticks.tolist(), placements, strict=True):
         now[:] = placed
@@ -194,11 +194,10 @@ def _distances(fixed: Stage, recording: Recording, ticks: NDArray[np.int64],
             fixed.obstacles.shift(h, offset)
         measure()
         away = np.where(np.isfinite(seen.distance), seen.distance, np.nan)[:, None]
-        for kept, value in zip(frames.values(), (
-                seen.points, seen.points - away * seen.direction, seen.distance,
-                fixed.obstacles.centres), strict=True):
-            kept.append(value.copy())
-    return {name: np.array(kept) for name, kept in frames.items()}
+        frames.append((seen.points.copy(), seen.points - away * seen.direction,
+                       seen.distance.copy(), fixed.obstacles.centres.copy()))
+    return dict(zip(("points", "nearest", "distance", "centres"),
+                    map(np.array, zip(*frames, strict=True)), strict=True))
 
 
 def _active(recording: Recording, ticks: NDArray[np.int64], levels: Levels,
@@ -213,7 +212,7 @@ def _active(recording: Recording, ticks: NDArray[np.int64], levels: Levels,
 
 
 def _paths(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Moved]:
-    for section in getattr(recording.scenario, "tasks", ()):
+    for section in recording.scenario.tasks:
         if listed.position_of(section.title) not in recording:
             continue
         actual = recording[listed.position_of(section.title)][ticks]

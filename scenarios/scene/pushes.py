@@ -9,7 +9,7 @@ import numpy as np
 
 from hierarchy.problem import Array
 from scenarios.config.plant import PushSection
-from scenarios.recording.facts import ContactPoint, Facts, RobotFacts
+from scenarios.recording.facts import ContactPoint, Facts, RobotFacts, placed_points
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
@@ -77,10 +77,8 @@ def pushes(facts: Facts, scenario: Scenario, t: Array, placements: Array, forces
 def _contacts(points: Sequence[ContactPoint], placements: Array,
               forces: Array) -> tuple[Array, Array, Array]:
     """Return forces, cones and the support polygon."""
-    placed = placements[:, [point.joint for point in points]]
-    rotation = placed[..., :9].reshape(*placed.shape[:-1], 3, 3).swapaxes(-1, -2)
-    offsets = np.array([point.offset for point in points])[..., None]
-    at = placed[..., 9:] + (rotation @ offsets)[..., 0]
+    at = placed_points(placements, [point.joint for point in points],
+                       [point.offset for point in points])
     normals = np.array([point.normal for point in points])
     carried = (forces * normals).sum(axis=-1)
     same = np.array([[one.contact == other.contact for one in points] for other in points])
@@ -109,8 +107,8 @@ def _table(facts: Facts, scenario: Scenario, frames: int) -> Array:
     if height is None or facts.robot.base == "floating":
         return np.empty((frames, 0, 2, 3))
     point = facts.contacts[0]
-    placed = facts.robot.placements(np.array(scenario.start.q or facts.robot.rest))[point.joint]
-    x, y, _ = np.array(point.offset) @ placed[:9].reshape(3, 3) + placed[9:]
+    start = facts.robot.placements(np.array(scenario.start.q or facts.robot.rest))
+    x, y, _ = placed_points(start, [point.joint], point.offset)[0]
     at = np.linspace(-_TABLE, _TABLE, 9)
     along = np.array([[[-_TABLE, one, 0.0], [_TABLE, one, 0.0]] for one in at])
     lines = np.concatenate([along, along[..., [1, 0, 2]]])
@@ -127,9 +125,8 @@ def _shove(robot: RobotFacts, push: PushSection, t: Array, placements: Array) ->
     joint = robot.joint_names.index(push.joint) + 1
     body = [(np.array(one.start) + one.end) / 2 for one in robot.capsules if one.joint == joint]
     middle = np.mean(body, axis=0) if body else np.zeros(3)
-    placed = placements[:, joint]
-    tip = middle @ placed[:, :9].reshape(-1, 3, 3) + placed[:, 9:]
-    arrow: Array = tip[:, None, None] + _arrow(_LENGTH * push.vector)
+    tip = placed_points(placements, [joint], middle)
+    arrow: Array = tip[:, :, None] + _arrow(_LENGTH * push.vector)
     arrow[~push.acts(t)] = np.nan
     return arrow
 

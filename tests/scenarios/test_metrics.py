@@ -1,4 +1,4 @@
-"""Numbers of a run, by signals made by hand; jitter and singularities."""
+"""Numbers of a run, by signals made by hand; jitter."""
 
 from types import SimpleNamespace
 
@@ -7,7 +7,7 @@ import pytest
 from hand_made import asked, recording
 
 from hierarchy.paths import Jittered, Still
-from scenarios import load, simulate
+from scenarios import load
 from scenarios.measure.metrics import Metric, as_plain_data, measure
 from scenarios.recording import listed
 from solvers import Status
@@ -154,13 +154,3 @@ def test_frozen_returned_and_jerk_are_counted(spans, frozen, returned):
     assert found["error_returned_rms"].value == (
         pytest.approx(np.sqrt(np.mean(error[returned]**2))) if returned else None)
     assert found["jerk_max"].value == 2.0
-
-
-@pytest.mark.parametrize("name", ["singular", "singular-limits", "singular-acceleration",
-                                  "singular-acceleration-limits"])
-def test_a_run_has_the_metrics_of_singularities(name):
-    found = measure(simulate(load(name, ["control.duration=0.05"])))
-    assert found["ticks_frozen"].value == 0.0
-    assert found["error_returned_max"].value is None  # it has not been away
-    assert found["jerk_max"].value > 0.0
-    assert found["speed_limit_excess"].value == 0.0

@@ -21,6 +21,7 @@ from scenarios.draw.replay.page import NOTHING, html
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.live_page import LivePage
 from scenarios.draw.viewer.server import is_own, served
+from scenarios.recording.fate import Fate
 from scenarios.scene import scene
 
 LIMITED = load("ellipse-limits", ["control.duration=0.6"])
@@ -65,8 +66,8 @@ def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
     assert found["changed"].tolist() == [False] * 10 + [True] * 150
     drawn = scene(found)
     assert drawn.centres[-1, 0] == pytest.approx([0.1, 0.5, 0.2])
-    assert drawn.levels.known[0]
-    assert not drawn.levels.known[-1]
+    assert Fate.UNKNOWN not in drawn.levels.fate[0]
+    assert Fate.UNKNOWN in drawn.levels.fate[-1]
 
 
 def test_a_live_page_does_what_is_asked_for():

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hierarchy.errors import RobotError, naming
 from hierarchy.robots.found import Found, neutral_within_limits, proposed_end_effector
 from hierarchy.robots.library import coal
 from hierarchy.robots.mjcf import constraints
@@ -34,10 +35,9 @@ def read(path: Path, base: Base | None, shapes: bool, locked: Mapping[str, Array
     file = compiled(path)
     constraints.refuse(file)
     part = part_of(file, base, locked, root)
-    try:
+    with naming(f"robot file {file.file!r}: no model can be made of it", RobotError,
+                (ValueError, RuntimeError)):  # of pinocchio
         built = build(part)
-    except (ValueError, RuntimeError) as error:  # of pinocchio
-        raise file.error(f"no model can be made of it: {error}") from error
     said = (*part.said, *constraints.set_limits(built), *constraints.effort_limits(built))
     compare(built)
     end_effector = proposed_end_effector(built.model)  # before the loops add frames
@@ -86,9 +86,7 @@ def _shape(mj: Any, geom: int, kind: int) -> Any:
         return coal.Sphere(size[0])
     if kind in (_CAPSULE, _CYLINDER):
         return (coal.Capsule if kind == _CAPSULE else coal.Cylinder)(size[0], 2 * size[1])
-    if kind == _ELLIPSOID:
-        return coal.Ellipsoid(*size)
-    if kind == _BOX:
+    if kind in (_ELLIPSOID, _BOX):  # of an ellipsoid the box around it
         return coal.Box(*(2 * size))
     mesh = mj.geom_dataid[geom]
     first = mj.mesh_vertadr[mesh]

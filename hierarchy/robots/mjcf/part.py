@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, RobotError, UnknownNameError
+from hierarchy.errors import RobotError, check_name, naming
 from hierarchy.problem import Array
 from hierarchy.robots.joints import Part as JointPart
 from hierarchy.robots.joints import set_joint
@@ -159,8 +159,7 @@ def part_of(file: Compiled, base: Base | None, locked: Mapping[str, ArrayLike],
 def _from(file: Compiled, root: Sequence[str]) -> tuple[set[int], tuple[str, ...]]:
     parents = file.model.body_parentid
     for name in root:
-        if name not in file.bodies[1:]:
-            raise UnknownNameError("body", name, file.bodies[1:])
+        check_name("body", name, file.bodies[1:])
     bodies = {file.bodies.index(name) for name in root}
     for body in range(1, file.model.nbody):  # parents come first
         if parents[body] in bodies:
@@ -204,16 +203,13 @@ def _lock(file: Compiled, joints: Sequence[int], held: Array, name: str,
           value: ArrayLike) -> int:
     """Set the value of the joint `name`, one of `joints`, in `held` (nq,); return the joint."""
     names = [file.joints[j] for j in joints]
-    if name not in names:
-        raise UnknownNameError("joint", name, names)
+    check_name("joint", name, names)
     j = joints[names.index(name)]
     sizes = SIZES[file.kind(j)]
     q, here = np.zeros(sum(sizes)), file.model.jnt_qposadr[j]
     own = [JointPart(j, sum(sizes[:i]), 0, size) for i, size in enumerate(sizes)]
-    try:
+    with naming(f"robot file {file.file!r}: locked", RobotError):
         set_joint(own, q, j, name, value)
-    except HierarchyError as error:
-        raise file.error(f"locked: {error}") from error
     held[here:here + len(q)] = rolled(q, 1)
     return j
 

@@ -67,9 +67,9 @@ def axes(rotation: ArrayLike) -> Array:
     return np.asarray(rotation, dtype=float)[:, :2].T.ravel()
 
 
-def scene(robot: Robot, obstacles: Sequence[Obstacle], joints: JointsSection, servo: ServoSection,
-          gains: tuple[Array, Array], timestep: float) -> str:
-    """Return the scene: bodies of the robot, its capsules, servos, and movable obstacles.
+def scene(robot: Robot, q: Array, obstacles: Sequence[Obstacle], joints: JointsSection,
+          servo: ServoSection, gains: tuple[Array, Array], timestep: float) -> str:
+    """Return the scene of a robot at q (nq,): its bodies, capsules, servos; movable obstacles.
 
     gains : stiffness (n,) [N m/rad] and damping (n,) [N m s/rad] of the servos. Actuators are the
     n joint positions, then the n joint velocities. Obstacles are bodies "obstacle 1" and so on;
@@ -77,7 +77,7 @@ def scene(robot: Robot, obstacles: Sequence[Obstacle], joints: JointsSection, se
     """
     root, world = begin(robot, timestep, integrator="implicitfast")
     add(add(root, "default"), "geom", solref=(_SOFTNESS, 1.0), friction=_FRICTION)
-    _arm(world, robot, joints, servo)
+    _arm(world, robot, q, joints, servo)
     _obstacles(world, obstacles)
     actuator = add(root, "actuator")
     for kind, key, values in (("position", "kp", gains[0]), ("velocity", "kv", gains[1])):
@@ -94,20 +94,26 @@ def each(value: float | tuple[float, ...], n: int, name: str) -> Array:
     return values
 
 
-def _arm(world: Element, robot: Robot, joints: JointsSection, servo: ServoSection) -> None:
+def _stop(robot: Robot, k: int, q: Array) -> dict[str, ArrayLike]:
+    """Return the limits of coordinate k; where q (nq,) is beyond one, its stop is there."""
+    range_ = min(robot.lower[k], q[k]), max(robot.upper[k], q[k])
+    return {"limited": "true", "range": range_} if np.isfinite(range_).all() else {}
+
+
+def _arm(world: Element, robot: Robot, q: Array, joints: JointsSection,
+         servo: ServoSection) -> None:
     elements = [world]
     friction, damping, armature = (
         each(getattr(joints, key), robot.n, f"plant.joints.{key}")
         for key in ("friction", "damping", "armature"))
     for i, body in enumerate(robot.bodies()):
         elements.append(add_body(elements[body.parent], body, gravcomp=servo.gravity))
-        range_, effort = (robot.lower[i], robot.upper[i]), robot.effort_limit[i]
-        limits = {"limited": "true", "range": range_} if np.isfinite(range_).all() else {}
+        effort = robot.effort_limit[i]
         efforts = {"actuatorfrclimited": "true", "actuatorfrcrange": (-effort, effort)
                    } if np.isfinite(effort) else {}
         add(elements[-1], "joint", name=body.name, type="hinge", axis=(0, 0, 1),
             frictionloss=friction[i], damping=damping[i], armature=armature[i],
-            actuatorgravcomp="true", **limits, **efforts)
+            actuatorgravcomp="true", **_stop(robot, i, q), **efforts)
     for capsule in robot.capsules:
         add(elements[capsule.joint], "geom", name=capsule.name, type="capsule",
             fromto=(*capsule.start, *capsule.end), size=capsule.radius, contype="1",
@@ -184,11 +190,7 @@ def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> lis
             add(element, "joint", type="free", armature=own[0])
             continue
         kind, axis, v = of_joint[i + 1]
-        # A joint that starts beyond its limit has its stop there.
-        k = robot.coordinates[v]
-        range_ = min(robot.lower[k], q[k]), max(robot.upper[k], q[k])
-        stop = {"limited": "true", "range": range_} if (
-            floor.stops and np.isfinite(range_).all()) else {}
+        stop = _stop(robot, robot.coordinates[v], q) if floor.stops else {}
         add(element, "joint", name=body.name, type=kind, axis=axis, damping=damping[v],
             armature=own[v] + armature[v], frictionloss=friction[v], **stop)
     return elements

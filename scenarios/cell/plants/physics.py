@@ -1,7 +1,5 @@
 """An arm in MuJoCo with position servos, commanded in joint positions as through KUKA's FRI."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from math import ceil
@@ -70,7 +68,7 @@ class PhysicsArm:
         self.stiffness, self.damping = _gains(robot, q, servo, joints)
         self._obstacles = obstacles or Obstacles()
         self.model = mujoco.MjModel.from_xml_string(
-            scene(robot, self._obstacles.obstacles, joints, servo,
+            scene(robot, q, self._obstacles.obstacles, joints, servo,
                   (self.stiffness, self.damping), period / self._steps))
         self.data = mujoco.MjData(self.model)
         self._step, self._force_of = mujoco.mj_step, mujoco.mj_contactForce
@@ -81,9 +79,6 @@ class PhysicsArm:
 
     def _start(self, mujoco: Any, q: Array, v: Array) -> None:
         self.data.qpos[:], self.data.qvel[:] = q, v
-        # A joint that starts beyond its limit has its stop there and is not thrown back.
-        self.model.jnt_range[:] = np.column_stack([np.minimum(self.model.jnt_range[:, 0], q),
-                                                   np.maximum(self.model.jnt_range[:, 1], q)])
         self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(len(v))
         self.reference_q, self.reference_v = q.copy(), v.copy()
         self._time, self._wrench = 0.0, np.zeros(6)

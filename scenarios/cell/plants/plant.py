@@ -1,7 +1,5 @@
 """What a plant is, one that follows its commands exactly, how joints are measured, and [plant]."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from collections import deque

@@ -21,7 +21,7 @@ from scenarios.config import ScenarioError
 from scenarios.config.plant import PushSection, TorqueSection
 
 _STEP = 0.001      # [s] of the simulation, at most
-_ROUNDING = 1e-9   # of a number of steps, and [m]
+_ROUNDING = 1e-9   # of a number of steps
 _LOADED = 1.0      # [N] of normal force from which a contact carries
 _CORNERS = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1)])  # of a box, its bottom
 
@@ -231,12 +231,10 @@ def inside(points: Array, place: Array) -> float:
 
     That is the distance from the nearest edge, negative outside; NaN for points on a line.
     """
-    edge = points - points[:, None]  # (k, k, 2), from each point to each other
-    length = np.hypot(edge[..., 0], edge[..., 1])
-    normal = np.stack([edge[..., 1], -edge[..., 0]], axis=-1)
-    normal /= np.where(length, length, 1.0)[..., None]
-    beyond = np.einsum("ijx,kijx->ijk", normal, points[:, None, None] - points[None, :, None])
-    of_hull = (length > 0.0) & (beyond <= _ROUNDING).all(axis=2)
-    if not (beyond < -_ROUNDING).any():
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        edges = ConvexHull(points).equations  # outward normals, and offsets
+    except (QhullError, ValueError):  # ValueError: there are none
         return np.nan
-    return float(-np.einsum("ijx,ijx->ij", normal, place - points[:, None])[of_hull].max())
+    return float(-(edges[:, :2] @ place + edges[:, 2]).max())

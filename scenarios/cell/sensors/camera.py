@@ -1,7 +1,5 @@
 """Sources of depth images: a simulated camera with errors of its readings, and recorded images."""
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from bisect import bisect_right
@@ -16,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule, Obstacles
 from hierarchy.avoidance.body import pack_capsules
-from hierarchy.errors import UnknownNameError, positive
+from hierarchy.errors import UnknownNameError, naming, positive
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled, internal
 from hierarchy.problem import Array
@@ -207,11 +205,8 @@ def _pinhole(about: dict[str, Any], folder: Path) -> Pinhole:
 def _read_png(file: Path, pinhole: Pinhole) -> NDArray[np.uint16]:
     from PIL import Image as Png
 
-    try:
-        with Png.open(file) as png:
-            values = np.array(png)
-    except OSError as error:
-        raise HierarchyError(f"{file}: {error}") from error
+    with naming(str(file), of=OSError), Png.open(file) as png:
+        values = np.array(png)
     if values.shape != (pinhole.height, pinhole.width) or values.dtype.kind not in "ui":
         raise HierarchyError(f"{file}: an image {values.shape} of {values.dtype}, expected "
                              f"{(pinhole.height, pinhole.width)} of integers")

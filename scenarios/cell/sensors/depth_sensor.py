@@ -111,10 +111,7 @@ class DepthSensor:
         self.reading: Image | None = None
         self.stopped = self.covered = False
         self.outside = 0.0
-        self._nothing = self._current = self._empty()
-        self._spare: list[ObstacleImage] = []
         self._coming: deque[tuple[float, ObstacleImage]] = deque()
-        self._frame, self._now = -1, -inf
         self._forget()
 
     def measure(self, state: State) -> Measurement:
@@ -129,7 +126,6 @@ class DepthSensor:
             self._frame = frame
             self._take(frame, state)
         while self._coming and t - self._coming[0][0] >= self.source.latency - _ROUNDING:
-            self._keep(self._current)
             seen.stamp, self._current = self._coming.popleft()
         seen.blind = t - seen.stamp > self.stale_after + _ROUNDING
         self.space.measure(self._current, state.placements)
@@ -144,28 +140,19 @@ class DepthSensor:
         self.outside = perf_counter() - begin
         if self.covered:
             self.reading[:] = 0.0
-        image = self._spare.pop() if self._spare else self._empty()
+        image = self._empty()
         read = self.space.find_obstacles(self.reading, placements, image)
-        if read < self.least_readings or read == 0.0:
-            self._keep(image)
-        else:
+        if read >= self.least_readings and read > 0.0:
             self._coming.append((state.t, image))
 
     def _empty(self) -> ObstacleImage:
         pinhole = self.space.pinhole
         return ObstacleImage.empty(pinhole.height, pinhole.width)
 
-    def _keep(self, image: ObstacleImage) -> None:
-        if image is not self._nothing:
-            self._spare.append(image)
-
     def _forget(self) -> None:
         """Reset: no frame has been taken."""
-        self._keep(self._current)
-        for _, image in self._coming:
-            self._keep(image)
         self._coming.clear()
-        self._current, self._frame, self._now = self._nothing, -1, -inf
+        self._current, self._frame, self._now = self._empty(), -1, -inf
         self.measurement.stamp, self.measurement.blind = -inf, True
 
 

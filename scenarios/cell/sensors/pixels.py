@@ -6,8 +6,6 @@ Source: Flacco, Kroeger, De Luca, Khatib, "A depth space approach to human-robot
 avoidance", ICRA 2012 (the letter's [8]); equation numbers are those of the letter.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from math import sqrt
@@ -42,7 +40,7 @@ class Space(NamedTuple):
     """What is measured, and how; see `DepthSpace`.
 
     joints (P,), offsets (P, 3) of the control points, the end effector last; region, thin [m]; mean
-    (2,) is its mean_within; laws (2, 4) of `repulsion.laws`.
+    (2,) is its mean_within; laws (2, 4) of `packed_laws`.
     """
 
     joints: NDArray[np.int64]

@@ -6,8 +6,6 @@ frame, so that its point at share t has the depth t. Only the rectangle around t
 shape is visited. A shape that the camera is inside of is not seen.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-
 from __future__ import annotations
 
 from math import ceil, floor, sqrt

@@ -10,8 +10,8 @@ import numpy as np
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Measurement, Obstacles, Pairs, Repulsion, measure_pairs
 from hierarchy.avoidance.body import pack_points
-from hierarchy.avoidance.laws import laws
-from hierarchy.avoidance.measurement import exact_measurer
+from hierarchy.avoidance.measurement import measure_exactly
+from hierarchy.jit import bind
 from hierarchy.problem import Array
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
@@ -44,7 +44,7 @@ _TOUCHING = 1e-9  # [m] a control point this close to an obstacle has no directi
 
 def packed_laws(body: Repulsion | None = None, tip: Repulsion | None = None) -> Array:
     """Return the laws (2, 4) of both for kernels; without both there is no repulsion."""
-    return laws(body, tip) if body and tip else np.array([[0.0, 1.0, 1.0, 1.0]] * 2)
+    return np.array([body.packed(), tip.packed()] if body and tip else [(0.0, 1.0, 1.0, 1.0)] * 2)
 
 
 class ExactDistances:
@@ -75,19 +75,16 @@ class ExactDistances:
     def measure(self, state: State) -> Measurement:
         """Measure at a state and attach the measurement to it; valid until the next call."""
         if state is not self._followed:
-            self._follow(state)
+            self._followed = state
+            self._measure = bind(measure_exactly, state.placements, self._joints, self._offsets,
+                                 self.obstacles.table, self._laws, self._mean_within,
+                                 self.measurement.arrays)
         self.obstacles.at(state.t)
         self._measure()
         if self.measurement.pairs is not None:
             measure_pairs(self.measurement.pairs, self.measurement.points, self.obstacles)
         state.measurement = self.measurement
         return self.measurement
-
-    def _follow(self, state: State) -> None:
-        self._followed = state
-        self._measure = exact_measurer(self.measurement, state.placements, self._joints,
-                                       self._offsets, self.obstacles.table, self._laws,
-                                       self._mean_within)
 
     def check_start(self, state: State) -> None:
         """Raise a HierarchyError if an obstacle lies at a control point, or a point inside one."""
