@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import inf
 from typing import ClassVar
 
@@ -18,7 +17,7 @@ from hierarchy.kinematics import less, place
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, NamedRows, Rows, Writer, Written, in_turn
+from hierarchy.task import Level, NamedRows, Rows, Writer, Written
 from hierarchy.tasks.joint_limits import JointRows
 
 WRENCH = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
@@ -52,8 +51,8 @@ class FixedRows(NamedRows, ForceTask):
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         forces, *sides = self.fixed
-        fixed = np.hstack([np.zeros((len(forces), state.n)), forces]), *sides
-        return in_turn(*(partial(np.copyto, *pair) for pair in zip(rows, fixed, strict=True)))
+        A = np.hstack([np.zeros((len(forces), state.n)), forces])
+        return bind(_copy, A, *sides, *rows)
 
 
 def required(contacts: Contacts, task: str) -> Contacts:
@@ -61,6 +60,14 @@ def required(contacts: Contacts, task: str) -> Contacts:
     if not contacts.contacts:
         raise HierarchyError(f"task {task!r}: there are no contacts")
     return contacts
+
+
+@compiled
+def _copy(rows, low, up, A, lower, upper):
+    for i in range(rows.shape[0]):
+        for c in range(rows.shape[1]):
+            A[i, c] = rows[i, c]
+        lower[i], upper[i] = low[i], up[i]
 
 
 @dataclass(frozen=True)
