@@ -86,8 +86,7 @@ class Measured(Task):
 
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
         """Return a function of t [s] that moves `goal`; None where it rests."""
-        path = self.path
-        return None if path is None else lambda t: path.write(t, goal)
+        return None if self.path is None else self.path.writer(goal)
 
     def error(self, state: State) -> Array:
         """Error p_d - p at a state: (m,), in the task's unit."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import cos, inf, sin
@@ -23,7 +23,7 @@ from hierarchy.errors import (
     refuse,
     whole,
 )
-from hierarchy.jit import compiled
+from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 
@@ -36,6 +36,10 @@ class Path(ABC):
     @abstractmethod
     def write(self, t: float, out: Array) -> None:
         """Write position [m], velocity [m/s], acceleration [m/s^2] at t [s] as rows of (3, 3)."""
+
+    def writer(self, out: Array) -> Callable[[float], object]:
+        """Return a function of t [s] that does `write` into `out` (3, 3)."""
+        return lambda t: self.write(t, out)
 
     def __call__(self, t: float) -> Array:
         """Position, velocity and acceleration at t [s] as rows of a new (3, 3) array."""
@@ -79,6 +83,10 @@ class Ellipse(Path):
         """See `Path.write`."""
         _write_ellipse(self._packed, self.rate, out, t)
 
+    def writer(self, out: Array) -> Callable[[float], object]:
+        """See `Path.writer`."""
+        return bind(_write_ellipse, self._packed, self.rate, out, then=(0.0,))
+
 
 def circle(centre: Vector, radius: float, normal: Vector = (0.0, 0.0, 1.0), rate: float = 1.0,
            phase: float = 0.0) -> Ellipse:
@@ -116,6 +124,16 @@ class Shifted(Path):
         """See `Path.write`."""
         self.path.write(t, out)
         out[0] += self.offset
+
+    def writer(self, out: Array) -> Callable[[float], object]:
+        """See `Path.writer`."""
+        follow, offset = self.path.writer(out), np.asarray(self.offset, dtype=float)
+
+        def write(t: float) -> None:
+            follow(t)
+            out[0] += offset
+
+        return write
 
 
 @dataclass(frozen=True)
