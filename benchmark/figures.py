@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator, ScalarFormatter
 
-from benchmark.tables import Row
+from benchmark.report import Row
 from hierarchy.problem import Array
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.palette import Look, looks

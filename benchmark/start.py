@@ -17,9 +17,8 @@ from time import perf_counter
 from typing import Any, NamedTuple
 from zipfile import ZipFile
 
-from benchmark.report import Report, Section
+from benchmark.report import Column, Report, Row, Section, Table, digits
 from benchmark.solve.questions import resident
-from benchmark.tables import Column, Row, Table, digits
 
 _ROOT = Path(__file__).parents[1]
 _REPEATED = 5        # repetitions of short processes; the minimum counts

@@ -18,9 +18,8 @@ from typing import Self, final
 
 import numpy as np
 
-from benchmark.report import Report, Section
+from benchmark.report import Column, Report, Row, Section, Table, whole
 from benchmark.solve.judge import RIGHT, miss_of
-from benchmark.tables import Column, Row, Table, whole
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cli.terminal import bar
 from scenarios.problems.answers import answer

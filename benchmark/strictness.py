@@ -19,8 +19,7 @@ from benchmark.peers.compare import Log, measure
 from benchmark.peers.hierarchy import arm
 from benchmark.peers.moving import QUESTIONS, STEP_TICKS, judge_step, make_scenes
 from benchmark.peers.scenes import Arm
-from benchmark.report import Report, Section
-from benchmark.tables import Column, Row, Table, power, whole, yes
+from benchmark.report import Column, Report, Row, Section, Table, power, whole, yes
 from hierarchy import Hierarchy
 from solvers import Resolution, make, names
 from solvers.qp.backends import BACKENDS, installed

@@ -12,8 +12,7 @@ from benchmark.packages import Entrant
 from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
 from benchmark.peers.scenes import Arm
 from benchmark.process import START_LIMIT, EndedError
-from benchmark.report import Report, Section
-from benchmark.tables import Column, Row, Table, power, text
+from benchmark.report import Column, Report, Row, Section, Table, power, text
 from benchmark.urdf import urdf
 from hierarchy import Robot, State
 from hierarchy.paths import Still

@@ -10,8 +10,7 @@ import numpy as np
 
 from benchmark.packages import MINK, OWN, PINK, PLACO
 from benchmark.process import Field
-from benchmark.report import Report, Section
-from benchmark.tables import Column, Row, Table, power
+from benchmark.report import Column, Report, Row, Section, Table, power
 from benchmark.timing import times_of
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError

@@ -15,8 +15,7 @@ from benchmark.packages import OWN, PLACO, TSID
 from benchmark.peers.compare import TICK, Log, measure, times, turns
 from benchmark.peers.hierarchy import TASKS, robot_of, stack_of
 from benchmark.peers.scenes import Stand
-from benchmark.report import Report, Section
-from benchmark.tables import Column, Row, Table, power, text, whole
+from benchmark.report import Column, Report, Row, Section, Table, power, text, whole
 from benchmark.urdf import urdf
 from hierarchy import Robot, Stack, State
 from hierarchy.paths import Ellipse, Still

@@ -13,12 +13,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmark.packages import OWN, Entrant
-from benchmark.report import Report, Section
+from benchmark.report import Column, Report, Row, Section, Table, percent, power, whole
 from benchmark.solve import oracle
 from benchmark.solve.entrants import ENTRANTS, NUMPY
 from benchmark.solve.interface import Solver
 from benchmark.solve.resolvers import as_problem
-from benchmark.tables import Column, Row, Table, percent, power, whole
 from benchmark.worker import load
 from hierarchy.problem import Array, Hierarchy
 from scenarios.problems.answers import answer

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from benchmark import figures
-from benchmark.report import Report, Section
+from benchmark.report import Column, Report, Row, Section, Table, short, wide
 from benchmark.solve.accuracy import entrants
 from benchmark.solve.interface import Problem
-from benchmark.tables import Column, Row, Table, short, wide
 from benchmark.timing import take_turns
 from benchmark.worker import load
 

@@ -13,11 +13,10 @@ import numpy as np
 
 from benchmark.packages import Entrant
 from benchmark.process import CRASHED, HUNG, Field
-from benchmark.report import Report
+from benchmark.report import Report, Row
 from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
-from benchmark.tables import Row
 from benchmark.timing import machine
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
