@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from zipfile import ZipFile
 
 from benchmark.report import Column, Report, Row, Section, Table, digits
-from benchmark.solve.questions import resident
+from benchmark.solve.interface import resident
 
 _ROOT = Path(__file__).parents[1]
 _REPEATED = 5        # repetitions of short processes; the minimum counts
@@ -68,7 +68,7 @@ with tempfile.TemporaryDirectory() as folder:
     code = run_command([*sys.argv[1:], "--out", folder + "/run"])"""
 _MEMORY = f"""\
 {_COMMAND}
-from benchmark.solve.questions import resident
+from benchmark.solve.interface import resident
 print("[", resident() / 1024.0, "]")"""
 _SHORT = ("run", "ellipse", "--duration", "0.02")
 _COMPILE = """\

@@ -18,7 +18,7 @@ from hierarchy import Robot, State
 from hierarchy.paths import Still
 from hierarchy.tasks import Position
 
-QUESTIONS = "benchmark.peers.questions:Moving"
+QUESTIONS = "benchmark.peers.scenes:Moving"
 STEP_TICKS = 2000
 START = (0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0)   # [rad] start of the letter's run
 STEP = (-0.3, 0.15, -0.25)                                 # [m]

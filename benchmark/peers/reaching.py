@@ -18,7 +18,7 @@ from hierarchy.kinematics import rotation_vector
 from hierarchy.problem import Array
 from hierarchy.robots.names import file_of
 
-QUESTIONS = "benchmark.peers.questions:Reaching"
+QUESTIONS = "benchmark.peers.scenes:Reaching"
 TOLERANCE = 1e-6     # of the errors [m and rad] together
 STARTS = 20          # configurations that each problem may be started from
 LIMIT = 60.0         # [s] for one pose

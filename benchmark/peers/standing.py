@@ -24,7 +24,7 @@ from hierarchy.robot import Frame
 from hierarchy.tasks import CentreOfMass, Pose, Position, Posture, Together
 from solvers import make
 
-QUESTIONS = "benchmark.peers.questions:Standing"
+QUESTIONS = "benchmark.peers.scenes:Standing"
 TICKS = 1000
 BASE = 6              # velocities of the floating base
 _SWAY = 0.01, 0.04    # [m] of the centre of mass, forward and sideways

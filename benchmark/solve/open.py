@@ -26,7 +26,7 @@ from scenarios.problems.families import FAMILIES, Family
 from solvers.problems.files import Collection, read
 from solvers.proof import prove
 
-QUESTIONS = "benchmark.solve.questions:Questions"
+QUESTIONS = "benchmark.solve.interface:Questions"
 LIMIT = 10.0     # [s] of processor time for one problem with all its repetitions
 PATIENCE = 10.0  # [s] of processor time for a file, after which an entrant is not asked the rest
 BORDERS = tuple(10.0**-k for k in range(12, 4, -1))  # angles and lengths as proof.UNCLEAR

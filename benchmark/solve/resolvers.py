@@ -14,9 +14,8 @@ from benchmark import figures
 from benchmark.packages import Entrant
 from benchmark.report import TIMES, Column, Report, Row, Section, Table, percent, power, whole
 from benchmark.solve.entrants import ENTRANTS, HIERARCHICAL, NUMPY
-from benchmark.solve.interface import Problem
+from benchmark.solve.interface import Problem, Questions
 from benchmark.solve.judge import RIGHT, SOLVED, WRONG, by, judged, summary
-from benchmark.solve.questions import Questions
 from benchmark.solve.views import mark
 from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
