@@ -20,7 +20,7 @@ from benchmark.solve.interface import Solver
 from benchmark.solve.resolvers import as_problem
 from benchmark.worker import load
 from hierarchy.problem import Array, Hierarchy
-from scenarios.problems.answers import answer
+from scenarios.problems.families import answer
 from solvers import certify
 
 REGULAR = 0.05           # smallest singular value [m or 1] of a regular Jacobian

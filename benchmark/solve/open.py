@@ -21,8 +21,7 @@ from benchmark.timing import machine
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from scenarios.files import make_folder, named, slug, write_json, written
-from scenarios.problems.answers import export, file_of, save
-from scenarios.problems.families import FAMILIES, Family
+from scenarios.problems.families import FAMILIES, Family, export, file_of, save
 from solvers.problems.files import Collection, read
 from solvers.proof import prove
 

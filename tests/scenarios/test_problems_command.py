@@ -9,9 +9,8 @@ from hierarchy.archives import read_arrays
 from scenarios import load
 from scenarios.problems import recorded
 from scenarios.problems import reference as families
-from scenarios.problems.answers import export, save
-from scenarios.problems.families import FAMILIES, available, family
-from scenarios.problems.postures import posed
+from scenarios.problems.families import FAMILIES, available, export, family, save
+from scenarios.problems.made import posed
 from solvers import Status, certify, make, problems
 from solvers.problems.files import read
 
