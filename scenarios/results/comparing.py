@@ -16,9 +16,9 @@ from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.scenario import OWN
 from scenarios.files import OutputError, claim, make_folder, unlock, write_json, write_text
 from scenarios.loop.simulation import simulate
-from scenarios.measure.comparison import Comparison
 from scenarios.measure.run_folder import kept, versions
 from scenarios.measure.runs import Run
+from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Recording
 from scenarios.results import pool
 from scenarios.results.plan import side_by_side
