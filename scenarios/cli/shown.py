@@ -156,7 +156,7 @@ def why(folder: Run,
 
     The largest steps of torque, acceleration or speed: bisects between the rows of two ticks.
     """
-    from scenarios.measure.jumps import jumps
+    from scenarios.measure.happenings import jumps
     from scenarios.measure.run_folder import load_run
 
     found = jumps(load_run(folder), tick=tick)

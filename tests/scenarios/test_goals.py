@@ -11,9 +11,8 @@ from scipy.stats import rankdata
 from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.measure.causes import Tick, causes
-from scenarios.measure.given_up import given_up
 from scenarios.measure.goals import goals
-from scenarios.measure.jumps import jumps
+from scenarios.measure.happenings import given_up, jumps
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import best, paired, wilson
 from scenarios.measure.verdict import Verdict, goal_table, lines, verdicts

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hierarchy.errors import HierarchyError
 from scenarios.config import Scenario
 from scenarios.draw.figures.palette import Look, looks
-from scenarios.measure.jumps import Happening, happened
+from scenarios.measure.happenings import Happening, happened
 from scenarios.measure.verdict import verdict
 from scenarios.recording.fate import PHRASES, Fate
 from scenarios.recording.recording import Recording
