@@ -84,7 +84,7 @@ import json
 from scenarios import load
 from benchmark.start import resident_after
 from scenarios.results.pool import ended
-from scenarios.results.run import Job
+from scenarios.results.plan import Job
 text = load("ellipse", ["control.duration=0.5"]).to_toml()
 jobs = [Job(str(k), text, "tpm") for k in range(20)]
 print(json.dumps([found for _, found in ended(resident_after, jobs, 1)]))"""
@@ -199,7 +199,7 @@ def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
 
 def resident_after(job: Any) -> float:
     """Return the most memory [MB] that this process has had after a run of a sweep."""
-    from scenarios.results.run import outcome
+    from scenarios.results.plan import outcome
 
     outcome(job)
     return resident() / 1024.0

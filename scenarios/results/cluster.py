@@ -8,7 +8,7 @@ from threading import Lock
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError
-from scenarios.results.run import Job, Outcome, digest
+from scenarios.results.plan import Job, Outcome, digest
 
 _PATIENCE = 30.0  # [s] for a scheduler to answer and to have a worker
 _ONE_AT_A_TIME = Lock()  # the kernels' work arrays are shared by the threads of a worker

@@ -21,8 +21,7 @@ from scenarios.measure.runs import Run
 from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Recording
 from scenarios.results import pool
-from scenarios.results.plan import side_by_side
-from scenarios.results.run import Job, Outcome, digest, key_of
+from scenarios.results.plan import Job, Outcome, digest, key_of, side_by_side
 from scenarios.results.store import TABLE, write_table
 
 Progress = Callable[[str, int, int], None]

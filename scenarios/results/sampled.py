@@ -17,8 +17,7 @@ from scenarios.files import finite, write_text
 from scenarios.measure.run_folder import versions
 from scenarios.results import cluster, pool
 from scenarios.results.columns import Results, results, verdict
-from scenarios.results.plan import Plan, Sweep, find, load_sweep, plan
-from scenarios.results.run import Job, Outcome, outcome
+from scenarios.results.plan import Job, Outcome, Plan, Sweep, find, load_sweep, outcome, plan
 from scenarios.results.sampled_page import name_of, sampled_page, worst_runs
 from scenarios.results.store import TABLE, Store, write_table, writing
 

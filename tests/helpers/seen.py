@@ -48,8 +48,7 @@ from scenarios.measure.verdict import verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
 from scenarios.recording.facts import capsules as links
 from scenarios.recording.signals import described
-from scenarios.results import comparing, page, pool, sampled, sampled_page, sections
-from scenarios.results import run as table
+from scenarios.results import comparing, page, plan, pool, sampled, sampled_page, sections
 from scenarios.scene.drawn import scene
 from solvers import certify, explain, make, names
 from solvers.problems import Recipe, bounded, generate, structured
@@ -183,7 +182,7 @@ def steadily():
     with contextlib.ExitStack() as stack:
         for name, instead, modules in (
                 *((scene.__name__, noted(scene), (module,)) for module, scene in SCENES),
-                ("perf_counter", clock, (controller, faults, depth_sensor, doctor, runs, table)),
+                ("perf_counter", clock, (controller, faults, depth_sensor, doctor, runs, plan)),
                 ("requires", lambda _: REQUIRED, (doctor,)), ("__file__", "csv.py", (csv,)),
                 ("version", lambda name: INSTALLED.get(name) or version("none"), (doctor,)),
                 ("sys", SimpleNamespace(version="3.11.2 (main)", version_info=(3, 11)), (doctor,)),

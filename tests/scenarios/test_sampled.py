@@ -18,8 +18,7 @@ from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
 from scenarios.results import pool
 from scenarios.results.columns import Results
-from scenarios.results.plan import load_sweep, plan, shipped_sweeps
-from scenarios.results.run import Job, Outcome, outcome
+from scenarios.results.plan import Job, Outcome, load_sweep, outcome, plan, shipped_sweeps
 from scenarios.results.sampled import Workers, compare_starts
 from scenarios.results.store import FullError, Store
 
