@@ -24,6 +24,7 @@ from typing import Any, final
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError
 from scenarios.results.plan import Job, Outcome, digest
+from solvers.batch import cores
 
 Process = subprocess.Popen[bytes]
 
@@ -34,12 +35,6 @@ _ONE_AT_A_TIME = Lock()  # the kernels' work arrays are shared by the threads of
 _SERVE = "from scenarios.results.pool import serve; serve()"
 
 
-def processors() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (
-        os.cpu_count() or 1)
-
-
 def ended(work: Callable[[Any], Any], jobs: Sequence[Any], workers: int | None = None,
           salvage: bool = False) -> Iterator[tuple[Any, Any]]:
     """Yield each job with what `work` returns as it ends; None if it killed its process twice.
@@ -47,12 +42,12 @@ def ended(work: Callable[[Any], Any], jobs: Sequence[Any], workers: int | None =
     Parameters
     ----------
     work : a function that another process can import, or a partial of one.
-    workers : number of processes; by default one per processor.
+    workers : number of processes; by default one per core.
     salvage : at Ctrl-C, interrupt the work in progress too and yield what it returns before
         KeyboardInterrupt is raised; otherwise it is given up.
     """
     crew = _Crew(work)
-    threads = ThreadPoolExecutor(max(1, min(workers or processors(), len(jobs))))
+    threads = ThreadPoolExecutor(max(1, min(workers or cores(), len(jobs))))
     waiting = {threads.submit(crew.made, job): job for job in jobs}
     try:
         for future in as_completed(list(waiting)):
