@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmark import start, stress
-from benchmark.solve import accuracy, growth, resolvers
+from benchmark.solve import first_paper, resolvers
 from benchmark.solve.entrants import NUMPY
 from benchmark.solve.ours import Ours
 from benchmark.start import Case, Done, run
@@ -105,12 +105,12 @@ def test_failing_problems_are_listed_and_saved(tmp_path, monkeypatch):
 
 
 def test_strict_resolvers_reach_all_that_the_tasks_can_have(monkeypatch):
-    monkeypatch.setattr(growth, "FIRST_PAPER", {
-        key: sizes[:3] for key, sizes in growth.FIRST_PAPER.items()})
-    assert growth.run(seconds=0.0).rows["growth"]
-    made = {one.label: Ours(**one.options).resolver for one in accuracy.entrants()
+    monkeypatch.setattr(first_paper, "FIRST_PAPER", {
+        key: sizes[:3] for key, sizes in first_paper.FIRST_PAPER.items()})
+    assert first_paper.growth(seconds=0.0).rows["growth"]
+    made = {one.label: Ours(**one.options).resolver for one in first_paper.entrants()
             if "resolver" in one.options}
-    for row in accuracy.run(arms=50, checked=10).rows["errors"]:
+    for row in first_paper.accuracy(arms=50, checked=10).rows["errors"]:
         resolver = made.get(row["entrant"])
         if resolver and resolver.strict and row["case"] in ("regular", "conflict", "crowded"):
             assert max([row[key] for key in row if key.endswith("_max")]) < resolver.accuracy, row
