@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 from scenarios.cli.terminal import shown
 
 _ACCURACY, _GROWTH = "solve.first_paper:accuracy", "solve.first_paper:growth"
-_USUAL = ("solve.resolvers", "tick", _ACCURACY, _GROWTH, "strictness", "start")
+_STRICTNESS = "peers.moving:strictness"
+_USUAL = ("solve.resolvers", "tick", _ACCURACY, _GROWTH, _STRICTNESS, "start")
 _SCENES = {"ellipse": "peers.moving", "stand": "peers.standing"}
 
 Seconds = Annotated[float, typer.Option("--seconds", min=0.001, metavar="S",
@@ -93,7 +94,7 @@ def _add(name: str, words: str, *modules: str, **options: tuple[Any, Any]) -> No
 
 _add("tick", "Time one control tick, compiled and in plain numpy.", "tick")
 _add("start", "Measure start-up time, compilation and memory.", "start")
-_add("strictness", "Measure whether lower tasks disturb upper ones.", "strictness")
+_add("strictness", "Measure whether lower tasks disturb upper ones.", _STRICTNESS)
 _add("resolvers", "Time every resolver on the reference problems.", "solve.resolvers",
      seed=(Annotated[int | None, typer.Option(
          "--fresh", metavar="SEED", help="Also time fresh problems, from this seed on.")], None),
