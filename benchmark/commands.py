@@ -63,7 +63,7 @@ def _run(out: Path | None, *names: str, **options: Any) -> int:
 def _installed(packages: "tuple[Package, ...]") -> int:
     from benchmark.packages import install
 
-    said = install(packages)
+    said = {package.name: install(package) for package in packages}
     print(*(f"{name}: {why or 'installed'}" for name, why in said.items()), sep="\n")
     return int(any(said.values()))
 

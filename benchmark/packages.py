@@ -7,7 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, final
@@ -98,16 +98,11 @@ def python_of(package: Package) -> str:
     raise MissingError(f"not installed; {INSTALL if package.requirements else 'pip install daqp'}")
 
 
-def install(packages: Iterable[Package]) -> dict[str, str]:
-    """Make missing environments; return "" or the reason of a failure by name."""
-    said = {}
-    for package in packages:
-        folder = folder_of(package)
-        said[package.name] = "" if (folder / "done").is_file() else _make(package, folder)
-    return said
-
-
-def _make(package: Package, folder: Path) -> str:
+def install(package: Package) -> str:
+    """Make the package's environment unless it is there; return "" or the reason of a failure."""
+    folder = folder_of(package)
+    if (folder / "done").is_file():
+        return ""
     shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
     why = (_said([sys.executable, "-m", "venv", str(folder)])

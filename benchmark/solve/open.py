@@ -22,6 +22,7 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from scenarios.files import make_folder, named, slug, write_json, written
 from scenarios.problems.families import FAMILIES, Family, export, file_of, save
+from scenarios.results.store import StoreError
 from solvers.problems.files import Collection, read
 from solvers.proof import prove
 
@@ -34,10 +35,6 @@ CHECKED = ("EQ7", "EQ7sing", "INEQ7", "tied_box", "contacts", "mixed_units", "on
 _CHECKS = 4  # problems of each of them
 _ALIKE = 7   # digits of x / (1 + |x|) in which candidates for a proof count as one
 _BREAKS = {RAISED: "raises", CRASHED: "ends its process", HUNG: "takes longer than --limit"}
-
-
-class StoreError(HierarchyError):
-    """A file of rows that cannot be read."""
 
 
 @final
