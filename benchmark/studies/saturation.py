@@ -20,7 +20,7 @@ from benchmark.solve.judge import RIGHT, by, summary
 from benchmark.solve.resolvers import asked
 from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
-from scenarios.problems.reference import Problem
+from scenarios.problems.recorded import Problem
 from solvers import certify, make, names
 from solvers.problems import Recipe, written
 

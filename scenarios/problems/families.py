@@ -21,7 +21,6 @@ from hierarchy.errors import HierarchyError, UnknownNameError, is_one_of
 from hierarchy.problem import Array, Hierarchy
 from scenarios.files import named, written
 from scenarios.problems import made, recorded
-from scenarios.problems import reference as stored
 from solvers import make, problems
 from solvers.problems.files import FRESH, PUBLIC, Collection, Head
 from solvers.proof import Proof, prove
@@ -30,7 +29,7 @@ from solvers.qp.backends import installed
 COUNT = 50
 _CONSECUTIVE = 200
 _FEW = 20            # where a proof takes seconds
-_SIMULATED = (*stored.RECORDED, "stand-push")
+_SIMULATED = (*recorded.RECORDED, "stand-push")
 _STRIDE = 1_000_000  # seeds of single problems between two seeds of sets
 _BACKENDS = ("daqp", "quadprog", "clarabel", "proxqp")  # that give candidates
 _SAME = 1e-9         # relative to 1 + the value
@@ -80,11 +79,11 @@ def family(name: str) -> Family:
 
 def _reference(name: str, seed: int, count: int) -> list[Hierarchy]:
     """Return stored problems, or new ones of the same make."""
-    if seed and name in stored.RECORDED:
-        return [one.h for one in stored.fresh(name, seed, count)]
+    if seed and name in recorded.RECORDED:
+        return [one.h for one in recorded.fresh(name, seed, count)]
     if seed:
         return [problems.family(name, seed * _STRIDE + i) for i in range(count)]
-    return [one.h for one in stored.family(name)[:count]]
+    return [one.h for one in recorded.family(name)[:count]]
 
 
 def _kind(name: str, seed: int, count: int) -> list[Hierarchy]:

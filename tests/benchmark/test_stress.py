@@ -17,8 +17,8 @@ from benchmark.tick import PlainTick
 from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.problems import reference
-from scenarios.problems.reference import family
+from scenarios.problems import recorded
+from scenarios.problems.recorded import family
 from solvers import Resolution, Resolver, Status, certify, make, names, problems
 from solvers.qp import backends
 
@@ -123,7 +123,7 @@ EQUALITIES = {NUMPY, "augmented", "recursive", "reverse", "sns", "tpm", "tpm-pub
 
 def test_a_row_for_everybody_in_every_family_asked(tmp_path, capsys, monkeypatch):
     """Only one problem a family, since one cascade takes 40 ms for one of them."""
-    monkeypatch.setattr(resolvers.reference, "family", lambda name: family(name)[:1])
+    monkeypatch.setattr(resolvers.recorded, "family", lambda name: family(name)[:1])
     monkeypatch.setenv("COLUMNS", "80")
     found = resolvers.run(seconds=0.001, families=FEW)
     rows = found.rows["resolvers"]
@@ -133,7 +133,7 @@ def test_a_row_for_everybody_in_every_family_asked(tmp_path, capsys, monkeypatch
     assert {f"hqp {name}" for name in backends.BACKENDS if backends.installed(name)} <= known
     assert {(row["family"], row["entrant"]) for row in rows} == {
         (name, label) for name in FEW for label in known
-        if label not in EQUALITIES or name in reference.EQUALITIES}
+        if label not in EQUALITIES or name in recorded.EQUALITIES}
     for row in rows:
         if row["entrant"].startswith(("hqp", "hcod")) or row["entrant"] in ("tpm", "recursive"):
             assert row["wrong"] == 0, row
