@@ -104,28 +104,20 @@ class Case(NamedTuple):
     repeated: int = _REPEATED
 
 
-class Done(NamedTuple):
-    """Wall and processor seconds of a process, and the last line of its output, as JSON."""
-
-    seconds: float
-    processor: float
-    said: Any = None
-
-
 def run() -> Report:
     """Measure all costs."""
     with tempfile.TemporaryDirectory() as temporary:
         rows: list[Row] = []
         for case in _cases(Path(temporary)):
-            done = _measured(case)
-            rows.append(_row(case.what, done.seconds, "s", case.ceiling, done.processor))
+            seconds, processor, said = _measured(case)
+            rows.append(_row(case.what, seconds, "s", case.ceiling, processor))
             if _COMPILE in case.arguments:
-                kernels = own_seconds(done.said)
+                kernels = own_seconds(said)
                 rows.append(_row(f"compilation of {len(kernels)} kernels", sum(kernels.values()),
                                  "s"))
-    (run,) = _measured(Case("memory", None, ["-c", _MEMORY, "run", "ellipse", "--duration", "2"],
-                            repeated=0)).said
-    worker = _measured(Case("memory of a worker", None, ["-c", _WORKER], repeated=0)).said
+    *_, (run,) = _measured(Case("memory", None, ["-c", _MEMORY, "run", "ellipse", "--duration",
+                                                 "2"], repeated=0))
+    *_, worker = _measured(Case("memory of a worker", None, ["-c", _WORKER], repeated=0))
     rows += [_row("hierarchy run ellipse --duration 2", run, "MB", _MOST),
              _row("a worker of a sweep of 20 runs", max(worker), "MB", _MOST),
              _row("growth over the last 15 runs", worker[-1] - worker[4], "MB")]
@@ -205,8 +197,10 @@ def resident_after(job: Any) -> float:
     return resident() / 1024.0
 
 
-def _measured(case: Case) -> Done:
-    """Return what a case takes; raises RuntimeError with its output if it fails.
+def _measured(case: Case) -> tuple[float, float, Any]:
+    """Return wall and processor seconds of a case, and its last line if that is a list in JSON.
+
+    Raises RuntimeError with its output if it fails.
 
     It keeps bytecode, as Python does unless it is told otherwise: without, it compiles each module
     that it imports, which takes longer than all else.
@@ -224,8 +218,7 @@ def _measured(case: Case) -> Done:
             raise RuntimeError(f"{case.arguments}: {done.stderr.strip()}")
     last = done.stdout.splitlines()[-1:]
     seconds, processor = map(min, zip(*(found[1:] or found), strict=True))
-    return Done(seconds, processor,
-                json.loads(last[0]) if last and last[0].startswith("[") else None)
+    return seconds, processor, json.loads(last[0]) if last and last[0].startswith("[") else None
 
 
 def _busy() -> float:

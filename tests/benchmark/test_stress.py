@@ -12,7 +12,7 @@ from benchmark import start, stress
 from benchmark.solve import first_paper, resolvers
 from benchmark.solve.entrants import NUMPY
 from benchmark.solve.ours import Ours
-from benchmark.start import Case, Done, run
+from benchmark.start import Case, run
 from benchmark.tick import PlainTick
 from hierarchy import Hierarchy
 from scenarios import load, simulate
@@ -163,8 +163,8 @@ def test_everything_measured_is_told(monkeypatch):
     events = [[0.0, True, "solvers.kernels.a.b"], [2.0, False, "solvers.kernels.a.b"]]
     cases = [Case("help", 0.5, ["a"]), Case("first", None, [start._COMPILE]),
              Case("library", 10.0, ["b"])]
-    said = {"help": Done(0.1, 0.09), "first": Done(20.0, 19.0, events), "library": Done(11.0, 8.0),
-            "memory": Done(1.0, 1.0, [301.0]), "memory of a worker": Done(1.0, 1.0, [250.0] * 20)}
+    said = {"help": (0.1, 0.09, None), "first": (20.0, 19.0, events), "library": (11.0, 8.0, None),
+            "memory": (1.0, 1.0, [301.0]), "memory of a worker": (1.0, 1.0, [250.0] * 20)}
     monkeypatch.setattr(start, "_cases", lambda folder: cases)
     monkeypatch.setattr(start, "_measured", lambda case: said[case.what])
     found = run()
@@ -176,9 +176,9 @@ def test_everything_measured_is_told(monkeypatch):
 
 
 def test_a_process_is_measured_and_one_that_fails_is_named():
-    done = start._measured(Case("a sum", None, [
+    _, processor, said = start._measured(Case("a sum", None, [
         "-c", "print('noise'); print([sum(range(10**6))])"], repeated=1))
-    assert done.said == [499999500000]
-    assert 0.0 < done.processor
+    assert said == [499999500000]
+    assert 0.0 < processor
     with pytest.raises(RuntimeError, match="no such thing"):
         start._measured(Case("a fault", None, ["-c", "raise SystemExit('no such thing')"]))
