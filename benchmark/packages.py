@@ -53,7 +53,7 @@ class Package:
     requirements: tuple[str, ...] = ()
 
     def peer(self, asked: str, label: str, limits: str = "", **options: Any) -> Entrant:
-        """Return an entrant of a scene of `peers`: the function `asked` of the module's adapter."""
+        """Return an entrant: the function or class `asked` of the package's module in `peers`."""
         return Entrant(label, self, f"benchmark.peers.{self.module}:{asked}", options, limits)
 
 

@@ -55,9 +55,9 @@ ENTRANTS = (
               f"{_QP}: {words}.")
       for name, words, options in _TUNED if words != "as hqp" and BACKENDS[name].options),
     Entrant(NUMPY, OWN, f"{_HERE}.ours:Plain", limits="Equalities only, by np.linalg.pinv."),
-    *(Entrant(_labelled(HIERARCHICAL, words), DAQP, f"{_HERE}.with_daqp:Daqp", options,
-              "Minimises violations divided by the norms of rows, with a finite weight; rows of "
-              f"zeros are infeasible to it; tolerances: {words}.")
+    *(DAQP.peer("Daqp", _labelled(HIERARCHICAL, words),
+                "Minimises violations divided by the norms of rows, with a finite weight; rows of "
+                f"zeros are infeasible to it; tolerances: {words}.", **options)
       for words, options in _settings("daqp").items()),
     *(Entrant(_labelled(f"cascade {name}", words), package, f"{_HERE}.cascade:Cascade",
               {"backend": name, **options},
@@ -67,9 +67,8 @@ ENTRANTS = (
     *(Entrant(f"cascade {name}, slack", OWN, f"{_HERE}.cascade:Cascade",
               {"backend": name, "slack": _SLACK}, f"{_CASCADE} may move by {_SLACK:g}.")
       for name in ("quadprog", "daqp")),
-    Entrant("embodiK", EMBODIK, f"{_HERE}.with_embodik:Embodik", {}, _EMBODIK),
-    Entrant("embodiK refined", EMBODIK, f"{_HERE}.with_embodik:Embodik", {"refine": True},
-            _EMBODIK),
+    EMBODIK.peer("Embodik", "embodiK", _EMBODIK),
+    EMBODIK.peer("Embodik", "embodiK refined", _EMBODIK, refine=True),
 )
 """The solvers, in the order of tables."""
 
