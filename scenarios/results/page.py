@@ -18,7 +18,7 @@ from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.draw.figures.picture import picture
-from scenarios.draw.replay.page import html
+from scenarios.draw.replay import html
 from scenarios.measure.motions import BOUND, Motion, motions, partings
 from scenarios.measure.runs import Run
 from scenarios.measure.verdict import Comparison, goal_table, lines, verdicts

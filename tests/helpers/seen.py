@@ -32,15 +32,15 @@ from pinned import FOLDER, robot_facts
 
 from hierarchy import HierarchyError, Robot, jit, tasks
 from scenarios import Scenario, load, load_run, shipped, simulate
+from scenarios import export as mcap
 from scenarios.cell.plants import physics, torque
 from scenarios.cell.sensors import depth_sensor
 from scenarios.cli import doctor, runs
 from scenarios.cli.main import run_command
 from scenarios.config.distributions import Distribution
+from scenarios.draw import replay
 from scenarios.draw.figures import drawing, letter
-from scenarios.draw.replay import page as replay
 from scenarios.draw.viewer import live, live_page
-from scenarios.export import mcap
 from scenarios.loop import controller, faults
 from scenarios.measure import run_folder, safety
 from scenarios.measure.metrics import measure
