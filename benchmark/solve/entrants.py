@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmark.packages import DAQP, EMBODIK, HIGHS, OWN, Entrant
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, refuse
 from solvers import names
 from solvers.qp.backends import BACKENDS
 
@@ -89,8 +89,7 @@ def chosen(labels: Sequence[str], python: str = "", more: Sequence[Entrant] = ()
     for label in labels or known:
         file, _, kind = label.rpartition(":")
         if file.endswith(".py"):
-            if not Path(file).is_file():
-                raise HierarchyError(f"entrant {label!r}: {file} does not exist")
+            refuse(not Path(file).is_file(), f"entrant {label!r}: {file} does not exist")
             found.append(Entrant(kind, OWN, f"{Path(file).resolve()}:{kind}", {},
                                  "Not of the table.", python))
         elif label not in known:
@@ -106,8 +105,7 @@ def compiled(libraries: Sequence[Path], labels: Sequence[str]) -> list[Entrant]:
         raise HierarchyError(f"{len(libraries)} libraries and {len(labels)} names; each --library "
                              "needs a --name")
     for file in libraries:
-        if not file.is_file():
-            raise HierarchyError(f"--library: {file} does not exist")
+        refuse(not file.is_file(), f"--library: {file} does not exist")
     return [Entrant(label, OWN, f"{_HERE}.compiled:Compiled",
                     {"library": str(file.resolve()), "name": label}, f"From {file.name}.")
             for file, label in zip(libraries, labels, strict=True)]

@@ -18,7 +18,7 @@ from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
 from benchmark.timing import machine
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import refuse
 from hierarchy.problem import Array
 from scenarios.files import make_folder, named, slug, write_json, written
 from scenarios.problems.families import FAMILIES, Family, export, file_of, save
@@ -178,9 +178,8 @@ def report(store: Store) -> Report:
     rows = judge(raw, {one.digest: one for one in found})
     at = {float(folder.name): judge(raw, {one.digest: one for one in _problems(folder)})
           for folder in (store.folder / "borders").glob("[!.]*")}
-    if not rows:
-        raise HierarchyError(f"{store.folder} has no rows of a benchmark: run `hierarchy bench "
-                             "open` first")
+    refuse(not rows, f"{store.folder} has no rows of a benchmark: run `hierarchy bench "
+           "open` first")
     sections, kept = [], list[Row]()
     for seed in sorted({row["seed"] for row in rows}, key=lambda seed: (seed == 0, seed)):
         title = f"Fresh problems, seed {seed}" if seed else "Public problems"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, file_path
+from hierarchy.errors import file_path, refuse
 from scenarios.export import foxglove
 from scenarios.files import OutputError, named, write_text, written
 from scenarios.recording.recording import Recording
@@ -41,11 +41,9 @@ def export(recording: Recording, path: str | Path) -> list[Path]:
     HierarchyError : the suffix is another one, or the package mcap is not installed.
     """
     path = file_path("export", path)
-    if path.suffix != ".mcap":
-        raise HierarchyError(f"{path} is no .mcap file; for CSV, Parquet and other tables: "
-                             "scenarios.load_run(folder).to_dataframe()")
-    if find_spec("mcap") is None:
-        raise HierarchyError("mcap is not installed; pip install 'task-hierarchy[export]'")
+    refuse(path.suffix != ".mcap", f"{path} is no .mcap file; for CSV, Parquet and other tables: "
+           "scenarios.load_run(folder).to_dataframe()")
+    refuse(find_spec("mcap") is None, "mcap is not installed; pip install 'task-hierarchy[export]'")
     from mcap.writer import Writer
 
     files = [path, path.with_name(f"{path.name}.layout.json")]

@@ -17,7 +17,7 @@ import typer
 from numpy.typing import NDArray
 
 from hierarchy.archives import read_arrays
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import refuse
 from hierarchy.problem import Array, Hierarchy
 from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.sampling import changed, drawn
@@ -179,8 +179,7 @@ def family(name: str) -> list[Problem]:
     HierarchyError : there is no file of the family.
     """
     file = DATA / f"{name}.npz"
-    if not file.is_file():
-        raise HierarchyError(f"there are no reference problems at {file}")
+    refuse(not file.is_file(), f"there are no reference problems at {file}")
     data, problems = read_arrays(file), []
     for p in range(len(data["x"])):
         levels = []

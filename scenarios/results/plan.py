@@ -15,7 +15,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError, UnknownNameError, file_path
+from hierarchy.errors import UnknownNameError, file_path, refuse
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, is_shipped, load
 from scenarios.config.distributions import Parameters
@@ -245,8 +245,7 @@ def side_by_side(scenarios: Sequence[Scenario], specs: Sequence[str] | None, wha
         runs += [Run(one, spec, spec if shared[labels[spec]] > 1 else labels[spec])
                  for spec, one in can.items()]
         refused += cannot
-    if not runs:
-        raise HierarchyError("; ".join(refused) or "no resolver was given")
+    refuse(not runs, "; ".join(refused) or "no resolver was given")
     if len(runs) > 1 and len({run.spec for run in runs}) == 1:
         runs = [replace(run, label=run.scenario.name) for run in runs]
     return runs, tuple(refused)

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hierarchy.errors import HierarchyError, expect_each, file_path
+from hierarchy.errors import expect_each, file_path, refuse
 from hierarchy.words import listed
 from scenarios.config import Scenario, load
 from scenarios.files import finite, write_text
@@ -105,8 +105,7 @@ def _made(planned: Plan, out: str | Path, source: tuple[str, str], workers: Work
           progress: Progress | None) -> Finished:
     """Make the runs of a plan that a folder does not have, and write the results of all."""
     i, count = workers.part or (1, 1)
-    if not 1 <= i <= count:
-        raise HierarchyError(f"part {i}/{count}: give 1/{count} to {count}/{count}")
+    refuse(not 1 <= i <= count, f"part {i}/{count}: give 1/{count} to {count}/{count}")
     store = Store(file_path("out", out), f"part-{i}-of-{count}" if workers.part else "all")
     with store.opened():
         made = complete(planned.runs[i - 1::count], store, workers, planned.sweep.name, progress)

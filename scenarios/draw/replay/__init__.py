@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import refuse
 from scenarios.config import Scenario
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.measure.happenings import Happening, happened
@@ -102,8 +102,7 @@ def html(recordings: Mapping[str, Recording], title: str,
     the surrounding page. With `beside` several runs are side by side at first. Raises
     HierarchyError if there is nothing to show.
     """
-    if not recordings:
-        raise HierarchyError("a replay needs at least one run")
+    refuse(not recordings, "a replay needs at least one run")
     look = looks(recordings)
     runs = [run_data(
         scene(recording, rate), recording.scenario, label, look[label], fault=recording.fault,
