@@ -14,11 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmark.report import Report, Section
-from benchmark.tables import Column, Row, Table
+from benchmark.report import Column, Report, Row, Section, Table
 from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
-from scenarios.problems.reference import family
+from scenarios.problems.recorded import family
 from solvers import Resolver, make
 from solvers.batch import Batch, cores, solve
 

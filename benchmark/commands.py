@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from benchmark.packages import Package
 from scenarios.cli.terminal import shown
 
-_USUAL = ("solve.resolvers", "tick", "solve.accuracy", "solve.growth", "strictness", "start")
+_ACCURACY, _GROWTH = "solve.first_paper:accuracy", "solve.first_paper:growth"
+_STRICTNESS = "peers.moving:strictness"
+_USUAL = ("solve.resolvers", "tick", _ACCURACY, _GROWTH, _STRICTNESS, "start")
 _SCENES = {"ellipse": "peers.moving", "stand": "peers.standing"}
 
 Seconds = Annotated[float, typer.Option("--seconds", min=0.001, metavar="S",
@@ -41,17 +43,18 @@ bench = typer.Typer(invoke_without_command=True, rich_markup_mode=None)
 
 
 def _run(out: Path | None, *names: str, **options: Any) -> int:
-    """Run benchmarks, modules of this package, with those of the options that each has."""
+    """Run benchmarks, MODULE or MODULE:FUNCTION, with those of the options that each has."""
     from scenarios.files import claim, next_free
 
     folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
     failed = False
     for name in names:
-        run = import_module(f"benchmark.{name}").run
+        module, _, function = name.partition(":")
+        run = getattr(import_module(f"benchmark.{module}"), function or "run")
         known = signature(run).parameters
         report = run(**{key: value for key, value in options.items() if key in known})
         report.say()
-        report.write(folder / name.split(".")[-1] if len(names) > 1 else folder)
+        report.write(folder / (function or module).split(".")[-1] if len(names) > 1 else folder)
         failed = failed or report.failed
     print(f"\nNumbers: {shown(folder)}")
     return int(failed)
@@ -60,7 +63,7 @@ def _run(out: Path | None, *names: str, **options: Any) -> int:
 def _installed(packages: "tuple[Package, ...]") -> int:
     from benchmark.packages import install
 
-    said = install(packages)
+    said = {package.name: install(package) for package in packages}
     print(*(f"{name}: {why or 'installed'}" for name, why in said.items()), sep="\n")
     return int(any(said.values()))
 
@@ -91,7 +94,7 @@ def _add(name: str, words: str, *modules: str, **options: tuple[Any, Any]) -> No
 
 _add("tick", "Time one control tick, compiled and in plain numpy.", "tick")
 _add("start", "Measure start-up time, compilation and memory.", "start")
-_add("strictness", "Measure whether lower tasks disturb upper ones.", "strictness")
+_add("strictness", "Measure whether lower tasks disturb upper ones.", _STRICTNESS)
 _add("resolvers", "Time every resolver on the reference problems.", "solve.resolvers",
      seed=(Annotated[int | None, typer.Option(
          "--fresh", metavar="SEED", help="Also time fresh problems, from this seed on.")], None),
@@ -103,13 +106,13 @@ _add("resolvers", "Time every resolver on the reference problems.", "solve.resol
          "beside the yardsticks. May be repeated.")], None),
      seconds=(Annotated[float, typer.Option(
          "--seconds", min=0.001, metavar="S", help="Time for each resolver in each family.")], 0.5))
-_add("accuracy", "Measure errors on random arms against proved answers.", "solve.accuracy",
+_add("accuracy", "Measure errors on random arms against proved answers.", _ACCURACY,
      arms=(Arms, 10_000), checked=(Checked, 300))
-_add("growth", "Time a solve as the numbers of tasks and joints grow.", "solve.growth",
+_add("growth", "Time a solve as the numbers of tasks and joints grow.", _GROWTH,
      seconds=(Seconds, 40.0), larger=(Annotated[bool, typer.Option(
          "--larger", help="Up to 20 tasks, 300 joints and 20 rows a task.")], False))
-_add("first-paper", "Repeat the first TPM paper: accuracy and growth.", "solve.accuracy",
-     "solve.growth", arms=(Arms, 10_000), checked=(Checked, 300), seconds=(Seconds, 40.0))
+_add("first-paper", "Repeat the first TPM paper: accuracy and growth.", _ACCURACY, _GROWTH,
+     arms=(Arms, 10_000), checked=(Checked, 300), seconds=(Seconds, 40.0))
 _add("batch", "Measure how many problems per second batches solve.", "batch",
      counts=(Annotated[list[int] | None, typer.Option(
          "--count", min=1, metavar="N", help="Problems in a batch. May be repeated.")], None),

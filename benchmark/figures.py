@@ -14,14 +14,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator, ScalarFormatter
 
-from benchmark.tables import Row
+from benchmark.report import Row
 from hierarchy.problem import Array
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.palette import Look, looks
 
 _LEAST, _MOST = 1e-17, 1e-2  # errors beyond are drawn at the edge
 _SHADES = LinearSegmentedColormap.from_list("share", ["#b42318", "#f0c66b", "#e9f4ee", "#7cc4a0"])
-_STRICT = 1e-9               # [m per tick], as in `hierarchy bench strictness`
+STRICT = 1e-9                # [m per tick], also of `hierarchy bench strictness`
 _MARKS = "osD^v<P>X"
 _KINDS = "hqp", "cascade"  # with panels of their own
 _HUES = matplotlib.colormaps["tab20"]
@@ -150,7 +150,7 @@ def _bought(row: Row) -> str:
     if np.isnan(row["moved_m"]):
         return "no answer at the limits"
     lost = f", no answer in {row['step_failed']} ticks" if row["step_failed"] else ""
-    return ("strict" if row["moved_m"] <= _STRICT
+    return ("strict" if row["moved_m"] <= STRICT
             else f"posture moves it by {row['moved_m']:.0e} m a tick") + lost
 
 

@@ -7,7 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, final
@@ -53,7 +53,7 @@ class Package:
     requirements: tuple[str, ...] = ()
 
     def peer(self, asked: str, label: str, limits: str = "", **options: Any) -> Entrant:
-        """Return an entrant of a scene of `peers`: the function `asked` of the module's adapter."""
+        """Return an entrant: the function or class `asked` of the package's module in `peers`."""
         return Entrant(label, self, f"benchmark.peers.{self.module}:{asked}", options, limits)
 
 
@@ -98,16 +98,11 @@ def python_of(package: Package) -> str:
     raise MissingError(f"not installed; {INSTALL if package.requirements else 'pip install daqp'}")
 
 
-def install(packages: Iterable[Package]) -> dict[str, str]:
-    """Make missing environments; return "" or the reason of a failure by name."""
-    said = {}
-    for package in packages:
-        folder = folder_of(package)
-        said[package.name] = "" if (folder / "done").is_file() else _make(package, folder)
-    return said
-
-
-def _make(package: Package, folder: Path) -> str:
+def install(package: Package) -> str:
+    """Make the package's environment unless it is there; return "" or the reason of a failure."""
+    folder = folder_of(package)
+    if (folder / "done").is_file():
+        return ""
     shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
     why = (_said([sys.executable, "-m", "venv", str(folder)])

@@ -1,20 +1,110 @@
-"""What a benchmark found: printed, written as CSV and figures, and as one HTML page."""
+"""What a benchmark found: tables, figures and words, printed, as CSV, and as one HTML page.
 
+A column of a table says how its cells are written.
+"""
+
+import csv
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isnan
 from pathlib import Path
-from typing import final
+from typing import Any, NamedTuple, final
 
 from matplotlib.figure import Figure
 from rich.console import Console
+from rich.table import Table as Rich
 
-from benchmark.tables import Column, Row, Table, text, write_rows
 from benchmark.timing import machine
 from scenarios.draw.figures import drawing
-from scenarios.files import make_folder, slug, write_json, write_text
+from scenarios.files import make_folder, named, slug, write_json, write_text, written
 from scenarios.templates import filled, resource
+
+Row = dict[str, Any]
+NONE = "–"
+
+
+def _known(form: Callable[[Any], str]) -> Callable[[Any], str]:
+    """Return a form of values that writes what is not known as a dash."""
+    return lambda value: (NONE if value is None or (isinstance(value, float) and isnan(value))
+                          else form(value))
+
+
+text = _known(str)
+"""Words, in a column whose lines are broken."""
+whole = _known("{:.0f}".format)
+"""A number without decimals."""
+power = _known("{:.0e}".format)
+"""A size, as 1e-09."""
+short = _known(lambda value: f"{value:.{int(value < 10.0)}f}")
+"""A number with one decimal, or all digits before the decimal point."""
+digits = _known(lambda value: f"{value:.{2 - (value >= 10.0) - (value >= 100.0)}f}")
+"""A number with three digits, or all digits before the decimal point."""
+yes = _known(lambda value: "yes" if value else "no")
+"""Yes or no."""
+percent = _known(lambda value: f"{100.0 * value:.0f}%" if value in (0.0, 1.0) else
+                 f"{min(100.0 * value, 99.9):.1f}%")
+"""A share in percent; 100 only if it is all."""
+
+
+class Column(NamedTuple):
+    """A heading, the key of a row, and how its value is written."""
+
+    head: str
+    key: str
+    shown: Callable[[Any], str] = digits
+
+
+TIMES = (Column("median", "median_us"), Column("p95", "p95_us"), Column("p99.9", "p99.9_us"))
+
+
+@final
+@dataclass(frozen=True)
+class Table:
+    """Rows under a title, with a column for the name that `first` is the key of."""
+
+    title: str
+    rows: Sequence[Row]
+    columns: Sequence[Column]
+    first: str = "entrant"
+
+    def cells(self) -> list[tuple[str, list[str]]]:
+        """Return the name and the cells of each row."""
+        return [(str(row[self.first]), [one.shown(row.get(one.key)) for one in self.columns])
+                for row in self.rows]
+
+    def rich(self) -> Rich:
+        """Return the table for a terminal, without its title."""
+        made = Rich(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+        made.add_column("", no_wrap=True)
+        for column in self.columns:
+            words = column.shown is text
+            made.add_column(column.head, justify="left" if words else "right", no_wrap=not words,
+                            overflow="fold" if words else "ellipsis")
+        for name, cells in self.cells():
+            made.add_row(name, *cells)
+        return made
+
+
+def write_rows(rows: Sequence[Row], path: Path) -> None:
+    """Write rows as CSV; rows may have different columns."""
+    make_folder(path.parent)
+    with (named(path), written(path) as partial,
+          partial.open("w", newline="", encoding="utf-8") as file):
+        writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def wide(rows: Sequence[Row], down: str, across: str, value: str,
+         shown: Callable[[Any], str] = digits) -> tuple[list[Row], list[Column]]:
+    """Return rows by the key `down`, with a column for each value of the key `across`."""
+    made: dict[Any, dict[str, Any]] = {}
+    for row in rows:
+        made.setdefault(row[down], {down: row[down]})[str(row[across])] = row[value]
+    heads = dict.fromkeys(str(row[across]) for row in rows)
+    return list(made.values()), [Column(head, head, shown) for head in heads]
 
 
 @final

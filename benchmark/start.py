@@ -17,9 +17,8 @@ from time import perf_counter
 from typing import Any, NamedTuple
 from zipfile import ZipFile
 
-from benchmark.report import Report, Section
-from benchmark.solve.questions import resident
-from benchmark.tables import Column, Row, Table, digits
+from benchmark.report import Column, Report, Row, Section, Table, digits
+from benchmark.solve.interface import resident
 
 _ROOT = Path(__file__).parents[1]
 _REPEATED = 5        # repetitions of short processes; the minimum counts
@@ -69,7 +68,7 @@ with tempfile.TemporaryDirectory() as folder:
     code = run_command([*sys.argv[1:], "--out", folder + "/run"])"""
 _MEMORY = f"""\
 {_COMMAND}
-from benchmark.solve.questions import resident
+from benchmark.solve.interface import resident
 print("[", resident() / 1024.0, "]")"""
 _SHORT = ("run", "ellipse", "--duration", "0.02")
 _COMPILE = """\
@@ -85,7 +84,7 @@ import json
 from scenarios import load
 from benchmark.start import resident_after
 from scenarios.results.pool import ended
-from scenarios.results.run import Job
+from scenarios.results.plan import Job
 text = load("ellipse", ["control.duration=0.5"]).to_toml()
 jobs = [Job(str(k), text, "tpm") for k in range(20)]
 print(json.dumps([found for _, found in ended(resident_after, jobs, 1)]))"""
@@ -105,28 +104,20 @@ class Case(NamedTuple):
     repeated: int = _REPEATED
 
 
-class Done(NamedTuple):
-    """Wall and processor seconds of a process, and the last line of its output, as JSON."""
-
-    seconds: float
-    processor: float
-    said: Any = None
-
-
 def run() -> Report:
     """Measure all costs."""
     with tempfile.TemporaryDirectory() as temporary:
         rows: list[Row] = []
         for case in _cases(Path(temporary)):
-            done = _measured(case)
-            rows.append(_row(case.what, done.seconds, "s", case.ceiling, done.processor))
+            seconds, processor, said = _measured(case)
+            rows.append(_row(case.what, seconds, "s", case.ceiling, processor))
             if _COMPILE in case.arguments:
-                kernels = own_seconds(done.said)
+                kernels = own_seconds(said)
                 rows.append(_row(f"compilation of {len(kernels)} kernels", sum(kernels.values()),
                                  "s"))
-    (run,) = _measured(Case("memory", None, ["-c", _MEMORY, "run", "ellipse", "--duration", "2"],
-                            repeated=0)).said
-    worker = _measured(Case("memory of a worker", None, ["-c", _WORKER], repeated=0)).said
+    *_, (run,) = _measured(Case("memory", None, ["-c", _MEMORY, "run", "ellipse", "--duration",
+                                                 "2"], repeated=0))
+    *_, worker = _measured(Case("memory of a worker", None, ["-c", _WORKER], repeated=0))
     rows += [_row("hierarchy run ellipse --duration 2", run, "MB", _MOST),
              _row("a worker of a sweep of 20 runs", max(worker), "MB", _MOST),
              _row("growth over the last 15 runs", worker[-1] - worker[4], "MB")]
@@ -200,14 +191,16 @@ def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
 
 def resident_after(job: Any) -> float:
     """Return the most memory [MB] that this process has had after a run of a sweep."""
-    from scenarios.results.run import outcome
+    from scenarios.results.plan import outcome
 
     outcome(job)
     return resident() / 1024.0
 
 
-def _measured(case: Case) -> Done:
-    """Return what a case takes; raises RuntimeError with its output if it fails.
+def _measured(case: Case) -> tuple[float, float, Any]:
+    """Return wall and processor seconds of a case, and its last line if that is a list in JSON.
+
+    Raises RuntimeError with its output if it fails.
 
     It keeps bytecode, as Python does unless it is told otherwise: without, it compiles each module
     that it imports, which takes longer than all else.
@@ -225,8 +218,7 @@ def _measured(case: Case) -> Done:
             raise RuntimeError(f"{case.arguments}: {done.stderr.strip()}")
     last = done.stdout.splitlines()[-1:]
     seconds, processor = map(min, zip(*(found[1:] or found), strict=True))
-    return Done(seconds, processor,
-                json.loads(last[0]) if last and last[0].startswith("[") else None)
+    return seconds, processor, json.loads(last[0]) if last and last[0].startswith("[") else None
 
 
 def _busy() -> float:

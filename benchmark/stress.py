@@ -18,12 +18,11 @@ from typing import Self, final
 
 import numpy as np
 
-from benchmark.report import Report, Section
+from benchmark.report import Column, Report, Row, Section, Table, whole
 from benchmark.solve.judge import RIGHT, miss_of
-from benchmark.tables import Column, Row, Table, whole
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cli.terminal import bar
-from scenarios.problems.answers import answer
+from scenarios.problems.families import answer
 from scenarios.results.pool import ended
 from solvers import Resolver, Status, certify, make, problems
 from solvers.proof import prove

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmark.report import Report, Section
-from benchmark.tables import TIMES, Column, Row, Table, whole
+from benchmark.report import TIMES, Column, Report, Row, Section, Table, whole
 from benchmark.timing import one_core, times_of
 from hierarchy import HierarchyError, State
 from hierarchy.allocation import allocate

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from scenarios.config import Scenario, load, shipped
     from scenarios.loop.simulation import simulate
-    from scenarios.measure.comparison import Comparison
     from scenarios.measure.run_folder import load_run, save
+    from scenarios.measure.verdict import Comparison
     from scenarios.recording.recording import Recording
     from scenarios.results.comparing import compare
 
 __all__ = ["Comparison", "Recording", "Scenario", "compare", "load", "load_run", "save", "shipped",
            "simulate"]
 
-_HOME = {"Comparison": "measure.comparison", "Recording": "recording.recording",
+_HOME = {"Comparison": "measure.verdict", "Recording": "recording.recording",
          "Scenario": "config", "compare": "results.comparing", "load": "config",
          "load_run": "measure.run_folder", "save": "measure.run_folder", "shipped": "config",
          "simulate": "loop.simulation"}

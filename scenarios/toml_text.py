@@ -6,7 +6,7 @@ import re
 import tomllib
 import unicodedata
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from hierarchy.errors import HierarchyError
 
@@ -63,14 +63,6 @@ _MENDS = tuple((said, re.compile(pattern), mend) for said, pattern, mend in (
                    "write [[name]] above each")))
 
 
-class _Slip(NamedTuple):
-    """What is wrong in a text, at which character, and the mend if one is known."""
-
-    said: str
-    at: int
-    mend: str
-
-
 def read_toml(path: Path, what: str, error: type[HierarchyError]) -> dict[str, Any]:
     """Return the content of a TOML file; raises `error`, naming the file, if it cannot be read.
 
@@ -96,17 +88,18 @@ def parse(text: str, what: str, error: type[HierarchyError]) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as cause:
-        slip = _slip(text, str(cause))
-        line, column = text.count("\n", 0, slip.at) + 1, slip.at - text.rfind("\n", 0, slip.at)
-        raise error(f"{what}, line {line}, column {column}: {slip.said}\n{_pointed(text, slip.at)}"
-                    + (f"\n  {slip.mend}" if slip.mend else "")) from cause
+        said, at, mend = _slip(text, str(cause))
+        line, column = text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)
+        raise error(f"{what}, line {line}, column {column}: {said}\n{_pointed(text, at)}"
+                    + (f"\n  {mend}" if mend else "")) from cause
     except RecursionError as cause:
         raise error(f"{what} is nested too deep") from cause
     except ValueError as cause:
         raise error(f"{what} has an integer of thousands of digits") from cause
 
 
-def _slip(text: str, said: str) -> _Slip:
+def _slip(text: str, said: str) -> tuple[str, int, str]:
+    """Return what is wrong in a text, at which character, and the mend if one is known."""
     found = _PLACE.search(said)
     said, at = _PLACE.sub("", said), len(text)
     if found and found[1]:
@@ -116,15 +109,15 @@ def _slip(text: str, said: str) -> _Slip:
     opened = _opened(text[:at])
     if opened is not None and (at == len(text) or (
             not text[begins:at].strip() and _NEXT.match(text, at))):
-        return _Slip(said, opened, f"close this {text[opened]}")
+        return said, opened, f"close this {text[opened]}"
     if said.startswith("Cannot"):  # the parser stops behind the key
         at = begins + len(text[begins:at]) - len(text[begins:at].lstrip())
     elif (mend := _of_character(text[at:at + 1], said)) is not None:
-        return _Slip(said, at, mend)
+        return said, at, mend
     line = text[begins:at] + _AT + text[at:ends]
-    return _Slip(said, at, next((mend.replace("…", found[1]) if found.lastindex else mend
-                                 for start, pattern, mend in _MENDS if said.startswith(start)
-                                 and (found := pattern.search(line))), ""))
+    return said, at, next((mend.replace("…", found[1]) if found.lastindex else mend
+                           for start, pattern, mend in _MENDS if said.startswith(start)
+                           and (found := pattern.search(line))), "")
 
 
 def _of_character(character: str, said: str) -> str | None:

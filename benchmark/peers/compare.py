@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmark.packages import Entrant
 from benchmark.process import EndedError, Field
-from benchmark.tables import Column, Row
+from benchmark.report import Column, Row
 from benchmark.timing import times_of
 from hierarchy.problem import Array
 

@@ -1,25 +1,35 @@
-"""The scenes `ellipse` and `step`: a whole tick of inverse kinematics of an arm, judged."""
+"""The scenes `ellipse` and `step`: a whole tick of inverse kinematics of an arm, judged.
+
+In `step` a KUKA LWR tracks a step of its end effector that is too fast for its joints, and with
+lower priority another posture; every tick is resolved twice at the same state, with and without the
+posture. Does the lower task disturb the upper one while velocity limits are active? `strictness`
+asks every resolver that handles bounds; one whose answer is clipped at the limits shows what a lack
+of strictness looks like.
+"""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from benchmark import figures, packages
 from benchmark.packages import Entrant
 from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
+from benchmark.peers.hierarchy import arm
 from benchmark.peers.scenes import Arm
 from benchmark.process import START_LIMIT, EndedError
-from benchmark.report import Report, Section
-from benchmark.tables import Column, Row, Table, power, text
+from benchmark.report import Column, Report, Row, Section, Table, power, text, whole, yes
 from benchmark.urdf import urdf
-from hierarchy import Robot, State
+from hierarchy import Hierarchy, Robot, State
 from hierarchy.paths import Still
 from hierarchy.tasks import Position
+from solvers import Resolution, make, names
+from solvers.qp.backends import BACKENDS, installed
 
-QUESTIONS = "benchmark.peers.questions:Moving"
+QUESTIONS = "benchmark.peers.scenes:Moving"
 STEP_TICKS = 2000
 START = (0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0)   # [rad] start of the letter's run
 STEP = (-0.3, 0.15, -0.25)                                 # [m]
@@ -59,6 +69,15 @@ _COLUMNS = (*TICK, Column("at\nlimit", "at_limit_us"), Column("path", "path_erro
             Column("fail", "fails", str))
 _ABOUT = (Column("version", "version", text), Column("priorities; inequality rows", "kind", text),
           Column("after a NaN in q", "nan", text))
+_SETTINGS: Mapping[str, Sequence[Mapping[str, Any]]] = {  # of those that have several
+    "hqp": [{"backend": backend} for backend in BACKENDS if installed(backend)],
+    "weighted": [{"ratio": ratio} for ratio in (10.0, 100.0, 1000.0)],
+    "sns": [{}, {"form": "optimal"}]}
+_BESIDE = (Column("max per\ntick", "moved_m", power), Column("last\ntick", "last_m", power),
+            Column("limits\nprevent", "prevented_m", power),
+            Column("final\nerror", "error_m", power), Column("at\nlimit", "at_limit_ticks", whole),
+            Column("over\n[rad/s]", "excess_rad_s", power), Column("fail", "failed", whole),
+            Column("strict", "strict", yes))
 
 
 def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: float = 20.0
@@ -147,3 +166,41 @@ def _path_error(log: Log, scene: Arm) -> float:
             state.move(t, q, still)
             errors.append(float(np.linalg.norm(state.position(frame) - scene.target(t)[0])))
     return max(errors, default=np.nan)
+
+
+def cut_off(scene: Arm, posture: bool) -> tuple[Any, Any]:
+    """Ask `tpm` for all levels but the first, whose bounds clip its answer: not strict."""
+    def solve(h: Hierarchy, memory: Any) -> Resolution:
+        n = h.n
+        rest = h.changed(A=h.A[n:], lower=h.lower[n:], upper=h.upper[n:], sizes=h.sizes[1:],
+                         names=h.names[1:])
+        res = make("tpm").solve(rest)
+        return Resolution(np.clip(res.x, h.lower[:n], h.upper[:n]), res.status)
+
+    return arm(scene, posture, solve)
+
+
+def bounded() -> list[Entrant]:
+    """Return every resolver that handles bounds, in each of its settings, and one that does not."""
+    every = [(make(name, **more), more) for name in names() for more in _SETTINGS.get(name, [{}])]
+    return [*(packages.OWN.peer("arm", one.label, resolver=one.name, **more)
+              for one, more in every if one.handles != "equalities"),
+            Entrant("tpm, cut off", packages.OWN, "benchmark.peers.moving:cut_off")]
+
+
+def strictness() -> Report:
+    """Let all run the step; the rows have what `judge_step` finds, and who is strict."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene = make_scenes(Path(folder))["step"]
+
+        def judged(log: Log, _: Any) -> Row:
+            found, failed = judge_step(log, scene), int(log["failed"].sum())
+            return {"ticks": len(log["t"]), "failed": failed, **found,
+                    "strict": found["moved_m"] <= figures.STRICT and not failed}
+
+        rows, missing = measure(bounded(), QUESTIONS, [
+            ("open", asdict(scene), True), ("turn", STEP_TICKS, 0)], judged)
+    title = "Motion of the end effector due to the posture, which has lower priority [m]"
+    said = f"strict: at most {figures.STRICT:g} m per tick, and no tick without an answer."
+    return Report("Strictness at the limits", [
+        Section(title, [Table(title, rows, _BESIDE)], said)], {"strictness": rows}, missing)

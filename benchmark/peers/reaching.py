@@ -10,8 +10,7 @@ import numpy as np
 
 from benchmark.packages import MINK, OWN, PINK, PLACO
 from benchmark.process import Field
-from benchmark.report import Report, Section
-from benchmark.tables import Column, Row, Table, power
+from benchmark.report import Column, Report, Row, Section, Table, power
 from benchmark.timing import times_of
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
@@ -19,7 +18,7 @@ from hierarchy.kinematics import rotation_vector
 from hierarchy.problem import Array
 from hierarchy.robots.names import file_of
 
-QUESTIONS = "benchmark.peers.questions:Reaching"
+QUESTIONS = "benchmark.peers.scenes:Reaching"
 TOLERANCE = 1e-6     # of the errors [m and rad] together
 STARTS = 20          # configurations that each problem may be started from
 LIMIT = 60.0         # [s] for one pose

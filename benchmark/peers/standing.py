@@ -15,8 +15,7 @@ from benchmark.packages import OWN, PLACO, TSID
 from benchmark.peers.compare import TICK, Log, measure, times, turns
 from benchmark.peers.hierarchy import TASKS, robot_of, stack_of
 from benchmark.peers.scenes import Stand
-from benchmark.report import Report, Section
-from benchmark.tables import Column, Row, Table, power, text, whole
+from benchmark.report import Column, Report, Row, Section, Table, power, text, whole
 from benchmark.urdf import urdf
 from hierarchy import Robot, Stack, State
 from hierarchy.paths import Ellipse, Still
@@ -25,7 +24,7 @@ from hierarchy.robot import Frame
 from hierarchy.tasks import CentreOfMass, Pose, Position, Posture, Together
 from solvers import make
 
-QUESTIONS = "benchmark.peers.questions:Standing"
+QUESTIONS = "benchmark.peers.scenes:Standing"
 TICKS = 1000
 BASE = 6              # velocities of the floating base
 _SWAY = 0.01, 0.04    # [m] of the centre of mass, forward and sideways

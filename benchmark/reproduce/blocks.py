@@ -15,7 +15,7 @@ from benchmark.reproduce import fronts, protocol
 from benchmark.reproduce.fronts import Point
 from benchmark.reproduce.protocol import PROTOCOL, Claim, Rows
 from benchmark.reproduce.verdicts import DIFFERS, UNDECIDED, Found, judged, shown
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import refuse
 from scenarios.measure.statistics import probability
 
 ITEMS: Mapping[str, Mapping[str, Any]] = tomllib.loads(
@@ -104,8 +104,7 @@ def cell(output: str, asked: Mapping[str, str]) -> str:
     lines = [re.sub("[│|]", " ", line).strip() for line in takewhile(str.strip, below)]
     found = [line[len(asked["row"]):].split() for line in lines
              if line.startswith(f"{asked['row']} ")]
-    if not found:
-        raise HierarchyError(f"the output has no row {asked['row']!r} below {asked['table']!r}")
+    refuse(not found, f"the output has no row {asked['row']!r} below {asked['table']!r}")
     return min(found, key=len)[int(asked["place"]) - 1]
 
 

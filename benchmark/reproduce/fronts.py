@@ -17,7 +17,7 @@ from scenarios.config import load
 from scenarios.config.sampling import drawn
 from scenarios.draw.figures.palette import looks
 from scenarios.measure.metric import Metric, shown
-from scenarios.results.run import Outcome
+from scenarios.results.plan import Outcome
 from scenarios.results.sampled import Progress, Workers
 
 GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))

@@ -27,7 +27,7 @@ from itertools import dropwhile, takewhile
 from pathlib import Path
 
 from benchmark.reproduce.blocks import Stored, block, cell
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, refuse
 from scenarios.files import make_folder, slug, write_text
 
 ROOT = Path(__file__).parents[2]
@@ -148,8 +148,7 @@ def _part(lines: list[str], ranges: Sequence[Sequence[str]], where: str) -> list
     """Return the lines from one that starts as a range does to one that starts as its end does."""
     parts = [_between(lines, first, last) for first, last in ranges] or [lines]
     for (first, _), part in zip(ranges, parts, strict=False):
-        if not part:
-            raise HierarchyError(f"{where} has no line that starts with {first!r}")
+        refuse(not part, f"{where} has no line that starts with {first!r}")
     return "\n\n".join("\n".join(part).rstrip() for part in parts).splitlines()
 
 

@@ -21,7 +21,7 @@ from scenarios.config.distributions import Value
 from scenarios.config.sampling import changed, drawn
 from scenarios.config.scenario import OWN
 from scenarios.files import make_folder, write_bytes
-from scenarios.results.run import Job, Outcome, digest, key_of, outcome
+from scenarios.results.plan import Job, Outcome, digest, key_of, outcome
 from scenarios.results.sampled import Progress, Workers, complete
 from scenarios.results.store import Store
 

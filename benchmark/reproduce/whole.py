@@ -9,7 +9,7 @@ from time import perf_counter
 from benchmark.reproduce import fronts, pages, protocol
 from benchmark.reproduce.blocks import POINTS, ROWS, Stored, every, said
 from benchmark.reproduce.protocol import PROTOCOL, Rows
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import UnknownNameError, refuse
 from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.terminal import bar, print_json, shown
 from scenarios.files import make_folder, reason, write_json, write_text
@@ -22,7 +22,8 @@ def fill() -> int:
     """Write the pages of the checkout from the rows and outputs that are stored."""
     written, lacking = pages.fill(pages.ROOT, Stored.read(pages.ROOT))
     print(*map(shown, written), sep="\n")
-    return _lacking(lacking)
+    refuse(lacking, "; ".join(lacking))
+    return 0
 
 
 def run(names: list[str], out: Path, quick: bool = False, workers: int | None = None,
@@ -36,9 +37,8 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
         if name not in known:
             raise UnknownNameError("page", name, known)
     asked = [name for name in known if name in names or not names]
-    if quick and NAME not in asked:
-        raise HierarchyError(f"--quick makes runs, and {', '.join(asked)} has the output of "
-                             "commands; leave --quick out")
+    refuse(quick and NAME not in asked, f"--quick makes runs, and {', '.join(asked)} has the "
+           "output of commands; leave --quick out")
     make_folder(out)
     rows, lacking = None, list[str]()
     try:
@@ -56,7 +56,8 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
     if rows is not None:
         _report(rows, as_json)
     _say(f"{_minutes(begun)} in all")
-    return _lacking(lacking)
+    refuse(lacking, "; ".join(lacking))
+    return 0
 
 
 def _made(asked: Sequence[str], out: Path, quick: bool, workers: Workers) -> Iterator[Rows | None]:
@@ -93,12 +94,6 @@ def _minutes(begun: float) -> str:
     """Return the time since then as minutes and seconds: "41:07 min"."""
     seconds = round(perf_counter() - begun)
     return f"{seconds // 60}:{seconds % 60:02} min"
-
-
-def _lacking(lacking: list[str]) -> int:
-    if lacking:
-        raise HierarchyError("; ".join(lacking))
-    return 0
 
 
 def _report(rows: Rows, as_json: bool) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmark.packages import DAQP, EMBODIK, HIGHS, OWN, Entrant
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, refuse
 from solvers import names
 from solvers.qp.backends import BACKENDS
 
@@ -55,9 +55,9 @@ ENTRANTS = (
               f"{_QP}: {words}.")
       for name, words, options in _TUNED if words != "as hqp" and BACKENDS[name].options),
     Entrant(NUMPY, OWN, f"{_HERE}.ours:Plain", limits="Equalities only, by np.linalg.pinv."),
-    *(Entrant(_labelled(HIERARCHICAL, words), DAQP, f"{_HERE}.with_daqp:Daqp", options,
-              "Minimises violations divided by the norms of rows, with a finite weight; rows of "
-              f"zeros are infeasible to it; tolerances: {words}.")
+    *(DAQP.peer("Daqp", _labelled(HIERARCHICAL, words),
+                "Minimises violations divided by the norms of rows, with a finite weight; rows of "
+                f"zeros are infeasible to it; tolerances: {words}.", **options)
       for words, options in _settings("daqp").items()),
     *(Entrant(_labelled(f"cascade {name}", words), package, f"{_HERE}.cascade:Cascade",
               {"backend": name, **options},
@@ -67,9 +67,8 @@ ENTRANTS = (
     *(Entrant(f"cascade {name}, slack", OWN, f"{_HERE}.cascade:Cascade",
               {"backend": name, "slack": _SLACK}, f"{_CASCADE} may move by {_SLACK:g}.")
       for name in ("quadprog", "daqp")),
-    Entrant("embodiK", EMBODIK, f"{_HERE}.with_embodik:Embodik", {}, _EMBODIK),
-    Entrant("embodiK refined", EMBODIK, f"{_HERE}.with_embodik:Embodik", {"refine": True},
-            _EMBODIK),
+    EMBODIK.peer("Embodik", "embodiK", _EMBODIK),
+    EMBODIK.peer("Embodik", "embodiK refined", _EMBODIK, refine=True),
 )
 """The solvers, in the order of tables."""
 
@@ -90,8 +89,7 @@ def chosen(labels: Sequence[str], python: str = "", more: Sequence[Entrant] = ()
     for label in labels or known:
         file, _, kind = label.rpartition(":")
         if file.endswith(".py"):
-            if not Path(file).is_file():
-                raise HierarchyError(f"entrant {label!r}: {file} does not exist")
+            refuse(not Path(file).is_file(), f"entrant {label!r}: {file} does not exist")
             found.append(Entrant(kind, OWN, f"{Path(file).resolve()}:{kind}", {},
                                  "Not of the table.", python))
         elif label not in known:
@@ -107,8 +105,7 @@ def compiled(libraries: Sequence[Path], labels: Sequence[str]) -> list[Entrant]:
         raise HierarchyError(f"{len(libraries)} libraries and {len(labels)} names; each --library "
                              "needs a --name")
     for file in libraries:
-        if not file.is_file():
-            raise HierarchyError(f"--library: {file} does not exist")
+        refuse(not file.is_file(), f"--library: {file} does not exist")
     return [Entrant(label, OWN, f"{_HERE}.compiled:Compiled",
                     {"library": str(file.resolve()), "name": label}, f"From {file.name}.")
             for file, label in zip(libraries, labels, strict=True)]

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmark.process import CRASHED, HUNG, SLOW
-from benchmark.tables import Row
+from benchmark.report import Row
 from benchmark.timing import times_of
 from hierarchy.problem import Array, Hierarchy
 from solvers.certificate import certify

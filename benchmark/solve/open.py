@@ -13,21 +13,20 @@ import numpy as np
 
 from benchmark.packages import Entrant
 from benchmark.process import CRASHED, HUNG, Field
-from benchmark.report import Report
+from benchmark.report import Report, Row
 from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
-from benchmark.tables import Row
 from benchmark.timing import machine
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import refuse
 from hierarchy.problem import Array
 from scenarios.files import make_folder, named, slug, write_json, written
-from scenarios.problems.answers import export, file_of, save
-from scenarios.problems.families import FAMILIES, Family
+from scenarios.problems.families import FAMILIES, Family, export, file_of, save
+from scenarios.results.store import StoreError
 from solvers.problems.files import Collection, read
 from solvers.proof import prove
 
-QUESTIONS = "benchmark.solve.questions:Questions"
+QUESTIONS = "benchmark.solve.interface:Questions"
 LIMIT = 10.0     # [s] of processor time for one problem with all its repetitions
 PATIENCE = 10.0  # [s] of processor time for a file, after which an entrant is not asked the rest
 BORDERS = tuple(10.0**-k for k in range(12, 4, -1))  # angles and lengths as proof.UNCLEAR
@@ -36,10 +35,6 @@ CHECKED = ("EQ7", "EQ7sing", "INEQ7", "tied_box", "contacts", "mixed_units", "on
 _CHECKS = 4  # problems of each of them
 _ALIKE = 7   # digits of x / (1 + |x|) in which candidates for a proof count as one
 _BREAKS = {RAISED: "raises", CRASHED: "ends its process", HUNG: "takes longer than --limit"}
-
-
-class StoreError(HierarchyError):
-    """A file of rows that cannot be read."""
 
 
 @final
@@ -183,9 +178,8 @@ def report(store: Store) -> Report:
     rows = judge(raw, {one.digest: one for one in found})
     at = {float(folder.name): judge(raw, {one.digest: one for one in _problems(folder)})
           for folder in (store.folder / "borders").glob("[!.]*")}
-    if not rows:
-        raise HierarchyError(f"{store.folder} has no rows of a benchmark: run `hierarchy bench "
-                             "open` first")
+    refuse(not rows, f"{store.folder} has no rows of a benchmark: run `hierarchy bench "
+           "open` first")
     sections, kept = [], list[Row]()
     for seed in sorted({row["seed"] for row in rows}, key=lambda seed: (seed == 0, seed)):
         title = f"Fresh problems, seed {seed}" if seed else "Public problems"

@@ -12,19 +12,17 @@ import numpy as np
 
 from benchmark import figures
 from benchmark.packages import Entrant
-from benchmark.report import Report, Section
+from benchmark.report import TIMES, Column, Report, Row, Section, Table, percent, power, whole
 from benchmark.solve.entrants import ENTRANTS, HIERARCHICAL, NUMPY
-from benchmark.solve.interface import Problem
+from benchmark.solve.interface import Problem, Questions
 from benchmark.solve.judge import RIGHT, SOLVED, WRONG, by, judged, summary
-from benchmark.solve.questions import Questions
 from benchmark.solve.views import mark
-from benchmark.tables import TIMES, Column, Row, Table, percent, power, whole
 from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
 from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Hierarchy
-from scenarios.problems import reference
-from scenarios.problems.reference import FAMILIES
+from scenarios.problems import recorded
+from scenarios.problems.recorded import FAMILIES
 from solvers import certify, names
 from solvers.proof import Proof
 from solvers.qp.backends import installed
@@ -85,8 +83,8 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
     for origin in (KNOWN,) if seed is None else (KNOWN, FRESH):
         some = []
         for name in families:
-            problems = (reference.family(name) if seed is None or origin == KNOWN
-                        else reference.fresh(name, seed, count))
+            problems = (recorded.family(name) if seed is None or origin == KNOWN
+                        else recorded.fresh(name, seed, count))
             some += [{"family": name, "origin": origin, **row}
                      for row in _measured(name, problems, entrants, seconds)]
         sections.append(_section(some, origin))
@@ -105,7 +103,7 @@ def _section(rows: Sequence[Row], origin: str) -> Section:
     return Section(origin, tables, figures={figure: figures.time_against_error(drawn)})
 
 
-def _measured(name: str, problems: Sequence[reference.Problem], entrants: Sequence[Entrant],
+def _measured(name: str, problems: Sequence[recorded.Problem], entrants: Sequence[Entrant],
               seconds: float) -> list[Row]:
     """Return a row for each entrant that can be asked, and one for its warm starts."""
     raw = asked(name, problems, entrants, seconds)
@@ -116,7 +114,7 @@ def _measured(name: str, problems: Sequence[reference.Problem], entrants: Sequen
              "to_numpy": row["median_us"] / medians.get(NUMPY, nan)} for row in rows]
 
 
-def asked(name: str, problems: Sequence[reference.Problem], entrants: Sequence[Entrant],
+def asked(name: str, problems: Sequence[recorded.Problem], entrants: Sequence[Entrant],
           seconds: float) -> list[Row]:
     """Ask all that can be asked, in turns on one core for `seconds` [s] each; judge the rows.
 
@@ -143,7 +141,7 @@ def as_problem(h: Hierarchy) -> Problem:
     return Problem(h.A, h.lower, h.upper, np.asarray(h.sizes), h.reference)
 
 
-def _proof(problem: reference.Problem) -> Proof | None:
+def _proof(problem: recorded.Problem) -> Proof | None:
     """Return a stored answer in the form of a proof, None without one."""
     count = len(problem.norms) + 1
     return Proof(problem.x, problem.norms, count, count, 0.0, 0.0) if problem.known else None
@@ -157,7 +155,7 @@ def _warm(row: Row) -> Row:
             "verdict": verdict}
 
 
-def _row(rows: Sequence[Row], problems: Sequence[reference.Problem]) -> Row:
+def _row(rows: Sequence[Row], problems: Sequence[recorded.Problem]) -> Row:
     certified = [row.get("solved") and certify(problems[row["problem"]].h, row["x"],
                                                RIGHT).certified for row in rows]
     found: dict[str, Any] = summary(rows)

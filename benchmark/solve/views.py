@@ -6,10 +6,9 @@ from math import isnan
 import numpy as np
 from rich.console import Console
 
-from benchmark import figures
-from benchmark.report import Section
+from benchmark import figures, report
+from benchmark.report import Column, Row, Section, Table, digits, percent, power, text, whole
 from benchmark.solve.judge import RIGHT, by, cells, profile, right_within, steps_of, summaries
-from benchmark.tables import Column, Row, Table, digits, percent, power, text, whole, wide, yes
 from hierarchy.words import listed
 from solvers.problems.files import Collection
 
@@ -34,8 +33,8 @@ _ANSWERS = (Column("asked", "asked", whole), Column("right", "right", percent),
             *(Column(key, key, whole) for key in ("wrong", "modest", "failed", "ended",
                                                  "slow")))
 _QUALITY = (Column("miss", "absolute", power), Column("relative", "relative", power),
-            Column("moved", "moved", power), Column("same", "same", yes), Column("rough", "rough"),
-            Column("MB", "memory_mb", whole))
+            Column("moved", "moved", power), Column("same", "same", report.yes),
+            Column("rough", "rough"), Column("MB", "memory_mb", whole))
 _INSIDE = (Column("Python", "median_us"), Column("C", "inside_median_us"),
            Column("warm, Python", "warm_median_us"), Column("C", "warm_inside_median_us"))
 
@@ -81,7 +80,7 @@ def _at_borders(title: str, every: Mapping[float, Mapping[str, Row]]) -> Table:
     found = [{**row, "border": f"{border:.0e}"} for border, some in every.items()
              for row in some.values()]
     return Table(f"{title}: answers called solved that are wrong, over the border of rank",
-                 *wide(found, "entrant", "border", "wrong", whole))
+                 *report.wide(found, "entrant", "border", "wrong", whole))
 
 
 def mark(row: Row) -> Row:

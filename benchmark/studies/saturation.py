@@ -15,13 +15,12 @@ import numpy as np
 import typer
 
 from benchmark.packages import OWN, Entrant
-from benchmark.report import Report, Section
+from benchmark.report import Column, Report, Row, Section, Table, percent, power, whole
 from benchmark.solve.judge import RIGHT, by, summary
 from benchmark.solve.resolvers import asked
-from benchmark.tables import Column, Row, Table, percent, power, whole
 from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
-from scenarios.problems.reference import Problem
+from scenarios.problems.recorded import Problem
 from solvers import certify, make, names
 from solvers.problems import Recipe, written
 

@@ -13,8 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from benchmark.report import Report, Section
-from benchmark.tables import Column, Table, power, whole
+from benchmark.report import Column, Report, Section, Table, power, whole
 from scenarios.config import load
 from scenarios.results.columns import Results
 from scenarios.results.sampled import Workers, compare_starts

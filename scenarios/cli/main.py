@@ -147,11 +147,10 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
 
     Builds it and, for a scenario, runs the first tick.
     """
-    from scenarios.cli import robot_check, scenario_check
+    from scenarios.cli.check import checked
 
-    checked = robot_check if robot_check.is_robot(file) else scenario_check
-    found = checked.look_at(file, changes)
-    print_json(checked.as_plain_data(*found)) if as_json else print(checked.say(*found))
+    data, said = checked(file, changes)
+    print_json(data) if as_json else print(said)
 
 
 @app.command("help")

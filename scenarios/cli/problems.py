@@ -69,17 +69,16 @@ def export(family: Annotated[list[str], typer.Argument(
                                        "FAMILY-fresh-S.npz.")] = Path("problems"),
            as_json: AsJson = False) -> None:
     """Write problems as files, with proved answers."""
-    from scenarios.problems.answers import export as write
-    from scenarios.problems.families import available, unavailable
-    from scenarios.problems.families import family as named
+    from scenarios.problems import families
 
-    chosen = available() if family == ["all"] else [named(name) for name in family]
-    for name, why in (unavailable() if family == ["all"] else {}).items():
+    every = family == ["all"]
+    chosen = families.available() if every else [families.family(name) for name in family]
+    for name, why in (families.unavailable() if every else {}).items():
         print(f"left out: {name}, which {why}", file=sys.stderr)
     files = []
     for one in chosen:
         with bar("problems") as told:
-            files.append(write(one, seed, count, answers, out, partial(told, one.name)))
+            files.append(families.export(one, seed, count, answers, out, partial(told, one.name)))
     print_files(files, as_json)
 
 
@@ -90,7 +89,7 @@ def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of p
 
     Exit code 1 if an answer in the file differs.
     """
-    from scenarios.problems.answers import check as compare
+    from scenarios.problems.families import check as compare
     from solvers.problems.files import read
 
     collection = read(file)

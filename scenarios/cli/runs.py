@@ -145,7 +145,7 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
              as_json: bool, workers: int | None) -> int:
     from scenarios.config.resolvers import default_resolvers
     from scenarios.results.comparing import compare
-    from scenarios.results.pool import processors
+    from solvers.batch import cores
 
     missing: dict[str, str] = {}
     for scenario in scenarios if resolvers is None else ():
@@ -153,7 +153,7 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
     for spec, remedy in missing.items():
         print(f"skipped: {spec} is not installed; {remedy}",
               file=sys.stderr if as_json else sys.stdout)
-    count = workers or processors()
+    count = workers or cores()
     with (interruptible(f"the runs made so far are in {shown(folder)}"),
           bar("runs" if count > 1 else "ticks") as told):
         comparison = compare(scenarios, resolvers, out=folder, progress=told,

@@ -50,7 +50,7 @@ def _replay(folders: list[Path], rate: float = 30.0, beside: bool = False) -> st
 
     Labels get the scenarios where those differ, and equal labels the folder.
     """
-    from scenarios.draw.replay.page import html
+    from scenarios.draw.replay import html
     from scenarios.measure.run_folder import load_run
 
     recordings = [load_run(folder) for folder in folders]
@@ -156,7 +156,7 @@ def why(folder: Run,
 
     The largest steps of torque, acceleration or speed: bisects between the rows of two ticks.
     """
-    from scenarios.measure.jumps import jumps
+    from scenarios.measure.happenings import jumps
     from scenarios.measure.run_folder import load_run
 
     found = jumps(load_run(folder), tick=tick)

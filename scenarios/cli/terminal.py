@@ -23,7 +23,7 @@ _EVERY = 10.0  # [s] between two lines about progress
 
 def troubles(recording: Any) -> list[str]:
     """Return one line per kind of problem: its ticks; and per missed level: what held it back."""
-    from scenarios.measure.given_up import given_up
+    from scenarios.measure.happenings import given_up
 
     faults = [f"{kind}: {action} in {len(ticks)} ticks, first in tick {ticks[0]} "
               f"(t = {recording['t'][ticks[0]]:.3f} s)"

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from hierarchy import plugins
-from scenarios.measure import safety, tracking  # noqa: F401, register metrics
-from scenarios.measure.metric import Criteria, finite, register
+from hierarchy.problem import Array
+from scenarios.measure import safety  # noqa: F401, registers metrics
+from scenarios.measure.metric import Criteria, finite, known, largest, register, true
 from scenarios.measure.metric import Metric as Metric
+from scenarios.recording import listed
 from scenarios.recording.recording import Recording
 from solvers import Status
+
+_STILL = 0.01    # largest joint speed [rad/s] of a robot that counts as standing still
+_FAR = 0.01      # error [m] at which it should not
+_AFTER = 0.5     # [s] after the return within reach that do not count as error
+_NOTHING = 1e-9  # errors of listed tasks below this are rounding and count as zero [m, deg, rad]
 
 _DONE = {"brake": "Ticks braked", "hold": "Ticks with the last command held",
          "use": "Ticks with trouble, answer sent", "stop": "Ticks that stopped the run",
@@ -24,16 +31,121 @@ _PERCENTILES = {"median": (50.0, "median"), "p95": (95.0, "95 %"), "p999": (99.9
 
 _GROUPS = ("Tracking", "Safety", "Contacts", "Torques", "Levels", "Singularities", "Switching",
            "Computing")  # as tables show them
-_metric = partial(Metric, group="Computing")
+
+Spans = Sequence[tuple[float, float]]
+_tracks = partial(Metric, group="Tracking")
+_timing = partial(Metric, group="Computing")
+
+
+@register("tracking")
+def _tracking(recording: Recording, by: Criteria) -> Iterator[Metric]:
+    if "position_error" not in recording:
+        return
+    error = np.linalg.norm(recording["position_error"], axis=1)
+    metrics = partial(_rms_and_max, group="Tracking")
+    after = error[recording["t"] - recording["t"][0] >= by.settle]
+    settled = f"Error after {by.settle:g} s"
+    yield from metrics("position_error", "Position error", error, "m")
+    yield from metrics("position_error", settled, after, "m", suffix="_settled")
+    yield _tracks("position_error_median_settled", f"{settled}, median",
+                  finite(np.median(after)) if after.size else None, "m")
+    if "true_ee_position" in recording:
+        off = recording["desired_position"] - recording["true_ee_position"]
+        error = np.linalg.norm(off, axis=1)
+        yield from metrics("true_position_error", "True position error", error, "m")
+
+
+@register("pointing")
+def _pointing(recording: Recording, by: Criteria) -> Iterator[Metric]:
+    pointing = recording.scenario.pointing
+    if "pointing_error" not in recording or pointing is None:
+        return
+    half_angle = pointing.alpha_d
+    beyond = pointing.angle(recording["pointing_error"]) - half_angle
+    yield _tracks("cone_violation_max", "Beyond the cone, max",
+                  finite(max(float(beyond.max()), 0.0)), "deg", note=f"a cone of {half_angle:g}°")
+    yield _tracks("cone_violation_share", "Time outside the cone",
+                  float(np.mean(beyond > by.cone_tolerance_deg)), "share",
+                  note=f"outside by more than {by.cone_tolerance_deg:g}°")
+
+
+@register("listed")
+def _listed(recording: Recording, by: Criteria) -> Iterator[Metric]:
+    """Errors of the tasks of `[[tasks]]`, each under its name."""
+    after = recording["t"] - recording["t"][0] >= by.settle
+    for section, unit, exact in listed.errors(recording):
+        error = np.where(exact < _NOTHING, 0.0, exact)
+        turned = unit == "deg" and section.kind in ("pose", "frame", "relative")
+        title = section.title[0].upper() + section.title[1:] + (", turned" if turned else "")
+        key = f"task_{section.title}{' turned' if turned else ''}".replace(" ", "_")
+        lower = None if section.kind == "posture" else True  # it gets what is left
+        yield _tracks(f"{key}_rms", f"{title}: error, rms",
+                      finite(np.sqrt(np.mean(error**2))), unit, lower)
+        yield _tracks(f"{key}_max_settled", f"{title}: after {by.settle:g} s, max",
+                      largest(error[after]), unit, lower)
+        yield _tracks(f"{key}_end", f"{title}: at the end", finite(error[-1]), unit, lower,
+                      detail=True)
+
+
+@register("strictness")
+def _strictness(recording: Recording, by: Criteria) -> Iterator[Metric]:
+    if "moved_by_lower" in recording:
+        yield _tracks("moved_by_lower_max", "Moved by lower tasks in a tick, max",
+                      largest(known(recording["moved_by_lower"])), "m", note="strict: not at all")
+
+
+@register("returning")
+def _returning(recording: Recording, by: Criteria) -> Iterator[Metric]:
+    """Metrics of runs whose path leaves the workspace: freezes, jerk, limits, the way back."""
+    found = _left_path(recording)
+    if found is None:
+        return
+    (spans, error), t, v, group = found, recording["t"], true(recording, "v"), "Singularities"
+    within, back = (np.all([(t < begin) | (t > end + after) for begin, end in spans], axis=0)
+                    for after in (0.0, _AFTER))
+    still = np.abs(v).max(axis=1, initial=0.0) < _STILL
+    yield Metric("ticks_frozen", "Ticks frozen", float((still & (error > _FAR) & within).sum()),
+                 "", group=group, note="still and off a path within reach")
+    returned = error[back & (t > min(end for _, end in spans) + _AFTER)]
+    yield from _rms_and_max("error_returned", "Error after return", returned, "m", group=group,
+                            note=f"from {_AFTER:g} s after the path is within reach")
+    jerk = np.diff(recording["a"], axis=0) / np.diff(t)[:, None]
+    yield from _rms_and_max("jerk", "Joint jerk", jerk, "rad/s^3", group=group)
+    if "velocity_limit" in recording:
+        excess = np.maximum(np.abs(v) - recording["velocity_limit"], 0.0)
+        yield Metric("speed_limit_excess", "Beyond a speed limit, max", largest(excess), "rad/s",
+                     group=group)
+
+
+def _left_path(recording: Recording) -> tuple[Spans, Array] | None:
+    """Return when the first path that leaves the workspace does so, and the error (T,) from it."""
+    position = recording.scenario.position
+    path = position.path if position else None
+    if path is not None and path.out_of_reach and "position_error" in recording:
+        return path.out_of_reach, np.linalg.norm(recording["position_error"], axis=1)
+    for section, unit, error in listed.errors(recording):
+        path = getattr(section, "path", None)
+        if unit == "m" and path is not None and path.out_of_reach:
+            return path.out_of_reach, error
+    return None
+
+
+def _rms_and_max(key: str, label: str, values: Array, unit: str, *, group: str, suffix: str = "",
+                 note: str = "") -> Iterator[Metric]:
+    """Yield the root of the mean square and the largest magnitude of values."""
+    rms = finite(np.sqrt(np.mean(values**2))) if values.size else None
+    yield Metric(f"{key}_rms{suffix}", f"{label}, rms", rms, unit, group=group)
+    yield Metric(f"{key}_max{suffix}", f"{label}, max", largest(values), unit, group=group,
+                 note=note)
 
 
 @register("switching")
 def _switching(recording: Recording, by: Criteria) -> Iterator[Metric]:
     metric = partial(Metric, unit="", group="Switching")
     yield metric("stack_changes", "Changes of the stack", float(recording.switches().size))
-    known = recording.signals.get("active_set")
-    if known is not None or recording.facts.asks != "equalities":
-        changes = None if known is None else float(np.count_nonzero(np.diff(known[known >= 0])))
+    acting = recording.signals.get("active_set")
+    if acting is not None or recording.facts.asks != "equalities":
+        changes = None if acting is None else float(np.count_nonzero(np.diff(acting[acting >= 0])))
         yield metric("active_set_changes", "Changes of the active set", changes,
                      lower_is_better=None,
                      note="of the inequality rows that act, where the resolver reports them")
@@ -46,21 +158,21 @@ def _switching(recording: Recording, by: Criteria) -> Iterator[Metric]:
 def _troubles(recording: Recording, by: Criteria) -> Iterator[Metric]:
     for action, label in _DONE.items():
         if ticks := {event.tick for event in recording.events if event.action == action}:
-            yield _metric(f"ticks_{action}", label, float(len(ticks)), "")
+            yield _timing(f"ticks_{action}", label, float(len(ticks)), "")
 
 
 @register("time")
 def _time(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "status" in recording:
         failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
-        yield _metric("ticks_not_solved", "Ticks not solved", float(failed), "")
+        yield _timing("ticks_not_solved", "Ticks not solved", float(failed), "")
     if "time_tick" in recording:
         late = np.count_nonzero(recording["time_tick"] > recording.scenario.control.period)
-        yield _metric("ticks_late", "Ticks longer than the period", float(late), "")
+        yield _timing("ticks_late", "Ticks longer than the period", float(late), "")
     for signal, part in _PARTS.items():
         shared = signal in ("time_kinematics", "time_rows")  # the same code under any resolver
         for key, (percent, label) in _PERCENTILES.items() if signal in recording else ():
-            yield _metric(f"{signal}_{key}", f"{part}, {label}",
+            yield _timing(f"{signal}_{key}", f"{part}, {label}",
                           finite(np.percentile(recording[signal], percent)), "s",
                           lower_is_better=None if shared else True,
                           detail=shared and key != "median")

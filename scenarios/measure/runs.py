@@ -11,7 +11,7 @@ from scenarios.config import Scenario
 from scenarios.config.scenario import OWN
 from scenarios.files import slug
 from scenarios.measure import metrics
-from scenarios.measure.jumps import Happening, happened
+from scenarios.measure.happenings import Happening, happened
 from scenarios.measure.metrics import Metric
 from scenarios.recording.facts import ResolverFacts, resolver_facts
 from scenarios.recording.recording import Recording

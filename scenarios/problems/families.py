@@ -1,33 +1,41 @@
-"""The families of the open benchmark: each makes a public set and fresh ones from a seed.
+"""The families of the open benchmark, their files, and proved answers.
 
-A family of your own is one entry in FAMILIES: a function from a seed and a count to hierarchies.
-Seed 0 is the public set, which everybody may tune on; any other seed is fresh.
+Each family makes a public set and fresh ones from a seed. A family of your own is one entry in
+FAMILIES: a function from a seed and a count to hierarchies. Seed 0 is the public set, which
+everybody may tune on; any other seed is fresh. Resolvers give candidates for an answer, and
+`solvers.proof` decides.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, distribution, version
+from pathlib import Path
 from typing import final
 
 import numpy as np
 
 from hierarchy.errors import HierarchyError, UnknownNameError, is_one_of
-from hierarchy.problem import Hierarchy
-from scenarios.problems import others, postures, recorded
-from scenarios.problems import reference as stored
-from solvers import problems
+from hierarchy.problem import Array, Hierarchy
+from scenarios.files import named, written
+from scenarios.problems import made, recorded
+from solvers import make, problems
 from solvers.problems.files import FRESH, PUBLIC, Collection, Head
+from solvers.proof import Proof, prove
+from solvers.qp.backends import installed
 
 COUNT = 50
 _CONSECUTIVE = 200
 _FEW = 20            # where a proof takes seconds
-_SIMULATED = (*stored.RECORDED, "stand-push")
+_SIMULATED = (*recorded.RECORDED, "stand-push")
 _STRIDE = 1_000_000  # seeds of single problems between two seeds of sets
+_BACKENDS = ("daqp", "quadprog", "clarabel", "proxqp")  # that give candidates
+_SAME = 1e-9         # relative to 1 + the value
 
 Make = Callable[[int, int], Sequence[Hierarchy]]
+Progress = Callable[[int, int], None]
 
 
 @final
@@ -71,11 +79,11 @@ def family(name: str) -> Family:
 
 def _reference(name: str, seed: int, count: int) -> list[Hierarchy]:
     """Return stored problems, or new ones of the same make."""
-    if seed and name in stored.RECORDED:
-        return [one.h for one in stored.fresh(name, seed, count)]
+    if seed and name in recorded.RECORDED:
+        return [one.h for one in recorded.fresh(name, seed, count)]
     if seed:
         return [problems.family(name, seed * _STRIDE + i) for i in range(count)]
-    return [one.h for one in stored.family(name)[:count]]
+    return [one.h for one in recorded.family(name)[:count]]
 
 
 def _kind(name: str, seed: int, count: int) -> list[Hierarchy]:
@@ -83,7 +91,7 @@ def _kind(name: str, seed: int, count: int) -> list[Hierarchy]:
 
 
 def _other(name: str, seed: int, count: int) -> list[Hierarchy]:
-    make = {"of-soth": others.of_soth, "of-lexls": others.of_lexls, "of-daqp": others.of_daqp}[name]
+    make = {"of-soth": made.of_soth, "of-lexls": made.of_lexls, "of-daqp": made.of_daqp}[name]
     return [make(np.random.default_rng([seed, i])) for i in range(count)]
 
 
@@ -144,8 +152,8 @@ FAMILIES = {name: Family(
     _FEW if name in _SIMULATED else _CONSECUTIVE if name in recorded.PERIODS else COUNT)
     for group, make, named in (
         ("reference", _reference, _REFERENCE), ("recorded", recorded.recorded, recorded.SCENARIOS),
-        ("postures", postures.posed, _POSTURES), ("degenerate", _kind, _KINDS),
-        ("others", _other, _OTHERS), ("others", others.of_examples, _EXAMPLES),
+        ("postures", made.posed, _POSTURES), ("degenerate", _kind, _KINDS),
+        ("others", _other, _OTHERS), ("others", made.of_examples, _EXAMPLES),
         ("random", _recipe, {"recipe": "random sizes, ranks, ties, scales"}))
     for name, what in named.items()}
 """The families by name."""
@@ -170,3 +178,74 @@ def unavailable() -> dict[str, str]:
         except PackageNotFoundError:
             found[name] = f"needs {package}: pip install 'task-hierarchy[{extra}]'"
     return found
+
+
+def answer(h: Hierarchy) -> Proof:
+    """Return the proof that the answer of `hcod` leads to, or else the best of all candidates'."""
+    found = prove(h, [make("hcod").solve(h).x])
+    return found if found.complete else max(found, prove(h, _candidates(h)),
+                                            key=lambda one: one.judged)
+
+
+def _candidates(h: Hierarchy) -> Iterator[Array]:
+    for name in filter(installed, _BACKENDS):
+        yield make("hqp", backend=name).solve(h).x
+    if h.is_equality:
+        yield make("recursive").solve(h).x
+
+
+def file_of(folder: Path, family: str, seed: int) -> Path:
+    """Return the path of a set's file."""
+    return folder / f"{family}-{f'fresh-{seed}' if seed else 'public'}.npz"
+
+
+def export(family: Family, seed: int, count: int | None, answers: bool, folder: Path,
+           progress: Progress | None = None) -> Path:
+    """Write a set of a family into the folder, and return the file.
+
+    answers : whether to prove those that can be. progress : told the number of problems done, and
+        their number.
+    """
+    found, proofs = family.half(seed, count), []
+    for done, h in enumerate(found.problems if answers else (), 1):
+        proofs.append(answer(h))
+        if progress is not None:
+            progress(done, len(found.problems))
+    return save(replace(found, answers=tuple(proofs)) if answers else found, folder)
+
+
+def save(collection: Collection, folder: Path) -> Path:
+    """Write a collection under its usual name, whole or not at all."""
+    file = file_of(folder, collection.head.family, collection.head.seed)
+    with named(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    with named(file), written(file) as partial:
+        collection.save(partial)
+    return file
+
+
+def check(collection: Collection) -> dict[int, str]:
+    """Return what is wrong with the answers of a collection, by number of the problem.
+
+    An answer is wrong if one that is proved here has other least violations or another x.
+    """
+    wrong = {}
+    for p, (h, said) in enumerate(zip(collection.problems, collection.answers or (),
+                                      strict=collection.answers is not None)):
+        difference = _difference(said, answer(h))
+        if difference:
+            wrong[p] = difference
+    return wrong
+
+
+def _difference(said: Proof, found: Proof) -> str:
+    judged = min(said.judged, found.judged)
+    off = abs(said.least - found.least)[:judged] > _SAME * (1.0 + abs(found.least[:judged]))
+    if off.any():
+        k = int(np.argmax(off))
+        return f"level {k + 1}: least violation {said.least[k]:.17g}, proved {found.least[k]:.17g}"
+    off = abs(said.x - found.x) > _SAME * (1.0 + abs(found.x).max())
+    if judged > len(said.least) and off.any():
+        i = int(np.argmax(abs(said.x - found.x)))
+        return f"x[{i}] is {said.x[i]:.17g}, proved {found.x[i]:.17g}"
+    return ""

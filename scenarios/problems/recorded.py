@@ -1,26 +1,37 @@
-"""Problems of closed loops: windows of consecutive ticks, and DYN60, of `stand-push` (extra `sim`).
+"""Reference problems, stored and fresh, and problems of closed loops: windows of consecutive ticks.
 
-`python -m scenarios.problems.recorded --out FILE` writes the stored set again, with another seed
-a fresh one.
+DYN60 is recorded from `stand-push` (extra `sim`): `python -m scenarios.problems.recorded --out
+FILE` writes the stored set again, with another seed a fresh one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
+from numpy.typing import NDArray
 
+from hierarchy.archives import read_arrays
+from hierarchy.errors import refuse
 from hierarchy.problem import Array, Hierarchy
 from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.sampling import changed, drawn
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
 from solvers import Status, certify, make
+from solvers.problems import family as make_problem
 from solvers.qp.backends import BACKENDS, installed
 
+EQUALITIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10")
+INEQUALITIES = ("INEQ7", "HUM38", "DEGEN7")
+RECORDED = ("DYN60",)
+FAMILIES = EQUALITIES + INEQUALITIES + RECORDED
+DATA = Path(__file__).parent / "data"
 SCENARIO = "stand-push"
 SEED, COUNT, TOGETHER = 60, 100, 10  # of the stored set; ticks in a row of one run
 LEFT_OUT = "joint limits"            # a level of the scenario that the family lacks
@@ -30,7 +41,7 @@ _NEAREST = 1e-9                      # tolerance of `certify`
 _AGREE = 1e-6                        # of answers, relative to 1 + |x|
 
 
-def sequences(seed: int) -> Iterator[list[tuple[Hierarchy, Array]]]:
+def ticks(seed: int) -> Iterator[tuple[Hierarchy, Array]]:
     """Yield TOGETHER consecutive ticks of one sampled run after another, with certified answers.
 
     A run that falls before its ticks is left out, and one with a tick that has no certified answer,
@@ -47,7 +58,7 @@ def sequences(seed: int) -> Iterator[list[tuple[Hierarchy, Array]]]:
                  for h in window(changed(base, values, "DYN60"), first, TOGETHER)]
         some = [(h, x) for h in found if (x := answer(h)) is not None]
         if len(some) == TOGETHER:
-            yield some
+            yield from some
         run += 1
 
 
@@ -142,16 +153,74 @@ def window(scenario: Scenario, first: int, count: int) -> list[Hierarchy]:
     return kept[:count]
 
 
+@dataclass(frozen=True)
+class Problem:
+    """A hierarchy with its certified answer x (n,) and violations, norms (L,); NaN if unknown.
+
+    `before` is the problem of the tick before, of a recorded sequence, or None.
+    """
+
+    h: Hierarchy
+    x: Array
+    norms: Array
+    before: Hierarchy | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether a certified answer is known."""
+        return not bool(np.isnan(self.norms).any())
+
+
+def family(name: str) -> list[Problem]:
+    """Read the problems of one reference family.
+
+    Raises
+    ------
+    HierarchyError : there is no file of the family.
+    """
+    file = DATA / f"{name}.npz"
+    refuse(not file.is_file(), f"there are no reference problems at {file}")
+    data, problems = read_arrays(file), []
+    for p in range(len(data["x"])):
+        levels = []
+        for k in range(int(data["L"])):
+            lower, upper = data[f"lb{k}"][p], data[f"ub{k}"][p]
+            levels.append((data[f"A{k}"][p], np.where(lower <= -_MISSING, -np.inf, lower),
+                           np.where(upper >= _MISSING, np.inf, upper)))
+        problems.append(Problem(Hierarchy.from_levels(levels), data["x"][p], data["norms"][p]))
+    return _in_sequence(problems, data.get("sequence"))
+
+
+def _in_sequence(problems: list[Problem], sequence: NDArray[Any] | None) -> list[Problem]:
+    """Return problems with those before them, where neighbours are of one sequence."""
+    if sequence is None:
+        return problems
+    return [replace(one, before=problems[p - 1].h) if p and sequence[p] == sequence[p - 1] else one
+            for p, one in enumerate(problems)]
+
+
+def fresh(name: str, seed: int, count: int) -> list[Problem]:
+    """Generate problems of a family with seeds `seed`, `seed` + 1, ..., not used for tuning.
+
+    Those of DYN60 are recorded from runs sampled with `seed`, which needs the extra `sim`, with the
+    answers with which they were kept; of the others no answer is known.
+    """
+    if name in RECORDED:
+        found = [Problem(h, x, h.violations(x)) for h, x in islice(ticks(seed), count)]
+        return _in_sequence(found, np.arange(count) // TOGETHER)
+    made = (make_problem(name, seed + i) for i in range(count))
+    return [Problem(h, np.full(h.n, np.nan), np.full(len(h.sizes), np.nan)) for h in made]
+
+
 def main(out: Annotated[Path, typer.Option(metavar="FILE")], seed: int = SEED,
          count: int = COUNT) -> None:
     """Record problems of the family DYN60 and write its file."""
     problems: list[tuple[Hierarchy, Array]] = []
-    for some in sequences(seed):
-        problems += some
-        print(f"{len(problems)} of {count}", flush=True)
-        if len(problems) >= count:
-            break
-    np.savez_compressed(out, allow_pickle=False, **packed(problems[:count]))
+    for one in islice(ticks(seed), count):
+        problems.append(one)
+        if len(problems) % TOGETHER == 0:
+            print(f"{len(problems)} of {count}", flush=True)
+    np.savez_compressed(out, allow_pickle=False, **packed(problems))
 
 
 if __name__ == "__main__":

@@ -18,8 +18,7 @@ from scenarios.measure import statistics
 from scenarios.measure.metrics import Metric
 from scenarios.measure.runs import Cell, Row, grouped
 from scenarios.measure.statistics import Paired, Spread, paired, wilson
-from scenarios.results.plan import Plan
-from scenarios.results.run import Job, Outcome
+from scenarios.results.plan import Job, Outcome, Plan
 
 # What is weighed in the verdict.
 _WEIGHED = ("position_error_median_settled", "body_distance_min", "ee_distance_min",

@@ -16,13 +16,12 @@ from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.scenario import OWN
 from scenarios.files import OutputError, claim, make_folder, unlock, write_json, write_text
 from scenarios.loop.simulation import simulate
-from scenarios.measure.comparison import Comparison
 from scenarios.measure.run_folder import kept, versions
 from scenarios.measure.runs import Run
+from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Recording
 from scenarios.results import pool
-from scenarios.results.plan import side_by_side
-from scenarios.results.run import Job, Outcome, digest, key_of
+from scenarios.results.plan import Job, Outcome, digest, key_of, side_by_side
 from scenarios.results.store import TABLE, write_table
 
 Progress = Callable[[str, int, int], None]

@@ -18,11 +18,10 @@ from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import svg
 from scenarios.draw.figures.palette import Look, looks
 from scenarios.draw.figures.picture import picture
-from scenarios.draw.replay.page import html
-from scenarios.measure.comparison import Comparison
+from scenarios.draw.replay import html
 from scenarios.measure.motions import BOUND, Motion, motions, partings
 from scenarios.measure.runs import Run
-from scenarios.measure.verdict import lines, table, verdicts
+from scenarios.measure.verdict import Comparison, goal_table, lines, verdicts
 from scenarios.results import sections
 from scenarios.templates import render, resource
 
@@ -126,7 +125,7 @@ def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
              "panels": sections.multiples(name, found, look),
              "overlays": sections.overlays(name, runs, found, look)} if found else {}
     return render("results/group.html", name=name, looks=look, verdict=lines(judged),
-                  goals=table(judged),
+                  goals=goal_table(judged),
                   **_about(name, runs), **_picture(name, found, look),
                   **{"replay": "", "panels": "", "overlays": "", **moved},
                   numbers=sections.numbers(runs, look), stack=sections.stack(name, runs, look),

@@ -1,17 +1,21 @@
-"""A sweep: the validated form of its file, and its runs, each with a key of its content."""
+"""A sweep: the validated form of its file, its runs, each with a key of its content; one run."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
-from typing import Annotated
+from time import perf_counter
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError, UnknownNameError, file_path
+from hierarchy.errors import UnknownNameError, file_path, refuse
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, is_shipped, load
 from scenarios.config.distributions import Parameters
@@ -19,9 +23,102 @@ from scenarios.config.resolvers import check_names, usable
 from scenarios.config.sampling import changed, drawn
 from scenarios.config.sections import Name, Section
 from scenarios.config.validation import validated
+from scenarios.measure.metrics import Metric, measure
+from scenarios.measure.run_folder import versions
 from scenarios.measure.runs import Run
-from scenarios.results.run import Job, digest, key_of
+from scenarios.recording.recording import Recording
 from scenarios.toml_text import read_toml
+
+# Code that only requests or shows runs: changing it does not change the measurements.
+_NOT_IN_A_RUN = ("cli/", "draw/", "export/", "library/", "problems/", "results/", "scene/",
+                 "files.py", "templates.py", *(f"measure/{name}.py" for name in (
+                     "goals", "motions", "runs", "statistics", "verdict")))
+_PLACE = ("system", "processor")  # entries of versions() that describe the machine
+
+
+@dataclass(frozen=True)
+class Job:
+    """A planned run: the scenario's text, the resolver, the key of both, and needed plugins.
+
+    sample, values : the number of the sample, and what was sampled by dotted key. group, label :
+    the runs that it stands beside, and its column there.
+    """
+
+    key: str
+    text: str
+    resolver: str
+    scenario: str = ""
+    sample: int = 0
+    values: Mapping[str, Any] = field(default_factory=dict)
+    plugins: tuple[str, ...] = ()
+    group: str = ""
+    label: str = ""
+
+    def load(self) -> Scenario:
+        """Return the scenario under its resolver, after importing the plugins."""
+        for module in self.plugins:
+            plugins.allow(module)
+        return Scenario.from_toml(self.text).with_resolver(self.resolver)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a run; `reason` says why it did not reach its end, otherwise None."""
+
+    key: str
+    ticks: int
+    reason: str | None
+    wall_seconds: float
+    metrics: tuple[Metric, ...] = ()
+
+
+Measured = Callable[[Scenario], tuple[Recording, tuple[Metric, ...]]]
+
+
+def key_of(text: str, resolver: str, versions: str) -> str:
+    """Return the key of a run, which is the same for the same scenario, resolver and code."""
+    return hashlib.sha256("\0".join((text, resolver, versions)).encode()).hexdigest()[:32]
+
+
+def digest() -> str:
+    """Return a digest of everything besides the scenario that the numbers of a run depend on.
+
+    This is the source code used in a run, including kernels and plugins, and the versions of
+    dependencies.
+    """
+    return _of_the_package() + plugins.fingerprint()
+
+
+@cache
+def _of_the_package() -> str:
+    root = Path(__file__).parents[2]
+    used = {name: version for name, version in versions().items() if name not in _PLACE}
+    found = hashlib.sha256(json.dumps(used, sort_keys=True).encode())
+    for package in ("hierarchy", "solvers", "scenarios"):
+        for path in sorted((root / package).rglob("*.py")):
+            name = path.relative_to(root).as_posix()
+            if not name.removeprefix("scenarios/").startswith(_NOT_IN_A_RUN):
+                found.update(name.encode() + path.read_bytes())
+    return found.hexdigest()[:16]
+
+
+def simulated(scenario: Scenario) -> tuple[Recording, tuple[Metric, ...]]:
+    """Return the recording of a run and what is measured on it."""
+    from scenarios import simulate
+
+    recording = simulate(scenario)
+    return recording, tuple(measure(recording).values())
+
+
+def outcome(job: Job, measured: Measured = simulated) -> Outcome:
+    """Make a run and measure it; an exception becomes its reason."""
+    begun = perf_counter()
+    try:
+        recording, metrics = measured(job.load())
+    except Exception as error:  # the failed run is a row too, with the reason
+        return Outcome(job.key, 0, f"{type(error).__name__}: {error}", perf_counter() - begun)
+    return Outcome(job.key, recording.ticks, recording.fault, perf_counter() - begun, metrics)
+
 
 LIBRARY = Path(__file__).parents[1] / "library" / "sweeps"
 
@@ -104,7 +201,7 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
     asked = [load(name, lasting) for name in sweep.scenarios] if scenarios is None else scenarios
     columns, refused = side_by_side(asked, sweep.resolvers or None, f"sweep {sweep.name!r}: ")
     alone = len({run.spec for run in columns}) == 1 and len(asked) > 1
-    versions = digest()
+    code = digest()
     runs: dict[str, Job] = {}
     for index in range(sweep.samples):
         for scenario in asked:
@@ -118,7 +215,7 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
             text = changed(scenario, values, what).to_toml()
             for run in columns:
                 if run.scenario.name == scenario.name:
-                    key = key_of(text, run.spec, versions)
+                    key = key_of(text, run.spec, code)
                     runs.setdefault(key, Job(
                         key, text, run.spec, scenario.name, index, values, plugins.loaded(),
                         run.spec if alone else scenario.name, run.label))
@@ -148,8 +245,7 @@ def side_by_side(scenarios: Sequence[Scenario], specs: Sequence[str] | None, wha
         runs += [Run(one, spec, spec if shared[labels[spec]] > 1 else labels[spec])
                  for spec, one in can.items()]
         refused += cannot
-    if not runs:
-        raise HierarchyError("; ".join(refused) or "no resolver was given")
+    refuse(not runs, "; ".join(refused) or "no resolver was given")
     if len(runs) > 1 and len({run.spec for run in runs}) == 1:
         runs = [replace(run, label=run.scenario.name) for run in runs]
     return runs, tuple(refused)

@@ -10,15 +10,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hierarchy.errors import HierarchyError, expect_each, file_path
+from hierarchy.errors import expect_each, file_path, refuse
 from hierarchy.words import listed
 from scenarios.config import Scenario, load
 from scenarios.files import finite, write_text
 from scenarios.measure.run_folder import versions
-from scenarios.results import cluster, pool
+from scenarios.results import pool
 from scenarios.results.columns import Results, results, verdict
-from scenarios.results.plan import Plan, Sweep, find, load_sweep, plan
-from scenarios.results.run import Job, Outcome, outcome
+from scenarios.results.plan import Job, Outcome, Plan, Sweep, find, load_sweep, outcome, plan
 from scenarios.results.sampled_page import name_of, sampled_page, worst_runs
 from scenarios.results.store import TABLE, Store, write_table, writing
 
@@ -106,8 +105,7 @@ def _made(planned: Plan, out: str | Path, source: tuple[str, str], workers: Work
           progress: Progress | None) -> Finished:
     """Make the runs of a plan that a folder does not have, and write the results of all."""
     i, count = workers.part or (1, 1)
-    if not 1 <= i <= count:
-        raise HierarchyError(f"part {i}/{count}: give 1/{count} to {count}/{count}")
+    refuse(not 1 <= i <= count, f"part {i}/{count}: give 1/{count} to {count}/{count}")
     store = Store(file_path("out", out), f"part-{i}-of-{count}" if workers.part else "all")
     with store.opened():
         made = complete(planned.runs[i - 1::count], store, workers, planned.sweep.name, progress)
@@ -131,7 +129,7 @@ def complete(jobs: Sequence[Job], store: Store, workers: Workers, name: str,
     told = partial(progress or (lambda *_: None), name)
     told(begun, len(jobs))
     ended = (pool.ended(work, missing, workers.processes) if workers.scheduler is None else
-             cluster.ended(work, missing, workers.scheduler))
+             pool.ended_on_cluster(work, missing, workers.scheduler))
     for done, (job, found) in enumerate(ended, begun + 1):
         store.add(job, found or Outcome(job.key, 0, "Killed: every process that started this run "
                                         "died", float("nan")))

@@ -21,8 +21,7 @@ from scenarios.measure.run_folder import versions
 from scenarios.measure.runs import caveats
 from scenarios.recording.facts import resolver_facts
 from scenarios.results.columns import Results, rows, verdict
-from scenarios.results.plan import Plan
-from scenarios.results.run import Job
+from scenarios.results.plan import Job, Plan
 from scenarios.templates import render, resource
 
 _FAILURES = 20  # reasons listed

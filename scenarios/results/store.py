@@ -18,7 +18,7 @@ from typing import Any
 from hierarchy.errors import HierarchyError
 from scenarios import files
 from scenarios.measure.metrics import Metric
-from scenarios.results.run import Job, Outcome
+from scenarios.results.plan import Job, Outcome
 
 COLUMNS = ("key", "scenario", "resolver", "sample", "metric", "value", "unit", "label", "group",
            "better", "note")

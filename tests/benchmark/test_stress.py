@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from benchmark import start, stress
-from benchmark.solve import accuracy, growth, resolvers
+from benchmark.solve import first_paper, resolvers
 from benchmark.solve.entrants import NUMPY
 from benchmark.solve.ours import Ours
-from benchmark.start import Case, Done, run
+from benchmark.start import Case, run
 from benchmark.tick import PlainTick
 from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.problems import reference
-from scenarios.problems.reference import family
+from scenarios.problems import recorded
+from scenarios.problems.recorded import family
 from solvers import Resolution, Resolver, Status, certify, make, names, problems
 from solvers.qp import backends
 
@@ -105,12 +105,12 @@ def test_failing_problems_are_listed_and_saved(tmp_path, monkeypatch):
 
 
 def test_strict_resolvers_reach_all_that_the_tasks_can_have(monkeypatch):
-    monkeypatch.setattr(growth, "FIRST_PAPER", {
-        key: sizes[:3] for key, sizes in growth.FIRST_PAPER.items()})
-    assert growth.run(seconds=0.0).rows["growth"]
-    made = {one.label: Ours(**one.options).resolver for one in accuracy.entrants()
+    monkeypatch.setattr(first_paper, "FIRST_PAPER", {
+        key: sizes[:3] for key, sizes in first_paper.FIRST_PAPER.items()})
+    assert first_paper.growth(seconds=0.0).rows["growth"]
+    made = {one.label: Ours(**one.options).resolver for one in first_paper.entrants()
             if "resolver" in one.options}
-    for row in accuracy.run(arms=50, checked=10).rows["errors"]:
+    for row in first_paper.accuracy(arms=50, checked=10).rows["errors"]:
         resolver = made.get(row["entrant"])
         if resolver and resolver.strict and row["case"] in ("regular", "conflict", "crowded"):
             assert max([row[key] for key in row if key.endswith("_max")]) < resolver.accuracy, row
@@ -123,7 +123,7 @@ EQUALITIES = {NUMPY, "augmented", "recursive", "reverse", "sns", "tpm", "tpm-pub
 
 def test_a_row_for_everybody_in_every_family_asked(tmp_path, capsys, monkeypatch):
     """Only one problem a family, since one cascade takes 40 ms for one of them."""
-    monkeypatch.setattr(resolvers.reference, "family", lambda name: family(name)[:1])
+    monkeypatch.setattr(resolvers.recorded, "family", lambda name: family(name)[:1])
     monkeypatch.setenv("COLUMNS", "80")
     found = resolvers.run(seconds=0.001, families=FEW)
     rows = found.rows["resolvers"]
@@ -133,7 +133,7 @@ def test_a_row_for_everybody_in_every_family_asked(tmp_path, capsys, monkeypatch
     assert {f"hqp {name}" for name in backends.BACKENDS if backends.installed(name)} <= known
     assert {(row["family"], row["entrant"]) for row in rows} == {
         (name, label) for name in FEW for label in known
-        if label not in EQUALITIES or name in reference.EQUALITIES}
+        if label not in EQUALITIES or name in recorded.EQUALITIES}
     for row in rows:
         if row["entrant"].startswith(("hqp", "hcod")) or row["entrant"] in ("tpm", "recursive"):
             assert row["wrong"] == 0, row
@@ -163,8 +163,8 @@ def test_everything_measured_is_told(monkeypatch):
     events = [[0.0, True, "solvers.kernels.a.b"], [2.0, False, "solvers.kernels.a.b"]]
     cases = [Case("help", 0.5, ["a"]), Case("first", None, [start._COMPILE]),
              Case("library", 10.0, ["b"])]
-    said = {"help": Done(0.1, 0.09), "first": Done(20.0, 19.0, events), "library": Done(11.0, 8.0),
-            "memory": Done(1.0, 1.0, [301.0]), "memory of a worker": Done(1.0, 1.0, [250.0] * 20)}
+    said = {"help": (0.1, 0.09, None), "first": (20.0, 19.0, events), "library": (11.0, 8.0, None),
+            "memory": (1.0, 1.0, [301.0]), "memory of a worker": (1.0, 1.0, [250.0] * 20)}
     monkeypatch.setattr(start, "_cases", lambda folder: cases)
     monkeypatch.setattr(start, "_measured", lambda case: said[case.what])
     found = run()
@@ -176,9 +176,9 @@ def test_everything_measured_is_told(monkeypatch):
 
 
 def test_a_process_is_measured_and_one_that_fails_is_named():
-    done = start._measured(Case("a sum", None, [
+    _, processor, said = start._measured(Case("a sum", None, [
         "-c", "print('noise'); print([sum(range(10**6))])"], repeated=1))
-    assert done.said == [499999500000]
-    assert 0.0 < done.processor
+    assert said == [499999500000]
+    assert 0.0 < processor
     with pytest.raises(RuntimeError, match="no such thing"):
         start._measured(Case("a fault", None, ["-c", "raise SystemExit('no such thing')"]))

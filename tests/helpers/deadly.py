@@ -2,7 +2,7 @@
 
 import os
 
-from scenarios.results.run import Outcome
+from scenarios.results.plan import Outcome
 
 
 def dies_of_one(job):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hierarchy import Hierarchy
-from scenarios.problems import reference as families
+from scenarios.problems import recorded as families
 from solvers import Status
 
 

@@ -32,15 +32,15 @@ from pinned import FOLDER, robot_facts
 
 from hierarchy import HierarchyError, Robot, jit, tasks
 from scenarios import Scenario, load, load_run, shipped, simulate
+from scenarios import export as mcap
 from scenarios.cell.plants import physics, torque
 from scenarios.cell.sensors import depth_sensor
 from scenarios.cli import doctor, runs
 from scenarios.cli.main import run_command
 from scenarios.config.distributions import Distribution
+from scenarios.draw import replay
 from scenarios.draw.figures import drawing, letter
-from scenarios.draw.replay import page as replay
 from scenarios.draw.viewer import live, live_page
-from scenarios.export import mcap
 from scenarios.loop import controller, faults
 from scenarios.measure import run_folder, safety
 from scenarios.measure.metrics import measure
@@ -48,8 +48,7 @@ from scenarios.measure.verdict import verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
 from scenarios.recording.facts import capsules as links
 from scenarios.recording.signals import described
-from scenarios.results import comparing, page, pool, sampled, sampled_page, sections
-from scenarios.results import run as table
+from scenarios.results import comparing, page, plan, pool, sampled, sampled_page, sections
 from scenarios.scene.drawn import scene
 from solvers import certify, explain, make, names
 from solvers.problems import Recipe, bounded, generate, structured
@@ -183,7 +182,7 @@ def steadily():
     with contextlib.ExitStack() as stack:
         for name, instead, modules in (
                 *((scene.__name__, noted(scene), (module,)) for module, scene in SCENES),
-                ("perf_counter", clock, (controller, faults, depth_sensor, doctor, runs, table)),
+                ("perf_counter", clock, (controller, faults, depth_sensor, doctor, runs, plan)),
                 ("requires", lambda _: REQUIRED, (doctor,)), ("__file__", "csv.py", (csv,)),
                 ("version", lambda name: INSTALLED.get(name) or version("none"), (doctor,)),
                 ("sys", SimpleNamespace(version="3.11.2 (main)", version_info=(3, 11)), (doctor,)),

@@ -115,7 +115,7 @@ def test_what_cannot_be_written_says_why(run, tmp_path, name, said, monkeypatch)
     (tmp_path / "mine.mcap").write_text("mine")
     refused(said, export, run, tmp_path / name)
     assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [("mine.mcap", "mine")]
-    monkeypatch.setattr("scenarios.export.mcap.find_spec", lambda name: None)
+    monkeypatch.setattr("scenarios.export.find_spec", lambda name: None)
     refused("pip install 'task-hierarchy[export]'", export, run, tmp_path / "run.mcap")
 
 

@@ -11,12 +11,11 @@ from scipy.stats import rankdata
 from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.measure.causes import Tick, causes
-from scenarios.measure.given_up import given_up
 from scenarios.measure.goals import goals
-from scenarios.measure.jumps import jumps
+from scenarios.measure.happenings import given_up, jumps
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import best, paired, wilson
-from scenarios.measure.verdict import Verdict, lines, table, verdicts
+from scenarios.measure.verdict import Verdict, goal_table, lines, verdicts
 from solvers import make
 
 
@@ -72,7 +71,7 @@ def run(label, **signals):
 def test_the_table_has_a_row_for_each_goal_and_a_cell_for_each_run():
     broken = Run(recording().scenario, "c", "c", None, "HierarchyError: no")
     found = verdicts([run("a", **at([2, 0, 1204, 4, 4])), run("b"), broken])
-    rows = dict(table(found))
+    rows = dict(goal_table(found))
     assert rows["position, at its target"] == ("4 mm, worst 1204 mm, out 75 %",
                                                "0 mm, worst 0 mm", "–")
     assert rows["joint limits"] == ("kept", "kept", "–")

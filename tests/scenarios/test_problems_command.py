@@ -8,10 +8,8 @@ from rank_cases import solved
 from hierarchy.archives import read_arrays
 from scenarios import load
 from scenarios.problems import recorded
-from scenarios.problems import reference as families
-from scenarios.problems.answers import export, save
-from scenarios.problems.families import FAMILIES, available, family
-from scenarios.problems.postures import posed
+from scenarios.problems.families import FAMILIES, available, export, family, save
+from scenarios.problems.made import posed
 from solvers import Status, certify, make, problems
 from solvers.problems.files import read
 
@@ -76,7 +74,7 @@ def test_problems_as_others_make_them_are_what_their_makers_describe():
 
 @pytest.mark.parametrize("name", problems.FAMILIES)
 def test_sizes_equalities_norms_of_rows_and_ranks_are_those_of_the_stored_problems(name):
-    stored = [problem.h for problem in families.family(name)]
+    stored = [problem.h for problem in recorded.family(name)]
     fresh = [problems.family(name, seed) for seed in range(40)]
     for h in fresh:
         assert h.sizes.tolist() == stored[0].sizes.tolist()
@@ -88,7 +86,7 @@ def test_sizes_equalities_norms_of_rows_and_ranks_are_those_of_the_stored_proble
 
 
 def test_the_stored_answers_are_certified_and_half_of_its_ticks_meet_no_limit():
-    stored = families.family("DYN60")
+    stored = recorded.family("DYN60")
     assert len(stored) == recorded.COUNT
     free = 0
     for problem in stored:
@@ -101,7 +99,7 @@ def test_the_stored_answers_are_certified_and_half_of_its_ticks_meet_no_limit():
     assert 30 <= free <= 70
     np.testing.assert_allclose(recorded.answer(stored[0].h), stored[0].x, atol=1e-6)
     made = recorded.packed([(problem.h, problem.x) for problem in stored])
-    kept = read_arrays(families.DATA / "DYN60.npz")
+    kept = read_arrays(recorded.DATA / "DYN60.npz")
     assert made.keys() == kept.keys()
     for name, values in kept.items():
         np.testing.assert_allclose(made[name], values, atol=1e-9, err_msg=name)

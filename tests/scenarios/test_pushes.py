@@ -9,7 +9,7 @@ from hand_made import recording as hand_made
 from hierarchy import Robot, State
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.draw.replay.page import html
+from scenarios.draw.replay import html
 from scenarios.draw.viewer.live import Live
 from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge

@@ -16,7 +16,7 @@ from hierarchy.errors import HierarchyError, UnknownNameError
 from scenarios import load, load_run, save, simulate
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.figures.panels import Panel
-from scenarios.export.mcap import grouped
+from scenarios.export import grouped
 from scenarios.files import OutputError, claim, next_free, whole
 from scenarios.measure import run_folder
 from scenarios.measure.metrics import Metric

@@ -15,8 +15,8 @@ from scenarios import load, save, simulate
 from scenarios.config.kinds import ListedPosition
 from scenarios.draw.figures import letter, palette, panels
 from scenarios.draw.figures.timeline import timeline
-from scenarios.measure.comparison import Comparison
 from scenarios.measure.runs import Run, table
+from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
 from scenarios.results.page import comparison_page as page
 from scenarios.results.page import run_command

@@ -14,7 +14,7 @@ from urdf_text import INERTIAL, joint, link, placed, shape, urdf
 from hierarchy import Robot
 from scenarios import load, load_run, save, simulate
 from scenarios.cell.robot import make_robot
-from scenarios.draw.replay.page import html
+from scenarios.draw.replay import html
 from scenarios.recording.fate import Fate
 from scenarios.scene import scene
 

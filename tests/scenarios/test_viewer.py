@@ -17,7 +17,7 @@ from headless import chromium
 from hierarchy.errors import HierarchyError
 from scenarios import load, load_run, save, simulate
 from scenarios.cli import shown
-from scenarios.draw.replay.page import NOTHING, html
+from scenarios.draw.replay import NOTHING, html
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.live_page import LivePage
 from scenarios.draw.viewer.server import is_own, served

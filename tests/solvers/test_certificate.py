@@ -10,7 +10,7 @@ from rank_cases import build, family, rng
 from refusals import refused
 
 from hierarchy import Hierarchy
-from scenarios.problems import reference
+from scenarios.problems import recorded
 from solvers import certificate, certify, make, problems
 from solvers.proof import prove
 
@@ -200,9 +200,9 @@ def test_the_answer_of_equalities_is_that_of_rational_arithmetic(seed):
 
 
 @pytest.mark.parametrize("name", [
-    name for name in reference.FAMILIES if name not in ("HUM38", "DEGEN7", "DYN60", "EQ30L8")])
+    name for name in recorded.FAMILIES if name not in ("HUM38", "DEGEN7", "DYN60", "EQ30L8")])
 def test_stored_answers_lead_to_proofs_that_agree_with_them(name):
-    for one in reference.family(name)[:2]:
+    for one in recorded.family(name)[:2]:
         found = prove(one.h, [one.x])
         assert found.complete
         assert found.turn < 1e-15

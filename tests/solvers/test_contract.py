@@ -14,7 +14,7 @@ from refusals import refused
 
 from benchmark.solve import oracle
 from hierarchy import Hierarchy, HierarchyError
-from scenarios.problems import reference as families
+from scenarios.problems import recorded as families
 from solvers import Status, certify, make, names
 from solvers.qp.backends import BACKENDS
 

@@ -10,7 +10,7 @@ from rank_cases import sequence
 from hierarchy import Hierarchy, HierarchyError
 from hierarchy.jit import caching
 from hierarchy.jit.sources import source_digest
-from scenarios.problems.reference import FAMILIES, family
+from scenarios.problems.recorded import FAMILIES, family
 from solvers import make, problems
 from solvers.library import write
 from solvers.library.entries import can_open

@@ -19,7 +19,7 @@ from benchmark.studies import recorded
 from hierarchy import HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position
-from scenarios.problems.reference import family
+from scenarios.problems.recorded import family
 from solvers import make, problems
 from solvers.library import differs, write
 

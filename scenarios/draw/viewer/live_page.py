@@ -19,7 +19,7 @@ from hierarchy.tasks.pose import Pose
 from scenarios.config import Scenario
 from scenarios.config.resolvers import default_resolvers
 from scenarios.draw.figures.palette import looks
-from scenarios.draw.replay.page import as_json, document, packed, run_data
+from scenarios.draw.replay import as_json, document, packed, run_data
 from scenarios.draw.viewer.live import Live
 from scenarios.scene.pushes import key
 from scenarios.templates import resource

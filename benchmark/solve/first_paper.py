@@ -1,27 +1,29 @@
-"""Errors of tasks and of x on random 6R arms: regular, near-singular, damped, conflicting.
+"""The experiments of the first TPM paper: errors on random arms, and growth of the time of a solve.
 
-The first experiment of the paper that introduced the Task Priority Matrix: F. Flacco, "The Tasks
-Priority Matrix: a new tool for hierarchical redundancy resolution" (2016).
+F. Flacco, "The Tasks Priority Matrix: a new tool for hierarchical redundancy resolution" (2016).
+The arms are regular, near-singular, damped, conflicting; errors are those of tasks and of x.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import nan
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from benchmark import figures
 from benchmark.packages import OWN, Entrant
-from benchmark.report import Report, Section
+from benchmark.report import Column, Report, Row, Section, Table, percent, power, short, whole, wide
 from benchmark.solve import oracle
 from benchmark.solve.entrants import ENTRANTS, NUMPY
-from benchmark.solve.interface import Solver
+from benchmark.solve.interface import Problem, Solver
 from benchmark.solve.resolvers import as_problem
-from benchmark.tables import Column, Row, Table, percent, power, whole
+from benchmark.timing import take_turns
 from benchmark.worker import load
 from hierarchy.problem import Array, Hierarchy
-from scenarios.problems.answers import answer
+from scenarios.problems.families import answer
 from solvers import certify
 
 REGULAR = 0.05           # smallest singular value [m or 1] of a regular Jacobian
@@ -164,7 +166,7 @@ def entrants(damping: float = 0.0) -> list[Entrant]:
                     {"resolver": "reverse", "form": "in-order", **settings})]
 
 
-def run(arms: int = 10_000, checked: int = 300) -> Report:
+def accuracy(arms: int = 10_000, checked: int = 300) -> Report:
     """Resolve `arms` of every case with all resolvers.
 
     `checked` of the arms are also compared with the proved x, and certified.
@@ -219,3 +221,59 @@ def _errors(solver: Solver, case: Case, problems: Sequence[Hierarchy], least: Ar
                for name, values in columns.items()
                for key, of in (("mean", np.mean), ("median", np.median), ("max", np.max))},
             "certified": nan if case.damping else certified / len(right)}
+
+
+Size = tuple[int, int, int]  # joints, tasks, rows of each
+FIRST_PAPER: dict[str, tuple[Size, ...]] = {
+    "tasks": tuple((30, count, 3) for count in range(1, 11)),
+    "joints": tuple((n, 5, 3) for n in (20, 30, 45, 70, 100, 150, 200, 300))}
+LARGER: dict[str, tuple[Size, ...]] = {
+    "tasks": tuple((70, count, 3) for count in (1, 2, 3, 4, 5, 7, 10, 14, 20)),
+    "rows": tuple((100, 5, each) for each in (1, 2, 3, 4, 6, 9, 14, 20)),
+    "joints": tuple((n, 5, 3) for n in (6, 7, 10, 15, 20, 30, 45, 70, 100, 150, 200, 300))}
+LEVEL_LESS = ("augmented", "weighted")  # not timed: no priorities
+_GROWTH_NOTES = """\
+Times: one call from Python, one core, all resolvers in turns; power: slope of the upper half of \
+sizes, log over log."""
+
+
+def growth(seconds: float = 40.0, larger: bool = False) -> Report:
+    """Time all resolvers with priorities at every size for `seconds` [s] in total.
+
+    The sizes are those of the first paper, or `larger`.
+    """
+    sizes = LARGER if larger else FIRST_PAPER
+    rows = take_turns([one for i, figure in enumerate(sizes)
+                       for one in _field(figure, sizes[figure], i)], seconds)
+    panels, tables = {}, []
+    for figure, ((joints, tasks, each), *_) in sizes.items():
+        words = {"joints": f"{joints} joints", "tasks": f"{tasks} tasks",
+                 "rows": f"{each} rows a task"}
+        fixed = ", ".join(text for key, text in words.items() if key != figure)
+        some = [row for row in rows if row["figure"] == figure]
+        made, columns = wide(some, "entrant", figure, "median_us", short)
+        powers = figures.exponents(some, figure)
+        tables.append(Table(
+            f"Median time of a solve [us], {fixed}, over the number of {figure}",
+            [{**row, "power": powers[row["entrant"]]} for row in made],
+            [*columns, Column("power", "power")]))
+        panels[figure] = f"number of {figure}", figure[0], fixed
+    return Report("Growth of the time of a solve", [Section(
+        "Median times", tables, _GROWTH_NOTES, {"growth": figures.over_sizes(rows, panels)})],
+        {"growth": rows})
+
+
+def _field(figure: str, sizes: Sequence[Size], seed: int) -> list[tuple[Row, Callable[[], Any]]]:
+    solvers = {one.label: load(one.adapter)(**one.options) for one in entrants()
+               if one.label not in LEVEL_LESS}
+    found: list[tuple[Row, Callable[[], Any]]] = []
+    for i, (joints, tasks, each) in enumerate(sizes):
+        rng = np.random.default_rng(seed + i)  # almost surely of full rank, with joints enough
+        b = rng.normal(size=each * tasks)
+        problem = Problem(rng.normal(size=(each * tasks, joints)), b, b, np.full(tasks, each),
+                          np.zeros(joints))
+        found += [({"figure": figure, "entrant": label, "joints": joints, "tasks": tasks,
+                    "rows": each if figure == "rows" else each * tasks},
+                   partial(solver.solve, solver.prepare(problem)))
+                  for label, solver in solvers.items()]
+    return found

@@ -1,12 +1,13 @@
-"""`hierarchy check ROBOT`: summarize a robot's file and propose a [robot] section."""
+"""`hierarchy check`: a scenario and its first tick, or a robot and a proposed [robot] section."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from math import isfinite
 from operator import itemgetter
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -17,16 +18,20 @@ from hierarchy.robots import TABLES
 from hierarchy.robots.found import remarks
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.words import some
-from scenarios.config import ScenarioError, is_shipped, shipped, shipped_groups
+from scenarios.cli.options import loaded
+from scenarios.config import Scenario, ScenarioError, is_shipped, shipped, shipped_groups
 from scenarios.config.changes import change_all, parse_changes
 from scenarios.config.reading import WANTED, no_scenario
 from scenarios.config.robot import RobotSection
 from scenarios.config.sections import Section
 from scenarios.config.validation import validated
+from scenarios.loop.first_tick import FirstTick, first_tick
+from solvers import Status
 
 _ROUND = 4     # decimals of proposed positions [m]
 _TURNS = 50.0  # [rad] between limits of a joint beyond which they are taken for degrees
 _LEVEL = 0.02  # [m] between frames that are at the same height
+_WIDTH, _UNDER = 100, " " * 12  # of a summary of a scenario
 _UNITS = {"rad": "rad, rad/s, N m", "m": "m, m/s, N"}
 
 
@@ -34,6 +39,17 @@ class _OfRobot(Section):
     """The part of a scenario that a robot has."""
 
     robot: RobotSection
+
+
+def checked(file: str, changes: list[str] | None) -> tuple[dict[str, Any], str]:
+    """Return what there is to say of a scenario or robot, as plain data for JSON and as text."""
+    if is_robot(file):
+        section, robot = robot_of(file, changes)
+        found = robot_data(section, robot)
+        return found, robot_in_words(section, robot, found)
+    scenario = loaded(file, changes)
+    tick = first_tick(scenario)
+    return scenario_data(scenario, tick), scenario_in_words(scenario, tick)
 
 
 def is_robot(text: str) -> bool:
@@ -53,7 +69,7 @@ def is_robot(text: str) -> bool:
     return True
 
 
-def look_at(model: str, changes: Sequence[str] | None) -> tuple[RobotSection, Robot]:
+def robot_of(model: str, changes: Sequence[str] | None) -> tuple[RobotSection, Robot]:
     """Make the robot of a model with changes "robot.key=value"; raises HierarchyError."""
     from scenarios.cell.robot import make_robot
 
@@ -65,7 +81,7 @@ def look_at(model: str, changes: Sequence[str] | None) -> tuple[RobotSection, Ro
     return section, make_robot(section)
 
 
-def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
+def robot_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
     """Return the summary as plain data for JSON; missing limits are None."""
     return {
         "model": section.model, "base": robot.base, "velocities": robot.n, "positions": robot.nq,
@@ -84,9 +100,9 @@ def as_plain_data(section: RobotSection, robot: Robot) -> dict[str, Any]:
         "starts": list(robot.starts), "may_touch": [list(pair) for pair in robot.apart]}
 
 
-def say(section: RobotSection, robot: Robot) -> str:
+def robot_in_words(section: RobotSection, robot: Robot, found: dict[str, Any]) -> str:
     """Return the summary as text, with a [robot] section to paste."""
-    found, of_table = as_plain_data(section, robot), robot.table is not None
+    of_table = robot.table is not None
     listed = "from its table" if of_table else "proposed"
     end = "as given" if section.end_effector else listed
     points = "as listed" if section.control_points is not None else listed
@@ -119,18 +135,17 @@ def say(section: RobotSection, robot: Robot) -> str:
     lines += [f"Warning: joint {name} may turn from {low:g} to {high:g} rad. Are these degrees?"
               for name, unit, low, high, *_ in map(dict.values, found["joints"])
               if unit == "rad" and None not in (low, high) and high - low > _TURNS]
-    return "\n".join([*lines, "", "For a scenario file:", "", paste(section, robot)])
+    return "\n".join([*lines, "", "For a scenario file:", "", paste(section, robot, found)])
 
 
-def paste(section: RobotSection, robot: Robot) -> str:
+def paste(section: RobotSection, robot: Robot, found: dict[str, Any]) -> str:
     """Return the [robot] section for this robot, with all proposed values."""
     values = {"model": section.model, "base": robot.base, "end_effector": robot.end_effector,
               **({"root": section.root} if section.root else {})}
     lines = ["[robot]", *(f"{key} = {_toml(value)}" for key, value in values.items())]
     if section.locked:
         lines.append(f"locked = {_inline({_toml(k): v for k, v in section.locked.items()})}")
-    found = {} if robot.table is not None else as_plain_data(section, robot)
-    for key in ("control_points", "capsules") if found else ():
+    for key in ("control_points", "capsules") if robot.table is None else ():
         rows = [f"    {_inline(row)}," for row in found[key]]
         lines += [f"{key} = [", *rows, "]"] if rows else []
     return "\n".join(lines)
@@ -204,3 +219,54 @@ def _carrier(robot: Robot, joint: int) -> str | None:
 
 def _rounded(place: Any) -> list[float]:
     return [float(value) + 0.0 for value in np.round(place, _ROUND)]
+
+
+def scenario_data(scenario: Scenario, found: FirstTick) -> dict[str, Any]:
+    """Return a scenario and its first tick as plain data for JSON."""
+    return {"scenario": scenario.model_dump(mode="json"), "first_tick": {
+        "status": None if found.status is None else found.status.name,
+        "levels": list(found.levels), "unmet": list(found.unmet),
+        "distances_m": found.distances}, "warnings": list(found.warnings)}
+
+
+def scenario_in_words(scenario: Scenario, found: FirstTick) -> str:
+    """Return the summary of a scenario and its first tick as text."""
+    lines = [f"{scenario.name}: {scenario.title}", *_sections(scenario), *_first(found)]
+    lines += [fill(f"Warning: {text}.", _WIDTH, subsequent_indent="  ") for text in found.warnings]
+    return "\n".join([*lines, "Valid."])
+
+
+def _first(found: FirstTick) -> Iterator[str]:
+    if found.distances:
+        yield "  start     " + ", ".join(f"{name} {1e3 * distance:.0f} mm from the nearest obstacle"
+                                         for name, distance in found.distances.items())
+    if found.status is None:
+        yield "  tick 0    not resolved: there is no usable measurement yet"
+        return
+    solved = "" if found.status is Status.SOLVED else f", {found.status}"
+    yield f"  tick 0    {' > '.join(found.levels)}{solved}"
+    for line in found.unmet or ("Every level is met.",):
+        yield fill(line, _WIDTH, initial_indent=_UNDER, subsequent_indent=f"{_UNDER}  ")
+
+
+def _sections(scenario: Scenario) -> Iterator[str]:
+    control = scenario.control
+    yield f"  robot     {scenario.robot.model}"
+    yield (f"  control   {control.level} level, {control.ticks} ticks of "
+           f"{1e3 * control.period:g} ms")
+    yield f"  plant     {scenario.plant.kind}"
+    yield f"  resolver  {scenario.make_resolver()!r}"
+    if scenario.pointing is not None:
+        yield f"  pointing  {scenario.pointing.rows}, cone of {scenario.pointing.alpha_d:g} deg"
+    if scenario.avoidance is not None:
+        asked = scenario.avoidance
+        body, tip = (" and ".join(f"{distance:g}" for distance in thresholds.values())
+                     for thresholds in (asked.thresholds, asked.tip_thresholds))
+        yield (f"  avoidance {asked.kind}, {len(asked.obstacles)} obstacles; within {body} m of "
+               f"the body, {tip} m of the end effector")
+    if scenario.limits is not None:
+        yield (f"  limits    positions and velocities of the robot, {scenario.limits.acceleration} "
+               f"rad/s^2, "
+               f"{'in the stack' if scenario.limits_in_stack else 'as a guard outside the stack'}")
+    for i, task in enumerate(scenario.tasks):
+        yield f"  task {i:<4} {task.title}" + (f", {task.kind}" if task.name else "")
