@@ -152,7 +152,9 @@ class DepthSensor:
     def _forget(self) -> None:
         """Reset: no frame has been taken."""
         self._coming.clear()
-        self._current, self._frame, self._now = self._empty(), -1, -inf
+        self._current = self._empty()
+        self._frame: int = -1
+        self._now: float = -inf
         self.measurement.stamp, self.measurement.blind = -inf, True
 
 
