@@ -103,6 +103,9 @@ class DepthSensor:
     the time the source took to make the image, which is not part of the control loop.
     """
 
+    _frame: int   # of the source, newest that was taken
+    _now: float  # [s]
+
     def __init__(self, section: ImageSection, source: Source, space: DepthSpace) -> None:
         self.source, self.space = source, space
         self.stale_after, self.least_readings = section.stale_after, section.least_readings
@@ -152,9 +155,7 @@ class DepthSensor:
     def _forget(self) -> None:
         """Reset: no frame has been taken."""
         self._coming.clear()
-        self._current = self._empty()
-        self._frame: int = -1
-        self._now: float = -inf
+        self._current, self._frame, self._now = self._empty(), -1, -inf
         self.measurement.stamp, self.measurement.blind = -inf, True
 
 
