@@ -53,8 +53,9 @@ class Package:
     requirements: tuple[str, ...] = ()
 
     def peer(self, asked: str, label: str, limits: str = "", **options: Any) -> Entrant:
-        """Return an entrant: the function or class `asked` of the package's module in `peers`."""
-        return Entrant(label, self, f"benchmark.peers.{self.module}:{asked}", options, limits)
+        """Return an entrant: the function or class `asked` of the package's adapter."""
+        return Entrant(label, self, f"benchmark.peers.adapters.{self.module}:{asked}", options,
+                       limits)
 
 
 OWN = Package("task-hierarchy", "hierarchy")

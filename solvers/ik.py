@@ -17,8 +17,8 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Task, check_period
-from hierarchy.tasks.joint_limits import StepLimits
-from hierarchy.tasks.mechanism import MECHANISM, Mechanism, bends
+from hierarchy.tasks.joints.joint_limits import StepLimits
+from hierarchy.tasks.joints.mechanism import MECHANISM, Mechanism, bends
 from hierarchy.words import listed
 from solvers.reaching import Reached, reach, stacked
 from solvers.resolver import Resolution, Resolver, make

@@ -13,8 +13,8 @@ from hierarchy.robot import Robot
 from hierarchy.stack import Stack
 from hierarchy.state import State
 from hierarchy.task import Task, parts
-from hierarchy.tasks.joint_limits import StepLimits
-from hierarchy.tasks.mechanism import Mechanism, above, model_rows
+from hierarchy.tasks.joints.joint_limits import StepLimits
+from hierarchy.tasks.joints.mechanism import Mechanism, above, model_rows
 from hierarchy.words import listed
 from solvers.explain import nowhere
 from solvers.resolver import Resolver

@@ -17,8 +17,8 @@ import numpy as np
 
 from benchmark import figures, packages
 from benchmark.packages import Entrant
+from benchmark.peers.adapters.hierarchy import arm
 from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
-from benchmark.peers.hierarchy import arm
 from benchmark.peers.scenes import Arm
 from benchmark.process import START_LIMIT, EndedError
 from benchmark.report import Column, Report, Row, Section, Table, power, text, whole, yes

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.optimize import nnls
 
 from benchmark.packages import OWN, PLACO, TSID
+from benchmark.peers.adapters.hierarchy import TASKS, robot_of, stack_of
 from benchmark.peers.compare import TICK, Log, measure, times, turns
-from benchmark.peers.hierarchy import TASKS, robot_of, stack_of
 from benchmark.peers.scenes import Stand
 from benchmark.report import Column, Report, Row, Section, Table, power, text, whole
 from benchmark.urdf import urdf

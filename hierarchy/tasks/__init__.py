@@ -3,17 +3,23 @@
 from hierarchy.task import Task
 from hierarchy.tasks.avoidance import Avoidance, CumulatedRepulsion, DangerBounds
 from hierarchy.tasks.com import CentreOfMass, Momentum
-from hierarchy.tasks.contact_motion import ContactMotion
-from hierarchy.tasks.coupling import JointCoupling
-from hierarchy.tasks.forces import BaseDynamics, ContactForce, LeastForce, TorqueLimits, TorqueStep
-from hierarchy.tasks.friction import CentreOfPressure, Friction
-from hierarchy.tasks.joint_limits import JointLimits
+from hierarchy.tasks.contacts.contact_motion import ContactMotion
+from hierarchy.tasks.contacts.forces import (
+    BaseDynamics,
+    ContactForce,
+    LeastForce,
+    TorqueLimits,
+    TorqueStep,
+)
+from hierarchy.tasks.contacts.friction import CentreOfPressure, Friction
+from hierarchy.tasks.joints.coupling import JointCoupling
+from hierarchy.tasks.joints.joint_limits import JointLimits
+from hierarchy.tasks.joints.mechanism import Mechanism, model_rows
+from hierarchy.tasks.joints.posture import JointDamping, Posture
 from hierarchy.tasks.manipulability import Manipulability
-from hierarchy.tasks.mechanism import Mechanism, model_rows
 from hierarchy.tasks.pointing import LookAt, Pointing
 from hierarchy.tasks.pose import FrameLog, Pose, RelativePose
 from hierarchy.tasks.position import Along, Position
-from hierarchy.tasks.posture import JointDamping, Posture
 from hierarchy.tasks.separation import SelfSeparation, Separation
 from hierarchy.tasks.together import Together
 

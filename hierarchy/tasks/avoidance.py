@@ -48,8 +48,8 @@ from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written, in_turn, seen_by
-from hierarchy.tasks.joint_limits import JointLimits
-from hierarchy.tasks.posture import JointTask
+from hierarchy.tasks.joints.joint_limits import JointLimits
+from hierarchy.tasks.joints.posture import JointTask
 
 
 @measured

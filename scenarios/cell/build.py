@@ -27,8 +27,8 @@ from scenarios.cell.sensors import Sensor
 from scenarios.cell.sensors.sensor import sensor_of
 from scenarios.cell.tasks import Tasks, tasks_of
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.avoidance import AvoidanceSection
-from scenarios.config.references import References
+from scenarios.config.sections.avoidance import AvoidanceSection
+from scenarios.config.sections.references import References
 from solvers import Resolver
 from solvers.resolvers.merged import Merged
 from solvers.resolvers.set_based import SetBased

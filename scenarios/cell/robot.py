@@ -17,13 +17,18 @@ from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
-from hierarchy.tasks.mechanism import Mechanism, model_rows
+from hierarchy.tasks.joints.mechanism import Mechanism, model_rows
 from scenarios.cell.plants.mjcf import BALL
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.plant import TorqueSection
-from scenarios.config.references import References
-from scenarios.config.robot import ContactSection, RobotPointSection, RobotSection, StartSection
 from scenarios.config.sections import naming
+from scenarios.config.sections.plant import TorqueSection
+from scenarios.config.sections.references import References
+from scenarios.config.sections.robot import (
+    ContactSection,
+    RobotPointSection,
+    RobotSection,
+    StartSection,
+)
 from solvers import make
 
 _REACHED = 1e-6      # [m]

@@ -10,15 +10,15 @@ from hierarchy import tasks as kinds
 from hierarchy.avoidance import SurveillanceAreas
 from hierarchy.contacts import Contacts
 from hierarchy.task import check_period
-from hierarchy.tasks.mechanism import above, model_rows
+from hierarchy.tasks.joints.mechanism import above, model_rows
 from scenarios.cell.published import PublishedAvoidance
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.avoidance import AvoidanceSection, SeparationSection
-from scenarios.config.control import ControlSection
-from scenarios.config.references import References
 from scenarios.config.sections import naming
-from scenarios.config.tasks import LimitsSection, Made
+from scenarios.config.sections.avoidance import AvoidanceSection, SeparationSection
+from scenarios.config.sections.control import ControlSection
+from scenarios.config.sections.references import References
+from scenarios.config.sections.tasks import LimitsSection, Made
 
 
 class Tasks(NamedTuple):

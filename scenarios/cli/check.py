@@ -22,8 +22,8 @@ from scenarios.cli.options import loaded
 from scenarios.config import Scenario, ScenarioError, is_shipped, shipped, shipped_groups
 from scenarios.config.changes import change_all, parse_changes
 from scenarios.config.reading import WANTED, no_scenario
-from scenarios.config.robot import RobotSection
 from scenarios.config.sections import Section
+from scenarios.config.sections.robot import RobotSection
 from scenarios.config.validation import validated
 from scenarios.loop.first_tick import FirstTick, first_tick
 from solvers import Status

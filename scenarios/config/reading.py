@@ -12,10 +12,10 @@ from pydantic import Field
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError, file_path
 from hierarchy.robots.names import in_package, is_file_name
-from scenarios.config.avoidance import as_table
 from scenarios.config.changes import change_all, lay_over, parse_changes
 from scenarios.config.scenario import Scenario
 from scenarios.config.sections import ScenarioError, Section, naming
+from scenarios.config.sections.avoidance import as_table
 from scenarios.config.validation import validated
 from scenarios.files import scenarios_in
 from scenarios.toml_text import read_toml

@@ -11,18 +11,23 @@ from typing import TYPE_CHECKING, Any, Self
 import tomli_w
 from pydantic import Field, field_validator
 
-import scenarios.config.kinds  # noqa: F401, registers them
+import scenarios.config.sections.kinds  # noqa: F401, registers them
 from hierarchy import plugins
 from hierarchy.errors import expect
-from scenarios.config.avoidance import AvoidanceKind
 from scenarios.config.changes import change_all, parse_changes, without_none
-from scenarios.config.control import RIVALS, ControlSection, FaultSection, unfit
 from scenarios.config.distributions import Parameters
-from scenarios.config.plant import KinematicSection, PlantKind
-from scenarios.config.robot import ContactSection, ForcesSection, RobotSection, StartSection
 from scenarios.config.sections import Name, Section
-from scenarios.config.sensor import ExactSection, SensorKind
-from scenarios.config.tasks import (
+from scenarios.config.sections.avoidance import AvoidanceKind
+from scenarios.config.sections.control import RIVALS, ControlSection, FaultSection, unfit
+from scenarios.config.sections.plant import KinematicSection, PlantKind
+from scenarios.config.sections.robot import (
+    ContactSection,
+    ForcesSection,
+    RobotSection,
+    StartSection,
+)
+from scenarios.config.sections.sensor import ExactSection, SensorKind
+from scenarios.config.sections.tasks import (
     DampingSection,
     LimitsSection,
     ListedTask,

@@ -16,9 +16,9 @@ from hierarchy.state import State
 from scenarios.cell.build import Cell
 from scenarios.cell.sensors import DepthSensor, Sensor
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.avoidance import ObstacleSection
-from scenarios.config.control import FaultSection
 from scenarios.config.sections import naming
+from scenarios.config.sections.avoidance import ObstacleSection
+from scenarios.config.sections.control import FaultSection
 from solvers import Resolution, Resolver, Status
 from solvers.resolver import Around, Handles
 

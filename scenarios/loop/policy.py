@@ -14,7 +14,7 @@ from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level
 from scenarios.cell.build import Cell
-from scenarios.config.control import ControlSection, PolicySection
+from scenarios.config.sections.control import ControlSection, PolicySection
 
 _ORDER = ("use", "hold", "brake", "stop")  # the last of those requested in a tick is taken
 _BRAKE = 10.0    # [1/s] deceleration per velocity

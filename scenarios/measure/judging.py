@@ -13,7 +13,7 @@ from hierarchy.jit import compiled
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell, build
 from scenarios.cell.sensors import DepthSensor
-from scenarios.config.plant import KinematicSection
+from scenarios.config.sections.plant import KinematicSection
 from scenarios.recording.fate import Fate
 from scenarios.recording.recording import DepthView, Recording
 from solvers.certificate import TOLERANCE

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.config.kinds import ListedForce
+from scenarios.config.sections.kinds import ListedForce
 from scenarios.measure.metric import Criteria, Metric, known, largest, least, passed, register, true
 from scenarios.recording.recording import Recording
 

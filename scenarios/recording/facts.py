@@ -19,7 +19,7 @@ from hierarchy.robots import DHTable
 from hierarchy.robots.table import Base
 from scenarios.cell.robot import contacts_of, on_column, sensed_points
 from scenarios.config import Scenario
-from scenarios.config.plant import TorqueSection
+from scenarios.config.sections.plant import TorqueSection
 from solvers.resolver import Handles
 
 Vector = tuple[float, float, float]

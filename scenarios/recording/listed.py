@@ -10,7 +10,7 @@ from hierarchy import HierarchyError, Robot, State, Task
 from hierarchy.problem import Array
 from hierarchy.tasks import Along, CentreOfMass, Position
 from hierarchy.tasks.pose import Pose
-from scenarios.config.tasks import ListedTask
+from scenarios.config.sections.tasks import ListedTask
 from scenarios.recording.recording import Recording
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.config.plant import PushSection
+from scenarios.config.sections.plant import PushSection
 from scenarios.recording.facts import ContactPoint, Facts, RobotFacts, placed_points
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import pytest
 
 from benchmark.packages import PACKAGES, Entrant, MissingError, Package, python_of
 from benchmark.peers import reaching, standing
+from benchmark.peers.adapters.hierarchy import stand
 from benchmark.peers.compare import joined
-from benchmark.peers.hierarchy import stand
 from benchmark.peers.moving import ENTRANTS, QUESTIONS, START, make_scenes, run
 from benchmark.process import Field
 from benchmark.solve import entrants as solvers_

@@ -22,7 +22,7 @@ import scenarios
 import solvers
 from hierarchy import Hierarchy, HierarchyError, State, paths, tasks
 from hierarchy.loop import Loop
-from hierarchy.tasks.mechanism import Mechanism, model_rows
+from hierarchy.tasks.joints.mechanism import Mechanism, model_rows
 from scenarios.measure.goals import goals
 from scenarios.measure.metrics import measure
 from solvers import Resolution, certify, make, solve_ik

@@ -4,7 +4,7 @@ import numpy as np
 
 from hierarchy import Robot
 from scenarios.config import load
-from scenarios.config.tasks import PositionSection
+from scenarios.config.sections.tasks import PositionSection
 from scenarios.recording.facts import facts_of
 from scenarios.recording.recording import Recording
 

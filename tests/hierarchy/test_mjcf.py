@@ -9,7 +9,7 @@ from refusals import refused
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError, UnknownNameError
 from scenarios.cell.robot import start_of
-from scenarios.config.robot import StartSection
+from scenarios.config.sections.robot import StartSection
 
 mujoco = pytest.importorskip("mujoco")
 public_robots = pytest.importorskip("benchmark.studies.public_robots")

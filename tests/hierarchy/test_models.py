@@ -13,8 +13,8 @@ from hierarchy import Robot, State
 from hierarchy.avoidance.body import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
 from scenarios.cell.robot import make_robot
-from scenarios.config.references import separable_pairs
-from scenarios.config.robot import RobotSection
+from scenarios.config.sections.references import separable_pairs
+from scenarios.config.sections.robot import RobotSection
 
 ROBOTS = Path(__file__).parents[1] / "data" / "robots"
 LIMIT = '<limit lower="0.5" upper="2" velocity="3" effort="10"/>'

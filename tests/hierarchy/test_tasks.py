@@ -16,7 +16,7 @@ from hierarchy.paths import Ellipse
 from hierarchy.robots import TABLES as ROBOT_TABLES
 from hierarchy.robots import link_capsules
 from hierarchy.task import Rows
-from scenarios.config import kinds
+from scenarios.config.sections import kinds
 
 STEP = 1e-6
 STATES = states(11)

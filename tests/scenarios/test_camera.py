@@ -8,7 +8,7 @@ from scene import TURN, deproject, distance
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
-from scenarios.config.sensor import CameraSection, DepthErrors
+from scenarios.config.sections.sensor import CameraSection, DepthErrors
 
 STATE = State.at(Robot.named("kuka_lwr"), [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
 SMALL = {"width": 80, "height": 60, "fx": 70.0, "fy": 65.0}

@@ -17,7 +17,7 @@ from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
-from scenarios.config.sensor import CameraSection, ImageSection
+from scenarios.config.sections.sensor import CameraSection, ImageSection
 
 CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])

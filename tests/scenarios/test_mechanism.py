@@ -17,7 +17,7 @@ from scenarios import simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.plant import TorqueSection
+from scenarios.config.sections.plant import TorqueSection
 from scenarios.loop.first_tick import first_tick
 from solvers import solve_ik
 

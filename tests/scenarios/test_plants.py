@@ -10,7 +10,7 @@ from hierarchy import Hierarchy, State
 from hierarchy.avoidance import Obstacles
 from scenarios import load, load_run, save, simulate
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
-from scenarios.config.plant import MeasurementSection, PhysicsSection
+from scenarios.config.sections.plant import MeasurementSection, PhysicsSection
 from scenarios.loop.audit import ActiveSets
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure

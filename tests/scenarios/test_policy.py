@@ -10,7 +10,7 @@ from benchmark.solve import oracle
 from hierarchy import Hierarchy, Stack
 from hierarchy.tasks import JointLimits
 from scenarios.config import load
-from scenarios.config.control import PolicySection
+from scenarios.config.sections.control import PolicySection
 from scenarios.loop.controller import Controller
 from scenarios.loop.policy import Policy
 from scenarios.loop.transition import Blend, Key

@@ -12,7 +12,7 @@ from headless import Balanced, chromium
 
 from hierarchy import HierarchyError
 from scenarios import load, save, simulate
-from scenarios.config.kinds import ListedPosition
+from scenarios.config.sections.kinds import ListedPosition
 from scenarios.draw.figures import letter, palette, panels
 from scenarios.draw.figures.timeline import timeline
 from scenarios.measure.runs import Run, table

@@ -19,7 +19,7 @@ from hierarchy.contacts import Contact, Contacts
 from hierarchy.problem import Array
 from hierarchy.robot import Body
 from scenarios.config import ScenarioError
-from scenarios.config.plant import JointsSection, ServoSection, TorqueSection
+from scenarios.config.sections.plant import JointsSection, ServoSection, TorqueSection
 
 _GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] in the world, as in the robot's own model
 _SOFTNESS = 0.02   # [s] time constant of a contact: a few mm of penetration at usual speeds

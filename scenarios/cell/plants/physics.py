@@ -16,7 +16,7 @@ from hierarchy.robots import TABLES, DHTable
 from hierarchy.task import Level
 from scenarios.cell.plants.mjcf import Stops, each, scene
 from scenarios.config import ScenarioError
-from scenarios.config.plant import JointsSection, PhysicsSection, ServoSection
+from scenarios.config.sections.plant import JointsSection, PhysicsSection, ServoSection
 
 _ROUNDING = 1e-9  # of a number of steps
 _ARMS = [name for name, table in TABLES.items() if isinstance(table, DHTable)]

@@ -15,9 +15,9 @@ from hierarchy.contacts import Contacts
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.task import Level
-from hierarchy.tasks.mechanism import Mechanism
+from hierarchy.tasks.joints.mechanism import Mechanism
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.plant import MeasurementSection
+from scenarios.config.sections.plant import MeasurementSection
 
 _WHOLE = 1e-6  # of a period: tolerance of a delay in whole periods
 _MOST = 1_000_000  # periods of a delay: what is on its way is kept in memory

@@ -13,12 +13,12 @@ from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
 from hierarchy.errors import UnknownNameError
 from hierarchy.problem import Array
-from hierarchy.tasks.mechanism import Mechanism
+from hierarchy.tasks.joints.mechanism import Mechanism
 from scenarios.cell.plants.mjcf import Stops, on_floor
 from scenarios.cell.plants.physics import mujoco_module
 from scenarios.cell.plants.plant import whole_periods
 from scenarios.config import ScenarioError
-from scenarios.config.plant import PushSection, TorqueSection
+from scenarios.config.sections.plant import PushSection, TorqueSection
 
 _STEP = 0.001      # [s] of the simulation, at most
 _ROUNDING = 1e-9   # of a number of steps

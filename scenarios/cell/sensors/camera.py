@@ -21,7 +21,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.rendering import draw_scene
 from scenarios.config.reading import LIBRARY
-from scenarios.config.sensor import CameraSection
+from scenarios.config.sections.sensor import CameraSection
 from scenarios.toml_text import read_toml
 
 Image = NDArray[np.float32]

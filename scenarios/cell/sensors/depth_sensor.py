@@ -25,7 +25,7 @@ from scenarios.cell.sensors.pixels import (
 )
 from scenarios.cell.sensors.rendering import draw_robot
 from scenarios.cell.sensors.sensor import Asked, ExactDistances, packed_laws
-from scenarios.config.sensor import CameraSection, FramesSection, ImageSection
+from scenarios.config.sections.sensor import CameraSection, FramesSection, ImageSection
 
 _ON_ITS_WAY = 0.3  # [m]
 _ROUNDING = 1e-9   # [s] of times that are compared

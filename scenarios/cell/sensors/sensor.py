@@ -15,8 +15,8 @@ from hierarchy.jit import bind
 from hierarchy.problem import Array
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.avoidance import AvoidanceKind, AvoidanceSection, ObstacleSection
 from scenarios.config.sections import naming
+from scenarios.config.sections.avoidance import AvoidanceKind, AvoidanceSection, ObstacleSection
 
 
 class Asked(NamedTuple):

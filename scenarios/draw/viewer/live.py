@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from hierarchy.errors import HierarchyError
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.plant import KinematicSection
+from scenarios.config.sections.plant import KinematicSection
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import rehearsed, tick

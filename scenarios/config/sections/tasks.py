@@ -1,6 +1,6 @@
 """The keys of the tasks of the end effector and of all joints, of [limits] and [damping].
 
-Each section of a task makes it; `scenarios.config.kinds` has those that only `[[tasks]]` have.
+Each section of a task makes it; `kinds` has those that only `[[tasks]]` have.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from hierarchy.paths import Path, Shifted, Still
 from hierarchy.plugins import Group
 from hierarchy.problem import Array
 from scenarios.config import sections as keys
-from scenarios.config.own import OwnSection, PartSection
-from scenarios.config.paths import PathSection
 from scenarios.config.sections import ScenarioError
+from scenarios.config.sections.own import OwnSection, PartSection
+from scenarios.config.sections.paths import PathSection
 
 if TYPE_CHECKING:
     from hierarchy import Task
-    from scenarios.config.references import References
+    from scenarios.config.sections.references import References
 
 Acceleration = Annotated[keys.Positive, keys.Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]

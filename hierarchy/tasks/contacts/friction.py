@@ -15,7 +15,7 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level, Rows, Writer, in_turn
-from hierarchy.tasks.forces import FixedRows, required
+from hierarchy.tasks.contacts.forces import FixedRows, required
 
 _SLOW = 0.01      # [m/s] below which the friction of a sliding point falls to zero
 _NOTHING = 1e-6   # [N] of normal force that counts as none

@@ -15,7 +15,7 @@ from pydantic import Field
 from hierarchy.plugins import Group, register
 from hierarchy.problem import Array
 from scenarios.config import sections as keys
-from scenarios.config.own import OwnSection, PartSection
+from scenarios.config.sections.own import OwnSection, PartSection
 
 FOOT = 0.31  # [m] height of the column that a robot without floor stands on
 Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), keys.Unit("px")]

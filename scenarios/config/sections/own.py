@@ -21,8 +21,8 @@ from hierarchy import plugins
 from hierarchy.errors import HierarchyError
 from hierarchy.paths import Path
 from hierarchy.plugins import Group
-from scenarios.config.paths import AnyPath, PathSection
 from scenarios.config.sections import Finite, Flag, ScenarioError, Section, Whole, naming
+from scenarios.config.sections.paths import AnyPath, PathSection
 
 if TYPE_CHECKING:
     from hierarchy import Robot

@@ -15,12 +15,12 @@ from hierarchy.paths import Still
 from hierarchy.plugins import register
 from hierarchy.problem import Array
 from scenarios.config import sections as keys
-from scenarios.config import tasks as base
-from scenarios.config.avoidance import BarrierSection
+from scenarios.config.sections import tasks as base
+from scenarios.config.sections.avoidance import BarrierSection
 
 if TYPE_CHECKING:
     from hierarchy import Task
-    from scenarios.config.references import References
+    from scenarios.config.sections.references import References
 
 
 @register("tasks", "contact-force", shipped=True)

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from scenarios.config import sections as keys
-from scenarios.config.avoidance import AvoidanceSection, SeparationSection
-from scenarios.config.robot import ControlPointSection
-from scenarios.config.tasks import LimitsSection, PointingTask
+from scenarios.config.sections.avoidance import AvoidanceSection, SeparationSection
+from scenarios.config.sections.robot import ControlPointSection
+from scenarios.config.sections.tasks import LimitsSection, PointingTask
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
 BlindPolicy = Literal["brake", "hold", "stop"]

@@ -19,7 +19,7 @@ from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written
-from hierarchy.tasks.coupling import FollowedJoints
+from hierarchy.tasks.joints.coupling import FollowedJoints
 from hierarchy.tasks.pose import RelativePose
 from hierarchy.tasks.together import Together
 

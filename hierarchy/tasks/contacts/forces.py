@@ -18,7 +18,7 @@ from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level, NamedRows, Rows, Writer, Written
-from hierarchy.tasks.joint_limits import JointRows
+from hierarchy.tasks.joints.joint_limits import JointRows
 
 WRENCH = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 

@@ -12,7 +12,7 @@ from pydantic import Field
 from hierarchy.plugins import Group, register
 from hierarchy.problem import Array
 from scenarios.config import sections as keys
-from scenarios.config.own import OwnSection, PartSection
+from scenarios.config.sections.own import OwnSection, PartSection
 
 Bandwidth = Annotated[keys.Positive, keys.Unit("rad/s")]
 Friction = Annotated[keys.NotNegative, keys.Unit("N m")]

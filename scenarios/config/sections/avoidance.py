@@ -12,8 +12,8 @@ from hierarchy.avoidance import Barrier, Obstacle, Repulsion
 from hierarchy.problem import Array
 from hierarchy.words import listed
 from scenarios.config import sections as keys
-from scenarios.config.paths import PathSection, WaypointsSection
 from scenarios.config.sections import naming
+from scenarios.config.sections.paths import PathSection, WaypointsSection
 
 
 class RepulsionSection(keys.Section):

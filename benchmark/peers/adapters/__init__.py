@@ -1,0 +1,1 @@
+"""Packages of control and inverse kinematics as entrants: one module for each."""

@@ -1,0 +1,1 @@
+"""Tasks of joints: their limits, couplings, mechanisms and posture."""
