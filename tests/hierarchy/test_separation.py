@@ -92,6 +92,11 @@ def segments():
         yield np.array([shift, shift]), a[[0, 0]]
 
 
+def test_capsules_of_an_arm_on_a_moving_base_are_of_the_joints_behind_it():
+    fixed, moved = (link_capsules(TABLES["kuka_lwr"], 0.3, base=base) for base in (0, 2))
+    assert moved == tuple(replace(one, joint=one.joint + 2) for one in fixed)
+
+
 def test_distance_of_segments_is_the_least_there_is():
     """That of the best shares of both, between 0 and 1; of capsules without radius, at rest."""
     for a, b in segments():

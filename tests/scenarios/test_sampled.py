@@ -68,6 +68,14 @@ def test_a_wrong_file_is_refused_before_anything_is_run(parameters, changed, say
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_scenario_is_no_sweep_and_a_file_with_neither_is_an_incomplete_one(tmp_path):
+    path = tmp_path / "one.toml"
+    for text, said in (('extends = "ellipse"', "is a scenario, to be run by"),
+                       ('name = "one"', "samples: Field required")):
+        path.write_text(text)
+        refused(said, load_sweep, path)
+
+
 def test_every_shipped_sweep_can_be_planned_and_every_scenario_varies():
     for name in shipped_sweeps():
         small = load_sweep(name).model_copy(update={"samples": 2})
