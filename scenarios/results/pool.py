@@ -1,8 +1,7 @@
-"""Where runs are made side by side: processes of this machine, or workers on many.
+"""Processes of this machine that make runs side by side: each asks for the next as one ends.
 
-The processes each ask for the next run as one ends. They are fresh interpreters, so that a caller
-needs no main module that can be imported again, and one that dies costs only its own run. Only
-`ended_on_cluster` knows Dask.
+They are fresh interpreters, so that a caller needs no main module that can be imported again, and
+one that dies costs only its own run.
 """
 
 from __future__ import annotations
@@ -15,23 +14,17 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from threading import Event, Lock
+from threading import Event
 from typing import Any, final
 
-from hierarchy import plugins
-from hierarchy.errors import HierarchyError
-from scenarios.results.plan import Job, Outcome, digest
 from solvers.batch import cores
 
 Process = subprocess.Popen[bytes]
 
 _GIVEN_UP = object()  # what an interrupted job returns
 _TRIES = 2  # processes that may die of the same job
-_PATIENCE = 30.0  # [s] for a scheduler to answer and to have a worker
-_ONE_AT_A_TIME = Lock()  # the kernels' work arrays are shared by the threads of a worker
 _SERVE = "from scenarios.results.pool import serve; serve()"
 
 
@@ -133,53 +126,3 @@ def serve() -> None:
 def _interrupt_once(*_: object) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     raise KeyboardInterrupt
-
-
-class ClusterError(RuntimeError):
-    """The sweep cannot continue: the scheduler is lost, or a worker has another version."""
-
-
-def ended_on_cluster(work: Callable[[Job], Outcome], jobs: Sequence[Job], scheduler: str
-                     ) -> Iterator[tuple[Job, Outcome | None]]:
-    """Yield each job with its outcome as it ends on workers of the Dask scheduler at an address.
-
-    The outcome is None if a job killed its workers.
-
-    Raises
-    ------
-    HierarchyError : Dask is not installed, no scheduler answers, or it has no workers.
-    ClusterError : the scheduler is lost, or a worker has another version of the code.
-    """
-    try:
-        from distributed import Client, KilledWorker, as_completed
-    except ImportError as error:
-        raise HierarchyError("--scheduler needs dask.distributed: "
-                             "pip install 'task-hierarchy[sweep]'") from error
-    try:
-        client = Client(scheduler, timeout=_PATIENCE)
-    except (OSError, ValueError, TypeError) as error:
-        raise HierarchyError(f"no Dask scheduler answers at {scheduler}: {error}") from error
-    with client:
-        try:
-            client.wait_for_workers(1, timeout=_PATIENCE)
-        except TimeoutError:
-            raise HierarchyError(f"the Dask scheduler at {scheduler} has no workers") from None
-        futures = client.map(partial(_checked, work, digest()), jobs, pure=False)
-        job_of = {future.key: job for future, job in zip(futures, jobs, strict=True)}
-        for future in as_completed(futures):
-            broken = future.exception() if future.status == "error" else None
-            if future.status != "finished" and not isinstance(broken, KilledWorker):
-                raise ClusterError(f"{broken or 'the scheduler is lost'}; finished runs are kept")
-            yield job_of[future.key], None if broken else future.result()
-            future.release()
-
-
-def _checked(work: Callable[[Job], Outcome], versions: str, job: Job) -> Outcome:
-    """Run a job on a worker; raises ClusterError unless its code is that of the client."""
-    for module in job.plugins:
-        plugins.allow(module)
-    if digest() != versions:
-        raise ClusterError("a worker has other versions of task-hierarchy or its dependencies than "
-                           "this machine; install the same on both")
-    with _ONE_AT_A_TIME:
-        return work(job)

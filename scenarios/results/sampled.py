@@ -15,7 +15,7 @@ from hierarchy.words import listed
 from scenarios.config import Scenario, load
 from scenarios.files import finite, write_text
 from scenarios.measure.run_folder import versions
-from scenarios.results import pool
+from scenarios.results import cluster, pool
 from scenarios.results.columns import Results, results, verdict
 from scenarios.results.plan import Job, Outcome, Plan, Sweep, find, load_sweep, outcome, plan
 from scenarios.results.sampled_page import name_of, sampled_page, worst_runs
@@ -129,7 +129,7 @@ def complete(jobs: Sequence[Job], store: Store, workers: Workers, name: str,
     told = partial(progress or (lambda *_: None), name)
     told(begun, len(jobs))
     ended = (pool.ended(work, missing, workers.processes) if workers.scheduler is None else
-             pool.ended_on_cluster(work, missing, workers.scheduler))
+             cluster.ended(work, missing, workers.scheduler))
     for done, (job, found) in enumerate(ended, begun + 1):
         store.add(job, found or Outcome(job.key, 0, "Killed: every process that started this run "
                                         "died", float("nan")))

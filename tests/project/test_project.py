@@ -73,6 +73,7 @@ def test_make_says_what_is_missing_where_python_does_not_serve(interpreter, said
     ("import solvers, hierarchy as h; solvers.make('hcod').solve(h.Hierarchy.from_levels("
      "[([[1.0]], [1.0])]))", {"pinocchio", "matplotlib", "qpsolvers"}),
     ("import scenarios.cli.main", {"numpy", "numba", "pinocchio", "scipy", "matplotlib"}),
+    ("import scenarios.ahead.building", {"pydantic", "pinocchio"}),  # which `make` installs later
     ("import scenarios.cell.build", {"scipy.spatial", "matplotlib"}),
     ("from scenarios.cli.main import run_command; run_command(['--help'])",
      {"numpy", "numba", "pinocchio", "pydantic", "matplotlib"}),

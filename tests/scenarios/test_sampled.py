@@ -210,7 +210,7 @@ with Store(Path(sys.argv[1])).opened(): print(flush=True); time.sleep(60)"""
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("starts") / "out"
-    with mock.patch("scenarios.results.pool.ended_on_cluster"):  # which needs another package
+    with mock.patch("scenarios.results.cluster.ended"):  # which needs another package
         found = compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], 7, 3,
                                folder, workers=Workers(1))
     return found, json.loads((folder / "results.json").read_text()), folder
