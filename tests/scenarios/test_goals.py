@@ -229,3 +229,4 @@ def test_an_answer_that_the_resolver_does_not_give_is_not_blamed_on_the_rows():
 def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
     run = simulate(load("reach-torque-smooth").with_changes({"control.duration": 0.05}))
     assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
+    assert [jump.tick for jump in jumps(run, 1)] == [1]  # the first that has one before it

@@ -91,6 +91,7 @@ def test_a_violation_is_the_distance_to_the_rows_interval():
     ([([[np.inf, 0]], [1])], None, "A[0, 0] is inf"),
     ([(np.eye(2), [1, np.inf])], None, "level 1, row 1"),
     ([([[1, 0]], [np.inf], [np.inf])], None, "level 1, row 0"),
+    ([([[1, 0]], [-np.inf], [-np.inf])], None, "level 1, row 0"),
     ([(np.eye(2), [1])], None, "b has shape (1,), expected (2,)"),
     ([(np.eye(2), [1, 2]), (np.eye(3), [1, 2, 3])], None, "level 2: A has 3 columns"),
     ([(np.zeros((0, 0)), [])], None, "n = 0"), ([], None, "no levels"),
