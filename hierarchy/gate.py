@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, brief
+from hierarchy.errors import HierarchyError, brief, refuse
 
 Array = NDArray[np.float64]
 Sizes = NDArray[np.int64]
@@ -113,22 +113,23 @@ def check_rows(name: str, A: Array, lower: Array, upper: Array) -> None:
 
     Shapes: A (m_k, n), lower and upper (m_k,).
     """
-    if sound_rows(A, lower, upper):
-        return
     for row, column in np.argwhere(~np.isfinite(A))[:1]:
         raise HierarchyError(f"{name}, row {row}: A[{row}, {column}] is {A[row, column]}")
-    for side, values in (("lower", lower), ("upper", upper)):
-        for (row,) in np.argwhere(np.isnan(values))[:1]:
-            raise HierarchyError(f"{name}, row {row}: {side} is nan")
-    for (row,) in np.argwhere((lower > upper) | (lower == np.inf) | (upper == -np.inf))[:1]:
+    for (row,) in np.argwhere(_empty(lower, upper))[:1]:
+        for side, value in (("lower", lower[row]), ("upper", upper[row])):
+            refuse(np.isnan(value), f"{name}, row {row}: {side} is nan")
         raise HierarchyError(
             f"{name}, row {row}: no value lies between lower {lower[row]} and upper {upper[row]}")
 
 
 def sound_rows(A: Array, lower: Array, upper: Array) -> bool:
     """Whether A is finite and a value lies between the sides of every row."""
-    return bool(np.isfinite(A).all() and (lower <= upper).all() and (lower < np.inf).all()
-                and (upper > -np.inf).all())
+    return bool(np.isfinite(A).all()) and not _empty(lower, upper).any()
+
+
+def _empty(lower: Array, upper: Array) -> NDArray[np.bool_]:
+    """Whether no value lies between the sides of a row (m,), of which one may be NaN."""
+    return ~((lower <= upper) & (lower < np.inf) & (upper > -np.inf))
 
 
 def check_finite(what: str, values: Array) -> None:
