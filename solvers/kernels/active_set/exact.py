@@ -228,7 +228,6 @@ def answer(s, record, settings, work):
         restore(s)
         code, tries, level = pivot_one_by_one(s, current, saved, limit - steps, level)
         steps += tries
-        code = _verified(s, code, YES)
     if code == SOLVED and neglects(s):
         code, tries, more = _solve_with_light_rows(s, current, saved, limit - steps)
         steps, blocks = steps + tries + more, blocks + tries
@@ -261,7 +260,8 @@ def _pass(s, saved, settings, share, seeded, most, work):
     code, level = pass_through_levels(t, settings[TOLERANCE], limit, seeded)
     s.scalar[RANK] = declared
     save(s, saved, s.multiplier.shape[0] - 1 if code == SOLVED else level)
-    return _verified(s, code, NO), level, t.count[STEPS]
+    code = ZERO + (INACCURATE if code == SOLVED and not verify(s, NO) else code)
+    return code, level, t.count[STEPS]
 
 
 @internal
@@ -344,7 +344,6 @@ def _solve_with_light_rows(s, current, saved, limit):
     if code != SOLVED and tries < limit:
         restore(s)
         code, steps, _ = pivot_one_by_one(s, current, saved, limit - tries, ZERO)
-        code = _verified(s, code, YES)
     if code == SOLVED and length_of(s.x) <= largest:
         return code, tries, steps
     assign(s.x, saved)
@@ -416,12 +415,6 @@ def _resumed_at(number, levels):
     """Return the level at which an earlier search ended, -1 for none."""
     at = -2.0 - number if number <= -2.0 else number
     return np.int64(at) if 0.0 <= at < levels else ZERO - 1
-
-
-@inlined
-def _verified(s, code, factored):
-    """Return the code of a search: INACCURATE in place of SOLVED if its claims are no proof."""
-    return ZERO + (INACCURATE if code == SOLVED and not verify(s, factored) else code)
 
 
 @inlined

@@ -181,6 +181,7 @@ def _keep_sound(s):
 def pivot_one_by_one(s, current, saved, limit, level):
     """Let rows enter and leave one by one; return the code, the iterations, the last level.
 
+    SOLVED is verified; INACCURATE: nothing is wrong, but that is not verified.
     current (L + 1, m): scratch, the multipliers on the way. saved (n,): the x that met most levels.
     level: where an earlier search ended.
     """
@@ -210,11 +211,13 @@ def pivot_one_by_one(s, current, saved, limit, level):
         elif last < levels:
             save(s, saved, last)
             last, newest, fresh = _next_level(s, last), ZERO - 1, True
-        elif s.count[DIRTY] == 1 and clean < RESTORED and not verify(s, YES):
-            restore(s)  # free of what other working sets cut
+        elif verify(s, YES):
+            return ZERO + SOLVED, tries, last - 1
+        elif s.count[DIRTY] == 1 and clean < RESTORED:  # free of what other working sets cut
+            restore(s)
             newest, fresh, clean, recurred = ZERO - 1, True, clean + 1, ZERO
         else:
-            return ZERO + SOLVED, tries, last - 1
+            return ZERO + INACCURATE, tries, last - 1
     if accepted > 1:  # go on later from the last accepted set; if this step is long, from within
         _copy_states(s, SEED, STATE)
     return ZERO + UNPROVED, tries, last - 1

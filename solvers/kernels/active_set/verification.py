@@ -257,7 +257,7 @@ def _signs_hold(s, level, unsure, reach, allowed, met):
     """Whether no multiplier of level p points inward for a row that nothing has decided.
 
     unsure: those below it decide weakly. allowed: what may remain of the gradient, also where an
-    inward violation counts as zero.
+    inward violation counts as zero. met: whether the level is, which then refutes no sign.
     """
     mu, holds = s.multiplier[level.p], True
     for i in range(level.end):
