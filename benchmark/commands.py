@@ -33,10 +33,10 @@ Family = Annotated[list[str] | None, typer.Option(
 
 def _known(what: str, name: str | None, names: Any) -> None:
     """Raise UnknownNameError unless a name, if there is one, is among names."""
-    if name is not None and name not in names:
-        from hierarchy.errors import UnknownNameError
+    if name is not None:
+        from hierarchy.errors import check_name
 
-        raise UnknownNameError(what, name, list(names))
+        check_name(what, name, names)
 
 
 bench = typer.Typer(invoke_without_command=True, rich_markup_mode=None)

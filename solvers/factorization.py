@@ -11,7 +11,7 @@ import numpy as np
 from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, UnknownNameError, expect
+from hierarchy.errors import HierarchyError, check_name, expect
 from hierarchy.gate import Sizes, check_finite, check_rows, level_names, readable, shaped
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.staircase import solve_by_staircase
@@ -229,8 +229,7 @@ class Factorization:
 
     def _place(self, level: Level) -> int:
         if isinstance(level, str):
-            if level not in self.names:
-                raise UnknownNameError("level", level, self.names)
+            check_name("level", level, self.names)
             return self.names.index(level)
         if not isinstance(level, Integral) or not 0 <= level < len(self._levels):
             raise HierarchyError(f"index {level} is outside 0 .. {len(self._levels) - 1}")

@@ -18,8 +18,8 @@ from hierarchy.errors import (
     UnknownNameError,
     as_float,
     brief,
+    check_name,
     expect,
-    is_one_of,
     whole,
 )
 from hierarchy.jit import announce_compilation
@@ -69,8 +69,7 @@ def whole_number(default: int | None, least: int) -> Any:
 def one_of(*allowed: str) -> Any:
     """Return a field: a setting that is one of these, the first by default."""
     def check(resolver: Resolver, name: str, value: Any) -> None:
-        if not is_one_of(value, allowed):
-            raise UnknownNameError(f"{name} of {resolver.name}", value, allowed)
+        check_name(f"{name} of {resolver.name}", value, allowed)
 
     return dataclasses.field(default=allowed[0], metadata={_CHECK: check, _CHOICES: allowed})
 
@@ -138,8 +137,7 @@ class Resolver(ABC):
 
     def can_resolve(self, required: Handles) -> bool:
         """Whether the resolver accepts rows of the required kind."""
-        if required not in _KINDS:
-            raise UnknownNameError("kind of rows", required, _KINDS)
+        check_name("kind of rows", required, _KINDS)
         return _KINDS.index(required) <= _KINDS.index(self.handles)
 
     @property
@@ -345,6 +343,5 @@ def make(name: str, /, **settings: Any) -> Resolver:
     kind = _REGISTRY[name]
     known = [field.name for field in dataclasses.fields(kind)]
     for setting in settings:
-        if setting not in known:
-            raise UnknownNameError(f"setting of {name}", setting, known)
+        check_name(f"setting of {name}", setting, known)
     return kind(**settings)

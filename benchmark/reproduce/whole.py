@@ -9,7 +9,7 @@ from time import perf_counter
 from benchmark.reproduce import fronts, pages, protocol
 from benchmark.reproduce.blocks import POINTS, ROWS, Stored, every, said
 from benchmark.reproduce.protocol import PROTOCOL, Rows
-from hierarchy.errors import UnknownNameError, refuse
+from hierarchy.errors import check_name, refuse
 from scenarios.cli.options import INTERRUPTED
 from scenarios.cli.terminal import bar, print_json, shown
 from scenarios.files import make_folder, reason, write_json, write_text
@@ -34,8 +34,7 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
     """
     begun, known = perf_counter(), (NAME, TUNED, *pages.marked(pages.ROOT))
     for name in names:
-        if name not in known:
-            raise UnknownNameError("page", name, known)
+        check_name("page", name, known)
     asked = [name for name in known if name in names or not names]
     refuse(quick and NAME not in asked, f"--quick makes runs, and {', '.join(asked)} has the "
            "output of commands; leave --quick out")

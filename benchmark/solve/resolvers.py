@@ -19,7 +19,7 @@ from benchmark.solve.judge import RIGHT, SOLVED, WRONG, by, judged, summary
 from benchmark.solve.views import mark
 from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
-from hierarchy.errors import UnknownNameError
+from hierarchy.errors import check_name
 from hierarchy.problem import Hierarchy
 from scenarios.problems import recorded
 from scenarios.problems.recorded import FAMILIES
@@ -54,8 +54,7 @@ def field(wanted: Sequence[str] | None = None) -> tuple[list[Entrant], dict[str,
         are always there. Raises UnknownNameError.
     """
     for name in wanted or ():
-        if name not in names():
-            raise UnknownNameError("resolver", name, names())
+        check_name("resolver", name, names())
     chosen = [one for one in ENTRANTS if one.label in (NUMPY, HIERARCHICAL)]
     chosen += [one for one in ENTRANTS if one.adapter.endswith("ours:Ours") and (
         wanted is None or one.label.split("-")[0].split()[0] in wanted)]
@@ -76,8 +75,7 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
     """
     families = families or FAMILIES
     for name in families:
-        if name not in FAMILIES:
-            raise UnknownNameError("family", name, FAMILIES)
+        check_name("family", name, FAMILIES)
     entrants, missing = field(resolvers)
     rows, sections = list[Row](), list[Section]()
     for origin in (KNOWN,) if seed is None else (KNOWN, FRESH):

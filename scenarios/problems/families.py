@@ -17,7 +17,7 @@ from typing import final
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, UnknownNameError, is_one_of
+from hierarchy.errors import HierarchyError, check_name
 from hierarchy.problem import Array, Hierarchy
 from scenarios.files import named, written
 from scenarios.problems import made, recorded
@@ -72,8 +72,7 @@ class Family:
 
 def family(name: str) -> Family:
     """Return a family by name; raises UnknownNameError."""
-    if not is_one_of(name, FAMILIES):
-        raise UnknownNameError("family of problems", name, list(FAMILIES))
+    check_name("family of problems", name, FAMILIES)
     return FAMILIES[name]
 
 

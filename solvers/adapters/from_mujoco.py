@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, UnknownNameError, check_name
 from hierarchy.problem import Array
 
 if TYPE_CHECKING:
@@ -108,8 +108,7 @@ def limit_level(model: MjModel, data: MjData, period: float, velocity: float | A
 
 
 def _index(model: MjModel, name: str, kind: str) -> int:
-    if kind not in KINDS:
-        raise UnknownNameError("kind of frame", kind, KINDS)
+    check_name("kind of frame", kind, KINDS)
     named = getattr(model, kind)
     try:
         return int(named(name).id)

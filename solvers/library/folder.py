@@ -19,7 +19,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, final
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, check_name
 
 TARGETS = ("native", "x86_64", "aarch64")
 RESOLVERS = ("hcod", "tpm", "recursive", "sns", "merged")
@@ -86,11 +86,9 @@ def emitted(resolvers: Sequence[str], target: str, fix: Sequence[int] = ()) -> E
 
 def check(resolvers: Sequence[str], target: str, fix: Sequence[int] = ()) -> None:
     """Raise a HierarchyError for a wrong name or size, or a machine without objects in ELF."""
-    if target not in TARGETS:
-        raise UnknownNameError("target", target, TARGETS)
+    check_name("target", target, TARGETS)
     for name in resolvers:
-        if name not in RESOLVERS:
-            raise UnknownNameError("resolver of the C library", name, RESOLVERS)
+        check_name("resolver of the C library", name, RESOLVERS)
     if not resolvers:
         raise HierarchyError("a C library needs at least one resolver")
     if fix and ("hcod" not in resolvers or len(fix) != 3 or not 1 <= fix[0] <= _MOST_FIXED

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.archives import array_in, read_members
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, naming
 from hierarchy.problem import Hierarchy
 from solvers.proof import Proof
 
@@ -98,11 +98,9 @@ def read(path: str | Path) -> Collection:
     has one of a wrong type or length; its problems are not those that were written, or not valid.
     """
     head, arrays = _opened(Path(path))
-    try:
+    with naming(str(path), ProblemFileError, ValueError):
         problems = tuple(_unpacked(arrays))
         answers = _answers(arrays, problems) if head["answers"] else None
-    except ValueError as error:
-        raise ProblemFileError(f"{path}: {error}") from error
     if len(problems) != head["count"]:
         raise ProblemFileError(f"{path}: {len(problems)} problems where its {_HEAD} says "
                                f"{head['count']}")

@@ -8,7 +8,7 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import Any, final
 
-from hierarchy.errors import HierarchyError, UnknownNameError, is_one_of
+from hierarchy.errors import HierarchyError, check_name
 
 
 @final
@@ -57,8 +57,7 @@ def backend_of(name: str) -> Backend:
     UnknownNameError : no such backend.
     HierarchyError : it is not installed; names the package or extra to install.
     """
-    if not is_one_of(name, BACKENDS):
-        raise UnknownNameError("backend of hqp", name, BACKENDS)
+    check_name("backend of hqp", name, BACKENDS)
     backend = BACKENDS[name]
     if not installed(name):
         where = "task-hierarchy[scenarios]" if backend.core else "task-hierarchy[qp]"

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from hierarchy.errors import HierarchyError, UnknownNameError
+from hierarchy.errors import HierarchyError, check_name
 from hierarchy.problem import Array
 from scenarios.cell.sensors.camera import Pinhole
 from scenarios.config import load
@@ -85,8 +85,7 @@ def redraw(runs: Sequence[str | Path], style: str = "screen",
     HierarchyError : one of `runs` is not a run folder or is damaged, `style` is not in
         drawing.STYLES, `out` is missing or cannot be written, or there is nothing to draw.
     """
-    if style not in drawing.STYLES:
-        raise UnknownNameError("style", style, drawing.STYLES)
+    check_name("style", style, drawing.STYLES)
     if len(runs) > 1 and out is None:
         raise HierarchyError(f"figures of {len(runs)} runs belong to no run's folder: give --out")
     claimed = None if out is None else claim(out)
