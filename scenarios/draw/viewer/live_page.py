@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, check_name, number
+from hierarchy.errors import HierarchyError, UnknownNameError, number
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.pose import Pose
@@ -212,7 +212,8 @@ class LivePage:
 
 def named(what: str, name: Any, known: Collection[str]) -> str:
     """Return a name that is known; raises UnknownNameError for another."""
-    check_name(what, name, known)
+    if name not in known:
+        raise UnknownNameError(what, name, known)
     return str(name)
 
 
