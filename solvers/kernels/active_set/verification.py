@@ -156,7 +156,8 @@ def _balances(s, p, reach, factored):
     source, allowed = (reach if last else level.source), REMAINDER * reach
     if not last:
         allowed = REMAINDER * level.least * level.least * level.missed
-    clear = SIGN_ROUNDING * source <= allowed  # else heavy rows may round off a light one
+    # Else heavy rows may round off a light one; small pivots enlarge that.
+    clear = SIGN_ROUNDING * source <= allowed * (1.0 if last else s.scalar[PIVOT])
     if not (clear or factored):
         return met
     outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
@@ -167,7 +168,7 @@ def _balances(s, p, reach, factored):
         refine(s, p)
         outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
         rest = _beyond_rounding(s)
-    holds = (not outside and rest <= allowed and (clear or _is_clear(s, level))
+    holds = (not outside and rest <= allowed and (clear or _is_clear(s, level, reach))
              and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     left = length_of(s.number[GRADIENT, :s.x.size])
     error = SIGN_MARGIN * (left + rounding) / s.scalar[PIVOT]
@@ -183,10 +184,10 @@ def _balances(s, p, reach, factored):
 
 
 @inlined
-def _is_clear(s, level):
+def _is_clear(s, level, reach):
     """Whether no row rounds off the force of a far lighter one, in the column of this one.
 
-    Where pivots are small, a row that comes after has rounding there even if its entry is zero.
+    Where pivots are small, a row has rounding there even if its entry is zero.
     """
     clear, begin, end = True, s.index[BEGIN, level.p], s.index[BEGIN, level.p + 1]
     above, norms = s.index[RANK, level.p], s.number[NORM]
@@ -196,10 +197,10 @@ def _is_clear(s, level):
         norm, force = norms[s.index[LIST, own]], 0.0
         for q in range(begin, end):
             i = s.index[LIST, q]
-            if (s.W[q, t] != 0.0 or (q > own and rough)) and norms[i] > HEAVIER * norm:
+            if (s.W[q, t] != 0.0 or rough) and norms[i] > HEAVIER * norm:
                 force += abs(s.multiplier[level.p, i]) * norms[i]
         clear = clear and (SIGN_ROUNDING * force
-                           <= REMAINDER * norm * abs(s.W[own, t]) * level.missed)
+                           <= REMAINDER * max(level.missed, reach) * norm * abs(s.W[own, t]))
     return clear
 
 
