@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, internal
+from hierarchy.jit import compiled, inlined, inner_product, internal
 from solvers.kernels.active_set.exact import DAMPING, solve, work_size
-from solvers.kernels.linalg.rows import ZERO, all_equal, finish
+from solvers.kernels.linalg.rows import ZERO, all_equal, finish, only_entry
 from solvers.kernels.linalg.space import View, fill, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET
@@ -117,7 +117,7 @@ def _is_at_bound(A, lower, upper, sizes, x, record, work):
         if box.low[c] <= box.high[c]:
             x[c] = min(max(x[c], box.low[c]), box.high[c])
     for i in range(box.end):
-        c = _unknown(A, i)
+        c = only_entry(A[i])
         if record[c] == NONE and abs(inner[i]) == 1.0:
             record[c] = inner[i] if A[i, c] > 0.0 else -inner[i]
             x[c] = box.high[c] if record[c] > 0.0 else box.low[c]
@@ -145,22 +145,19 @@ def _refused(A, lower, upper, end):
     """
     sane, mixed, refused, bound = True, False, ZERO, ZERO
     for i in range(lower.size):
-        entries, square, entry = 0, 0.0, 1.0
-        for c in range(A.shape[1]):
-            entries += A[i, c] != 0.0
-            square += A[i, c] * A[i, c]
-            entry = A[i, c] if A[i, c] != 0.0 else entry
-        sane &= np.isfinite(square) and lower[i] <= upper[i]
+        only = only_entry(A[i])
+        single, entry = only >= 0, A[i, only] if only >= 0 else 1.0
+        sane &= np.isfinite(inner_product(A[i], A[i])) and lower[i] <= upper[i]
         sane &= lower[i] < np.inf and upper[i] > -np.inf
-        if i < end and entries == 1:
+        if i < end and single:
             sane &= np.isfinite(lower[i] / entry) or not np.isfinite(lower[i])
             sane &= np.isfinite(upper[i] / entry) or not np.isfinite(upper[i])
-        mixed |= i < end and entries != 1
+        mixed |= i < end and not single
         if lower[i] == upper[i]:
             continue
-        if i < end and entries == 1 and bound == 0:
+        if i < end and single and bound == 0:
             bound = -(ZERO + i + 1)
-        elif refused == 0 and (i >= end or entries != 1):
+        elif refused == 0 and (i >= end or not single):
             refused = -(ZERO + i + 1)
     if not sane:
         return ZERO + NUMERICAL_FAILURE
@@ -175,19 +172,10 @@ def _intersect(A, lower, upper, box):
     fill(box.low, -np.inf)
     fill(box.high, np.inf)
     for i in range(box.end):
-        c = _unknown(A, i)
+        c = only_entry(A[i])
         one, other = lower[i] / A[i, c], upper[i] / A[i, c]
         box.low[c] = max(box.low[c], min(one, other))
         box.high[c] = min(box.high[c], max(one, other))
-
-
-@inlined
-def _unknown(A, i):
-    """Return the unknown of a bound."""
-    c = 0
-    while A[i, c] == 0.0:
-        c += 1
-    return c
 
 
 @inlined

@@ -24,11 +24,13 @@ from solvers.kernels.linalg.rows import (
     YES,
     ZERO,
     factor_level,
+    inequalities_hold,
     length_of,
+    only_entry,
     reflect,
     reflect_back,
 )
-from solvers.kernels.linalg.space import Block, View, integers, matrix, shared, vector
+from solvers.kernels.linalg.space import Block, View, assign, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET, SATURATES
 from solvers.status import NUMERICAL_FAILURE
@@ -91,17 +93,15 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
         for i in range(first, first + sizes[k]):
             _copy_row(d, A, lower, upper, i)
             if lower[i] == upper[i]:
-                for c in range(x.size):
-                    d.E[count, c] = A[i, c]
+                assign(d.E[count], A[i])
                 d.b[count] = lower[i]
                 count += 1
         d.ends[k], first = count - begin, first + sizes[k]
         fixed = fixed or bool(count > begin and _are_bounds(d, A, first, k))
-    for c in range(x.size):
-        d.free[c] = x[c]
+    assign(d.free, x)
     E, b = d.E[:count], d.b[:count]
     code = solve_by_staircase(E, b, b, d.ends, d.free, settings, work)
-    if code == NUMERICAL_FAILURE or (not fixed and _is_met(d, A, lower, upper)):
+    if code == NUMERICAL_FAILURE or (not fixed and inequalities_hold(A, lower, upper, d.free)):
         return True, code
     _factor_equalities(d, A, sizes, settings, work, YES)
     _take_out_exceeded(d, E, A, lower, upper, x)
@@ -112,8 +112,7 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
 @inlined
 def _copy_row(d, A, lower, upper, i):
     """Write row i of the hierarchy."""
-    for c in range(A.shape[1]):
-        d.A[i, c] = A[i, c]
+    assign(d.A[i], A[i])
     d.lower[i], d.upper[i] = lower[i], upper[i]
 
 
@@ -122,20 +121,8 @@ def _are_bounds(d, A, last, k):
     """Whether level k, which ends at row `last`, has bounds alone: they are not damped."""
     bounds = d.ends[k] < d.sizes[k]
     for i in range(last - d.sizes[k], last):
-        entries = 0
-        for c in range(A.shape[1]):
-            entries += A[i, c] != 0.0
-        bounds = bounds and entries <= 1
+        bounds = bounds and (only_entry(A[i]) >= 0 or not A[i].any())
     return bounds
-
-
-@inlined
-def _is_met(d, A, lower, upper):
-    """Whether the x of the equalities meets all inequalities."""
-    met = True
-    for i in range(lower.size):
-        met &= lower[i] == upper[i] or lower[i] <= inner_product(A[i], d.free) <= upper[i]
-    return met
 
 
 @inlined
@@ -160,8 +147,7 @@ def _factor_equalities(d, A, sizes, settings, work, whole):
     for k in range(sizes.size):
         end, last = begin + d.ends[k], first + sizes[k]
         for e in range(begin, end):
-            for c in range(n):
-                rows.W[e, c] = d.E[e, c]
+            assign(rows.W[e], d.E[e])
             rows.zero[e] = (settings.rank_tolerance * length_of(d.E[e])) ** 2
         reflect(basis, ZERO, rank, rows.W, begin, end)
         above, rank = rank, factor_level(rows, basis, begin, end, rank)
@@ -190,8 +176,7 @@ def damp_level(d, k):
         d.lower[end + t] = d.factor[k] * d.free[t]
     for q in range(begin, begin + d.ranks[k]):
         add_multiple(d.lower[end:end + n], -d.factor[k] * inner_product(d.Q[q], d.free), d.Q[q])
-    for t in range(n):
-        d.upper[end + t] = d.lower[end + t]
+    assign(d.upper[end:end + n], d.lower[end:])
     return end
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product, internal
 from solvers.kernels.active_set.exact import DAMPING, solve, work_size
-from solvers.kernels.linalg.rows import ZERO
+from solvers.kernels.linalg.rows import ZERO, only_entry
 from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, vector
 from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
 
@@ -155,7 +155,7 @@ def _merge(s, A, lower, upper, sizes, strict, y, damped):
             y[i] = min(max(y[i], -cap), cap) if np.isfinite(y[i]) else 0.0
             moved, weight = y[i], 1.0
             if k >= strict:
-                weight, only = s.weights[k], _only_entry(A[i])
+                weight, only = s.weights[k], only_entry(A[i])
                 if only >= 0 and lower[i] == upper[i]:
                     s.own[only] = 1.0
                 if only < 0 and _repeats(A, lower, upper, i, hard):
@@ -174,18 +174,6 @@ def _merge(s, A, lower, upper, sizes, strict, y, damped):
 def _cap(s, sizes, k, strict):
     """Return how far the sides of level k may move; strict rows and the lowest level have none."""
     return s.caps[k] if strict <= k < sizes.size - 1 else 0.0
-
-
-@inlined
-def _only_entry(a):
-    """Return the unknown that a row names alone, -1 if it has none or several."""
-    only = ZERO - 1
-    for c in range(a.size):
-        if a[c] != 0.0 and only >= 0:
-            return ZERO - 1
-        if a[c] != 0.0:
-            only = ZERO + c
-    return only
 
 
 @inlined

@@ -9,6 +9,7 @@ from solvers.kernels.linalg.rows import (
     ZERO,
     all_equal,
     factor_level,
+    inequalities_hold,
     length_of,
     reflect,
     reflect_back,
@@ -52,7 +53,7 @@ def plainly_met(A, lower, upper, offsets, least):
                 return False
             assign(x[0], y)
             reflect_back(basis, rank, x, ZERO, ZERO + 1)
-        if not _within(A, lower, upper, x[0], end):
+        if not inequalities_hold(A[:end], lower[:end], upper[:end], x[0]):
             return False
     return True
 
@@ -68,12 +69,3 @@ def _is_short(rows, mu, first, end, above, least):
         of_multiplier += mu[i] ** 2
         square += inner_product(rows.W[i], rows.W[i])
     return least * np.sqrt(square) * np.sqrt(of_multiplier) <= 1.0
-
-
-@compiled
-def _within(A, lower, upper, x, m):
-    """Whether the inequalities among the first m rows hold at x."""
-    held = True
-    for i in range(m):
-        held &= lower[i] == upper[i] or lower[i] <= inner_product(A[i], x) <= upper[i]
-    return held

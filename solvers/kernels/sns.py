@@ -17,10 +17,12 @@ from hierarchy.jit import compiled, inlined, inner_product, internal
 from solvers.kernels.linalg.block import solve_level
 from solvers.kernels.linalg.rows import (
     ZERO,
+    all_finite,
     factor_level,
     finish,
     load_rows,
     make_reflector,
+    only_entry,
     reflect,
     reflect_back,
 )
@@ -198,13 +200,10 @@ def _read_box(A, lower, upper, bounds, space, record):
         low, up = lower[i], upper[i]
         if not low <= up or low == np.inf or up == -np.inf:
             return NUMERICAL_FAILURE
-        at, entries = 0, 0
-        for c in range(A.shape[1]):
-            if not np.isfinite(A[i, c]):
-                return NUMERICAL_FAILURE
-            if A[i, c] != 0.0:
-                at, entries = c, entries + 1
-        if entries != 1:
+        at = only_entry(A[i])
+        if not all_finite(A[i]):
+            return NUMERICAL_FAILURE
+        if at < 0:
             return -((i if low < up else refused) + 1)
         low, up = low / A[i, at], up / A[i, at]
         space.low[at] = max(min(low, up), space.low[at])

@@ -48,7 +48,7 @@ from solvers.kernels.damping import (
     open_damped,
 )
 from solvers.kernels.linalg.rows import NO, YES, ZERO, all_equal, finish, length_of
-from solvers.kernels.linalg.space import assign, matrix, vector
+from solvers.kernels.linalg.space import assign, fill, matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import (
     BAND,
@@ -143,8 +143,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
         rows, levels = end + (0 if k > last else n), min(k + 1, sizes.size)
         if k <= last:
             d.sizes[k] += n
-        for i in range(3 * rows + 3):
-            inner[i] = 0.0
+        fill(inner[:3 * rows + 3], 0.0)
         assign(x, reference)
         code = solve_hierarchy(d.A[:rows], d.lower[:rows], d.upper[:rows], d.sizes[:levels], x,
                                inner[:3 * rows + 3], limits, work[at:])

@@ -30,6 +30,7 @@ from solvers.kernels.active_set.tableau import (
 )
 from solvers.kernels.active_set.working_set import NORM, TOLERANCE, side_at
 from solvers.kernels.linalg.least_squares import least_squares
+from solvers.kernels.linalg.space import fill
 from solvers.kernels.tolerances import CANCELLED, EPSILON, FAINT
 
 
@@ -91,8 +92,7 @@ def weigh_rows(t):
             worst = max(worst, over / around(s, i, side, t.scalar[SCALE]))
     if not missed:
         worst = pulled = 0.0
-        for q in range(t.count[ROWS]):
-            s.number[OVER, q] = 0.0
+        fill(s.number[OVER, :t.count[ROWS]], 0.0)
     t.scalar[WORST], t.scalar[PULLED] = worst, pulled
     length = worst * t.scalar[SCALE]
     share = min(EPSILON * t.scalar[SIZE] / length, 1.0) if length > 0.0 else 0.0

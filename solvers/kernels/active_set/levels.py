@@ -90,6 +90,7 @@ from solvers.kernels.active_set.working_set import (
     side_at,
 )
 from solvers.kernels.linalg.rows import ZERO, length_of
+from solvers.kernels.linalg.space import assign, fill
 from solvers.kernels.tolerances import (
     CANCELLED,
     FLOOR,
@@ -166,15 +167,12 @@ def _start(t, seeded):
         s.index[ACTED, i] = s.index[STATE, i]
         if s.index[STATE, i] != EQUAL:
             s.index[STATE, i] = FREE
-    for c in range(0 if seeded else s.x.size):
-        s.x[c] = 0.0
-    for c in range(t.count.size):
-        t.count[c] = 0
-    for c in range(t.scalar.size):
-        t.scalar[c] = 0.0
+    if not seeded:
+        fill(s.x, 0.0)
+    fill(t.count, ZERO)
+    fill(t.scalar, 0.0)
     for p in range(s.multiplier.shape[0]):
-        for i in range(s.A.shape[0]):
-            s.multiplier[p, i] = 0.0
+        fill(s.multiplier[p], 0.0)
     open_tableau(t)
 
 
@@ -187,8 +185,7 @@ def _sets_goal(t, k):
         whole = t.count[FIX] < s.x.size and gives_all(s, k, s.number[GOAL], s.number[STEP])
         t.scalar[WEIGHT] = s.number[NORM, s.index[FIRST, k]] ** 2 if whole else 1.0
         return whole
-    for c in range(s.x.size):
-        s.number[GOAL, c] = s.number[REFERENCE, c]
+    assign(s.number[GOAL, :s.x.size], s.number[REFERENCE])
     t.scalar[WEIGHT] = 1.0
     return True
 
@@ -232,8 +229,7 @@ def _begin(t, k, last, whole, tolerance):
 def _write_multipliers(t, k, whole):
     """Write the multipliers in level k of all rows that own a basis vector."""
     s, end, largest = t.of, t.count[FIX] + t.count[HARD], 0.0
-    for c in range(end):
-        s.number[PULL, c] = 0.0
+    fill(s.number[PULL, :end], 0.0)
     if whole:
         _pull_of_goal(t, ZERO, end)
     for i in range(0 if whole else s.index[FIRST, k], 0 if whole else s.index[FIRST, k + 1]):
@@ -335,8 +331,7 @@ def _write_step(t, rank):
     """
     x, p, z, size, square = t.of.x, t.of.number[STEP], t.of.number[Z], t.scalar[REACH], 0.0
     begin, base = t.count[FIX] + t.count[HARD], t.count[BASE]
-    for c in range(x.size):
-        p[c] = 0.0
+    fill(p[:x.size], 0.0)
     for r in range(begin, begin + rank):
         size = max(size, abs(z[r]))
         add_multiple(p[:x.size], z[r], t.M[r, base:])

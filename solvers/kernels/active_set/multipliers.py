@@ -45,7 +45,7 @@ from solvers.kernels.active_set.working_set import (
 )
 from solvers.kernels.linalg.least_squares import turn
 from solvers.kernels.linalg.rows import length_of, reflect
-from solvers.kernels.linalg.space import matrix
+from solvers.kernels.linalg.space import fill, matrix
 from solvers.kernels.tolerances import CANCELLED, EPSILON, FAINT, NEGLIGIBLE, SHADOW
 from solvers.status import EQUAL
 
@@ -61,17 +61,14 @@ def write_multipliers(s, tolerance):
     levels, whole = s.multiplier.shape[0] - 1, s.count[WHOLE]
     reach = length_of(s.x) + SHADOW * s.scalar[SIZE]
     for p in range(levels + 1):
-        for i in range(s.A.shape[0]):
-            s.multiplier[p, i] = 0.0
+        fill(s.multiplier[p], 0.0)
     last = levels if whole < 0 else whole
     for k in range(last):
         _write_violations(s, k, reach, tolerance)
-    for p in range(last):
-        if _pull(s, p, reach):
-            _balance(s, p, p)
     weight = _write_distances(s, whole) if whole >= 0 else 1.0
-    if _pull_of_goal(s, last, weight, reach):
-        _balance(s, levels if whole < 0 else whole, last)
+    for p in range(last + 1):
+        if _pull(s, p, reach) if p < last else _pull_of_goal(s, last, weight, reach):
+            _balance(s, p)
 
 
 @inlined
@@ -139,8 +136,7 @@ def _add_rows(s, k, least, reach, far):
     """
     begin, end, above = s.index[BEGIN, k], s.index[BEGIN, k + 1], s.index[RANK, k]
     total, square, short = s.number[SCRATCH], 0.0, s.index[SHORT, k] == 1
-    for t in range(s.x.size if short else 0):
-        total[t] = 0.0
+    fill(total[:s.x.size if short else 0], 0.0)
     for q in range(begin, end):
         i, force = s.index[LIST, q], s.number[FORCE, q]
         norm = s.number[NORM, i]
@@ -201,10 +197,10 @@ def _write_forces(s, last):
 
 
 @inlined
-def _balance(s, p, last):
-    """Write the multipliers in level p of the rows of the levels before `last`, and their signs."""
-    _write_forces(s, last)
-    for q in range(s.index[BEGIN, last]):
+def _balance(s, p):
+    """Write the multipliers in level p of the rows of the levels above, and their signs."""
+    _write_forces(s, p)
+    for q in range(s.index[BEGIN, p]):
         i, force = s.index[LIST, q], s.number[FORCE, q]
         if force != 0.0:
             s.multiplier[p, i] = force
@@ -227,8 +223,7 @@ def _substitute(s, begin, end, above):
 def _share(s, begin, end, above, rank):
     """Write the shortest forces of a level of dependent rows."""
     force = s.number[FORCE]
-    for q in range(begin, end):
-        force[q] = 0.0
+    fill(force[begin:end], 0.0)
     T, _ = matrix(s.T, above * s.W.shape[0], rank - above, end - begin)
     for k in range(rank - above):
         pull, unsure = s.number[GRADIENT, above + k], s.number[NOISE, above + k]

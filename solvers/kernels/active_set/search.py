@@ -44,7 +44,7 @@ from solvers.kernels.active_set.working_set import (
     value_at,
 )
 from solvers.kernels.linalg.rows import YES, ZERO, length_of
-from solvers.kernels.linalg.space import View, assign
+from solvers.kernels.linalg.space import View, assign, fill
 from solvers.kernels.tolerances import (
     MET,
     RECURRENCES,
@@ -74,14 +74,12 @@ def judge(s, last, newest):
     """
     wrong, leaving, most, worst = ZERO, ZERO, ZERO - 1, 0.0
     reach = length_of(s.x) + SHADOW * s.scalar[SIZE]
-    for i in range(s.A.shape[0]):
-        s.index[CHANGE, i] = 0
+    fill(s.index[CHANGE], ZERO)
     for q in range(s.index[BEGIN, s.multiplier.shape[0] - 1]):
         i = s.index[LIST, q]
         if s.index[SIGN, q] == INWARD and i == newest:
             s.index[SIGN, q] = UNDECIDED
-            for p in range(s.multiplier.shape[0]):
-                s.multiplier[p, i] = 0.0
+            fill(s.multiplier[:, i], 0.0)
         elif s.index[SIGN, q] == INWARD:
             s.index[CHANGE, i] = LEAVES
             leaving += 1
@@ -188,8 +186,7 @@ def pivot_one_by_one(s, current, saved, limit, level):
     levels, last, newest, fresh = (
         s.multiplier.shape[0] - 1, _next_level(s, max(level, 0)), ZERO - 1, True)
     clean, accepted, tries, recurred = ZERO, ZERO, ZERO, ZERO
-    for i in range(s.A.shape[0]):
-        s.index[ENTERED, i] = 0
+    fill(s.index[ENTERED], ZERO)
     while tries < limit:
         tries += 1
         recurred = _count_recurrences(s, last, tries, recurred)
@@ -272,21 +269,14 @@ def _release_all(s):
 def _enter(s, current, newest):
     """Let a row enter; rows that nothing holds at their side leave."""
     for p in range(current.shape[0]):
-        for i in range(current.shape[1]):
-            current[p, i] = s.multiplier[p, i]
+        assign(current[p], s.multiplier[p])
     for q in range(s.index[BEGIN, current.shape[0] - 1]):
         i = s.index[LIST, q]
         if s.index[SIGN, q] == UNDECIDED and s.index[ENTERED, i] < RELEASED:
             s.index[STATE, i] = FREE
-            _forget(current, i)
+            fill(current[:, i], 0.0)
     s.index[STATE, newest] = s.index[CHANGE, newest]
     s.index[ENTERED, newest] += 1
-
-
-@inlined
-def _forget(current, i):
-    for p in range(current.shape[0]):
-        current[p, i] = 0.0
 
 
 @inlined
@@ -302,8 +292,7 @@ def _release_first(s, current):
             _write_share(current[:, i], s.multiplier[:, i], k, other)
             if blocking < 0 or _is_less(other, share):
                 blocking = i
-                for p in range(levels + 1):
-                    share[p] = other[p]
+                assign(share, other)
     k = 0
     for q in range(s.index[BEGIN, levels]):
         while s.index[BEGIN, k + 1] <= q:
@@ -315,7 +304,7 @@ def _release_first(s, current):
                 change += share[j] * (s.multiplier[p - j, i] - current[p - j, i])
             current[p, i] += change
     s.index[STATE, blocking] = FREE
-    _forget(current, blocking)
+    fill(current[:, blocking], 0.0)
 
 
 @inlined

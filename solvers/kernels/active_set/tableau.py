@@ -33,7 +33,7 @@ from solvers.kernels.active_set.working_set import (
     note_pivot,
 )
 from solvers.kernels.linalg.rows import ZERO, swap
-from solvers.kernels.linalg.space import View, assign, integers, matrix, vector
+from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CLEAR_SQUARE, FLOOR, NEGLIGIBLE
 from solvers.status import EQUAL
 
@@ -95,16 +95,14 @@ def open_tableau(t):
     s, M, base = t.of, t.M, t.M.shape[1] - t.of.x.size
     at = base
     for r in range(s.x.size):
-        for c in range(base, M.shape[1]):
-            M[r, c] = 0.0
+        fill(M[r, base:], 0.0)
         M[r, base + r] = 1.0
     for i in range(s.A.shape[0]):
         s.index[COLUMN, i] = base + s.index[UNIT, i] if s.index[UNIT, i] >= 0 else -1
         if s.index[COLUMN, i] < 0 and s.index[STATE, i] == EQUAL:
             at -= 1
             s.index[COLUMN, i], s.index[ROW, at] = at, i
-            for c in range(s.x.size):
-                M[c, at] = s.A[i, c]
+            assign(M[:, at], s.A[i])
     t.count[BASE], t.count[TURNING] = base, at
 
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, inlined, inner_product, internal
 from solvers.kernels.linalg.least_squares import substitute_back, triangularise, turn
-from solvers.kernels.linalg.rows import ZERO, factor_level, reflect, swap
-from solvers.kernels.linalg.space import Rows, View, integers, matrix, vector
+from solvers.kernels.linalg.rows import ZERO, factor_level, only_entry, reflect, swap
+from solvers.kernels.linalg.space import Rows, View, assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE, SPARED
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
@@ -207,19 +207,10 @@ def rescale(s, lower, upper, scaled):
 @inlined
 def _measure(s, i):
     """Note the only entry of a row of A, if it has one; return the square of its norm."""
-    a, entries, only, square = s.A[i], ZERO, ZERO, 0.0
-    for c in range(a.size):
-        entries += a[c] != 0.0
-    if entries == 1:
-        while a[only] == 0.0:
-            only += 1
-        square = a[only] * a[only]
-    elif entries > 1:
-        square = inner_product(a, a)
-    s.index[UNIT, i] = only if entries == 1 else -1
-    s.number[ENTRY, i] = a[only] if entries == 1 else 0.0
-    s.number[CUT, i] = 0.0
-    return square
+    a, only = s.A[i], only_entry(s.A[i])
+    s.index[UNIT, i], s.number[CUT, i] = only, 0.0
+    s.number[ENTRY, i] = entry = a[only] if only >= 0 else 0.0
+    return entry * entry if only >= 0 else inner_product(a, a)
 
 
 @internal
@@ -279,8 +270,7 @@ def meet(s, last):
         if k >= last or s.count[WHOLE] >= 0:
             continue
         if gives_all(s, k, s.number[GRADIENT], s.number[SCRATCH]):
-            for c in range(s.x.size):
-                s.number[GOAL, c] = s.number[GRADIENT, c]
+            assign(s.number[GOAL, :s.x.size], s.number[GRADIENT])
             s.count[WHOLE] = k
             continue
         s.count[FACTORED] = k + 1
@@ -336,8 +326,7 @@ def gives_all(s, k, goal, seen):
     first, n, last = s.index[FIRST, k], s.x.size, s.index[FIRST, k + 1]
     if last - first != n:
         return False
-    for c in range(n):
-        seen[c] = 0.0
+    fill(seen[:n], 0.0)
     for i in range(first, last):
         c = s.index[UNIT, i]
         if (c < 0 or s.index[STATE, i] != EQUAL or s.number[NORM, i] != s.number[NORM, first]
@@ -368,8 +357,7 @@ def _factor(s, begin, end, rank, short):
         i = listed[q]
         least = s.scalar[TOLERANCE] * s.number[NORM, i]
         s.number[ZEROED, q] = least * least
-        for t in range(s.x.size):
-            s.W[q, t] = 0.0
+        fill(s.W[q], 0.0)
         add_row(s, i, 1.0, s.W[q])
     if short:
         _see_in_columns(s, begin, end, rank)
@@ -445,8 +433,7 @@ def _pick(s, begin, end, rank):
             swap(listed, q, first)
     for q in range(begin, end):
         i = s.index[LIST, q]
-        for t in range(rank):
-            s.W[q, t] = 0.0
+        fill(s.W[q, :rank], 0.0)
         s.W[q, place[s.index[UNIT, i]]] = s.number[ENTRY, i]
     s.count[PICKED] = rank
     return rank
@@ -477,8 +464,7 @@ def _solve(s, begin, end, above, rank, short):
     """Write y of the columns above .. rank - 1, and the residuals of a level."""
     y, miss = s.number[Y], s.number[MISS]
     if short:
-        for t in range(above, s.x.size):
-            y[t] = 0.0
+        fill(y[above:s.x.size], 0.0)
         _write_x(s, above)
     for q in range(begin, end):
         i, w = s.index[LIST, q], s.W[q]
@@ -501,8 +487,7 @@ def _solve(s, begin, end, above, rank, short):
             y[t] = s.number[DIAGONAL, t]
             s.scalar[SIZE] = max(s.scalar[SIZE], abs(miss[begin + t - above] / y[t]))
         substitute_back(T, miss[begin:], y[above:])
-        for q in range(begin, begin + rank - above):
-            miss[q] = 0.0
+        fill(miss[begin:begin + rank - above], 0.0)
         turn(T, miss[begin:], True)
         s.scalar[SIZE] = max(s.scalar[SIZE], _compromise(s, begin, end))
     for t in range(above, rank):
@@ -541,15 +526,13 @@ def _keep_goal(s, rank):
         for t in range(n):
             goal[t] = s.number[SCRATCH, order[t]]
         reflect(s.basis, picked, rank, s.number, GOAL, GOAL + 1)
-    for t in range(rank, n):
-        s.number[Y, t] = goal[t]
+    assign(s.number[Y, rank:n], goal[rank:])
 
 
 @inlined
 def _write_x(s, rank):
     """Write x = Q y, by the first reflectors."""
-    for t in range(s.x.size):
-        s.number[SCRATCH, t] = s.number[Y, t]
+    assign(s.number[SCRATCH, :s.x.size], s.number[Y])
     for k in range(rank - 1, s.count[PICKED] - 1, -1):
         reflect(s.basis, k, k + 1, s.number, SCRATCH, SCRATCH + 1)
     for t in range(s.x.size):

@@ -70,6 +70,26 @@ def all_equal(lower, upper):
 
 
 @inlined
+def inequalities_hold(A, lower, upper, x):
+    """Whether x meets all rows that are no equalities."""
+    hold = True
+    for i in range(lower.size):
+        hold &= lower[i] == upper[i] or lower[i] <= inner_product(A[i], x) <= upper[i]
+    return hold
+
+
+@inlined
+def only_entry(a):
+    """Return the unknown that a row names alone, -1 if it has none or several."""
+    entries, only = ZERO, ZERO
+    for c in range(a.size):
+        entries += a[c] != 0.0
+    while entries == 1 and a[only] == 0.0:
+        only += 1
+    return only if entries == 1 else ZERO - 1
+
+
+@inlined
 def largest_row(W, zero, i0, i1, c0):
     """Return the row of i0 .. i1 - 1 with the largest norm from column c0 on, and its square.
 
