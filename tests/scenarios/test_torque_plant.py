@@ -40,6 +40,17 @@ def test_without_contact_it_accelerates_as_the_robots_model(seed):
     assert np.abs(accelerations(plant, torques) - expected).max() < 1e-3 * np.abs(expected).max()
 
 
+def test_gravity_is_that_of_the_robots_file(tmp_path):
+    (tmp_path / "moon.xml").write_text(
+        '<mujoco><option gravity="0.5 0 -1.62"/><worldbody><body><joint axis="0 1 0"/>'
+        '<geom size=".1" pos=".3 0 .1"/></body></worldbody></mujoco>')
+    robot = Robot.load(tmp_path / "moon.xml")
+    plant = TorqueRobot(robot, Contacts(robot, ()), np.zeros(1), section=plant_with(**IDEAL))
+    plant.act(np.zeros(1))
+    expected = pin.aba(robot.model, robot.model.createData(), *np.zeros((3, 1)))
+    np.testing.assert_allclose(plant.a, expected, rtol=1e-3)
+
+
 def test_torques_arrive_late_by_the_delay_and_are_cut_off_at_their_limits():
     q, v, _ = in_the_air(8)
     plant = TorqueRobot(ROBOT, CONTACTS, q, v, section=plant_with(delay=0.002))
