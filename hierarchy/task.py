@@ -101,7 +101,7 @@ class Task(ABC):
             cls.__eq__ = _equal  # type: ignore[method-assign]
         for name in _OF_STATE:
             if name in vars(cls):
-                setattr(cls, name, _of_state(vars(cls)[name]))
+                setattr(cls, name, _of_state(vars(cls)[name], name in ("measure", "writer")))
 
     def __post_init__(self) -> None:
         """Check what the task was made with; raises HierarchyError.
@@ -266,15 +266,30 @@ def check_parts(task: Task) -> None:
         raise HierarchyError(f"task {task.name!r}: needs at least one control point")
 
 
-def _of_state(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a method of a task that refuses anything but a State in place of one."""
+def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:
+    """Return a method of a task that refuses anything but a State in place of one.
+
+    One that binds a kernel, which looks at no index, refuses the state of another robot.
+    """
     @wraps(method)
     def checked(self: Task, state: State, *rest: Any, **named: Any) -> Any:
         if not isinstance(state, State):
             expect(f"task {self.name!r}: state", state, State, "make one with State.at(robot, q)")
+        if binds:
+            _check_robot(self, state.robot)
         return method(self, state, *rest, **named)
 
     return checked
+
+
+def _check_robot(task: Task, robot: Robot) -> None:
+    for name, value in vars(task).items():
+        what, own = f"task {task.name!r}: {name}", getattr(value, "robot", value)
+        if isinstance(own, Robot):
+            robot.check_same(what, own)
+        for part in value if isinstance(value, list | tuple) else (value,):
+            if isinstance(joint := getattr(part, "joint", None), int):
+                robot.check_joint(what, joint)
 
 
 def _equal(one: Any, other: Any) -> bool:
