@@ -305,6 +305,8 @@ def test_level_after_level_as_quadratic_programs_is_what_hcod_finds(seed):
 def test_a_problem_needs_a_level_that_is_there_and_what_the_levels_above_reach():
     h = made_hierarchy(0)
     for asked, said in (([9], "level 9: the hierarchy has levels 0 to 4"),
-                        ([2], "level 2: above must be"),
+                        ([None], "level_problem: level = None: expected a whole number"),
+                        ([2, "x"], "above is not an array of numbers: str 'x'"),
+                        ([2], "level 2: above must be the x (7,) of the levels"),
                         ([2, np.full(7, np.nan)], "level 2: above must be")):
         refused(said, level_problem, h, *asked)
