@@ -145,6 +145,7 @@ class Contacts:
                    "this name")
             refuse(contact.frame.joint == 0, f"contact {contact.name!r}: no joint moves frame "
                    f"{contact.frame.name!r}")
+            self.robot.check_joint(f"contact {contact.name!r}", contact.frame.joint)
         frames = [contact.frame for contact in contacts for _ in contact.points]
         offsets = [contact.frame.offset + contact.frame.rotation @ np.array(point, dtype=float)
                    for contact in contacts for point in contact.points]
@@ -200,12 +201,14 @@ class Contacts:
 
     def torques(self, state: State, x: ArrayLike) -> Array:
         """Torques M a + h - J_c^T f (n,) [N m or N] of the actuated joints that an x takes."""
+        self.robot.check_same("contacts: state", state.robot)
         torques = np.empty(self.robot.n - self.robot.actuated)
         _write_torques(*state.dynamics, state.kinematics, self.points, self._checked(x), torques)
         return torques
 
     def jacobian(self, state: State) -> Array:
         """Jacobian J_c (3 p, n) of all contact points [m], world axes."""
+        self.robot.check_same("contacts: state", state.robot)
         J = np.empty((3 * len(self.points.joints), state.n))
         _write_jacobian(state.kinematics, self.points, J)
         return J

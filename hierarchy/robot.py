@@ -245,6 +245,17 @@ class Robot:
         check_name("joint", name, self.joint_names)
         return self.joint_names.index(name) + 1
 
+    def check_joint(self, what: str, joint: int) -> None:
+        """Raise a RobotError for the index of a joint that the robot does not have."""
+        if not 0 <= joint < len(self.parents):
+            raise RobotError(f"{what} is on joint {joint}, and robot {self.name!r} has "
+                             f"{len(self.parents) - 1} joints: it is of another robot")
+
+    def check_same(self, what: str, robot: Robot) -> None:
+        """Raise a RobotError for another robot, which has other joints."""
+        if robot is not self and robot.joint_names != self.joint_names:
+            raise RobotError(f"{what} is of robot {robot.name!r}, not of {self.name!r}")
+
     def coordinate(self, name: str) -> int:
         """Index in q of the position of the joint called `name`; RobotError if it has several.
 

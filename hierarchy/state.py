@@ -202,6 +202,8 @@ class State:
         if isinstance(frame, str):
             return self.robot.frame(frame)
         expect("frame", frame, Frame, "make one with robot.frame(name)")
+        if frame.joint >= len(self.placements):
+            self.robot.check_joint(f"frame {frame.name!r}", frame.joint)
         return frame
 
     def _placement(self, joint: int) -> tuple[Array, Array]:

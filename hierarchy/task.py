@@ -101,7 +101,7 @@ class Task(ABC):
             cls.__eq__ = _equal  # type: ignore[method-assign]
         for name in _OF_STATE:
             if name in vars(cls):
-                setattr(cls, name, _of_state(vars(cls)[name]))
+                setattr(cls, name, _of_state(vars(cls)[name], name in ("measure", "writer")))
 
     def __post_init__(self) -> None:
         """Check what the task was made with; raises HierarchyError.
@@ -208,19 +208,21 @@ def check_gains(task: Task, rows: int | None = None) -> None:
                f"{gain} has the shape {sides.shape}, expected a number or ({rows},)")
 
 
-def check_period(task: Task, period: float) -> None:
-    """Raise a HierarchyError unless a task suits a velocity that is held for `period` [s].
+def check_period(task: Task, period: float, level: Level = "velocity") -> None:
+    """Raise a HierarchyError unless a task suits commands that are held for `period` [s].
 
     A period of the task, or of one in it, is that one, and its error must not grow by itself: after
-    a tick it is 1 - gain period times what it was, so gain period is at most 2.
+    a tick it is 1 - gain period times what it was, so gain period is at most 2. So is, at the other
+    levels, damping period, for the rate of the error.
     """
+    what, of = ("gain", "error") if level == "velocity" else ("damping", "rate")
     for part in (task, *parts(task)):
         own = getattr(part, "period", period)
         refuse(abs(own - period) > _ROUNDING * period, f"task {part.name!r}: its period is "
-               f"{own:g} s, that of the velocity {period:g} s; give both the same")
-        gain = np.max(np.asarray(part.gain, dtype=float), initial=0.0)
-        refuse(gain * period > 2.0 * (1.0 + _ROUNDING), f"task {part.name!r}: gain = {gain:g} 1/s "
-               f"times the period of {period:g} s is {gain * period:g}; above 2 its error grows "
+               f"{own:g} s, that of the commands {period:g} s; give both the same")
+        gain = np.max(np.asarray(getattr(part, what), dtype=float), initial=0.0)
+        refuse(gain * period > 2.0 * (1.0 + _ROUNDING), f"task {part.name!r}: {what} = {gain:g} 1/s"
+               f" times the period of {period:g} s is {gain * period:g}; above 2 its {of} grows "
                f"from tick to tick, so give at most {2.0 / period:g} 1/s")
 
 
@@ -266,15 +268,30 @@ def check_parts(task: Task) -> None:
         raise HierarchyError(f"task {task.name!r}: needs at least one control point")
 
 
-def _of_state(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a method of a task that refuses anything but a State in place of one."""
+def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:
+    """Return a method of a task that refuses anything but a State in place of one.
+
+    One that binds a kernel, which looks at no index, refuses the state of another robot.
+    """
     @wraps(method)
     def checked(self: Task, state: State, *rest: Any, **named: Any) -> Any:
         if not isinstance(state, State):
             expect(f"task {self.name!r}: state", state, State, "make one with State.at(robot, q)")
+        if binds:
+            _check_robot(self, state.robot)
         return method(self, state, *rest, **named)
 
     return checked
+
+
+def _check_robot(task: Task, robot: Robot) -> None:
+    for name, value in vars(task).items():
+        what, own = f"task {task.name!r}: {name}", getattr(value, "robot", value)
+        if isinstance(own, Robot):
+            robot.check_same(what, own)
+        for part in value if isinstance(value, list | tuple) else (value,):
+            if isinstance(joint := getattr(part, "joint", None), int):
+                robot.check_joint(what, joint)
 
 
 def _equal(one: Any, other: Any) -> bool:

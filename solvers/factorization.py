@@ -86,6 +86,7 @@ class Factorization:
 
         Raises HierarchyError: it has a metric, or levels that give.
         """
+        expect("Factorization.of: h", h, Hierarchy, "make one with Hierarchy.from_levels")
         h.refuse_extras("the hierarchy", "a factorization")
         return cls([A for A, _, _ in h.levels()], h.names, h.n, settings)
 

@@ -2,7 +2,7 @@
 
 Of each package that is installed, or of the folders given instead, every MJCF is compared with
 MuJoCo and every URDF with pinocchio's own parser: joints, masses and limits, and in three
-configurations the places of all bodies, sites or frames and the mass matrix.
+configurations the places of all bodies, sites or frames, the mass matrix and gravity.
 """
 
 import sys
@@ -121,6 +121,7 @@ def _same_at(model: Any, joints: list[int], robot: Robot, generator: np.random.G
     for row, unit in zip(M, np.eye(model.nv), strict=True):
         mujoco.mj_mulM(model, data, row, unit)
     T = block_diag(*turns)
+    _same("gravity", state.dynamics.h, T.T @ data.qfrc_bias[dofs])
     _same("mass matrix", state.dynamics.M, T.T @ M[np.ix_(dofs, dofs)] @ T)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from hierarchy.errors import RobotError
 from hierarchy.robots.found import Coupled
-from hierarchy.words import some
+from hierarchy.words import listed, some
 
 Element = ElementTree.Element
 
@@ -192,8 +192,9 @@ def _of_link(link: Element) -> Iterator[str]:
         yield from _unread(collision, "origin", 3, xyz="0 0 0", rpy="0 0 0")
         for shape in collision.findall("geometry/*"):
             yield from (f"its {shape.tag} has {key} = {shape.get(key)!r}"
-                        for key in ("radius", "length") if shape.get(key) is not None
-                        and not (numbers_in(str(shape.get(key)), 1) or (-1.0,))[0] >= 0.0)
+                        for key, count in (("radius", 1), ("length", 1), ("size", 3))
+                        if shape.get(key) is not None
+                        and not min(numbers_in(str(shape.get(key)), count) or (-1.0,)) >= 0.0)
 
 
 def _of_tree(root: Element, links: list[str]) -> Iterator[str]:
@@ -272,24 +273,33 @@ def remarks(root: Element) -> Iterator[str]:
              if joint.get("type") == "planar" and joint.find("axis") is None]
     if plain:
         yield f"axes of the planar joints {some(plain)}: their planes are normal to x by default"
-    moments = {name_of(link): _least_moment(link) for link in root.findall("link")}
-    for sign, what in ((-1.0, "negative, which no body has"),
-                       (0.0, "zero, though the link has a mass")):
-        if names := [name for name, found in moments.items() if found == sign]:
+    flaws = {name_of(link): _flaw(link) for link in root.findall("link")}
+    for what in (_NEGATIVE, _ZERO, _LARGE):
+        if names := [name for name, flaw in flaws.items() if flaw == what]:
             yield f"inertias of {some(names)}: a principal moment is {what}"
+    passive = [key for key in ("damping", "friction") for joint in root.findall("joint")
+               if numbers_in(attribute_of(joint, "dynamics", key) or "0", 1) not in ([0.0], None)]
+    if passive:
+        yield f"{listed(list(dict.fromkeys(passive)))} of joints: not in the equations of motion"
 
 
-def _least_moment(link: Element) -> float:
-    """Return the sign of the least principal moment of a link; 1 without an inertia or a mass."""
+_NEGATIVE, _ZERO = "negative, which no body has", "zero, though the link has a mass"
+_LARGE = "larger than the sum of the others, which no body has"
+
+
+def _flaw(link: Element) -> str:
+    """Return what is wrong with the principal moments of a link; "" without an inertia."""
     inertia = link.find("inertial/inertia")
     numbers = None if inertia is None else numbers_in(
         " ".join(inertia.get(key, "") for key in _INERTIA), len(_INERTIA))
     if numbers is None:
-        return 1.0  # the parser says so
+        return ""  # the parser says so
     xx, xy, xz, yy, yz, zz = numbers
     moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     mass = numbers_in(attribute_of(link, "inertial/mass", "value") or "", 1) or [0.0]
     rounding = _ROUNDING * float(np.abs(moments).max())
     if abs(moments[0]) <= rounding:
-        return 0.0 if mass[0] > 0.0 else 1.0
-    return float(np.sign(moments[0]))
+        return _ZERO if mass[0] > 0.0 else ""
+    if moments[0] < 0.0:
+        return _NEGATIVE
+    return _LARGE if moments[2] > moments[0] + moments[1] + rounding else ""

@@ -61,13 +61,12 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
     last = posture if scenario.posture and scenario.posture.role == "task" else None
     tasks = [*first, *(task for task in avoiding if task not in moved),
              *(task for task in (position, pointing, *listed, last) if task)]
-    if scenario.control.level == "velocity":
-        for task in tasks:
-            check_period(task, scenario.control.period)
+    reference = _reference(scenario, at, None if last else posture)
+    for task in (*tasks, *((reference,) if reference else ())):
+        check_period(task, scenario.control.period, scenario.control.level)
     return Tasks(tasks, first if areas else [*first, *avoiding], position, pointing, limits,
                  tuple(task for task in listed if task not in moved), areas,
-                 _reference(scenario, at, None if last else posture),
-                 {task.title: task.give for task in scenario.tasks if task.give})
+                 reference, {task.title: task.give for task in scenario.tasks if task.give})
 
 
 def _first(scenario: Scenario, at: References) -> tuple[kinds.JointLimits | None, list[Task]]:

@@ -2,7 +2,9 @@
 
 The unknown is the velocity (nv,), in MuJoCo's order. The data must be up to date for its qpos: call
 `mj_forward`, or `mj_kinematics` and `mj_comPos`. Each `_level` function returns a level for
-`Hierarchy.from_levels`: `(A, b)` or `(A, lower, upper)`.
+`Hierarchy.from_levels`: `(A, b)` or `(A, lower, upper)`. It raises a HierarchyError, naming the
+argument, for a gain below zero, a target or a velocity of another shape or that is not finite, and
+for a rotation that is none.
 """
 
 from __future__ import annotations
@@ -12,7 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, UnknownNameError, check_name
+from hierarchy.errors import (
+    HierarchyError,
+    UnknownNameError,
+    check_name,
+    finite_numbers,
+    number,
+    positive,
+    refuse,
+)
+from hierarchy.gate import array_of, check_rotation
 from hierarchy.problem import Array
 
 if TYPE_CHECKING:
@@ -48,7 +59,8 @@ def position_level(model: MjModel, data: MjData, name: str, target: ArrayLike, g
     """
     position, _ = frame(model, data, name, kind)
     return (jacobian(model, data, name, kind)[:3],
-            np.asarray(velocity, float) + gain * (_shaped("target", target, (3,)) - position))
+            finite_numbers("velocity [m/s]", velocity, 3)
+            + _gain(gain) * (finite_numbers("target [m]", target, 3) - position))
 
 
 def orientation_level(model: MjModel, data: MjData, name: str, target: ArrayLike, gain: float,
@@ -60,11 +72,12 @@ def orientation_level(model: MjModel, data: MjData, name: str, target: ArrayLike
     import mujoco
 
     _, rotation = frame(model, data, name, kind)
-    error = _shaped("target", target, (3, 3)) @ rotation.T
+    check_rotation("target", target)
+    error = np.array(target, dtype=float) @ rotation.T
     quaternion, vector = np.empty(4), np.empty(3)
     mujoco.mju_mat2Quat(quaternion, error.ravel())
     mujoco.mju_quat2Vel(vector, quaternion, 1.0)
-    return jacobian(model, data, name, kind)[3:], gain * vector
+    return jacobian(model, data, name, kind)[3:], _gain(gain) * vector
 
 
 def posture_level(model: MjModel, data: MjData, target: ArrayLike, gain: float
@@ -74,8 +87,8 @@ def posture_level(model: MjModel, data: MjData, target: ArrayLike, gain: float
 
     difference = np.empty(model.nv)
     mujoco.mj_differentiatePos(model, difference, 1.0, data.qpos,
-                               _shaped("target", target, (model.nq,)))
-    return np.eye(model.nv), gain * difference
+                               finite_numbers("target", target, model.nq))
+    return np.eye(model.nv), _gain(gain) * difference
 
 
 def limit_level(model: MjModel, data: MjData, period: float, velocity: float | ArrayLike = np.inf
@@ -90,10 +103,10 @@ def limit_level(model: MjModel, data: MjData, period: float, velocity: float | A
     """
     import mujoco
 
-    fastest = np.broadcast_to(np.asarray(velocity, dtype=float), model.nv)
-    if not (period > 0.0 and (fastest > 0.0).all()):
-        raise HierarchyError(f"limits: period {period} s and velocity {velocity!r} must be "
-                             "positive")
+    period, given = positive("limits: period [s]", period), array_of("limits: velocity", velocity)
+    refuse(given.shape not in ((), (model.nv,)) or not (given > 0.0).all(), "limits: velocity "
+           f"{velocity!r}: expected a number > 0, or {model.nv} of them")
+    fastest = np.broadcast_to(given, model.nv)
     single = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
     lower, upper = -fastest, fastest.copy()
     for joint in range(model.njnt):
@@ -112,13 +125,10 @@ def _index(model: MjModel, name: str, kind: str) -> int:
     named = getattr(model, kind)
     try:
         return int(named(name).id)
-    except KeyError:
+    except (KeyError, TypeError):
         names = [named(i).name for i in range(getattr(model, f"n{kind}"))]
         raise UnknownNameError(kind, name, [known for known in names if known]) from None
 
 
-def _shaped(what: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    array = np.array(value, dtype=float)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise HierarchyError(f"{what} must be {shape} finite numbers, got {value!r}")
-    return array
+def _gain(value: float) -> float:
+    return number("gain [1/s]", value, 0.0)

@@ -23,7 +23,15 @@ import numpy as np
 from numpy.linalg import norm
 
 from hierarchy.archives import read_arrays
-from hierarchy.errors import HierarchyError, expect, file_path
+from hierarchy.errors import (
+    HierarchyError,
+    expect,
+    file_path,
+    finite_numbers,
+    number,
+    refuse,
+    whole,
+)
 from hierarchy.problem import Array, Hierarchy
 from solvers.problems.kinds import Random, happens
 
@@ -43,7 +51,7 @@ class Recipe:
     inequalities: ties (a side exactly at x*), one_sided, sideless. docs/problem-files.md
     defines each.
 
-    Raises HierarchyError for an empty range or a chance outside 0..1.
+    Raises HierarchyError for an empty range, a chance outside 0..1, or another type.
     """
 
     joints: tuple[int, int] = (1, 60)
@@ -69,15 +77,16 @@ class Recipe:
     def __post_init__(self) -> None:
         least = {"joints": 1, "levels": 1, "rows": 0, "angles": 0.0, "scales": 0.0}
         for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
+            what, value = f"recipe: {field.name}", getattr(self, field.name)
             if field.name in least:
-                valid = least[field.name] <= value[0] <= value[1] < np.inf
+                low, high = finite_numbers(what, value, 2)
+                refuse(not least[field.name] <= low <= high, f"{what} = {value!r} is out of range")
+            elif field.name == "equalities_only":
+                expect(what, value, bool, "give True or False")
             elif field.name == "spread":
-                valid = 1.0 <= value < np.inf
+                number(what, value, 1.0)
             else:
-                valid = 0.0 <= value <= 1.0
-            if not valid:
-                raise HierarchyError(f"recipe: {field.name} = {value!r} is out of range")
+                number(what, value, 0.0, 1.0)
 
 
 ANY = Recipe()
@@ -86,7 +95,8 @@ _MORE = ("metric", "give")  # what a file has of the hierarchies that have it
 
 def generate(seed: int, recipe: Recipe = ANY) -> Hierarchy:
     """Return the hierarchy of a seed, reproducibly."""
-    rng = np.random.default_rng(seed)
+    expect("generate: recipe", recipe, Recipe, "give Recipe()")
+    rng = np.random.default_rng(whole("generate: seed", seed))
     n = _whole(rng, recipe.joints)
     count = _whole(rng, recipe.levels)
     rows = (max(recipe.rows[0], min(1, recipe.rows[1])), recipe.rows[1])

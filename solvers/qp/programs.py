@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect, whole
+from hierarchy.gate import array_of
 from hierarchy.problem import Array, Hierarchy
 from solvers.qp.backends import Backend
 from solvers.qp.refinement import Rows, split
@@ -128,6 +129,7 @@ def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None, *,
     Raises HierarchyError: no such level; `above` missing, of a wrong shape or not finite; a metric
     or levels that give.
     """
+    expect("level_problem: h", h, Hierarchy, "make one with Hierarchy.from_levels")
     h.refuse_extras("the hierarchy", "level_problem")
     x = _checked(h, level, above)
     m = int(h.offsets[level])
@@ -144,10 +146,11 @@ def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None, *,
 
 def _checked(h: Hierarchy, level: int, above: ArrayLike | None) -> Array:
     """Return `above` as an array (n,), or raise a HierarchyError."""
-    if not 0 <= level <= len(h.sizes):
+    if whole("level_problem: level", level) > len(h.sizes):
         raise HierarchyError(f"level {level}: the hierarchy has levels 0 to {len(h.sizes) - 1}, "
                              f"and {len(h.sizes)} for its reference")
-    x = np.zeros(h.n) if above is None and level == 0 else np.asarray(above, dtype=float)
+    x = np.zeros(h.n) if above is None and level == 0 else array_of(
+        "above", () if above is None else above)
     if x.shape != (h.n,) or not np.isfinite(x).all():
         raise HierarchyError(f"level {level}: above must be the x ({h.n},) of the levels above, "
                              f"finite, got {above!r}")

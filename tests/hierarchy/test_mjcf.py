@@ -55,6 +55,8 @@ KINDS = {
         f"<body><joint/>{GEOM}</body></body>"),
     "names in common": world(
         f'<body name="a"><joint name="a" pos=".1 0 0"/>{GEOM}<site name="a" pos="0 0 .2"/></body>'),
+    "on the moon, tilted": world(link("a"), '<option gravity="1 0 -1.62"/>'),
+    "without gravity": world(WALKER, '<option><flag gravity="disable"/></option>'),
     "a frame around": world(f'<frame pos="0 .1 0" euler="0 0 20">{link("a")}</frame>'),
     "copies": world(link("a", more=f'<replicate count="3" offset="0 .2 0" euler="0 0 30">'
                                    f"{link('b')}</replicate>")),
@@ -201,6 +203,11 @@ def test_couplings_are_polynomials_of_positions(written):
         np.testing.assert_allclose(residual(path, q), 0.0, atol=1e-12)
     held = Robot.load(path, locked={"b_joint": 0.3}).coupled[0]
     np.testing.assert_allclose(held.coefficients, [np.polyval(one.coefficients[::-1], 0.3)])
+    off = path.read_text().replace("<equality>", '<option><flag equality="disable"/></option>'
+                                   "<equality>")
+    robot = Robot.load(written(off[len("<mujoco>"):-len("</mujoco>")]))
+    assert not robot.coupled
+    assert any(said.startswith("equalities that are not active") for said in robot.missing)
 
 
 def test_tendons_that_keep_their_length_couple_their_joints(written):

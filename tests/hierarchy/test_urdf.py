@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from refusals import refused
 from scipy.spatial.transform import Rotation
-from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape
+from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape, urdf
 
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
@@ -111,8 +111,11 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
     ({"arm": INERTIAL.replace("0.4", "-0.4")}, "inertias of arm: a principal moment is negative"),
     ({"arm": '<inertial><mass value="1"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>'
              "</inertial>"}, "inertias of arm: a principal moment is zero, though"),
-    ({"arm": '<collision><geometry><box size="1 2"/></geometry></collision>'},
-     "collision of arm cannot be read: Parser found 2 elements"),
+    ({"arm": INERTIAL.replace("0.4", "1.4")}, "inertias of arm: a principal moment is larger than"),
+    ({"limit": LIMIT + '<dynamics damping="0" friction="0.1"/>'},
+     "friction of joints: not in the equations of motion"),
+    ({"arm": '<collision><geometry><sphere/></geometry></collision>'},
+     "collision of arm cannot be read: Sphere shape must have a radius"),
     ({"arm": INERTIAL.replace("0.4", "${x}")}, "the macros ${x} stand for is not in the robot"),
     ({"more": '<xacro:gripper side="left"/>'}, "the macros <xacro:gripper> stand for"),
     ({"more": '<x:gripper xmlns:y="" side="left"/>', "root": ' xmlns:x="http://wiki.ros.org/xacro"'},
@@ -152,6 +155,8 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
     ("a.xml", "<mujocoinclude/>", "give the file that includes it"),
     ("a.toml", "name = 'a'", r"A scenario is read by scenarios\.load"),
     ("a.urdf", "<robot/>", "its <robot> has no name"),
+    ("a.urdf", urdf(link("a", shape('<box size="1 -1 1"/>'))),
+     "link 'a': its box has size = '1 -1 1'"),
     ("a.urdf", "<robot name='r'><link name='table'/></robot>", "with base = 'floating'")])
 def test_another_file_is_refused_with_what_to_give(tmp_path, name, text, said):
     (tmp_path / name).write_text(text)

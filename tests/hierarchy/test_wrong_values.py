@@ -22,7 +22,7 @@ from hierarchy.robots import TABLES, link_capsules
 
 NAN, INF = float("nan"), float("inf")
 A, B = np.eye(2), np.ones(2)
-FOOT = HUMANOID.frame("left_foot")
+FOOT, PALM = (HUMANOID.frame(f"left_{name}") for name in ("foot", "hand"))
 STATE = State.at(ROBOT, [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0])
 BARE = State.at(Robot.load(Path(__file__).parents[2] / "examples/robots/so101.urdf"), [0.0] * 5)
 THERE = Still([0.3, 0.5, 0.1])
@@ -50,6 +50,16 @@ def limits(**settings):
     (lambda: tasks.JointLimits("kuka_lwr", 10.0, 0.01), "give Robot.load('kuka_lwr')"),
     (lambda: Stack(["position"]), "a stack: expected a Task, got str 'position'"),
     (lambda: Stack([HAND]).hierarchy(ROBOT), "state: expected a State, got Rob"),
+    (lambda: STATE.position(PALM), "frame 'left_hand' is on joint 22, and robot 'kuka_lwr' has 7"),
+    (lambda: tasks.Position(PALM, THERE).error(STATE), "task 'position': frame is on joint"),
+    (lambda: Stack([tasks.Position(PALM, THERE)]).hierarchy(STATE), "has 7 joints: it is of ano"),
+    (lambda: Stack([tasks.CentreOfMass(HUMANOID, THERE)]).hierarchy(STATE),
+     "task 'centre of mass': robot is of robot 'humanoid', not of 'kuka_lwr'"),
+    (lambda: tasks.Avoidance(HUMANOID.control_points).jacobian(STATE), "points is on joint"),
+    (lambda: tasks.Friction(CONTACTS).rows(STATE), "contacts is of robot 'humanoid'"),
+    (lambda: Contacts(ROBOT, [Contact(PALM)]), "contact 'left_hand' is on joint"),
+    (lambda: CONTACTS.jacobian(STATE), "contacts: state is of robot"),
+    (lambda: CONTACTS.torques(STATE, np.zeros(CONTACTS.unknowns)), "contacts: state is of robot"),
     (lambda: tasks.TorqueLimits(ROBOT, "all"), "torque limits': fraction = 'all': expected a num"),
     (lambda: tasks.TorqueStep(ROBOT, A), "'torque step': step = array"),
     (lambda: tasks.Separation(POINTS, KEPT, 1.5), "obstacles = 1.5: expected a whole number"),

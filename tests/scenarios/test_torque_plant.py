@@ -6,8 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 import pytest
+from refusals import refused
 from scipy.spatial.transform import Rotation
 from standing import IDEAL, ROBOT, accelerations, feet, moving_state
+from urdf_text import INERTIAL, joint, link
 
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
@@ -38,6 +40,26 @@ def test_without_contact_it_accelerates_as_the_robots_model(seed):
     expected = pin.aba(ROBOT.model, ROBOT.model.createData(), q, v, np.r_[np.zeros(6), torques])
     plant = TorqueRobot(ROBOT, CONTACTS, q, v, section=plant_with(**IDEAL))
     assert np.abs(accelerations(plant, torques) - expected).max() < 1e-3 * np.abs(expected).max()
+
+
+def test_gravity_is_that_of_the_robots_file(tmp_path):
+    (tmp_path / "moon.xml").write_text(
+        '<mujoco><option gravity="0.5 0 -1.62"/><worldbody><body><joint axis="0 1 0"/>'
+        '<geom size=".1" pos=".3 0 .1"/></body></worldbody></mujoco>')
+    robot = Robot.load(tmp_path / "moon.xml")
+    plant = TorqueRobot(robot, Contacts(robot, ()), np.zeros(1), section=plant_with(**IDEAL))
+    plant.act(np.zeros(1))
+    expected = pin.aba(robot.model, robot.model.createData(), *np.zeros((3, 1)))
+    np.testing.assert_allclose(plant.a, expected, rtol=1e-3)
+
+
+def test_a_robot_whose_inertia_no_body_has_is_named(tmp_path):
+    arm = link("arm", INERTIAL.replace("0.4", "1.4"))
+    (tmp_path / "flat.urdf").write_text(f'<robot name="flat">{link("base")}{arm}' + joint(
+        "only", "revolute", "base", "arm") + "</robot>")
+    robot = Robot.load(tmp_path / "flat.urdf")
+    refused("plant: MuJoCo refuses robot 'flat'", TorqueRobot, robot, Contacts(robot, ()),
+            np.zeros(1), section=plant_with(), error=ScenarioError)
 
 
 def test_torques_arrive_late_by_the_delay_and_are_cut_off_at_their_limits():

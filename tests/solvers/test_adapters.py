@@ -262,6 +262,21 @@ def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
     assert (np.abs(data.qpos) <= 2.0).all()
 
 
+@pytest.mark.parametrize(("level", "settings", "said"), [
+    ("position", {"target": "abc"}, "target [m]: expected 3 finite numbers, got str 'abc'"),
+    ("position", {"target": [0, 0, 1], "velocity": (0, 0)}, "velocity [m/s]: expected 3 finite"),
+    ("orientation", {"target": 2.0 * np.eye(3)}, "target: expected a rotation matrix (3, 3), but"),
+    ("posture", {"target": np.zeros(4), "gain": np.nan}, "gain [1/s] = nan: expected a finite"),
+    ("limit", {"period": 0.01, "velocity": [1.0, 2.0]}, "expected a number > 0, or 4 of them"),
+    ("limit", {"period": None}, "limits: period [s] = None: expected a finite number"),
+    ("position", {"name": None, "target": [0, 0, 1]}, "unknown body None")])
+def test_a_wrong_argument_of_a_level_out_of_mujoco_is_named(arm, level, settings, said):
+    _, adapter, model, data = arm
+    own = {"position": {"name": "lower", "gain": 1.0}, "posture": {"gain": 1.0}, "limit": {},
+           "orientation": {"name": "lower", "gain": 1.0}}[level]
+    refused(said, getattr(adapter, f"{level}_level"), model, data, **own | settings)
+
+
 # --- qpsolvers ----------------------------------------------------------------------------------
 def made_hierarchy(seed):
     """Seven joints in their box, then equalities, inequalities that contradict each other, more."""
@@ -290,6 +305,8 @@ def test_level_after_level_as_quadratic_programs_is_what_hcod_finds(seed):
 def test_a_problem_needs_a_level_that_is_there_and_what_the_levels_above_reach():
     h = made_hierarchy(0)
     for asked, said in (([9], "level 9: the hierarchy has levels 0 to 4"),
-                        ([2], "level 2: above must be"),
+                        ([None], "level_problem: level = None: expected a whole number"),
+                        ([2, "x"], "above is not an array of numbers: str 'x'"),
+                        ([2], "level 2: above must be the x (7,) of the levels"),
                         ([2, np.full(7, np.nan)], "level 2: above must be")):
         refused(said, level_problem, h, *asked)

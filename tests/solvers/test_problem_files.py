@@ -163,9 +163,10 @@ def test_a_metric_and_levels_that_give_cannot_be_written(tmp_path, what, said):
 
 @pytest.mark.parametrize(("knob", "value"), [
     ("joints", (0, 5)), ("joints", (5, 2)), ("rows", (-1, 3)), ("spread", 0.5), ("ties", 1.5),
-    ("scales", (1.0, np.inf)), ("empty", float("nan"))])
+    ("scales", (1.0, np.inf)), ("empty", float("nan")),
+    ("joints", None), ("equalities_only", 1)])
 def test_a_knob_out_of_range_is_named(knob, value):
-    refused(f"recipe: {knob} = ", Recipe, **{knob: value})
+    refused(f"recipe: {knob}", Recipe, **{knob: value})
 
 
 @settings(max_examples=50, deadline=None, derandomize=True)

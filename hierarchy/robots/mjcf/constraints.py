@@ -12,7 +12,7 @@ from numpy.polynomial import Polynomial
 from hierarchy.problem import Array
 from hierarchy.robots.found import Coupled, Loop
 from hierarchy.robots.mjcf.model import Built, add_frame, address, armature, joint_actuators, pose
-from hierarchy.robots.mjcf.part import WORLD, Compiled, Part, name_of
+from hierarchy.robots.mjcf.part import WORLD, Compiled, Part, disabled, name_of
 from hierarchy.words import each, listed, some
 
 _FREE: Array = np.array([-np.inf, np.inf])
@@ -96,6 +96,8 @@ def left_out(part: Part) -> Iterator[str]:
                "friction": mj.dof_frictionloss}
     if found := [what for what, values in passive.items() if np.any(values)]:
         yield f"{listed(found)} of joints: not in the equations of motion"
+    if mj.opt.density or mj.opt.viscosity:
+        yield "drag of the air or fluid around: not in the equations of motion"
 
 
 def refuse(file: Compiled) -> None:
@@ -191,7 +193,7 @@ def loops(built: Built) -> tuple[tuple[Loop, ...], list[str]]:
                     found.append(Loop(name, ends, kind == _WELD))
             elif any(joints):
                 said.append(f"equality {name!r} is left out: a body of it is not of the robot")
-    idle = [_name(mj, i) for i in range(mj.neq) if not mj.eq_active0[i]]
+    idle = [_name(mj, i) for i in range(mj.neq) if not _acts(mj, i)]
     others = [name for kind in set(mj.eq_type.tolist()) - {_CONNECT, _WELD, _JOINT}
               for name, i in _active(mj, kind) if kind != _TENDON or not _fixed(mj, i)]
     said += each(("equalities that are not active are left out", idle),
@@ -201,7 +203,11 @@ def loops(built: Built) -> tuple[tuple[Loop, ...], list[str]]:
 
 def _active(mj: Any, kind: int) -> Iterator[tuple[str, int]]:
     yield from ((_name(mj, i), i) for i in range(mj.neq)
-                if mj.eq_type[i] == kind and mj.eq_active0[i])
+                if mj.eq_type[i] == kind and _acts(mj, i))
+
+
+def _acts(mj: Any, i: int) -> bool:
+    return bool(mj.eq_active0[i]) and not disabled(mj, "equality")
 
 
 def _name(mj: Any, i: int) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from hierarchy.problem import Array
 from hierarchy.robots.from_table import ROOT
 from hierarchy.robots.library import pin
-from hierarchy.robots.mjcf.part import SIZES, WORLD, Part, rolled
+from hierarchy.robots.mjcf.part import SIZES, WORLD, Part, disabled, rolled
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,8 @@ def build(part: Part) -> Built:
     """Build the model: joints, inertias, armature, gravity and frames, but no limits."""
     mj, built = part.compiled.model, Built(part, pin.Model())
     built.model.name = str(part.compiled.file)
-    built.model.gravity.linear = np.array(mj.opt.gravity)
+    weight = 0.0 if disabled(mj, "gravity") else 1.0
+    built.model.gravity.linear = weight * np.array(mj.opt.gravity)
     base = 0
     if part.on_base:
         base = _add(built.model, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT)

@@ -89,6 +89,13 @@ def _in_one_line(text: str) -> str:
     return " ".join(text.removeprefix("Error: ").split())
 
 
+def disabled(model: Any, what: str) -> bool:
+    """Return whether the options of a model disable "gravity", "equality" or another part."""
+    import mujoco
+
+    return bool(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{what.upper()}"))
+
+
 def name_of(model: Any, kind: str, index: int) -> str:
     """Return the name of a thing of a model, of a kind such as "body"; else kind and index."""
     import mujoco

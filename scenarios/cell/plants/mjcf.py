@@ -21,7 +21,6 @@ from hierarchy.robot import Body
 from scenarios.config import ScenarioError
 from scenarios.config.sections.plant import JointsSection, ServoSection, TorqueSection
 
-_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] in the world, as in the robot's own model
 _SOFTNESS = 0.02   # [s] time constant of a contact: a few mm of penetration at usual speeds
 _FRICTION = (0.5, 0.005, 0.0001)  # of a contact: sliding, turning [m], rolling [m]
 _LEAST = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
@@ -46,7 +45,7 @@ def begin(robot: Robot, timestep: float, **option: ArrayLike) -> tuple[Element, 
     """Return the root of a scene and its world."""
     root = Element("mujoco", model=robot.name)
     add(root, "compiler", angle="radian", inertiafromgeom="false")
-    about = add(root, "option", timestep=timestep, gravity=_GRAVITY, **option)
+    about = add(root, "option", timestep=timestep, gravity=robot.model.gravity.linear, **option)
     add(about, "flag", autoreset="disable")  # a diverged state is not reset
     return root, add(root, "worldbody")
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
-from hierarchy.errors import UnknownNameError
+from hierarchy.errors import UnknownNameError, naming
 from hierarchy.problem import Array
 from hierarchy.tasks.joints.mechanism import Mechanism
 from scenarios.cell.plants.mjcf import Stops, on_floor
@@ -37,8 +37,8 @@ class TorqueRobot:
     world axes, `slip` (C,) [m] and `pressure_margin` (C,) [m]; and `support_margin` () [m], see
     `Touch`.
 
-    Raises ScenarioError if mujoco is not installed, a joint has several axes, a push is on an
-    unknown joint, or the delay is not a whole number of periods.
+    Raises ScenarioError if mujoco is not installed or refuses the robot, a joint has several axes,
+    a push is on an unknown joint, or the delay is not a whole number of periods.
     """
 
     def __init__(self, robot: Robot, contacts: Contacts, q: Array, v: Array | None = None,
@@ -46,8 +46,9 @@ class TorqueRobot:
         self._mujoco = mujoco = mujoco_module()
         self._section = section = section or TorqueSection(kind="torque")
         self._period, self._steps = period, ceil(period / _STEP - _ROUNDING)
-        self.model = mujoco.MjModel.from_xml_string(
-            on_floor(robot, contacts, section, period / self._steps, q))
+        scene = on_floor(robot, contacts, section, period / self._steps, q)
+        with naming(f"plant: MuJoCo refuses robot {robot.name!r}", ScenarioError, ValueError):
+            self.model = mujoco.MjModel.from_xml_string(scene)
         self.data = mujoco.MjData(self.model)
         self._floating = robot.base == "floating"
         self.q, self.v = q.copy(), np.zeros(robot.n) if v is None else v.copy()
