@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, UnknownNameError, check_name
+from hierarchy.errors import (
+    HierarchyError,
+    UnknownNameError,
+    brief,
+    check_name,
+    finite_numbers,
+    number,
+    positive,
+)
+from hierarchy.gate import array_of, check_rotation
 from hierarchy.problem import Array
 
 if TYPE_CHECKING:
@@ -47,8 +56,9 @@ def position_level(model: MjModel, data: MjData, name: str, target: ArrayLike, g
     gain [1/s]; `velocity` (3,) [m/s] of the target.
     """
     position, _ = frame(model, data, name, kind)
+    away = finite_numbers("target [m]", target, 3) - position
     return (jacobian(model, data, name, kind)[:3],
-            np.asarray(velocity, float) + gain * (_shaped("target", target, (3,)) - position))
+            finite_numbers("velocity [m/s]", velocity, 3) + number("gain [1/s]", gain) * away)
 
 
 def orientation_level(model: MjModel, data: MjData, name: str, target: ArrayLike, gain: float,
@@ -60,11 +70,12 @@ def orientation_level(model: MjModel, data: MjData, name: str, target: ArrayLike
     import mujoco
 
     _, rotation = frame(model, data, name, kind)
-    error = _shaped("target", target, (3, 3)) @ rotation.T
+    check_rotation("target", target)
+    error = np.asarray(target, dtype=float) @ rotation.T
     quaternion, vector = np.empty(4), np.empty(3)
     mujoco.mju_mat2Quat(quaternion, error.ravel())
     mujoco.mju_quat2Vel(vector, quaternion, 1.0)
-    return jacobian(model, data, name, kind)[3:], gain * vector
+    return jacobian(model, data, name, kind)[3:], number("gain [1/s]", gain) * vector
 
 
 def posture_level(model: MjModel, data: MjData, target: ArrayLike, gain: float
@@ -74,8 +85,8 @@ def posture_level(model: MjModel, data: MjData, target: ArrayLike, gain: float
 
     difference = np.empty(model.nv)
     mujoco.mj_differentiatePos(model, difference, 1.0, data.qpos,
-                               _shaped("target", target, (model.nq,)))
-    return np.eye(model.nv), gain * difference
+                               finite_numbers("target", target, model.nq))
+    return np.eye(model.nv), number("gain [1/s]", gain) * difference
 
 
 def limit_level(model: MjModel, data: MjData, period: float, velocity: float | ArrayLike = np.inf
@@ -90,10 +101,12 @@ def limit_level(model: MjModel, data: MjData, period: float, velocity: float | A
     """
     import mujoco
 
-    fastest = np.broadcast_to(np.asarray(velocity, dtype=float), model.nv)
-    if not (period > 0.0 and (fastest > 0.0).all()):
-        raise HierarchyError(f"limits: period {period} s and velocity {velocity!r} must be "
-                             "positive")
+    positive("limits: period [s]", period)
+    fastest = array_of("limits: velocity", velocity)
+    if fastest.shape not in ((), (model.nv,)) or not (fastest > 0.0).all():
+        raise HierarchyError(f"limits: velocity: expected one positive number or {model.nv}, got "
+                             f"{brief(velocity)}")
+    fastest = np.broadcast_to(fastest, model.nv)
     single = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
     lower, upper = -fastest, fastest.copy()
     for joint in range(model.njnt):
@@ -115,10 +128,3 @@ def _index(model: MjModel, name: str, kind: str) -> int:
     except KeyError:
         names = [named(i).name for i in range(getattr(model, f"n{kind}"))]
         raise UnknownNameError(kind, name, [known for known in names if known]) from None
-
-
-def _shaped(what: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    array = np.array(value, dtype=float)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise HierarchyError(f"{what} must be {shape} finite numbers, got {value!r}")
-    return array

@@ -263,6 +263,18 @@ def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
     assert (np.abs(data.qpos) <= 2.0).all()
 
 
+@pytest.mark.parametrize(("level", "arguments", "said"), [
+    ("position", ("tip", [0.0, 0.0], 1.0, "site"), "target [m]: expected 3 finite numbers"),
+    ("position", ("tip", [0.0] * 3, np.nan, "site"), "gain [1/s] = nan"),
+    ("orientation", ("tip", np.ones((3, 3)), 1.0, "site"), "target: expected a rotation matrix"),
+    ("posture", ([0.0] * 3, 1.0), "target: expected 4 finite numbers"),
+    ("limit", (0.01, [1.0, 2.0]), "velocity: expected one positive number or 4"),
+    ("limit", (0.01, np.nan), "velocity: expected one positive number or 4")])
+def test_what_is_wrong_with_a_level_out_of_mujoco_is_named(arm, level, arguments, said):
+    _, adapter, model, data = arm
+    refused(said, getattr(adapter, f"{level}_level"), model, data, *arguments)
+
+
 # --- qpsolvers ----------------------------------------------------------------------------------
 def made_hierarchy(seed):
     """Seven joints in their box, then equalities, inequalities that contradict each other, more."""
