@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError, brief, expect, number
+from hierarchy.gate import shaped
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from solvers.resolver import Resolution
@@ -28,7 +29,7 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     level, with them the largest missed inequalities of a level are named too. `units` of the m rows
     are written behind what a row gives. Rows whose sides cross are all that is said of such a
     hierarchy. Raises a HierarchyError unless the resolution is from `hcod`, the only resolver that
-    reports the state of each row, and if names or units are not m.
+    reports the state of each row, and if its rows, names or units are not m.
     """
     expect("explain: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
     number("explain: tolerance", tolerance, 0.0)
@@ -44,6 +45,7 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     if not isinstance(resolution, ActiveSetResolution):
         raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
                              "which rows are active")
+    shaped("explain: active", resolution.active, (h.m,))
     for i in np.flatnonzero(~(h.lower <= h.upper)).tolist():  # NaN too
         return (f"{h.names[_level_of(h, i)]} {names[i]}: no value lies between lower "
                 f"{h.lower[i]:g} and upper {h.upper[i]:g}")

@@ -160,8 +160,9 @@ class Factorization:
 
     def swap(self, i: Level, j: Level) -> None:
         """Swap two levels, given by name or by index from 0."""
-        i, j, levels = self._place(i), self._place(j), self._levels
-        levels[i], levels[j], self._known = levels[j], levels[i], None
+        i, j, levels = self._place(i), self._place(j), [*self._levels]
+        levels[i], levels[j] = levels[j], levels[i]
+        self._levels, self._known = levels, None
 
     def reorder(self, order: Sequence[Level]) -> None:
         """Put all levels in a new order, given by name or by current index from 0.
@@ -176,8 +177,8 @@ class Factorization:
 
     def delete(self, level: Level) -> None:
         """Delete a level, given by name or by index from 0."""
-        del self._levels[self._place(level)]
-        self._known = None
+        place = self._place(level)
+        self._levels, self._known = self._levels[:place] + self._levels[place + 1:], None
 
     def insert(self, level: str, A: ArrayLike, at: int | None = None) -> None:
         """Insert a level with rows A (m_k, n) at an index, 0 the most important; None for last.
@@ -186,14 +187,14 @@ class Factorization:
         an entry that is not finite; the factorization is then unchanged.
         """
         place = len(self._levels) if at is None else at
-        if level in self.names:
-            raise HierarchyError(f"{level}: a level of this name exists")
+        level_names([*self.names, level], len(self._levels) + 1)
         if not isinstance(place, Integral) or not 0 <= place <= len(self._levels):
             raise HierarchyError(f"{level}: index {at} is outside 0 .. {len(self._levels)}")
         block = self._checked(level, A)
         if len(self._Q) + len(block) > 2 * (self.m + len(block)) + _FEWEST:
             self._factor_afresh([(held.name, held.A) for held in self._levels])
-        self._levels.insert(place, _Held(level, block.copy(), self._projected(block)))
+        new = _Held(level, block.copy(), self._projected(block))
+        self._levels = [*self._levels[:place], new, *self._levels[place:]]
         self._known = None
 
     # -- answers ----------------------------------------------------------------------------------

@@ -66,8 +66,8 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
     Raises HierarchyError as `solve_ik` does, and if no task decides.
     """
     positive("solve_ik: until", until)
-    search = _Search(robot, tasks, until, limits, resolver, damping, t)
-    rng, start = np.random.default_rng(0), State.at(robot, q, t=t).q.copy()
+    search = _Search(State.at(robot, q, t=t), tasks, until, limits, resolver, damping)
+    rng, start = np.random.default_rng(0), search.state.q.copy()
     best = search.descend(start, resolver)
     iterations, count = best[2], 1
     while max(best[0]) > until and count < _STARTS:
@@ -93,16 +93,16 @@ def stacked(robot: Robot, tasks: Sequence[Task], period: float, limits: Sequence
 
 
 class _Search:
-    """A robot with a stack over one state, and the resolver of its steps."""
+    """A stack over one state, and the resolver of its steps."""
 
-    def __init__(self, robot: Robot, tasks: Sequence[Task], until: float, limits: bool,
-                 resolver: Resolver, damping: float, t: float) -> None:
+    def __init__(self, state: State, tasks: Sequence[Task], until: float, limits: bool,
+                 resolver: Resolver, damping: float) -> None:
         gains = [np.max(np.asarray(part.gain, dtype=float), initial=0.0)
                  for task in tasks for part in (task, *parts(task))]
         rates = [part.barrier.rate for task in tasks for part in (task, *parts(task))
                  if hasattr(part, "barrier")]
-        self.period = 1.0 / max([*gains, *rates, 1e-3])
-        self.robot, self.until, self.t, self.tasks = robot, until, t, list(tasks)
+        self.period, robot = 1.0 / max([*gains, *rates, 1e-3]), state.robot
+        self.robot, self.until, self.t, self.tasks = robot, until, state.t, list(tasks)
         self.limits = [StepLimits(robot, self.period, 1.0 / self.period)] if limits else []
         self.stack, self.settled = stacked(robot, tasks, self.period, self.limits, resolver,
                                            damping)
@@ -111,7 +111,8 @@ class _Search:
         if not self.deciding:
             raise HierarchyError("solve_ik: until: only joint tasks are given, which are "
                                  "preferences; give a task of a frame too")
-        self.state, self.status = State(robot), Status.SOLVED
+        self.moving = [task for task in tasks if np.any(task.desired_velocity(state))]
+        self.state, self.status = state, Status.SOLVED
 
     def descend(self, q: Array, resolver: Resolver, still: float = _STILL
                 ) -> tuple[list[float], Array, int]:
@@ -126,17 +127,29 @@ class _Search:
             if done or (k >= _PATIENCE and min(history[-_PATIENCE:])
                         > (1.0 - still) * min(history[:-_PATIENCE])):
                 return (errors, q, k) if done else (*best, k)
-            found = resolver.solve(self.stack.hierarchy(self.state), memory)
+            found = resolver.solve(self._rows(), memory)
             self.status, memory = found.status, found.memory
             step = found.x * self.period
             q = self.mechanism.closed(self.robot.integrate(
                 q, step * min(1.0, _STEP / max(abs(step).max(), 1e-300))))
         return (*best, _MOST)
 
+    def _rows(self) -> Hierarchy:
+        """Return the problem at the state as if targets stood still, for t does."""
+        h = self.stack.hierarchy(self.state)
+        ahead = np.zeros(h.m)
+        for task in self.moving:
+            k = h.names.index(task.name)
+            ahead[h.offsets[k]:h.offsets[k + 1]] = task.desired_velocity(self.state)
+        return h.changed(lower=h.lower - ahead, upper=h.upper - ahead) if self.moving else h
+
     def _errors(self, q: Array) -> list[float]:
-        """Move to q and return the norm of the error of each deciding task."""
+        """Move to q and return the norm of the error of each deciding task, `until` if it is met.
+
+        What is left below that, rounding, must not outweigh the tasks below.
+        """
         self.state.move(self.t, q, np.zeros(self.robot.n))
-        return [self._missed(task) for task in self.deciding]
+        return [max(self._missed(task), self.until) for task in self.deciding]
 
     def _missed(self, task: Task) -> float:
         error = task.error(self.state)
@@ -154,7 +167,7 @@ class _Search:
     def _verdict(self, errors: dict[str, float]) -> str:
         """Say what holds back the first task that is not met."""
         task = next(one for one in self.deciding if errors[one.name] > self.until)
-        h = self.stack.hierarchy(self.state)
+        h = self._rows()
         k = h.names.index(task.name)
         pull = h.A[h.offsets[k]:h.offsets[k + 1]].T @ h.slacks(np.zeros(h.n))[
             h.offsets[k]:h.offsets[k + 1]]

@@ -7,7 +7,8 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect, number
+from hierarchy.gate import shaped
 from hierarchy.notebook import html_table, numbers
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.active_set.exact import verify_answer
@@ -49,8 +50,11 @@ class Resolution:
         of every level. False too for an answer with damping, which is optimal for other data.
 
         Raises HierarchyError for a hierarchy with a metric or with levels that give, and for a
-        resolver that reports no active rows; `certify(h, x)` judges these.
+        resolver that reports no active rows; `certify(h, x)` judges these. And for one of other
+        rows or unknowns than this resolution.
         """
+        expect("verified: h", h, Hierarchy, "give the one that was resolved")
+        number("verified: rank_tolerance", rank_tolerance, 0.0, 1.0)
         active = self.active
         if active is None and (h.lower == h.upper).all():
             active = np.zeros(h.m, dtype=np.int8)
@@ -58,8 +62,9 @@ class Resolution:
             why = "no active rows are reported" if h.plain else "h has a metric or levels that give"
             raise HierarchyError(f"verified: {why}; certify(h, x) judges such an answer")
         settings = np.array([0.0, 0.0, rank_tolerance])
-        return run(verify_answer, *h.rows, np.concatenate([self.x, h.reference]),
-                   active.astype(float), settings) == SOLVED
+        x = np.concatenate([shaped("verified: x", self.x, (h.n,)), h.reference])
+        states = shaped("verified: active", active, (h.m,))
+        return run(verify_answer, *h.rows, x, states, settings) == SOLVED
 
     def __repr__(self) -> str:
         return (f"{type(self).__name__}({self.status.name}, x={numbers(self.x)}, "

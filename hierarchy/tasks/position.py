@@ -91,6 +91,10 @@ class Along(Written):
         """Distance to the path along the directions (m,) [m]."""
         return np.asarray(self.directions) @ self.task.error(state)
 
+    def desired_velocity(self, state: State) -> Array:
+        """Velocity of the path along the directions (m,) [m/s]."""
+        return np.asarray(self.directions) @ self.task.desired_velocity(state)
+
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         three, D = Rows.empty(3, rows.A.shape[1]), np.array(self.directions, dtype=float)

@@ -106,6 +106,7 @@ class Packed:
                  pull: Pull | None = None, *, solve: Solve | None = None) -> None:
         positive("period [s]", period)
         self.n, self.joints, self.period, self.pull = n, joints, period, pull
+        self.reference = np.zeros(n) if pull is None else pull.centre
         entries = [constraints, *(one if isinstance(one, Sequence) else (one,) for one in tasks)]
         self.limits, self.read = limits, [[
             _read(task, configuration, pull is not None) for task in entry] for entry in entries]
@@ -221,7 +222,8 @@ class Packed:
 
     def hierarchy(self) -> Hierarchy:
         """Return the levels as a Hierarchy of its own."""
-        return Hierarchy.trusted(*self.rows, None, self.names, named=partial(_row_names, self))
+        return Hierarchy.trusted(*self.rows, self.reference, self.names,
+                                 named=partial(_row_names, self))
 
 
 def _contradiction(packed: Packed, i: int) -> ContradictionError:

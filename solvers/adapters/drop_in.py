@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import expect, number
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from solvers.adapters.displacements import ContradictionError, Packed, Solve
@@ -30,8 +30,9 @@ def answer(solver: str | Resolver, settings: dict[str, Any], damping: float, tol
     solver, settings, damping, tolerance : as `for_pink.solve_ik` takes them.
     """
     resolver = _resolver(solver, settings) if isinstance(solver, str) else solver
-    if not 0.0 <= damping < np.inf:
-        raise HierarchyError(f"damping {damping} must not be negative")
+    expect("solver", resolver, Resolver, "give a name of solvers.names()")
+    number("damping", damping, 0.0)
+    number("tolerance", tolerance, 0.0)
     solve = partial(_solved, resolver, tolerance, failed)
     try:
         levels = pack(solve)
@@ -43,7 +44,7 @@ def answer(solver: str | Resolver, settings: dict[str, Any], damping: float, tol
 
 def _at_once(resolver: Hcod, levels: Any, tolerance: float) -> Array | None:
     """Return what `_solved` does without making a Hierarchy, or None where that has more to say."""
-    x = np.zeros(levels.n)
+    x = levels.reference.copy()
     solved = solve_exactly(levels, x, np.zeros(3 * levels.count + 3), resolver._settings) == SOLVED
     held = largest_violation(levels.A, *levels.sides, x, 0, levels.always) <= tolerance
     return x if solved and held else None

@@ -74,7 +74,10 @@ class Collection:
         return _digest(_packed(_DATA, self.problems))
 
     def save(self, path: str | Path) -> None:
-        """Write a file; the same content makes the same bytes."""
+        """Write a file; the same content makes the same bytes.
+
+        Raises ProblemFileError, and leaves a file that is there, for what `read` would refuse.
+        """
         for p, h in enumerate(self.problems):
             h.refuse_extras(f"problem {p}", f"version {VERSION} of the format")
         arrays = _packed(_DATA, self.problems)
@@ -83,8 +86,11 @@ class Collection:
                 "sha256": _digest(arrays)}
         if self.answers is not None:
             arrays |= _packed(_ANSWERS, self.answers)
+        with naming(str(path), ProblemFileError, ValueError):
+            _content(_head(head), arrays)
+            said = json.dumps(head, indent=1, allow_nan=False)
         with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-            archive.writestr(zipfile.ZipInfo(_HEAD, _STAMP), json.dumps(head, indent=1))
+            archive.writestr(zipfile.ZipInfo(_HEAD, _STAMP), said)
             for name, values in arrays.items():
                 stream = io.BytesIO()
                 np.lib.format.write_array(stream, values, version=(1, 0), allow_pickle=False)
@@ -99,8 +105,7 @@ def read(path: str | Path) -> Collection:
     """
     head, arrays = _opened(Path(path))
     with naming(str(path), ProblemFileError, ValueError):
-        problems = tuple(_unpacked(arrays))
-        answers = _answers(arrays, problems) if head["answers"] else None
+        problems, answers = _content(head, arrays)
     if len(problems) != head["count"]:
         raise ProblemFileError(f"{path}: {len(problems)} problems where its {_HEAD} says "
                                f"{head['count']}")
@@ -158,6 +163,13 @@ def _packed(kinds: dict[str, str], things: Sequence[Any]) -> Arrays:
     return {name: np.concatenate([np.empty(0), *(
         np.ravel(len(one.sizes) if name == "levels" else getattr(one, name)) for one in things)]
         ).astype(f"<{kind}") for name, kind in kinds.items()}
+
+
+def _content(head: dict[str, Any], arrays: Arrays
+             ) -> tuple[tuple[Hierarchy, ...], tuple[Proof, ...] | None]:
+    """Return problems and answers; raises ValueError as `_unpacked`."""
+    problems = tuple(_unpacked(arrays))
+    return problems, _answers(arrays, problems) if head["answers"] else None
 
 
 def _unpacked(arrays: Arrays) -> Iterable[Hierarchy]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isnan
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,11 @@ class ActiveSetResolution(Resolution):
     def __init__(self, x: Array, status: Status, record: Array) -> None:
         self.x, self.status, self.witnesses = x, status, None  # half the time of super().__init__
         self.memory = self.record = record
+
+    def __getstate__(self) -> tuple[None, dict[str, Any]]:
+        """What is kept; `iterations`, which the class above keeps, is worked out here."""
+        kept = ("x", "status", "witnesses", "memory", "record")
+        return None, {name: getattr(self, name) for name in kept}
 
     @property
     def iterations(self) -> int:  # type: ignore[override]

@@ -94,6 +94,7 @@ SCENES = {
     "no limits, little damping": lambda c: arm_scene(c, lm_damping=50.0, damping=1e-3, limits=[]),
     "barrier": lambda c: arm_scene(c, barriers=[wall(c, 1e-3, 1.0, 0.0)]),
     "barrier with a safe displacement": lambda c: arm_scene(c, barriers=[wall(c, 1e-3, 9.0, 0.7)]),
+    "a barrier alone": lambda c: (c, [], {"barriers": [wall(c, 1.0, 9.0, 0.7)]}),
     "one row": lambda c: (c, [posture_task(Q + 0.1)], {}),
     "humanoid": humanoid_scene}
 
@@ -188,7 +189,9 @@ def rows_at(robot, configuration, level):
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, solver="proxpq"), "unknown resolver 'proxpq'"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, solver="hcod", guess=1),
      "unknown setting of hcod 'guess'"),
-    (lambda c, r: solve_ik(c, [posture_task(Q)], DT, damping=-1), "damping -1 must not be neg"),
+    (lambda c, r: solve_ik(c, [posture_task(Q)], DT, 3), "solver: expected a Resolver, got int 3"),
+    (lambda c, r: solve_ik(c, [posture_task(Q)], DT, damping=-1), "damping = -1: expected a"),
+    (lambda c, r: solve_ik(c, [posture_task(Q)], DT, tolerance=np.nan), "tolerance = nan"),
     (lambda c, r: solve_ik(c, [posture_task(np.full(7, np.nan))], DT), "PostureTask"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], 0.0), "period [s] = 0: expected"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, limits=[limit((0, np.nan, 1.0))]),

@@ -1,5 +1,7 @@
 """A factored stack after any edits is the stack factored afresh, and that of `tpm`."""
 
+import copy
+
 import numpy as np
 import pytest
 from rank_cases import CASES, build
@@ -58,6 +60,7 @@ def test_after_random_edits_the_answers_are_those_of_tpm():
         levels = [rng.normal(size=(rng.integers(5), n)) for _ in range(rng.integers(6))]
         factored = Factorization(levels, n=n)
         for number in range(int(rng.integers(3, 13))):
+            edit(copy.copy(factored), rng, number)  # of which the first has nothing
             edit(factored, rng, number)
             if rng.random() < 0.5:
                 gaps.append(agrees(factored, rng))
@@ -95,7 +98,7 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
 
 @pytest.mark.parametrize(("mistake", "text"), [
     (lambda f: f.swap("hand", "elbo"), "unknown level 'elbo'; did you mean 'elbow'"),
-    (lambda f: f.insert("hand", np.eye(3)), "hand: a level of this name exists"),
+    (lambda f: f.insert("hand", np.eye(3)), "2 levels are named 'hand'"),
     (lambda f: f.insert("foot", [[1, 2, 3], [0, np.nan, 0]]), "foot, row 1: A[1, 1] is nan"),
     (lambda f: f.solve({"hand": [1.0, 2.0]}), "elbow: no target given"),
     (lambda f: f.solve([[1.0, 2.0], [1.0, 2.0]]), "elbow: b has shape (2,), expected (1,)"),

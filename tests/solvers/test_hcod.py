@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from rank_cases import family, solved
+from refusals import refused
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, explain, make
@@ -81,6 +82,10 @@ def test_a_solved_answer_is_verified_from_its_active_rows_and_no_other_is():
         assert not type(res)(x, res.status, memory).verified(BOX)
     with pytest.raises(HierarchyError, match=r"certify\(h, x\)"):
         make("weighted").solve(BOX).verified(BOX.changed(metric=np.eye(3)))
+    fewer = BOX.upper_part(1)
+    refused("verified: active has shape (5,), expected (3,)", res.verified, fewer)
+    refused("explain: active has shape (5,), expected (3,)", explain, fewer, res)
+    refused("rank_tolerance = nan", res.verified, BOX, rank_tolerance=np.nan)
 
 
 X, Y = ([[1.0, 0.0]], [0.0]), ([[0.0, 1.0]], [0.0])

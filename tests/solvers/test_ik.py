@@ -10,8 +10,8 @@ from standing import ROBOT as HUMANOID
 from standing import WEIGHT, feet, standing_stack
 
 from hierarchy import Robot, State
-from hierarchy.paths import Still
-from hierarchy.tasks import JointLimits, Pose, Position, Posture
+from hierarchy.paths import Still, circle
+from hierarchy.tasks import Along, FrameLog, JointLimits, Pose, Position, Posture
 from solvers import Status, certify, explain, make, problems, solve_ik
 
 Q = np.array([0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3])
@@ -83,6 +83,8 @@ def test_poses_of_random_configurations_are_found_within_the_limits():
     for _ in range(10):
         goal = State.at(ROBOT, rng.uniform(ROBOT.lower, ROBOT.upper))
         pose = Pose(FRAME, Still(goal.position(FRAME)), goal.rotation(FRAME))
+        twice = [Position(FRAME, pose.path), pose]  # what is met to 1e-17 beats no other start
+        assert solve_ik(ROBOT, Q, twice, until=1e-6).met
         found = solve_ik(ROBOT, Q, [pose], until=1e-6)
         assert (found.met, found.verdict) == (True, "reached")
         assert found.iterations > 0
@@ -90,6 +92,14 @@ def test_poses_of_random_configurations_are_found_within_the_limits():
         here = State.at(ROBOT, found.q)
         np.testing.assert_allclose(here.position(FRAME), goal.position(FRAME), atol=1e-6)
         np.testing.assert_allclose(here.rotation(FRAME), goal.rotation(FRAME), atol=2e-6)
+
+
+@pytest.mark.parametrize("make_task", [
+    lambda path: Position(FRAME, path), lambda path: FrameLog(FRAME, path, np.eye(3)),
+    lambda path: Along(Position(FRAME, path), ((0.6, 0.0, 0.8), (0.0, 1.0, 0.0)))])
+def test_a_target_that_moves_is_reached_where_it_is_at_that_time(make_task):
+    found = solve_ik(ROBOT, Q, [make_task(circle([0.3, 0.4, 0.3], 0.1))], until=1e-6, t=0.3)
+    assert (found.verdict, found.starts) == ("reached", 1)
 
 
 def test_what_holds_a_target_out_of_reach_back_is_said():

@@ -4,6 +4,7 @@ import io
 import shutil
 import subprocess
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -128,6 +129,17 @@ def test_an_archive_is_refused_that_unpacks_to_more_than_it_may(small, monkeypat
     monkeypatch.setattr("hierarchy.archives.LARGEST", 2**21)
     with pytest.raises(ProblemFileError, match=r"it unpacks to 419.* bytes, more than 2097152"):
         read(small)
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"head": Head("a", "", "fresh", np.int64(3))}, "seed is np.int64(3) in its head.json"),
+    ({"head": Head("a", "", "fresh", 3, period=np.nan)}, "nan"),
+    ({"problems": (three_rows().changed(lower=[np.nan, 0.0, 0.0]),)}, "level 1, row 0: lower is"),
+    ({"answers": ()}, "x is too short: problem 0 needs")])
+def test_what_could_not_be_read_is_not_written(small, change, said):
+    before, one = small.read_bytes(), Collection(Head("a", "", "fresh", 3), (three_rows(),))
+    refused(said, replace(one, **change).save, small, error=ProblemFileError)
+    assert small.read_bytes() == before
 
 
 def test_a_single_hierarchy_in_a_file_passes_the_same_gate(tmp_path):

@@ -1,5 +1,6 @@
 """The registry, the status, the resolution; what importing costs."""
 
+import copy
 import dataclasses
 import pickle
 
@@ -18,9 +19,10 @@ from solvers.workspace import WORKSPACE
 @pytest.mark.parametrize("name", [*names(), "tpm-published"])
 def test_a_resolver_that_has_solved_can_be_pickled(name):
     resolver, h = make(name), Hierarchy.from_levels([(np.eye(3)[:2], [1.0, 2.0])])
-    x, copied = resolver.solve(h).x, pickle.loads(pickle.dumps(resolver))
+    found, copied = resolver.solve(h), pickle.loads(pickle.dumps(resolver))
     assert (copied, copied.handles) == (resolver, resolver.handles)
-    np.testing.assert_array_equal(copied.solve(h).x, x)
+    np.testing.assert_array_equal(copied.solve(h).x, found.x)
+    assert repr(pickle.loads(pickle.dumps(found))) == repr(copy.copy(found)) == repr(found)
 
 
 STEPS = {"tolerance": 1e-10, "max_iterations": 1000}
