@@ -71,8 +71,6 @@ def test_locked_joints_are_no_joints(arm):
     np.testing.assert_allclose(State.at(robot, [0.6, 0.7]).position("tool0"),
                                State.at(free, [0.6, 0.8, 0.7]).position("tool0"))
     refused("did you mean 'elbow'", Robot.load, arm(), locked={"elbo": 0.0}, error=UnknownNameError)
-    refused("its joints cannot be locked", Robot.load, "kuka_lwr", locked={"joint_1": 0.0},
-            error=RobotError)
 
 
 def test_a_section_lists_its_own_points_and_capsules(arm):

@@ -10,7 +10,6 @@ import pytest
 from hand_made import asked, recording
 from headless import Balanced, chromium
 
-from hierarchy import HierarchyError
 from scenarios import load, save, simulate
 from scenarios.config.sections.kinds import ListedPosition
 from scenarios.draw.figures import letter, palette, panels
@@ -172,8 +171,6 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, 
     assert (run_folder / "b.svg").read_text() == "new"
     assert (run_folder / "run.npz").exists()
     assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
-    with pytest.raises(HierarchyError, match="unknown style 'papr'; did you mean 'paper'"):
-        letter.redraw([run_folder], "papr")
 
 
 def test_tick_times_are_drawn_in_microseconds_beside_the_period():
