@@ -42,9 +42,11 @@ def test_a_tool_is_the_end_effector_and_primitives_are_capsules(arm):
     assert pairs_of_tree(robot.capsules, robot.parents) == [(0, 2)]
 
 
-@pytest.mark.parametrize("name", ["part.stl", "package://parts/meshes/part.stl"])
+@pytest.mark.parametrize("name", ["part.stl", "package://parts/meshes/part.stl",
+                                  "package://{}/part.stl"])
 def test_the_capsule_of_a_mesh_here_or_in_a_folder_above_holds_its_corners(arm, tmp_path, name):
-    path = tmp_path / name.partition("://")[2] if ":" in name else tmp_path / name
+    name = name.format(tmp_path.name)  # of the folder itself
+    path = tmp_path / name.removeprefix("package://").removeprefix(f"{tmp_path.name}/")
     path.parent.mkdir(parents=True, exist_ok=True)
     facets = ["facet normal 0 0 0\nouter loop\n{}\nendloop\nendfacet".format("\n".join(
         "vertex {} {} {}".format(*corner) for corner in face))
