@@ -53,6 +53,13 @@ def test_the_best_of_each_row_is_marked(runs, label, marked):
     assert best(next(row for row in table(runs) if row.label.startswith(label))) == marked
 
 
+def test_times_are_those_of_a_run_that_was_alone_and_nothing_else_is():
+    alone = recording(time_tick=np.full(5, 9e-6), a=2.0 * ONES)
+    found = dataclasses.replace(made(LETTER, a=ONES), timing=alone).metrics
+    assert found["time_tick_median"].value == pytest.approx(9e-6)
+    assert found["acceleration_max"].value == 1.0
+
+
 @pytest.mark.parametrize("runs", [
     [made(LETTER)], [made(LETTER), made("tpm"), made("recursive")],
     [made(LETTER), made("hqp", fault="diverged at tick 5")],
