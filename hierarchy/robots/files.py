@@ -152,11 +152,8 @@ def _mesh_file(name: str, path: Path) -> Path | None:
         file = path.parent / name.removeprefix("file://")
         return file.resolve() if file.is_file() else None
     package, _, rest = name.removeprefix("package://").partition("/")
-    for folder in path.resolve().parents:
-        for at in (folder / package / rest, folder / rest if folder.name == package else folder):
-            if at.is_file():
-                return at
-    return None
+    places = (folder / package / rest for folder in path.resolve().parents)
+    return next(filter(Path.is_file, places), None)
 
 
 def _held_by(model: Any, capsules: tuple[Any, ...]) -> tuple[tuple[Any, ...], tuple[str, ...]]:

@@ -114,10 +114,10 @@ def seen_of_keys():
                 {"around": 1}, {"around": [1, 2]})]}
 
 
-def seen_of_live_page(name):
+def seen_of_live_page(name, **changed):
     """Of the page of a live run, after some requests: what its script reads."""
     with steadily():
-        shown = live_page.LivePage(live.Live(load(name)))
+        shown = live_page.LivePage(live.Live(load(name).model_copy(update=changed)))
         found = [condensed(shown.data())]
         for what, value in (
                 ("resolver", "recursive"), ("pointing.alpha_d", 20.0), ("obstacle 0", [0, 0.5, 0]),
@@ -278,7 +278,7 @@ def seen_of_computed(name):
 
 
 def figure_facts(fig):
-    """Of each axes: what stands beside it, and of what is drawn in it look and numbers."""
+    """Of each axes: what stands beside it, and of what is drawn in it look and numbers; images."""
     return [[ax.get_title(loc="left"), ax.get_xlabel(), ax.get_ylabel(), ax.get_xscale(),
              ax.get_yscale(), condensed([ax.get_xlim(), ax.get_ylim(), fig.get_size_inches()]),
              [[text.get_text(), text.get_rotation(), text.get_fontsize(), text.get_ha(),
@@ -291,8 +291,12 @@ def figure_facts(fig):
                  [to_hex(colour, True) for colour in np.atleast_2d(colours)][:3]
                  for colours in (one.get_facecolor(), one.get_edgecolor())),
                condensed([path.vertices for path in one.get_paths()] if hasattr(one, "get_paths")
-                         else one.get_path().vertices)] for one in (*ax.patches, *ax.collections)]]
-            for ax in fig.axes]
+                         else one.get_path().vertices)] for one in (*ax.patches, *ax.collections)],
+             condensed([ax.axison, str(ax.get_aspect()), ax.get_xticks(), ax.get_yticks(), [
+                 (one.get_clim(), one.get_extent(), one.cmap(np.linspace(0.0, 1.0, 9)),
+                  np.ma.filled(one.get_array(), 0.0)) for one in ax.images]]),
+             [text.get_text() for one in (*fig.legends, *filter(None, [ax.get_legend()]), fig)
+              for text in (one.texts if one is fig else one.get_texts())]] for ax in fig.axes]
 
 
 def condensed(value):
@@ -372,6 +376,8 @@ PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
          **{f"commands {group}": partial(seen_of_commands, group) for group in GROUPS},
          **{f"computed {name}": partial(seen_of_computed, name) for name in COMPUTED},
          "answers": seen_of_answers, "live page": partial(seen_of_live_page, "ellipse"),
+         "live page of a cone": partial(seen_of_live_page, "ellipse", position=None,
+                                        avoidance=None),
          "keys": seen_of_keys, "problems": seen_of_problems, "robots": seen_of_robots}
 
 

@@ -68,6 +68,7 @@ def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
     task = tasks.CentreOfPressure(contacts, margin)
     assert task.row_names == tuple(f"{side}_foot edge {i}" for side in ("left", "right")
                                    for i in (1, 2, 3, 4))
+    assert tasks.CentreOfPressure(contacts, 0.0).row_names == task.row_names
     corners = np.array(contacts["right_foot"].points)[:, :2]
     rng, seen = np.random.default_rng(8), []
     for _ in range(300):

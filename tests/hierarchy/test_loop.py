@@ -3,6 +3,7 @@
 import gc
 import os
 from threading import Event
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -135,6 +136,9 @@ def test_a_watchdog_stops_once_when_it_was_not_fed_for_its_time():
     dog.feed()
     clock.now += 1.125
     assert (dog.check(), dog.check(), robot.stops) == (True, True, 1)
+    dog._over = mock.Mock(**{"wait.return_value": True})
+    dog._watch()
+    dog._over.wait.assert_called_once_with(0.25)  # between two looks, a quarter of its time
 
 
 @pytest.mark.parametrize(("hanging", "stops", "sent"), [("step", 1, 0), ("send", 2, 1)])

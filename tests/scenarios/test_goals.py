@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from hand_made import recording
-from scipy.stats import rankdata
+from scipy.stats import rankdata, wilcoxon
 
 from hierarchy import Hierarchy
 from scenarios import load, simulate
@@ -14,7 +14,7 @@ from scenarios.measure.causes import Tick, causes
 from scenarios.measure.goals import goals
 from scenarios.measure.happenings import given_up, jumps
 from scenarios.measure.runs import Run
-from scenarios.measure.statistics import best, paired, wilson
+from scenarios.measure.statistics import EXACT, best, paired, wilson
 from scenarios.measure.verdict import Verdict, goal_table, lines, verdicts
 from solvers import make
 
@@ -125,6 +125,9 @@ def test_the_p_value_is_that_of_all_signs_with_and_without_ties(seed):
     assert paired(first, second).p == pytest.approx(enumerated(second - first))
     second = np.random.default_rng(seed).integers(-2, 5, 11).astype(float)
     assert paired(np.zeros(11), second).p == pytest.approx(enumerated(second[second != 0.0]))
+    for count, method in ((EXACT, "exact"), (EXACT + 1, "asymptotic")):
+        apart = 0.2 + random.normal(size=count)
+        assert paired(np.zeros(count), apart).p == pytest.approx(wilcoxon(apart, method=method)[1])
 
 
 def test_pairs_are_counted_by_their_direction_and_too_few_tell_nothing():

@@ -27,8 +27,8 @@ from scenarios.cell.plants import KinematicArm
 from solvers import Resolution, Resolver, make
 
 @register("tasks", "elbow")
-def elbow(robot: Robot, joint: str, angle: float, name: str = "elbow"):
-    return JointCoupling(robot, {joint: 1.0}, angle, gain=2.0, name=name)
+def elbow(robot: Robot, joint: str, angle: float, gain: float = 2.0, name: str = "elbow"):
+    return JointCoupling(robot, {joint: 1.0}, angle, gain=gain, name=name)
 
 @register("tasks", "along")
 def along(frame: Frame, path: Path, name: str):

@@ -10,7 +10,6 @@ import pytest
 from hand_made import asked, recording
 from headless import Balanced, chromium
 
-from hierarchy import HierarchyError
 from scenarios import load, save, simulate
 from scenarios.config.sections.kinds import ListedPosition
 from scenarios.draw.figures import letter, palette, panels
@@ -52,6 +51,13 @@ ONES = np.ones((5, 7))
 ], ids=["more is better", "less is better", "equal within a percent", "stopped early"])
 def test_the_best_of_each_row_is_marked(runs, label, marked):
     assert best(next(row for row in table(runs) if row.label.startswith(label))) == marked
+
+
+def test_times_are_those_of_a_run_that_was_alone_and_nothing_else_is():
+    alone = recording(time_tick=np.full(5, 9e-6), a=2.0 * ONES)
+    found = dataclasses.replace(made(LETTER, a=ONES), timing=alone).metrics
+    assert found["time_tick_median"].value == pytest.approx(9e-6)
+    assert found["acceleration_max"].value == 1.0
 
 
 @pytest.mark.parametrize("runs", [
@@ -172,8 +178,6 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, 
     assert (run_folder / "b.svg").read_text() == "new"
     assert (run_folder / "run.npz").exists()
     assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
-    with pytest.raises(HierarchyError, match="unknown style 'papr'; did you mean 'paper'"):
-        letter.redraw([run_folder], "papr")
 
 
 def test_tick_times_are_drawn_in_microseconds_beside_the_period():

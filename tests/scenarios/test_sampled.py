@@ -16,7 +16,7 @@ from hierarchy import HierarchyError
 from scenarios import load, shipped, simulate
 from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
-from scenarios.results import pool
+from scenarios.results import pool, sampled_page
 from scenarios.results.columns import Results
 from scenarios.results.plan import Job, Outcome, load_sweep, outcome, plan, shipped_sweeps
 from scenarios.results.sampled import Workers, compare_starts
@@ -174,6 +174,12 @@ def test_the_distance_was_kept_by_runs_that_were_never_below_it():
     below = {"body_below_share": np.array([0.0, 0.5, 1.0])}
     assert Results(jobs, (None,) * 3, {}, below).shares()["Kept the distance asked for"] == {
         "tpm": (1, 3)}
+
+
+@pytest.mark.parametrize(("outlier", "high"), [(12.0, 12.0), (13.0, 11.0), (30.0, 11.0)])
+def test_an_axis_shows_values_up_to_twice_the_width_of_their_middle_away(outlier, high):
+    values = np.append(np.linspace(10.0, 11.0, 100), outlier)
+    assert sampled_page._limits([values]) == pytest.approx((10.0, high))
 
 
 def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path, monkeypatch):

@@ -69,6 +69,7 @@ def test_the_memory_moves_by_at_most_a_step_of_the_miss_or_the_cap_and_stays_wit
         found = solved(resolver, h, memory)
         miss = h.lower - h.A @ found.x
         y, memory = found.carried, found.memory
+        assert found.active.shape == (h.m,)
         assert (abs(y - before) <= 0.5 * np.minimum(abs(miss), 0.2) + 1e-12)[7:12].all()
         assert (abs(y) <= 0.2).all()
         assert (y[:7] == 0.0).all(), "what is strict has no memory"

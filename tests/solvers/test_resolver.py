@@ -1,7 +1,6 @@
 """The registry, the status, the resolution; what importing costs."""
 
 import copy
-import dataclasses
 import pickle
 
 import numpy as np
@@ -23,27 +22,6 @@ def test_a_resolver_that_has_solved_can_be_pickled(name):
     assert (copied, copied.handles) == (resolver, resolver.handles)
     np.testing.assert_array_equal(copied.solve(h).x, found.x)
     assert repr(pickle.loads(pickle.dumps(found))) == repr(copy.copy(found)) == repr(found)
-
-
-STEPS = {"tolerance": 1e-10, "max_iterations": 1000}
-DEFAULTS = {
-    "augmented": {}, "hcod": STEPS,
-    "hqp": {"backend": "proxqp", "form": "null-space", "slack": 1e-7},
-    "merged": {**STEPS, "ratio": 4.0, "scales": (), "cap": 1.0, "step": 0.1, "strict_levels": None,
-               "regularisation": 1e-3},
-    "recursive": {"method": "level", "isotropic": 0.0, "largest": None},
-    "reverse": {"form": "published"}, "sns": {"form": "basic", "scales": "target"},
-    "tpm": {"form": "staircase"},
-    "weighted": {**STEPS, "ratio": 100.0, "weights": None, "regularisation": 0.0,
-                 "strict_levels": None}}
-
-
-@pytest.mark.parametrize("name", names())
-def test_the_defaults_are_those_that_recorded_results_were_made_with(name):
-    resolver = make(name)
-    assert {field.name: getattr(resolver, field.name) for field in dataclasses.fields(resolver)
-            if field.init} == {"damping": 0.0, "threshold": 0.1, "rank_tolerance": 1e-8,
-                               **DEFAULTS[name]}
 
 
 @pytest.mark.parametrize("name", [*names(), "smooth"])

@@ -165,7 +165,7 @@ class LivePage:
                 self._follow()
             elif what == "speed":
                 self.speed = min(max(number("speed", value), 0.01), 100.0)
-            elif what == "path":
+            elif what == "path" and self.live.scenario.position is not None:
                 self._path_wanted = np.asarray(value, dtype=float).reshape(3) - self.middle
             elif what.startswith("obstacle ") and (obstacles := self.live.obstacles) is not None:
                 h = int(what.removeprefix("obstacle "))
@@ -175,7 +175,8 @@ class LivePage:
                 self.live.switch(self.specs[named("resolver", value, self.specs)])
                 self._follow()
             else:
-                keys = [_OFFSET, *(knob.key for knob, _ in knobs(self.live.scenario))]
+                position = [] if self.live.scenario.position is None else [_OFFSET]
+                keys = [*position, *(knob.key for knob, _ in knobs(self.live.scenario))]
                 self.live.change({named("setting", what, keys): value})
                 self._follow()
         except (HierarchyError, TypeError, ValueError, IndexError, OverflowError) as error:
