@@ -17,6 +17,7 @@ from hierarchy.tasks import TorqueLimits
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot
+from scenarios.config import ScenarioError
 from scenarios.config.sections.plant import PushSection, TorqueSection
 from scenarios.loop.first_tick import first_tick
 from scenarios.measure.safety import standing
