@@ -70,6 +70,7 @@ EXPERIMENT = (
     LetterFigure("errors-and-distances", (
         (("position-components",), _HUMAN), (_CONE, _HUMAN), (_TIP, _HUMAN), (_BODY, _HUMAN)), 10),
 )
+_SHORT = 10  # letters of a label, of which seven fit in a line
 _SINGLE = ("velocities-and-distance",)  # of two runs, its panels are in other figures
 
 
@@ -193,8 +194,9 @@ def stacked(parts: Sequence[tuple[Recording, Sequence[Panel]]], title: str,
     lines = {label: line for ax in axes
              for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     if lines:
+        wide = drawing.present().titled and max(map(len, lines)) <= _SHORT
         fig.legend(list(lines.values()), list(lines), fontsize="small", frameon=False,
-                   ncols=7 if drawing.present().titled else 4, handlelength=1.8,
+                   ncols=7 if wide else 4, handlelength=1.8,
                    columnspacing=1.0, loc="outside lower center")
     axes[-1].set_xlabel("time [s]")
     if drawing.present().titled:

@@ -53,11 +53,29 @@ class Panel:
 
 
 def columns(ax: Axes, recording: Recording, colour: str, signal: str, width: float,
-            named: Callable[[int], str] | None = None, scale: float = 1.0) -> None:
-    """Draw each column of a signal, as figures 4, 9 (b) and 10 (a) do."""
+            named: Callable[[int], str], scale: float = 1.0) -> None:
+    """Draw each column of a signal, as figure 10 (a) does."""
     for i, values in enumerate(recording[signal].T):
         drawing.curve(ax, recording["t"], scale * values, **drawing.joint_line(i), linewidth=width,
-                      label=None if named is None else named(i))
+                      label=named(i))
+
+
+def joints(ax: Axes, recording: Recording, colour: str, signal: str, width: float,
+           named: bool = False) -> None:
+    """Draw a signal of each joint, as figures 4 and 9 (b) do.
+
+    Of more joints than there are colours, the fastest have one, and the others are grey.
+    """
+    peaks = np.abs(recording["v"]).max(axis=0)
+    fastest = np.sort(np.argsort(-peaks, kind="stable")[:len(drawing.JOINTS)]).tolist()
+    values, robot = recording[signal].T, recording.facts.robot
+    for i in {*range(len(values))} - {*fastest}:
+        drawing.curve(ax, recording["t"], values[i], color=MEASURED, linewidth=0.3)
+    for k, i in enumerate(fastest):
+        name = f"joint {i + 1}" if len(peaks) == len(fastest) else robot.velocity_names[i]
+        unit = f" [{robot.velocity_units[i]}/s]" if robot.velocity_units[i] != "rad" else ""
+        drawing.curve(ax, recording["t"], values[i], **drawing.joint_line(k), linewidth=width,
+                      label=name + unit if named else None)
 
 
 def distance(ax: Axes, recording: Recording, colour: str, signal: str) -> None:
@@ -131,10 +149,10 @@ def _has_errors(unit: str, recording: Recording) -> bool:
 
 PANELS = (
     Panel("joint-velocities", "Joint velocities", "rad/s", "v",
-          partial(columns, signal="v", width=0.8, named=lambda j: f"joint {j + 1}"),
+          partial(joints, signal="v", width=0.8, named=True),
           "Continuous at acceleration level, with jumps at velocity level."),
     Panel("joint-accelerations", "Joint accelerations", "rad/s²", "a",
-          partial(columns, signal="a", width=0.6),
+          partial(joints, signal="a", width=0.6),
           "It jumps where the stack changes."),
     Panel("position-error", "Distance from the desired position", "mm, logarithmic",
           "position_error", position_error,
