@@ -41,8 +41,8 @@ def _layout(sizes: bytes) -> tuple[Sizes, Sizes]:
 
 @lru_cache(maxsize=256)
 def _giving(give: bytes, sizes: bytes) -> tuple[int, ...]:
-    """Return the levels with a row that gives, from the bytes of both."""
-    rows = np.flatnonzero(np.frombuffer(give) > 0.0)
+    """Return the levels with a row that gives, from the bytes of both; NaN gives too."""
+    rows = np.flatnonzero(np.frombuffer(give))
     return tuple(np.unique(np.searchsorted(_layout(sizes)[1], rows, side="right") - 1).tolist())
 
 

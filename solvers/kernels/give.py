@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from hierarchy.jit import as_matrix, compiled, inlined, inner_product
 from solvers.kernels.active_set.exact import answer, exact_size, open_working_set
 from solvers.kernels.active_set.working_set import (
@@ -23,7 +25,7 @@ from solvers.kernels.active_set.working_set import (
 )
 from solvers.kernels.linalg.rows import ZERO, finish, length_of
 from solvers.kernels.linalg.space import View, assign, fill
-from solvers.status import INACCURATE, SOLVED, TOO_SMALL
+from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 _ROUNDING = 1e-10  # of a violation, relative to |a| (1 + |x|)
 
@@ -47,9 +49,9 @@ def misses(A, lower, upper, x, first, last):
 
 @compiled
 def relax(A, lower, upper, give, x, first, last):
-    """Move the sides of these rows in place, as `Hierarchy.relaxed` does."""
+    """Move the sides of these rows in place, as `Hierarchy.relaxed` does; by NaN if below zero."""
     for i in range(first, last):
-        room = _miss(A[i], lower[i], upper[i], x) + give[i]
+        room = _miss(A[i], lower[i], upper[i], x) + (give[i] if give[i] >= 0.0 else np.nan)
         lower[i] -= room
         upper[i] += room
 
@@ -77,6 +79,8 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
     if exact_size(n, m, sizes.size) > work.size:
         return ZERO + TOO_SMALL
     s, code, at = open_working_set(A, lower, upper, sizes, x[:n], record[whole:], settings, work)
+    for i in range(m):
+        code = code if x[n + i] >= 0.0 else ZERO + NUMERICAL_FAILURE
     if code != SOLVED:
         return finish(x[:n], code)
     g = Giving(A, lower, upper, x[n:n + m], as_matrix(x[n + m:], (x.size - n - m) // n, n))

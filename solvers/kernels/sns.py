@@ -138,7 +138,7 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
     if row i is an inequality that is not handled.
     """
     m, n = A.shape
-    bounds = _bounds_above(lower, upper, sizes)
+    bounds, below = _bounds_above(lower, upper, sizes)
     _, of_equalities = carve_staircase(work, 3 * n, m - bounds, n)
     space, of_tasks = _carve(settings, work, m - bounds, n)
     if max(of_equalities, of_tasks) > work.size:
@@ -154,8 +154,8 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
     if bounds == 0:
         code, _ = climb(A, lower, upper, sizes, x, settings, work[3 * n:])
     else:
-        code = _saturate(A[bounds:], lower[bounds:], upper[bounds:], sizes[1:], x, space,
-                         record[n + 1:])
+        code = _saturate(A[bounds:], lower[bounds:], upper[bounds:], sizes[below:], x, space,
+                         record[n + below:])
     if code != SOLVED:
         return code - bounds if code < 0 else finish(x, code)
     _record_bounds(x, space, record)
@@ -180,12 +180,14 @@ def _touches(x, side):
 
 @inlined
 def _bounds_above(lower, upper, sizes):
-    """Return the number of rows of the first level if it has an inequality, else 0."""
-    if sizes.size > 0:
-        for i in range(sizes[0]):
-            if lower[i] < upper[i]:
-                return sizes[0]
-    return ZERO
+    """Return the rows of the first level with rows, 0 if it has no inequality; the next level."""
+    top = ZERO
+    while top < sizes.size and sizes[top] == 0:
+        top += 1
+    for i in range(sizes[top] if top < sizes.size else ZERO):
+        if lower[i] < upper[i]:
+            return sizes[top], top + 1
+    return ZERO, top
 
 
 @inlined
