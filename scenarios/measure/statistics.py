@@ -138,11 +138,12 @@ def _signed_rank(apart: Array) -> tuple[float, float]:
     return float(min(1.0, 2.0 * min(tails) / ways.sum())), signed
 
 
-def best(columns: Mapping[str, Array], lower_is_better: bool) -> tuple[str, ...]:
+def best(columns: Mapping[str, Array], lower_is_better: bool, level: float = LEVEL
+         ) -> tuple[str, ...]:
     """Return the columns that are better than all others, and equal among themselves.
 
     Empty if another column is not distinguishable from the best, or known in a sample in which
-    that is not: then nothing is best. The level of the tests is corrected for their number (Holm
+    that is not: then nothing is best. The `level` of the tests is corrected for their number (Holm
     1979).
     """
     cost = {label: values if lower_is_better else -values for label, values in columns.items()}
@@ -153,7 +154,7 @@ def best(columns: Mapping[str, Array], lower_is_better: bool) -> tuple[str, ...]
     first = min(medians, key=lambda label: medians[label])
     against = {label: paired(cost[first], values) for label, values in cost.items()}
     other = [one for one in against.values() if not one.equal]
-    if not other or max(holm([one.p for one in other])) >= LEVEL:
+    if not other or max(holm([one.p for one in other])) >= level:
         return ()
     if any(one.side < 1 for one in other) or any(
             (one & ~known[first]).any() for one in known.values()):

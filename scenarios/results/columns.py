@@ -103,12 +103,15 @@ class Results:
         """Return the paired differences of a metric from a column, by default the first."""
         return paired(self.compared(name, first or self.labels[0]), self.compared(name, label))
 
-    def best(self, metric: Metric) -> tuple[str, ...]:
-        """Return the labels that are better than all others; empty where a test cannot tell."""
+    def best(self, metric: Metric, of: int = 1) -> tuple[str, ...]:
+        """Return the labels that are better than all others; empty where a test cannot tell.
+
+        of : number of metrics that are asked for at once, for which the level is corrected.
+        """
         if metric.lower_is_better is None:
             return ()
         return statistics.best({label: self.compared(metric.name, label) for label in self.labels},
-                               metric.lower_is_better)
+                               metric.lower_is_better, statistics.LEVEL / of)
 
     def shares(self, tolerance: float = _TOLERANCE) -> dict[str, dict[str, Share]]:
         """Return the share of each resolver's runs that meet a criterion, by criterion and label.
@@ -191,8 +194,8 @@ def verdict(results: Results) -> list[str]:
     if same := [group for group in results.alike() if len(group) > 1]:
         lines.append(f"The same in every sample: {'; '.join(map(listed, same))}.")
     if len(results.labels) > 1:
-        best = {metric.label: results.best(metric) for metric in results.shown()
-                if metric.name in _WEIGHED}
+        weighed = [metric for metric in results.shown() if metric.name in _WEIGHED]
+        best = {metric.label: results.best(metric, len(weighed)) for metric in weighed}
         said = "; ".join(f"{name}: {listed(who)}" for name, who in best.items() if who)
         lines.append(f"Best beyond chance: {said or 'none'}.")
     return lines

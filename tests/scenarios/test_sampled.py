@@ -193,6 +193,16 @@ def test_runs_that_stopped_early_are_neither_the_best_nor_the_same(speed, stoppe
         f"; {stopped} without a pair" if stopped else "")
 
 
+def test_one_of_several_quantities_is_best_beyond_chance_only_if_it_would_be_alone():
+    names, one = ("speed_max", "acceleration_max"), np.linspace(1.0, 2.0, 6)  # p = 0.031
+    known = {name: metrics.Metric(name, name, 1.0, "") for name in names}
+    found = Results(tuple(Job("", "", "", sample=i, label=label) for label in "ab"
+                          for i in range(6)), (None,) * 12, known,
+                    dict.fromkeys(names, np.r_[one, 2.0 * one]))
+    assert found.best(known["speed_max"]) == ("a",)
+    assert verdict(found)[-1] == "Best beyond chance: none."
+
+
 def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path, monkeypatch):
     store, jobs = Store(tmp_path / "out"), [Job(key, "", "tpm") for key in "abc"]
     speed = metrics.Metric("speed_max", "Joint speed, max", 1.5, "rad/s")
