@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.measure.metric import passed, shown, true
+from scenarios.measure.metric import NOTHING, passed, shown, true
 from scenarios.measure.safety import wanted_forces
 from scenarios.recording.listed import errors
 from scenarios.recording.recording import Recording
@@ -18,8 +18,6 @@ from scenarios.recording.recording import Recording
 TOLERANCES = {"m": 1e-3, "deg": 1.0, "rad": 1e-2, "N": 1.0, "N s": 0.1, "N m s": 0.1, "": 1e-3}
 PROMISED = {"m": 1e-4, "deg": 1e-2, "rad": 1e-4, "rad/s": 1e-3, "m/s": 1e-3, "N m": 1e-3, "": 1e-6,
             "contacts in place": 5e-3}  # simulated soles creep
-
-_NOTHING = 1e-9  # SI units, rounding
 
 # What a scenario asks for: name, what, unit, how far off the run was (T,) or NaN, promised or not.
 _Asked = tuple[str, str, str, Array, bool]
@@ -162,7 +160,7 @@ def _goal(name: str, asked: str, unit: str, off: Array, promise: bool, t: Array)
     tolerances = PROMISED if promise else TOLERANCES
     tolerance = tolerances.get(name, tolerances.get(unit, 1e-3))
     known = np.isfinite(off)
-    t, off = t[known], np.where(off[known] < _NOTHING, 0.0, off[known])
+    t, off = t[known], np.where(off[known] < NOTHING, 0.0, off[known])
     within = np.flatnonzero(off <= tolerance)
     reached = float(t[within[0]]) if within.size else None
     if promise:

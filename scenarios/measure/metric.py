@@ -20,6 +20,8 @@ _SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "sha
           "N m s": (1.0, "N m s", 3),
           "rows": (1.0, "", 3), "": (1.0, "", 0)}  # "rows": in the units of a level's rows
 
+NOTHING = 1e-9  # SI units: what differs by less differs by rounding
+
 
 @dataclass(frozen=True)
 class Metric:

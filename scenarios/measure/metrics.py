@@ -11,7 +11,7 @@ import numpy as np
 from hierarchy import plugins
 from hierarchy.problem import Array
 from scenarios.measure import safety  # noqa: F401, registers metrics
-from scenarios.measure.metric import Criteria, finite, known, largest, register, true
+from scenarios.measure.metric import NOTHING, Criteria, finite, known, largest, register, true
 from scenarios.measure.metric import Metric as Metric
 from scenarios.recording import listed
 from scenarios.recording.recording import Recording
@@ -20,7 +20,6 @@ from solvers import Status
 _STILL = 0.01    # largest joint speed [rad/s] of a robot that counts as standing still
 _FAR = 0.01      # error [m] at which it should not
 _AFTER = 0.5     # [s] after the return within reach that do not count as error
-_NOTHING = 1e-9  # errors of listed tasks below this are rounding and count as zero [m, deg, rad]
 
 _DONE = {"brake": "Ticks braked", "hold": "Ticks with the last command held",
          "use": "Ticks with trouble, answer sent", "stop": "Ticks that stopped the run",
@@ -74,7 +73,7 @@ def _listed(recording: Recording, by: Criteria) -> Iterator[Metric]:
     """Errors of the tasks of `[[tasks]]`, each under its name."""
     after = recording["t"] - recording["t"][0] >= by.settle
     for section, unit, exact in listed.errors(recording):
-        error = np.where(exact < _NOTHING, 0.0, exact)
+        error = np.where(exact < NOTHING, 0.0, exact)
         turned = unit == "deg" and section.kind in ("pose", "frame", "relative")
         title = section.title[0].upper() + section.title[1:] + (", turned" if turned else "")
         key = f"task_{section.title}{' turned' if turned else ''}".replace(" ", "_")
@@ -166,15 +165,17 @@ def _time(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "status" in recording:
         failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
         yield _timing("ticks_not_solved", "Ticks not solved", float(failed), "")
+    simulated = "" if recording.scenario.plant.follows else "with the step of the simulated robot"
     if "time_tick" in recording:
         late = np.count_nonzero(recording["time_tick"] > recording.scenario.control.period)
-        yield _timing("ticks_late", "Ticks longer than the period", float(late), "")
+        yield _timing("ticks_late", "Ticks longer than the period", float(late), "", note=simulated)
     for signal, part in _PARTS.items():
         shared = signal in ("time_kinematics", "time_rows")  # the same code under any resolver
         for key, (percent, label) in _PERCENTILES.items() if signal in recording else ():
             yield _timing(f"{signal}_{key}", f"{part}, {label}",
                           finite(np.percentile(recording[signal], percent)), "s",
                           lower_is_better=None if shared else True,
+                          note=simulated if signal == "time_tick" else "",
                           detail=shared and key != "median")
 
 

@@ -12,11 +12,12 @@ from scenarios.config.scenario import OWN
 from scenarios.files import slug
 from scenarios.measure import metrics
 from scenarios.measure.happenings import Happening, happened
+from scenarios.measure.metric import NOTHING
 from scenarios.measure.metrics import Metric
 from scenarios.recording.facts import ResolverFacts, resolver_facts
 from scenarios.recording.recording import Recording
 
-_TIE, _ROUNDING = 0.01, 1e-12  # relative, and in SI units: values that near are as good
+_TIE = 0.01  # relative: values that near are as good, as those within NOTHING
 # How a resolver that is not strict departs from strict priorities, by its name.
 _DEPARTS = {
     "": "not strict",
@@ -166,5 +167,5 @@ def _best(values: Mapping[int, float], lower: bool | None) -> frozenset[int]:
         return frozenset()
     winner = min(values.values()) if lower else max(values.values())
     best = frozenset(i for i, value in values.items()
-                     if abs(value - winner) <= max(_TIE * max(abs(value), abs(winner)), _ROUNDING))
+                     if abs(value - winner) <= max(_TIE * max(abs(value), abs(winner)), NOTHING))
     return best if len(best) < len(values) else frozenset()

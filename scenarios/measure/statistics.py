@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hierarchy.problem import Array
+from scenarios.measure.metric import NOTHING
 
 LEVEL = 0.05     # probability of calling a difference real that is chance
-SAME = 1e-3      # relative difference below which two values count as the same
+SAME = 1e-3      # relative difference below which two values count as the same, as below NOTHING
 FEWEST = 6       # pairs that differ; with fewer the signed-rank test cannot reach LEVEL
 EXACT = 50       # pairs that differ, up to which the test is exact
 
@@ -35,40 +36,53 @@ class Spread:
 class Paired:
     """The differences of one quantity between two runs on the same samples: second minus first.
 
-    count : pairs in which both values are known. same : pairs within SAME of each other.
+    count : pairs in which both values are known. alone : samples in which only one of them is.
+    same : pairs within SAME of each other.
     lower, higher : pairs in which the second is lower or higher than the first.
     median, quartiles : of all differences. p : two-sided probability of such differences by
         chance, after Wilcoxon's signed-rank test of the pairs that differ (1 if too few do).
+    ranks : from -1 to 1, the sum of the signed ranks of that test over that of all ranks.
     """
 
     count: int
+    alone: int
     same: int
     lower: int
     higher: int
     median: float
     quartiles: tuple[float, float]
     p: float
+    ranks: float
+
+    @property
+    def differ(self) -> int:
+        """Number of pairs that differ."""
+        return self.count - self.same
 
     @property
     def equal(self) -> bool:
-        """Whether no pair differs."""
-        return self.same == self.count
+        """Whether no pair differs, and no sample is without a pair."""
+        return not self.differ and not self.alone
+
+    @property
+    def side(self) -> int:
+        """1 if the second is higher, -1 if it is lower, 0 if ranks and most pairs disagree."""
+        most = np.sign(self.higher - self.lower)
+        return int(most) if most == np.sign(self.ranks) else 0
 
     @property
     def distinguishable(self) -> bool:
-        """Whether the test tells the two apart."""
-        return self.p < LEVEL
+        """Whether the test tells the two apart, in the direction of most pairs that differ."""
+        return self.p < LEVEL and self.side != 0
 
     def __str__(self) -> str:
-        if not self.count:
-            return "no pair"
-        if self.equal:
-            return "the same"
-        if not self.distinguishable:
-            return "not distinguishable"
-        counts = {"lower": self.lower, "higher": self.higher}
-        word = max(counts, key=lambda one: counts[one])
-        rest = {**counts, "the same": self.same}
+        said = ("no pair" if not self.count else "the same" if not self.differ else
+                self._apart() if self.distinguishable else "not distinguishable")
+        return said + (f"; {self.alone} without a pair" if self.alone else "")
+
+    def _apart(self) -> str:
+        rest = {"lower": self.lower, "higher": self.higher, "the same": self.same}
+        word = "higher" if self.side > 0 else "lower"
         said = [f"{word} in {rest.pop(word)} of {self.count}",
                 *(f"{other} in {times}" for other, times in rest.items() if times)]
         return f"{', '.join(said)}, {probability(self.p)}"
@@ -89,59 +103,63 @@ def paired(first: Array, second: Array, same: float = SAME) -> Paired:
     same : relative difference within which two values count as one.
     """
     known = np.isfinite(first) & np.isfinite(second)
+    alone = int((np.isfinite(first) != np.isfinite(second)).sum())
     a, b = first[known], second[known]
     apart = b - a
-    apart[np.abs(apart) <= same * np.maximum(np.abs(a), np.abs(b))] = 0.0
+    apart[np.abs(apart) <= np.maximum(same * np.maximum(np.abs(a), np.abs(b)), NOTHING)] = 0.0
     if not apart.size:
-        return Paired(0, 0, 0, 0, np.nan, (np.nan, np.nan), 1.0)
+        return Paired(0, alone, 0, 0, 0, np.nan, (np.nan, np.nan), 1.0, 0.0)
     low, median, high = np.percentile(apart, [25.0, 50.0, 75.0])
-    return Paired(apart.size, int((apart == 0.0).sum()), int((apart < 0.0).sum()),
+    return Paired(apart.size, alone, int((apart == 0.0).sum()), int((apart < 0.0).sum()),
                   int((apart > 0.0).sum()), float(median), (float(low), float(high)),
-                  _signed_rank(apart[apart != 0.0]))
+                  *_signed_rank(apart[apart != 0.0]))
 
 
-def _signed_rank(apart: Array) -> float:
-    """Return the two-sided p-value of the signed-rank test (Wilcoxon 1945).
+def _signed_rank(apart: Array) -> tuple[float, float]:
+    """Return two-sided p-value and rank sum, see Paired, of the test of Wilcoxon (1945).
 
     Exact up to EXACT pairs; with ties, scipy is not, or tries all signs, which takes a second.
     """
+    _, place, count = np.unique(np.abs(apart), return_inverse=True, return_counts=True)
+    ranks = (2 * np.cumsum(count) - count + 1)[place]  # twice the mean rank of those that are equal
+    signed = float(np.sign(apart) @ ranks / max(ranks.sum(), 1))
     if apart.size < FEWEST:
-        return 1.0
+        return 1.0, signed
     if apart.size > EXACT:
         from scipy.stats import wilcoxon
 
-        return float(wilcoxon(apart, method="asymptotic").pvalue)
-    _, place, count = np.unique(np.abs(apart), return_inverse=True, return_counts=True)
-    ranks = (2 * np.cumsum(count) - count + 1)[place]  # twice the mean rank of those that are equal
+        return float(wilcoxon(apart, method="asymptotic").pvalue), signed
     ways = np.zeros(ranks.sum() + 1)  # in which signs give each sum of positive ranks
     ways[0] = 1.0
     for rank in ranks:
         ways[rank:] += ways[:-rank].copy()
     found = ranks[apart > 0.0].sum()
     tails = ways[:found + 1].sum(), ways[found:].sum()
-    return float(min(1.0, 2.0 * min(tails) / ways.sum()))
+    return float(min(1.0, 2.0 * min(tails) / ways.sum())), signed
 
 
-def best(columns: Mapping[str, Array], lower_is_better: bool) -> tuple[str, ...]:
+def best(columns: Mapping[str, Array], lower_is_better: bool, level: float = LEVEL
+         ) -> tuple[str, ...]:
     """Return the columns that are better than all others, and equal among themselves.
 
-    Empty if another column is not distinguishable from the best: then nothing is best. The level
-    of the tests is corrected for their number (Holm 1979).
+    Empty if another column is not distinguishable from the best, or known in a sample in which
+    that is not: then nothing is best. The `level` of the tests is corrected for their number (Holm
+    1979).
     """
-    known = {label: values for label, values in columns.items() if np.isfinite(values).any()}
-    if len(known) < 2 or len(known) < len(columns):
+    cost = {label: values if lower_is_better else -values for label, values in columns.items()}
+    known = {label: np.isfinite(values) for label, values in cost.items()}
+    if len(known) < 2 or not all(one.any() for one in known.values()):
         return ()
-    medians = {label: float(np.nanmedian(values)) for label, values in known.items()}
-    first = (min if lower_is_better else max)(medians, key=lambda label: medians[label])
-    against = {label: paired(known[first], values) for label, values in known.items()
-               if label != first}
-    equal = [label for label, one in against.items() if one.equal]
-    other = {label: one for label, one in against.items() if not one.equal}
-    if not other or max(holm([one.p for one in other.values()])) >= LEVEL:
+    medians = {label: float(np.nanmedian(values)) for label, values in cost.items()}
+    first = min(medians, key=lambda label: medians[label])
+    against = {label: paired(cost[first], values) for label, values in cost.items()}
+    other = [one for one in against.values() if not one.equal]
+    if not other or max(holm([one.p for one in other])) >= level:
         return ()
-    if any((one.median < 0.0) == lower_is_better for one in other.values()):
+    if any(one.side < 1 for one in other) or any(
+            (one & ~known[first]).any() for one in known.values()):
         return ()
-    return (first, *equal)
+    return tuple(label for label, one in against.items() if one.equal)
 
 
 def holm(p: Sequence[float]) -> list[float]:

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,11 +77,22 @@ class Results:
         """Number of samples."""
         return 1 + max(run.sample for run in self.runs)
 
+    @cached_property
+    def _ended(self) -> NDArray[np.bool_]:
+        return np.array([reason is None for reason in self.reasons])
+
     def column(self, name: str, label: str) -> NDArray[np.float64]:
         """Return a metric under a resolver by sample, (samples,)."""
+        return self._by_sample(self.values[name], label)
+
+    def compared(self, name: str, label: str) -> NDArray[np.float64]:
+        """Return a column with NaN for runs that stopped early: their numbers cover less time."""
+        return self._by_sample(np.where(self._ended, self.values[name], np.nan), label)
+
+    def _by_sample(self, values: NDArray[Any], label: str) -> NDArray[np.float64]:
         found = np.full(self.samples, np.nan)
         for i in np.flatnonzero(self._of[label]):
-            found[self.runs[i].sample] = self.values[name][i]
+            found[self.runs[i].sample] = values[i]
         return found
 
     def spread(self, name: str, label: str) -> Spread | None:
@@ -90,14 +101,17 @@ class Results:
 
     def paired(self, name: str, label: str, first: str | None = None) -> Paired:
         """Return the paired differences of a metric from a column, by default the first."""
-        return paired(self.column(name, first or self.labels[0]), self.column(name, label))
+        return paired(self.compared(name, first or self.labels[0]), self.compared(name, label))
 
-    def best(self, metric: Metric) -> tuple[str, ...]:
-        """Return the labels that are better than all others; empty where a test cannot tell."""
+    def best(self, metric: Metric, of: int = 1) -> tuple[str, ...]:
+        """Return the labels that are better than all others; empty where a test cannot tell.
+
+        of : number of metrics that are asked for at once, for which the level is corrected.
+        """
         if metric.lower_is_better is None:
             return ()
-        return statistics.best({label: self.column(metric.name, label) for label in self.labels},
-                               metric.lower_is_better)
+        return statistics.best({label: self.compared(metric.name, label) for label in self.labels},
+                               metric.lower_is_better, statistics.LEVEL / of)
 
     def shares(self, tolerance: float = _TOLERANCE) -> dict[str, dict[str, Share]]:
         """Return the share of each resolver's runs that meet a criterion, by criterion and label.
@@ -105,7 +119,7 @@ class Results:
         Those are the criteria that can be judged; a failed run meets none. Up to `tolerance` [rad]
         beyond a joint limit counts as within it.
         """
-        met = {"Reached the end": np.array([reason is None for reason in self.reasons])}
+        met = {"Reached the end": self._ended}
         near = [self.values[name] for name in ("body_distance_min", "ee_distance_min")
                 if name in self.values]
         contacts = [self.values["contact_ticks"]] if "contact_ticks" in self.values else []
@@ -146,11 +160,13 @@ class Results:
         return found
 
     def alike(self) -> list[list[str]]:
-        """Return the labels, together where no metric of any sample differs."""
+        """Return the labels, together where no metric of any sample differs, nor how it ended."""
         found: list[list[str]] = []
+        each = [self._ended, *(self.values[metric.name] for metric in self.shown())]
         for label in self.labels:
-            like = (group for group in found if all(
-                self.paired(metric.name, label, group[0]).equal for metric in self.shown()))
+            like = (group for group in found if not any(
+                paired(self._by_sample(one, group[0]), self._by_sample(one, label)).differ
+                for one in each))  # a metric that a resolver does not have differs in nothing
             if (group := next(like, [])) == []:
                 found.append(group)
             group.append(label)
@@ -178,8 +194,8 @@ def verdict(results: Results) -> list[str]:
     if same := [group for group in results.alike() if len(group) > 1]:
         lines.append(f"The same in every sample: {'; '.join(map(listed, same))}.")
     if len(results.labels) > 1:
-        best = {metric.label: results.best(metric) for metric in results.shown()
-                if metric.name in _WEIGHED}
+        weighed = [metric for metric in results.shown() if metric.name in _WEIGHED]
+        best = {metric.label: results.best(metric, len(weighed)) for metric in weighed}
         said = "; ".join(f"{name}: {listed(who)}" for name, who in best.items() if who)
         lines.append(f"Best beyond chance: {said or 'none'}.")
     return lines

@@ -133,12 +133,17 @@ def test_the_p_value_is_that_of_all_signs_with_and_without_ties(seed):
 def test_pairs_are_counted_by_their_direction_and_too_few_tell_nothing():
     first = np.array([1.0, 2.0, 3.0, 4.0, np.nan, 6.0])
     found = paired(first, np.array([1.0, 1.0, 5.0, 4.0 * (1 + 1e-4), 5.0, np.inf]))
-    assert (found.count, found.same, found.lower, found.higher) == (4, 2, 1, 1)
-    assert [replace(found, p=p).distinguishable for p in (0.0499, 0.05)] == [True, False]
-    assert str(found) == "not distinguishable"
+    assert (found.count, found.alone, found.same, found.lower, found.higher) == (4, 2, 2, 1, 1)
+    assert [replace(found, p=p, higher=2, ranks=0.1).distinguishable for p in (0.0499, 0.05)] == [
+        True, False]
+    assert str(found) == "not distinguishable; 2 without a pair"
     assert not paired(np.zeros(5), np.ones(5)).distinguishable
     assert paired(np.zeros(6), np.arange(1.0, 7.0)).distinguishable
-    assert str(paired(np.full(3, np.nan), np.ones(3))) == "no pair"
+    assert str(paired(np.full(3, np.nan), np.ones(3))) == "no pair; 3 without a pair"
+    assert str(paired(np.zeros(9), np.full(9, 1e-10))) == "the same"  # rounding
+    many = np.r_[np.full(26, -1.0), np.full(24, 2.0)]  # more are lower, but by less
+    assert paired(np.zeros(50), many).p < 0.01
+    assert str(paired(np.zeros(50), many)) == "not distinguishable"
 
 
 RISING = np.arange(1.0, 17.0)
@@ -155,6 +160,7 @@ def test_a_shift_of_pairs_is_told_beside_those_that_do_not_differ(shift, said):
 LOW, NORMAL = np.linspace(1.0, 1.5, 16), np.random.default_rng(2).normal(size=(2, 16))
 # One pair of 8 against the trend: p = 0.016 alone, too much for ten rivals after Holm.
 APART = np.array([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, -0.5])
+HOLES = np.where(np.arange(16) < 3, np.nan, 0.0)
 
 
 @pytest.mark.parametrize(("columns", "lower", "marked"), [
@@ -164,10 +170,15 @@ APART = np.array([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, -0.5])
     ([LOW, LOW.copy()], True, ()), ([LOW, np.full(16, np.nan)], True, ()), ([LOW], True, ()),
     ([LOW, LOW + np.r_[np.full(12, 1.0), np.full(4, -50.0)]], True, ()),
     ([np.zeros(8), APART], True, (0,)),
+    ([LOW * (1.0 + 1e-12), LOW + 1.0, LOW], True, (0, 2)), ([1e-12 * LOW, 2e-12 * LOW], True, ()),
+    ([LOW, np.where(LOW < 1.2, LOW + 1.0, LOW)], True, (0,)),
+    ([LOW, LOW + 1.0 + HOLES], True, (0,)), ([LOW + HOLES, LOW + 1.0], True, ()),
+    ([LOW, LOW + 1.0, LOW + HOLES], True, ()),
     ([np.zeros(8), *(APART * (1.0 + 0.01 * i) for i in range(10))], True, ())])
 def test_the_best_is_marked_with_those_equal_to_it_where_all_others_can_be_told_from_it(
         columns, lower, marked):
     assert best(dict(enumerate(columns)), lower_is_better=lower) == marked
+    assert best({i: -one for i, one in enumerate(columns)}, lower_is_better=not lower) == marked
 
 
 @pytest.mark.parametrize(("met", "of", "low", "high"), [

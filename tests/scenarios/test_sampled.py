@@ -17,7 +17,7 @@ from scenarios import load, shipped, simulate
 from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
 from scenarios.results import pool, sampled_page
-from scenarios.results.columns import Results
+from scenarios.results.columns import Results, verdict
 from scenarios.results.plan import Job, Outcome, load_sweep, outcome, plan, shipped_sweeps
 from scenarios.results.sampled import Workers, compare_starts
 from scenarios.results.store import FullError, Store
@@ -180,6 +180,33 @@ def test_the_distance_was_kept_by_runs_that_were_never_below_it():
 def test_an_axis_shows_values_up_to_twice_the_width_of_their_middle_away(outlier, high):
     values = np.append(np.linspace(10.0, 11.0, 100), outlier)
     assert sampled_page._limits([values]) == pytest.approx((10.0, high))
+
+
+@pytest.mark.parametrize(("speed", "stopped", "same", "best"), [
+    (1.0, 0, True, "none"), (1.0, 3, False, "none"), (np.nan, 16, False, "none"),
+    (0.1, 0, False, "Joint speed: b"), (0.1, 3, False, "none"), (0.1, 16, False, "none"),
+    (2.0, 3, False, "Joint speed: a")])
+def test_runs_that_stopped_early_are_neither_the_best_nor_the_same(speed, stopped, same, best):
+    values, reasons = np.linspace(1.0, 2.0, 16), (None,) * (32 - stopped) + ("fell",) * stopped
+    found = Results(tuple(Job("", "", "", sample=i, label=label) for label in "ab"
+                          for i in range(16)), reasons,
+                    {"speed_max": metrics.Metric("speed_max", "Joint speed", 1.0, "rad/s")},
+                    {"speed_max": np.r_[values, speed * values]})
+    said = verdict(found)
+    assert any(line.startswith("The same in every sample") for line in said) == same
+    assert said[-1] == f"Best beyond chance: {best}."
+    assert str(found.paired("speed_max", "b")).endswith(
+        f"; {stopped} without a pair" if stopped else "")
+
+
+def test_one_of_several_quantities_is_best_beyond_chance_only_if_it_would_be_alone():
+    names, one = ("speed_max", "acceleration_max"), np.linspace(1.0, 2.0, 6)  # p = 0.031
+    known = {name: metrics.Metric(name, name, 1.0, "") for name in names}
+    found = Results(tuple(Job("", "", "", sample=i, label=label) for label in "ab"
+                          for i in range(6)), (None,) * 12, known,
+                    dict.fromkeys(names, np.r_[one, 2.0 * one]))
+    assert found.best(known["speed_max"]) == ("a",)
+    assert verdict(found)[-1] == "Best beyond chance: none."
 
 
 def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path, monkeypatch):

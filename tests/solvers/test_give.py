@@ -105,6 +105,16 @@ def test_the_certificate_rejects_another_x_and_a_witness_that_misses_more(wrong)
     refused("1 levels give, so witnesses must be (1, 6)", certify, h, res.x)
 
 
+@pytest.mark.parametrize("resolver", [make("hcod"), make("hcod", damping=0.1), make("hqp")],
+                         ids=lambda one: one.label)
+@pytest.mark.parametrize("wrong", [np.nan, -1.0])
+def test_a_give_that_became_wrong_in_place_fails_with_zeros(resolver, wrong):
+    h = problem(0, 0.1)
+    h.give[3] = wrong
+    res = resolver.solve(h)
+    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
+
+
 def test_what_cannot_give_refuses_by_name():
     h = problem(1, 0.1)
     for resolver in map(make, set(names()) - {"hcod", "hqp"}):
