@@ -134,6 +134,7 @@ class Level(NamedTuple):
 
     least: the norm of the lightest row that acts. far: the largest violation. missed: the length of
     all, each over the norm of its row. source: the largest violation times the norm of its row.
+    unsure: what rounding of the largest may be in the force of the heaviest row.
     """
 
     p: int
@@ -143,6 +144,7 @@ class Level(NamedTuple):
     far: float
     missed: float
     source: float
+    unsure: float
 
 
 @inlined
@@ -171,7 +173,7 @@ def _balances(s, p, reach, factored):
     holds = (not outside and rest <= allowed and (clear or _is_clear(s, level, reach))
              and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
     left = length_of(s.number[GRADIENT, :s.x.size])
-    error = SIGN_MARGIN * (left + rounding) / s.scalar[PIVOT]
+    error = (SIGN_MARGIN * (left + rounding) + level.unsure) / s.scalar[PIVOT]
     cut = SIGN_MARGIN * turned / s.scalar[PIVOT]
     if holds and _signs_hold(s, level, error + cut, reach, allowed, met):
         if level.missed > CLEAR_MISS * s.scalar[TOLERANCE] * reach:
@@ -209,13 +211,14 @@ def _measured(s, p, last):
     """Return a `Level`."""
     begin = s.index[FIRST, p] if not last else s.A.shape[0]
     end = s.index[FIRST, p + 1] if not last else begin
-    least, square, far, source = np.inf, 0.0, 0.0, 0.0
+    least, most, square, far, source = np.inf, 0.0, 0.0, 0.0, 0.0
     for i in range(begin, end):
         if s.index[STATE, i] != FREE and s.number[NORM, i] > 0.0:
             norm, miss = s.number[NORM, i], abs(s.multiplier[p, i])
-            least, far, source = min(least, norm), max(far, miss), max(source, miss * norm)
+            least, most, far = min(least, norm), max(most, norm), max(far, miss)
+            source = max(source, miss * norm)
             square += (miss / norm) ** 2
-    return Level(p, begin, end, least, far, np.sqrt(square), source)
+    return Level(p, begin, end, least, far, np.sqrt(square), source, SIGN_ROUNDING * far * most)
 
 
 @inlined
