@@ -57,7 +57,7 @@ def run(scenario: Annotated[str, typer.Argument(
     from scenarios.files import claim, next_free
 
     name = f"{chosen.name}-{chosen.control.resolver}"
-    folder = claim(out if out is not None else next_free(Path("runs") / name))
+    folder = next_free(Path("runs") / name) if out is None else claim(out)
     if live:
         from scenarios.cli.shown import show_live
 
