@@ -134,6 +134,11 @@ def _locked(stream: TextIO) -> bool:
     return True
 
 
+def in_runs(name: str) -> Path:
+    """Return the folder of a name in `runs`, which is where output goes by default."""
+    return Path("runs") / slug(name)
+
+
 def next_free(base: str | Path) -> Path:
     """Return the first of base, base-2, base-3, ... that does not exist yet, claimed."""
     base = Path(base)
