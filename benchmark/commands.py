@@ -46,7 +46,7 @@ def _run(out: Path | None, *names: str, **options: Any) -> int:
     """Run benchmarks, MODULE or MODULE:FUNCTION, with those of the options that each has."""
     from scenarios.files import claim, next_free
 
-    folder = claim(out if out is not None else next_free(Path("runs") / "bench"))
+    folder = next_free(Path("runs") / "bench") if out is None else claim(out)
     failed = False
     for name in names:
         module, _, function = name.partition(":")

@@ -29,6 +29,10 @@ class OutputError(HierarchyError):
     """A folder that exists and is not empty, or that cannot be written."""
 
 
+class TakenError(OutputError):
+    """A folder that another process is going to write."""
+
+
 _HELD: dict[Path, TextIO] = {}  # lock files of this process, by what they lock
 
 
@@ -72,7 +76,7 @@ def _partial(path: Path) -> Path:
 
 
 def lock(path: Path) -> None:
-    """Lock a path for this process until its end or `unlock`; raises OutputError if it is locked.
+    """Lock a path for this process until its end or `unlock`; raises TakenError if it is locked.
 
     The system holds the lock and releases it however the process ends, in containers that share the
     folder too. The hidden file beside the path only says whose it is.
@@ -85,8 +89,8 @@ def lock(path: Path) -> None:
         with stream:
             stream.seek(0)
             owner = stream.read().strip() or "another process"
-        raise OutputError(f"output folder {path} is going to be written by {owner}; choose "
-                          "another, or wait for it to end")
+        raise TakenError(f"output folder {path} is going to be written by {owner}; choose "
+                         "another, or wait for it to end")
     if not file.exists() or file.stat().st_ino != os.fstat(stream.fileno()).st_ino:
         stream.close()
         return lock(path)  # whoever held it has just removed the file
@@ -130,11 +134,24 @@ def _locked(stream: TextIO) -> bool:
     return True
 
 
+def in_runs(name: str) -> Path:
+    """Return the folder of a name in `runs`, which is where output goes by default."""
+    return Path("runs") / slug(name)
+
+
 def next_free(base: str | Path) -> Path:
-    """Return the first of base, base-2, base-3, ... that does not exist yet."""
+    """Return the first of base, base-2, base-3, ... that does not exist yet, claimed."""
     base = Path(base)
     numbered = (base.with_name(f"{base.name}-{i}") for i in itertools.count(2))
-    return next(path for path in itertools.chain([base], numbered) if not path.exists())
+    return next(path for path in itertools.chain([base], numbered)
+                if not path.exists() and _free(path))
+
+
+def _free(path: Path) -> bool:
+    """Claim a path, unless another process has."""
+    with suppress(TakenError):
+        return bool(claim(path))
+    return False
 
 
 @contextmanager

@@ -54,10 +54,10 @@ def run(scenario: Annotated[str, typer.Argument(
     chosen = opt.loaded(scenario, changes, duration)
     if resolver is not None:
         chosen = chosen.with_resolver(resolver)
-    from scenarios.files import claim, next_free
+    from scenarios.files import claim, in_runs, next_free
 
     name = f"{chosen.name}-{chosen.control.resolver}"
-    folder = claim(out if out is not None else next_free(Path("runs") / name))
+    folder = next_free(in_runs(name)) if out is None else claim(out)
     if live:
         from scenarios.cli.shown import show_live
 
@@ -125,18 +125,18 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
         raise typer.BadParameter("needs --starts", param_hint="--seed, --scheduler, --part")
     from scenarios.config import members, shipped_groups
     from scenarios.config.scenario import OWN
-    from scenarios.files import next_free
+    from scenarios.files import in_runs, next_free
 
     chosen = [opt.loaded(name, changes, duration) for name in members(scenarios)]
     grouped = any(name in shipped_groups() for name in scenarios)
     specs = opt.listed_in(resolvers) if resolvers is not None else [OWN] if grouped else None
     if starts is None:
         name = scenarios[0] if grouped else chosen[0].name
-        folder = out if out is not None else next_free(Path("runs") / f"compare-{name}")
+        folder = out if out is not None else next_free(in_runs(f"compare-{name}"))
         return _compare(chosen, specs, folder, as_json, workers)
     from scenarios.results.sampled import Workers, compare_starts
 
-    folder = out if out is not None else Path("runs") / f"starts-{chosen[0].name}"
+    folder = out if out is not None else in_runs(f"starts-{chosen[0].name}")
     return _sampled(partial(compare_starts, chosen, specs, starts, seed, folder,
                             workers=Workers(workers, scheduler, part)), folder, as_json)
 
@@ -180,11 +180,12 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
     Run the same command again to resume an interrupted sweep.
     """
+    from scenarios.files import in_runs
     from scenarios.results.plan import load_sweep
     from scenarios.results.sampled import Workers
     from scenarios.results.sampled import sweep as make
 
-    folder = out if out is not None else Path("runs") / f"sweep-{load_sweep(file).name}"
+    folder = out if out is not None else in_runs(f"sweep-{load_sweep(file).name}")
     return _sampled(partial(make, file, folder, workers=Workers(workers, scheduler, part)), folder,
                     as_json)
 

@@ -33,11 +33,14 @@ def parse_changes(changes: Sequence[str], what: str) -> dict[str, Any]:
 
 def _value(text: str, what: str) -> Any:
     try:
-        return parse(f"value = {text}", what, ScenarioError)["value"]
+        value, *others = parse(f"value = {text}", what, ScenarioError).values()
     except ScenarioError:
         if text and all(c.isalnum() or c in "_-./" for c in text):
             return text  # a bare word needs no quotes on a command line
         raise
+    if others:
+        raise ScenarioError(f"{what}: expected one value")
+    return value
 
 
 def change_all(data: dict[str, Any], changes: Mapping[str, Any], root: type[Section]) -> None:

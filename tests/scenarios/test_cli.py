@@ -15,7 +15,7 @@ from hand_made import recording
 from scenarios import compare, load, load_run, simulate
 from scenarios.cli import doctor
 from scenarios.cli.main import _with_its_file, app
-from scenarios.files import OutputError, claim, slug
+from scenarios.files import OutputError, claim, in_runs, slug
 from scenarios.measure import run_folder
 
 
@@ -173,6 +173,7 @@ def test_names_of_settings_that_differ_late_give_different_folders():
     one, other = (slug(f"tpm:damping=0.{'0' * 300}{digit}") for digit in "12")
     assert one != other
     assert max(len(one), len(other)) <= 200
+    assert len(f"{in_runs(100 * '日').name}-2".encode()) <= 255
 
 
 def test_an_interruption_that_breaks_the_compiler_is_still_an_interruption(tmp_path):

@@ -104,6 +104,7 @@ def test_a_folder_that_another_process_has_locked_cannot_be_claimed(tmp_path):
                           stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         other.stdout.readline()
         refused("run is going to be written by", claim, tmp_path / "run", error=OutputError)
+        assert next_free(tmp_path / "run") == tmp_path / "run-2"
         other.stdin.close()
     assert claim(tmp_path / "run") == tmp_path / "run"
 

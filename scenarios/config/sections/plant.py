@@ -56,6 +56,10 @@ class AnyPlant(PartSection):
     FRI."""
     measurement: MeasurementSection = MeasurementSection()  #: Errors of the measured joints.
 
+    def _wrong(self) -> Iterator[str]:
+        if self.feedback == "commanded" and not self.measurement.ideal:
+            yield 'feedback = "commanded" takes no errors of the measurement, which nobody reads'
+
 
 @register("plants", "kinematic", shipped=True)
 class KinematicSection(AnyPlant):
