@@ -88,8 +88,8 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
         of a velocity, see `solvers.reaching.reach`; `limits` is then True or False.
 
     Raises HierarchyError: q does not fit the robot, a task is none, dt is not positive or not the
-    period of a task, a gain times dt is above 2, or the resolver cannot handle a row. A numerical
-    failure is a status, with a finite v.
+    period of a task, a gain times dt is above 2 or a rate times dt above 1, or the resolver cannot
+    handle a row. A numerical failure is a status, with a finite v.
     """
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
     expect_each("solve_ik: tasks", tasks, Task, "give a list of tasks")
