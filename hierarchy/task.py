@@ -213,7 +213,8 @@ def check_period(task: Task, period: float, level: Level = "velocity") -> None:
 
     A period of the task, or of one in it, is that one, and its error must not grow by itself: after
     a tick it is 1 - gain period times what it was, so gain period is at most 2. So is, at the other
-    levels, damping period, for the rate of the error.
+    levels, damping period, for the rate of the error. A barrier lets (rate period) times the
+    distance that is left go in a tick, so rate period is at most 1.
     """
     what, of = ("gain", "error") if level == "velocity" else ("damping", "rate")
     for part in (task, *parts(task)):
@@ -224,6 +225,10 @@ def check_period(task: Task, period: float, level: Level = "velocity") -> None:
         refuse(gain * period > 2.0 * (1.0 + _ROUNDING), f"task {part.name!r}: {what} = {gain:g} 1/s"
                f" times the period of {period:g} s is {gain * period:g}; above 2 its {of} grows "
                f"from tick to tick, so give at most {2.0 / period:g} 1/s")
+        rate = part.barrier.rate if hasattr(part, "barrier") else 0.0
+        refuse(rate * period > 1.0 + _ROUNDING, f"task {part.name!r}: rate = {rate:g} 1/s times "
+               f"the period of {period:g} s is {rate * period:g}; above 1 a tick may take more "
+               f"than the distance left, so give at most {1.0 / period:g} 1/s")
 
 
 def parts(task: Task) -> Iterator[Task]:

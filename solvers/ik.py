@@ -88,8 +88,8 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
         of a velocity, see `solvers.reaching.reach`; `limits` is then True or False.
 
     Raises HierarchyError: q does not fit the robot, a task is none, dt is not positive or not the
-    period of a task, a gain times dt is above 2, or the resolver cannot handle a row. A numerical
-    failure is a status, with a finite v.
+    period of a task, a gain times dt is above 2 or a rate times dt above 1, or the resolver cannot
+    handle a row. A numerical failure is a status, with a finite v.
     """
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
     expect_each("solve_ik: tasks", tasks, Task, "give a list of tasks")
@@ -121,15 +121,22 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
 
 def _solved(robot: Robot, q: Array, h: Hierarchy, resolver: Settled,
             memory: Array | None) -> Resolution:
-    """Solve, and where the mechanism bends within the period again with that on its sides."""
-    found = resolver.solve(h, memory)
+    """Solve, and where the mechanism bends within the period again with that on its sides.
+
+    Beside a singular configuration that may diverge: the first answer then counts.
+    """
+    plain = found = resolver.solve(h, memory)
     if not bends(robot):
         return found
-    mechanism, before, first = Mechanism(robot), np.zeros(0), h.offsets[h.names.index(MECHANISM)]
+    mechanism, first = Mechanism(robot), h.offsets[h.names.index(MECHANISM)]
+    before, change = np.zeros(1), np.inf
     for _ in range(_MOST_BENDS):
         bend = mechanism.bend(q, found.x, resolver.period)
-        if len(bend) == len(before) and np.abs(bend - before).max() < _STRAIGHT:
+        last, change = change, np.abs(bend - before).max(initial=0.0)
+        if change < _STRAIGHT:
             break
+        if change > last:
+            return plain
         lower, upper, rows = h.lower.copy(), h.upper.copy(), slice(first, first + len(bend))
         lower[rows] += bend
         upper[rows] += bend

@@ -28,6 +28,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 
 Vector = Sequence[float]
+_NUMBER = "+-.0123456789"  # how one may begin
 
 
 class Path(ABC):
@@ -224,8 +225,8 @@ class Blended(Path):
 
     `times` (N,) [s] increasing, `points` (N, 3) [m]. Within `blend` [s] the velocity of one line
     becomes that of the next, quintic in time, so that the acceleration is continuous. It rests
-    until the first time, is nearest to point i at times[i] + blend / 2, and rests from
-    times[N - 1] + blend on. A corner is missed by 5/64 blend times the change of velocity.
+    until the first time, and rests from times[N - 1] + blend on. It passes point i at times[i] +
+    blend / 2, at 5/64 blend times the change of velocity from it.
 
     Raises HierarchyError for points and times that do not fit, or a blend longer than an interval.
     """
@@ -291,11 +292,11 @@ class Recorded(Path):
         Raises HierarchyError, naming the file and the line, if it is not that.
         """
         rows: list[list[float]] = []
-        for count, line_ in enumerate(_lines(file), 1):
+        for count, line_ in _lines(file):
             try:
                 numbers = [float(part) for part in line_.split(",")]
             except ValueError:
-                if count == 1:  # names of columns
+                if not rows and line_[0] not in _NUMBER:  # names of columns
                     continue
                 numbers = []
             refuse(len(numbers) != 4, f"{file}, line {count}: expected t, x, y, z, got {line_!r}")
@@ -328,10 +329,12 @@ def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: A
     return None
 
 
-def _lines(file: str | File) -> list[str]:
+def _lines(file: str | File) -> list[tuple[int, str]]:
+    """Return the lines of a file that have text, with their numbers; it may begin with a mark."""
     with naming(f"{file} cannot be read", of=(OSError, UnicodeDecodeError)):
-        text = file_path("recorded path: file", file).read_text(encoding="utf-8")
-        return [line_ for line_ in text.splitlines() if line_]
+        text = file_path("recorded path: file", file).read_text(encoding="utf-8-sig")
+    lines = enumerate(map(str.strip, text.splitlines()), 1)
+    return [(count, line_) for count, line_ in lines if line_]
 
 
 def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -> None:

@@ -50,10 +50,10 @@ def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
     np.testing.assert_allclose(path(3.8), [POINTS[3], [0] * 3, [0] * 3], atol=1e-12)
 
 
-@pytest.mark.parametrize("names", ["", "t, x, y, z\n"])
+@pytest.mark.parametrize("names", ["", "t, x, y, z\n", "\ufeff"])
 def test_a_path_of_a_csv_file_passes_its_points_with_continuous_acceleration(names, tmp_path):
     rows = "\n".join(",".join(map(str, (t, *p))) for t, p in zip(TIMES, POINTS, strict=True))
-    (tmp_path / "a.csv").write_text(f"{names}{rows}\n\n")
+    (tmp_path / "a.csv").write_text(f"{names}{rows}\n\n", encoding="utf-8")
     path = paths.Recorded.from_csv(tmp_path / "a.csv")
     for t, point in zip(TIMES, POINTS, strict=True):
         np.testing.assert_allclose(path(t)[0], point, atol=1e-12)
@@ -66,6 +66,8 @@ def test_a_path_of_a_csv_file_passes_its_points_with_continuous_acceleration(nam
 @pytest.mark.parametrize(("text", "said"), [
     ("t,x,y,z\n0,0,0,0\n1,0,0\n", "line 3: expected t, x, y, z, got '1,0,0'"),
     ("0,0,0,0\n1,a,0,0\n", "line 2: expected t, x, y, z, got '1,a,0,0'"),
+    ("0,0,0,0;\n1,0,0,0\n2,0,0,0\n", "line 1: expected t, x, y, z, got '0,0,0,0;'"),
+    ("t,x,y,z\n\n0,0,0,0\n1,0,0\n", "line 4: expected t, x, y, z, got '1,0,0'"),
     ("0,0,0,0\n1,nan,0,0\n", "points[1] [m]: expected 3 finite numbers"),
     ("0,0,0,0\n0,1,0,0\n", "times must increase"), ("0,0,0,0\n", "one point is no motion"),
     ("", "0 times for 0 points")])

@@ -12,7 +12,7 @@ from urdf_text import joint, link, urdf
 from hierarchy import Robot, State, plugins
 from hierarchy.contacts import Contacts
 from hierarchy.paths import Still
-from hierarchy.tasks import Mechanism, Position
+from hierarchy.tasks import JointCoupling, Mechanism, Position
 from scenarios import simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot
@@ -195,3 +195,14 @@ def test_a_mobile_base_goes_to_a_posture_by_values(level, measurement, tmp_path)
     data["start"]["joints"]["turn"] = [1.0, 1.0]
     with pytest.raises(ScenarioError, match="start: joint 'turn'"):
         build(Scenario.model_validate(data))
+
+
+@pytest.mark.parametrize("crank", [3.138, 3.1395])
+def test_a_chain_that_is_nearly_flat_is_kept_closed_at_moderate_speeds(crank):
+    bar = four_bar()
+    mechanism, q = Mechanism(bar), bar.integrate(bar.rest, np.full(bar.n, 0.4))
+    for angle in np.linspace(0.4, crank, 40):
+        q = mechanism.closed(bar.configuration({**bar.values(q), "crank": angle}), ["crank"])
+    step = solve_ik(bar, q, [JointCoupling(bar, {"crank": 1.0}, crank + 0.1)], dt=0.02)
+    assert np.abs(step.v).max() < 2.0
+    assert mechanism.gap(bar.integrate(q, step.v * 0.02))[0] < 1e-6

@@ -80,7 +80,7 @@ class WaypointsSection(AnyPath):
     times: tuple[keys.Time, ...]  #: A time for each point.
     points: tuple[keys.Point, ...]  #: The points.
     blend: keys.Span | None = None
-    """Rounds each point in a curve of this duration, nearest to it half that time later."""
+    """Rounds each point in a curve of this duration, and passes it half that time later."""
 
     def _wrong(self) -> Iterator[str]:
         self._steady()  # raises, for points and times that do not fit
