@@ -44,9 +44,9 @@ bench = typer.Typer(invoke_without_command=True, rich_markup_mode=None)
 
 def _run(out: Path | None, *names: str, **options: Any) -> int:
     """Run benchmarks, MODULE or MODULE:FUNCTION, with those of the options that each has."""
-    from scenarios.files import claim, next_free
+    from scenarios.files import claim, in_runs, next_free
 
-    folder = next_free(Path("runs") / "bench") if out is None else claim(out)
+    folder = next_free(in_runs("bench")) if out is None else claim(out)
     failed = False
     for name in names:
         module, _, function = name.partition(":")

@@ -66,13 +66,13 @@ def _motion(recording: Recording, by: Criteria) -> Iterator[Metric]:
                       largest(np.diff(recording["v"], axis=0)), "rad/s", None, detail=True,
                       note="with the errors of the sensor")
     control, command = recording.scenario.control, recording["command"]
-    meant = "" if recording.scenario.plant.follows or control.level == "torque" else (
-        "of the command, not of the joints")
+    commanded = "of the command, not of the joints"
+    meant = "" if recording.scenario.plant.follows or control.level == "torque" else commanded
     if control.level != "torque":
         yield _metric("command_step_max", "Commanded speed step, max",
                       largest(np.diff(command, axis=0) if control.level == "velocity" else
                               command * control.period), "rad/s",
-                      note="of the command, not of the joints")
+                      note=commanded)
     yield _metric("acceleration_max", "Joint acceleration, max", largest(recording["a"]),
                   "rad/s^2", note=meant)
     yield from steps("acceleration", "Joint acceleration", recording["a"], "rad/s^2", meant)
