@@ -180,8 +180,7 @@ def _balances(s, p, reach, factored):
             # What is cut from a row lies beyond the columns of those that act: no pivot there
             # makes it larger.
             cut = min(cut, SIGN_MARGIN * turned)
-        _decide(s, level, error + cut, reach)
-        return True
+        return _decide(s, level, error, cut, reach)
     return met
 
 
@@ -275,12 +274,15 @@ def _signs_hold(s, level, unsure, reach, allowed, met):
 
 
 @inlined
-def _decide(s, level, unsure, reach):
+def _decide(s, level, error, cut, reach):
     """Note for each row how far level p decides its sign."""
+    clear = True
     for i in range(level.end):
         if s.index[CHANGE, i] != DECIDED and not _is_rounding(s, level, i, reach):
-            weak = abs(s.multiplier[level.p, i]) * s.number[NORM, i] <= unsure
-            s.index[CHANGE, i] = WEAKLY if weak else DECIDED
+            force = abs(s.multiplier[level.p, i]) * s.number[NORM, i]
+            s.index[CHANGE, i] = WEAKLY if force <= error + cut else DECIDED
+            clear = clear and not (error < force <= error + cut)
+    return clear
 
 
 @inlined
