@@ -162,16 +162,17 @@ def _balances(s, p, reach, factored):
     clear = SIGN_ROUNDING * source <= allowed * (1.0 if last else s.scalar[PIVOT])
     if not (clear or factored):
         return met
-    outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
-    if rounding > 0.0 or not last:  # rows with small pivots can make good what is left
+    outside, rounding, turned, signed = _add_rows(s, level, reach if last else 0.0)
+    if signed or not last:  # rows with small pivots can make good what is left
         allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
     rest = _beyond_rounding(s)
     if factored and not rest <= allowed:
         refine(s, p)
-        outside, rounding, turned = _add_rows(s, level, reach if last else 0.0)
+        outside, rounding, turned, signed = _add_rows(s, level, reach if last else 0.0)
         rest = _beyond_rounding(s)
     holds = (not outside and rest <= allowed and (clear or _is_clear(s, level, reach))
-             and turned <= CUT_BALANCE * source and rounding <= ROUNDING_BALANCE * source)
+             and turned <= CUT_BALANCE * source
+             and rounding <= (ROUNDING_BALANCE if signed else KNOWN_MULTIPLIER) * source)
     left = length_of(s.number[GRADIENT, :s.x.size])
     error = (SIGN_MARGIN * (left + rounding) + level.unsure) / s.scalar[PIVOT]
     cut = SIGN_MARGIN * turned / s.scalar[PIVOT]
@@ -180,7 +181,7 @@ def _balances(s, p, reach, factored):
             # What is cut from a row lies beyond the columns of those that act: no pivot there
             # makes it larger.
             cut = min(cut, SIGN_MARGIN * turned)
-        return _decide(s, level, error, cut, reach)
+        return _decide(s, level, error, cut, reach) or met
     return met
 
 
@@ -225,8 +226,8 @@ def _add_rows(s, level, reach):
     """Write the sum of the rows times their multipliers, and per unknown what may be rounding.
 
     reach: of x, for the level of the reference, else 0. Returns whether a row has a multiplier
-    that does not act, the rounding of the sum, 0 where no multiplier needs a sign, and what the
-    cuts of rows add to it.
+    that does not act, the rounding of the sum, what the cuts of rows add to it, and whether a
+    multiplier needs a sign.
     """
     mu, outside, rounding, turned = s.multiplier[level.p], False, SIGN_ROUNDING * reach, 0.0
     signed, k, cut, most = False, 0, 0.0, 0.0
@@ -243,7 +244,7 @@ def _add_rows(s, level, reach):
             rounding += SIGN_ROUNDING * abs(mu[i]) * s.number[NORM, i]
             _add_row(s, mu[i], i)
     turned += 2.0 * cut * most
-    return outside, rounding if signed else 0.0, turned
+    return outside, rounding, turned, signed
 
 
 @inlined
@@ -275,7 +276,7 @@ def _signs_hold(s, level, unsure, reach, allowed, met):
 
 @inlined
 def _decide(s, level, error, cut, reach):
-    """Note for each row how far level p decides its sign."""
+    """Note for each row how far level p decides its sign; False if what is cut may decide one."""
     clear = True
     for i in range(level.end):
         if s.index[CHANGE, i] != DECIDED and not _is_rounding(s, level, i, reach):
