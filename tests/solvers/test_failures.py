@@ -102,7 +102,8 @@ def test_numbers_that_overflow_when_squared_do_not_end_the_process(backend):
     ("hqp", "near_ties", (4, 11, 13)),  # more rows were taken to act than can be met at once
     ("hcod", "nearly_parallel", (
         261332389, 261339979, 261346471, 262321952, 271003400, 271018875, 271020795, 271025782,
-        271041751, 273008558, 360061111)),
+        271041751, 273008558, 360061111,
+        850009080)),  # multipliers of 1e18, rounding
     # In a violated level, the rounding of rows of 1 to 1e6 was the force of rows of 1e-12 to 1e-2.
     ("hcod", "near_singular_arm", (
         900000413, 900001267, 900001697, 900006110, 900006261, 900006637, 900008214, 900009317)),
@@ -110,7 +111,8 @@ def test_numbers_that_overflow_when_squared_do_not_end_the_process(backend):
         900002411, 900002485, 900004845, 900005634, 900007320, 900011099, 900011609,
         352038510, 771034816, 830004770)),
     # Entries of 1e-13 in a violated row kept bounds active that held lower levels back.
-    ("hcod", "near_singular_arm", (342031164, 342040775)), ("hcod", "shifted", (333070342,)),
+    ("hcod", "near_singular_arm", (342031164, 342040775, 850009867)),
+    ("hcod", "shifted", (333070342,)),
     ("tpm", "nearly_parallel", (
         180005648, 180039206, 180053662, 180059618, 180083959, 180086533, 180106780, 180122079,
         180128641, 180145055))])
