@@ -16,7 +16,6 @@ from benchmark.report import TIMES, Column, Report, Row, Section, Table, percent
 from benchmark.solve.entrants import ENTRANTS, HIERARCHICAL, NUMPY
 from benchmark.solve.interface import Problem, Questions
 from benchmark.solve.judge import RIGHT, SOLVED, WRONG, by, judged, summary
-from benchmark.solve.views import mark
 from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
 from hierarchy.errors import check_name
@@ -95,10 +94,8 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
 def _section(rows: Sequence[Row], origin: str) -> Section:
     tables = [Table(name if origin == KNOWN else f"{name}, {origin}", own, _COLUMNS)
               for name, own in by(rows, "family")]
-    drawn = [{**mark(row), "hollow": row["entrant"].endswith(" warm")} for row in rows
-             if row["answered"]]
     figure = "time-accuracy" if origin == KNOWN else f"time-accuracy-{origin}"
-    return Section(origin, tables, figures={figure: figures.time_against_error(drawn)})
+    return Section(origin, tables, figures={figure: figures.time_against_error(rows)})
 
 
 def _measured(name: str, problems: Sequence[recorded.Problem], entrants: Sequence[Entrant],
