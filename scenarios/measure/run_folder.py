@@ -26,7 +26,8 @@ from scenarios.recording.recording import DepthView, Event, Recording
 from scenarios.recording.signals import check_shapes
 from solvers.status import Status
 
-_ALWAYS = "t", "q", "v", "a", "command", "order", "status"
+_ALWAYS = ("t", "q", "v", "a", "command", "ee_position", "order", "status", "iterations",
+           "joint_lower", "joint_upper", "velocity_limit")  # what every run has, beside its times
 _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 
 
@@ -91,7 +92,7 @@ def load_run(folder: str | Path) -> Recording:
     facts = _facts(path / "facts.json")
     signals = _arrays(path / "run.npz", *_ALWAYS, "orders", "fault", "events")
     orders, fault, events = (signals.pop(name) for name in ("orders", "fault", "events"))
-    signals |= _arrays(path / "timings.npz")
+    signals |= _arrays(path / "timings.npz", *metrics.PARTS)
     ticks = signals["t"].size
     try:
         check_shapes(signals, T=ticks, nq=len(facts.robot.rest), n=len(facts.robot.velocity_names))

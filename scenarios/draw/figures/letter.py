@@ -141,11 +141,9 @@ def figures(recordings: Sequence[Recording]) -> Iterator[tuple[str, Figure]]:
 def _others(recording: Recording) -> Iterator[tuple[str, Figure]]:
     """Yield the picture of a run, its stack over time, its depth image and its times of ticks."""
     if recording.ticks > 1:
-        if "ee_position" in recording:
-            yield "picture", picture({recording.facts.resolver.label: recording})
+        yield "picture", picture({recording.facts.resolver.label: recording})
         yield "stack", timeline(recording)
-        if "time_tick" in recording:
-            yield "tick-times", tick_times(recording)
+        yield "tick-times", tick_times(recording)
     if recording.depth is not None and np.isfinite(recording.depth.distance[-1]):
         number = "figure-8-" if is_letters(recording, _HUMAN) else ""
         yield f"{number}depth-image", depth_figure(recording.depth)
