@@ -23,7 +23,6 @@ from hierarchy.problem import Hierarchy
 from scenarios.problems import recorded
 from scenarios.problems.recorded import FAMILIES
 from solvers import certify, names
-from solvers.proof import Proof
 from solvers.qp.backends import installed
 
 KNOWN, FRESH = "known", "fresh"
@@ -127,19 +126,13 @@ def asked(name: str, problems: Sequence[recorded.Problem], entrants: Sequence[En
                 own.asked(0)  # loads and compiles
                 running[one.label] = own
         return [judged({"entrant": label, "family": name, "problem": p, **own.asked(p)}, problem.h,
-                       _proof(problem))
+                       problem.proof)
                 for p, problem in enumerate(problems) for label, own in running.items()]
 
 
 def as_problem(h: Hierarchy) -> Problem:
     """Return a hierarchy as entrants have it."""
     return Problem(h.A, h.lower, h.upper, np.asarray(h.sizes), h.reference)
-
-
-def _proof(problem: recorded.Problem) -> Proof | None:
-    """Return a stored answer in the form of a proof, None without one."""
-    count = len(problem.norms) + 1
-    return Proof(problem.x, problem.norms, count, count, 0.0, 0.0) if problem.known else None
 
 
 def _warm(row: Row) -> Row:
