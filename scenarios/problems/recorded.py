@@ -157,7 +157,8 @@ def certified(h: Hierarchy, x: Array) -> Proof:
 def family(name: str) -> list[Problem]:
     """Read the problems of one reference family; raises HierarchyError if there is no file."""
     one = read(DATA / f"{name}.npz")
-    return _in_sequence(name, list(map(Problem, one.problems, one.answers or ())))
+    return _in_sequence(name, [Problem(h, proof) for h, proof in zip(
+        one.problems, one.answers or (), strict=True)])
 
 
 def _in_sequence(name: str, problems: list[Problem]) -> list[Problem]:
