@@ -31,14 +31,6 @@ Family = Annotated[list[str] | None, typer.Option(
     "--family", metavar="NAME", help="Only this family. May be repeated.")]
 
 
-def _known(what: str, name: str | None, names: Any) -> None:
-    """Raise UnknownNameError unless a name, if there is one, is among names."""
-    if name is not None:
-        from hierarchy.errors import check_name
-
-        check_name(what, name, names)
-
-
 bench = typer.Typer(invoke_without_command=True, rich_markup_mode=None)
 
 
@@ -130,9 +122,12 @@ def peers(install: Install = False,
     They are pink, mink, placo, tsid, embodiK, roboplan and frax. Run it once with --install first.
     Exit code 1 if a package of `--scene stand` is missing.
     """
-    _known("scene", scene, _SCENES)
+    from benchmark.packages import PACKAGES
+    from hierarchy.errors import check_name
+
+    if scene is not None:
+        check_name("scene", scene, _SCENES)
     if install:
-        from benchmark.packages import PACKAGES
         return _installed(PACKAGES)
     if scene is not None:
         return _run(out, _SCENES[scene])
@@ -227,10 +222,11 @@ def stress(count: Annotated[int, typer.Option(
     What is not certified is proved right or wrong. Exit code 1 if an answer fails.
     """
     from benchmark.stress import ALL, KINDS, report, run
+    from hierarchy.errors import check_name
     from solvers import make
 
     make(resolver)
-    _known("kind", kind, (ALL, *KINDS))
+    check_name("kind", kind, (ALL, *KINDS))
     found = report(resolver, run(count, resolver, first, processes, kind), out)
     found.say()
     return int(found.failed)

@@ -35,10 +35,12 @@ def _figure(width: float, height: float, style: Any = ()) -> Iterator[Figure]:
 
 
 def time_against_error(rows: Sequence[Row]) -> Figure:
-    """Return median time over the largest error, one panel for each family; low and left is better.
+    """Return median time over the largest miss, one panel for each family; low and left is better.
 
-    Of a row `hollow` marks are warm starts, faint ones left some unsolved, a cross was wrong.
+    rows : summaries of entrants in families. Hollow marks are warm starts, faint ones left some
+    unsolved, a cross was wrong.
     """
+    rows = [row for row in rows if row["answered"]]
     names = list(dict.fromkeys(row["family"] for row in rows))
     style = looks(dict.fromkeys(row["entrant"].removesuffix(" warm") for row in rows))
     columns = min(4, max(1, len(names)))
@@ -62,11 +64,12 @@ def time_against_error(rows: Sequence[Row]) -> Figure:
 
 
 def _dot(ax: Axes, row: Row, look: Look) -> None:
-    x, y = float(np.clip(np.nan_to_num(row["error"], nan=_MOST), _LEAST, _MOST)), row["median_us"]
+    x = float(np.clip(np.nan_to_num(row["relative"], nan=_MOST), _LEAST, _MOST))
+    y = row["median_us"]
     ax.plot(x, y, "o", color=look.colour, markersize=5.0, clip_on=False,
-            alpha=0.4 if row["faint"] else 1.0,
-            markerfacecolor="none" if row.get("hollow") else look.colour)
-    if row["crossed"]:
+            alpha=0.4 if row["right"] < 1.0 else 1.0,
+            markerfacecolor="none" if row["entrant"].endswith(" warm") else look.colour)
+    if row["wrong"]:
         ax.plot(x, y, "x", color=drawing.ALERT, markersize=4.0, markeredgewidth=0.8, clip_on=False)
 
 
@@ -190,12 +193,12 @@ def over_sizes(rows: Sequence[Row], panels: Mapping[str, tuple[str, str, str]]) 
     return fig
 
 
-def exponents(rows: Sequence[Row], figure: str, fewest: int = 3) -> dict[str, float]:
-    """Return the slope of log time over log size in the upper half of sizes, by entrant."""
+def exponents(rows: Sequence[Row], figure: str) -> dict[str, float]:
+    """Return the slope of log time over log size in the upper half of sizes, at least 3."""
     found: dict[str, float] = {}
     for label in dict.fromkeys(row["entrant"] for row in rows):
         points = sorted((row[figure], row["median_us"]) for row in rows if row["entrant"] == label)
-        upper = np.log(points[min(len(points) // 2, max(len(points) - fewest, 0)):])
+        upper = np.log(points[min(len(points) // 2, max(len(points) - 3, 0)):])
         found[label] = (float(np.polyfit(upper[:, 0], upper[:, 1], 1)[0]) if len(upper) > 1
                         else float("nan"))
     return found

@@ -10,7 +10,6 @@ from benchmark.report import TIMES, Column, Report, Row, Section, Table, whole
 from benchmark.timing import one_core, times_of
 from hierarchy import HierarchyError, State
 from hierarchy.allocation import allocate
-from hierarchy.avoidance import ControlPoint
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from scenarios.cell.build import Cell, build
@@ -99,17 +98,20 @@ class PlainTick:
             raise HierarchyError("the plain tick needs all tasks of `ellipse`")
         self.areas, self.position, self.pointing = tasks.areas, tasks.position, tasks.pointing
         self.obstacles, self.frame = sensor.obstacles.centres, tasks.position.frame
-        self.cell, self.period, self.log = cell, scenario.control.period, list[tuple[Any, ...]]()
+        self.points = [Frame(point.name, point.joint, point.offset, np.eye(3))
+                       for point in cell.robot.control_points]
+        self.state, self.period, self.log = cell.state, scenario.control.period, list[Any]()
 
     def step(self, t: float, q: Array, v: Array) -> Array:
         """Sense, allocate, stack, resolve, integrate, record; return the acceleration."""
-        cell, state = self.cell, self.cell.state
+        state = self.state
         state.move(t, q, v)
-        points = [_position(state, point) for point in cell.robot.control_points]
+        points = [state.position(point) for point in self.points]
         gaps = [np.linalg.norm(point - self.obstacles, axis=1) for point in points]
         nearest = [float(gap.min()) for gap in gaps]
         k = int(np.argmin(nearest))
-        p, J, dJ = _position(state, self.frame), *_jacobians(state, self.frame)
+        p = state.position(self.frame)
+        J, dJ = jacobians(state, self.frame.joint, p)
         end_gaps = np.linalg.norm(p - self.obstacles, axis=1)
         z_e = state.rotation(self.frame)[:, 2]
         z_d = self.pointing.z_d
@@ -133,7 +135,7 @@ class PlainTick:
         if "avoidance" in order:
             j = int(np.argmin(gaps[k]))
             r = (points[k] - self.obstacles[j]) / nearest[k]
-            J_c, dJ_c = _jacobians(state, cell.robot.control_points[k])
+            J_c, dJ_c = jacobians(state, self.points[k].joint, points[k])
             magnitude = _magnitude(nearest[k], 0.15, 0.15, 2.0, 3.0)
             rows["avoidance"] = (r @ J_c)[None], np.array([magnitude - r @ dJ_c @ v])
         a = _published_tpm([rows[name] for name in order], -5.0 * v)
@@ -143,13 +145,9 @@ class PlainTick:
         return a
 
 
-def _position(state: State, point: Frame | ControlPoint) -> Array:
-    row = state.placements[point.joint]
-    return np.asarray(row[9:] + row[:9].reshape(3, 3).T @ point.offset)
-
-
-def _jacobians(state: State, point: Frame | ControlPoint) -> tuple[Array, Array]:
-    p, mask = _position(state, point), state.supports[point.joint]
+def jacobians(state: State, joint: int, p: Array) -> tuple[Array, Array]:
+    """Return J (3, n) of the point that a joint's body has at p (3,) [m], and its derivative."""
+    mask = state.supports[joint]
     J = (state.J[:3] + np.cross(state.J[3:].T, p).T) * mask
     dJ = (state.dJ[:3] + np.cross(state.dJ[3:].T, p).T
           + np.cross(state.J[3:].T, J @ state.v).T) * mask

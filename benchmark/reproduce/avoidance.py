@@ -5,9 +5,8 @@ from typing import Any, final
 
 import numpy as np
 
-from hierarchy.kinematics import cross
+from benchmark.tick import jacobians
 from hierarchy.problem import Array
-from hierarchy.state import State
 from scenarios.config import Scenario
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
@@ -43,20 +42,10 @@ class Repulsion:
             self.jumps += int(n @ self._before[1] < _TURN)
         self._before = k, n
         if controller.level == "acceleration":
-            point = controller.cell.robot.control_points[k]
-            self.errors.append(float(
-                n @ acceleration(state, point.joint, seen.points[k], controller.sent)
-                - seen.magnitude[k]))
+            joint = controller.cell.robot.control_points[k].joint
+            J, dJ = jacobians(state, joint, seen.points[k])
+            self.errors.append(float(n @ (J @ controller.sent + dJ @ state.v) - seen.magnitude[k]))
         return {}
-
-
-def acceleration(state: State, joint: int, p: Array, a: Array) -> Array:
-    """Return the acceleration (3,) [m/s^2] of the point p (3,) [m] on a joint under a (n,)."""
-    moves = state.supports[joint]
-    v, w = (state.J[:, moves] @ state.v[moves]).reshape(2, 3)
-    dv, dw = (state.J[:, moves] @ a[moves] + state.dJ[:, moves] @ state.v[moves]).reshape(2, 3)
-    turned = cross(w)
-    return np.asarray(dv + cross(dw) @ p + turned @ (v + turned @ p))
 
 
 def measured(scenario: Scenario) -> tuple[Recording, tuple[Metric, ...]]:

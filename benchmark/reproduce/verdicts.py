@@ -1,7 +1,7 @@
 """What runs say about the claims of the protocol: effect, interval, Holm's p, and a verdict."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import erfc, sqrt
 
 import numpy as np
@@ -21,7 +21,6 @@ DIFFERS = "differs between layouts"
 class Effect:
     """The shift of paired differences from zero: estimate, its 95 % interval, and a p-value."""
 
-    count: int
     estimate: float
     low: float
     high: float
@@ -32,39 +31,32 @@ class Effect:
 class Found:
     """What was found about a claim: the effect, in the claim's direction, on all layouts and each.
 
-    Of a bound it is the share of starts from which it is kept. p : after Holm. verdict : of the
-    runs without noise, and `again` of those with it.
+    Of a bound it is the share of starts from which it is kept. p : after Holm. decided : the
+    verdict, which no noise may change.
     """
 
     claim: Claim
     effect: Effect
     layouts: tuple[Effect, ...]
     p: float
-    verdict: str
-    again: str
-
-    @property
-    def decided(self) -> str:
-        """The verdict, which no noise may change."""
-        return (self.verdict if self.verdict == self.again else
-                f"{UNDECIDED}: with noise {self.again}")
+    decided: str
 
 
 def judged(protocol: Protocol, rows: Rows, family: str) -> list[Found]:
     """Return what was found about the claims of a family."""
     claims = [one for one in protocol.claims if one.family == family]
-    first, second = (_judged(protocol, rows, claims, noisy) for noisy in (0, 1))
-    return [Found(claim, *found, again[-1])
-            for claim, found, again in zip(claims, first, second, strict=True)]
+    exact, noisy = (_judged(protocol, rows, claims, noisy) for noisy in (0, 1))
+    return [one if one.decided == other.decided else
+            replace(one, decided=f"{UNDECIDED}: with noise {other.decided}")
+            for one, other in zip(exact, noisy, strict=True)]
 
 
-def _judged(protocol: Protocol, rows: Rows, claims: Sequence[Claim], noisy: int
-            ) -> list[tuple[Effect, tuple[Effect, ...], float, str]]:
+def _judged(protocol: Protocol, rows: Rows, claims: Sequence[Claim], noisy: int) -> list[Found]:
     some = np.ones(rows.blocks.size, dtype=bool), *map(rows.layout, rows.layouts)
     effects = [[_effect(protocol, rows, claim, apart, each) for each in some]
                for claim, apart in ((claim, _apart(rows, claim, noisy)) for claim in claims)]
     adjusted = holm([effect.p for effect, *_ in effects])
-    return [(effect, tuple(layouts), p, _verdict(protocol, claim, effect, layouts, p))
+    return [Found(claim, effect, tuple(layouts), p, _verdict(protocol, claim, effect, layouts, p))
             for claim, (effect, *layouts), p in zip(claims, effects, adjusted, strict=True)]
 
 
@@ -89,7 +81,7 @@ def _effect(protocol: Protocol, rows: Rows, claim: Claim, apart: Array,
     from scipy.stats import binomtest
 
     met, of = int(apart[some].sum()), int(some.sum())
-    return Effect(of, met / of, *wilson(met, of), float(binomtest(met, of, protocol.share).pvalue))
+    return Effect(met / of, *wilson(met, of), float(binomtest(met, of, protocol.share).pvalue))
 
 
 def _verdict(protocol: Protocol, claim: Claim, effect: Effect, layouts: Sequence[Effect],
@@ -148,10 +140,9 @@ def blocked(differences: Array, blocks: NDArray[np.int64]) -> Effect:
         middle += n * (n + 1) / 4.0
         square += n * (n + 1) * (2 * n + 1) / 24.0
     if not means:
-        return Effect(0, np.nan, np.nan, np.nan, 1.0)
+        return Effect(np.nan, np.nan, np.nan, 1.0)
     ordered, deviation = np.sort(np.concatenate(means)), float(np.sqrt(square))
     above = (ordered > 0.0).sum() + (ordered == 0.0).sum() / 2.0
     p = erfc(max(abs(above - middle) - 0.5, 0.0) / deviation / sqrt(2.0))
     k = max(int(middle - 1.96 * deviation), 0)
-    return Effect(apart.size, float(np.median(ordered)), float(ordered[k]), float(ordered[-1 - k]),
-                  p)
+    return Effect(float(np.median(ordered)), float(ordered[k]), float(ordered[-1 - k]), p)

@@ -10,9 +10,8 @@ from benchmark.reproduce import fronts, pages, protocol
 from benchmark.reproduce.blocks import POINTS, ROWS, Stored, every, said
 from benchmark.reproduce.protocol import PROTOCOL, Rows
 from hierarchy.errors import check_name, refuse
-from scenarios.cli.options import INTERRUPTED
-from scenarios.cli.terminal import bar, print_json, shown
-from scenarios.files import make_folder, reason, write_json, write_text
+from scenarios.cli.terminal import bar, interruptible, print_json, shown
+from scenarios.files import make_folder, write_json, write_text
 from scenarios.results.sampled import Workers
 
 NAME, TUNED = "protocol", "fronts"  # of the runs
@@ -40,18 +39,10 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
            "output of commands; leave --quick out")
     make_folder(out)
     rows, lacking = None, list[str]()
-    try:
+    with interruptible("the same command continues from here"):
         for found in _made(asked, out, quick, Workers(workers)):
             rows = found or rows
             lacking = [] if quick else pages.fill(pages.ROOT, Stored.read(pages.ROOT))[1]
-    except OSError as error:
-        why = (f"{error.filename or 'a file'} cannot be written: {reason(error)}"
-               if error.strerror else str(error))
-        _say(f"hierarchy: fault: {why}")
-        return 1
-    except KeyboardInterrupt:
-        _say("hierarchy: interrupted; the same command continues from here")
-        return INTERRUPTED
     if rows is not None:
         _report(rows, as_json)
     _say(f"{_minutes(begun)} in all")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmark.packages import DAQP, EMBODIK, HIGHS, OWN, Entrant
-from hierarchy.errors import HierarchyError, UnknownNameError, refuse
+from hierarchy.errors import UnknownNameError, refuse
 from solvers import names
 from solvers.qp.backends import BACKENDS
 
@@ -101,9 +101,8 @@ def chosen(labels: Sequence[str], python: str = "", more: Sequence[Entrant] = ()
 
 def compiled(libraries: Sequence[Path], labels: Sequence[str]) -> list[Entrant]:
     """Return an entrant for each library that has the functions of solver.h; see HierarchyError."""
-    if len(libraries) != len(labels):
-        raise HierarchyError(f"{len(libraries)} libraries and {len(labels)} names; each --library "
-                             "needs a --name")
+    refuse(len(libraries) != len(labels), f"{len(libraries)} libraries and {len(labels)} names; "
+           "each --library needs a --name")
     for file in libraries:
         refuse(not file.is_file(), f"--library: {file} does not exist")
     return [Entrant(label, OWN, f"{_HERE}.compiled:Compiled",

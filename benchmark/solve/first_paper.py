@@ -65,7 +65,7 @@ def regular(count: int, seed: int = 0) -> Array:
     """Return Jacobians (count, 6, 6) with no singular value below REGULAR."""
     def some(rng: np.random.Generator) -> Array:
         J = jacobians(draw(count, rng), _configurations(count, rng))
-        return J[_singular_values(J)[:, -1] >= REGULAR]
+        return J[np.linalg.svdvals(J)[:, -1] >= REGULAR]
 
     return _collect(some, count, seed)
 
@@ -81,13 +81,13 @@ def near_singular(count: int, seed: int = 0) -> Array:
         arms, low, high = draw(count, rng), _configurations(count, rng), _configurations(count, rng)
         J_low, J_high = jacobians(arms, low), jacobians(arms, high)
         apart = np.linalg.det(J_low) * np.linalg.det(J_high) < 0.0
-        apart &= _singular_values(J_low)[:, -1] >= REGULAR  # some arms are singular everywhere
+        apart &= np.linalg.svdvals(J_low)[:, -1] >= REGULAR  # some arms are singular everywhere
         arms, low, high = arms[apart], low[apart], high[apart]
         along = (high - low) / np.linalg.norm(high - low, axis=1, keepdims=True)
         singular = _bisected(arms, low, high)
         step = np.exp(rng.uniform(np.log(_STEPS[0]), np.log(_STEPS[1]), (len(singular), 1)))
         J = jacobians(arms, singular + step * along)
-        s = _singular_values(J)
+        s = np.linalg.svdvals(J)
         return J[(s[:, -2] >= REGULAR) & (s[:, -1] >= NEAREST)]
 
     return _collect(some, count, seed)
@@ -122,10 +122,6 @@ def _collect(some: Callable[[np.random.Generator], Array], count: int, seed: int
             break
         found = np.concatenate([found, some(rng)])
     return found[:count]
-
-
-def _singular_values(J: Array) -> Array:
-    return np.asarray(np.linalg.svd(J, compute_uv=False))
 
 
 @final

@@ -17,7 +17,6 @@ from benchmark.report import Report, Row
 from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
-from benchmark.timing import machine
 from hierarchy.errors import refuse
 from hierarchy.problem import Array
 from scenarios.files import make_folder, named, slug, write_json, written
@@ -104,7 +103,6 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
             told(f"{family.name}, seed {seed}: problems and their proofs")
             export(family, seed, count, True, store.problems)
         left[file] = [one.label for one in entrants if not store.file_of(one.label, file).is_file()]
-    store.note("machine", machine())
     store.note("limits", store.notes("limits") | {one.label: one.limits for one in entrants})
     with Field([one for one in entrants if any(one.label in some for some in left.values())],
                QUESTIONS) as field:

@@ -16,7 +16,6 @@ from benchmark.report import TIMES, Column, Report, Row, Section, Table, percent
 from benchmark.solve.entrants import ENTRANTS, HIERARCHICAL, NUMPY
 from benchmark.solve.interface import Problem, Questions
 from benchmark.solve.judge import RIGHT, SOLVED, WRONG, by, judged, summary
-from benchmark.solve.views import mark
 from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
 from hierarchy.errors import check_name
@@ -24,7 +23,6 @@ from hierarchy.problem import Hierarchy
 from scenarios.problems import recorded
 from scenarios.problems.recorded import FAMILIES
 from solvers import certify, names
-from solvers.proof import Proof
 from solvers.qp.backends import installed
 
 KNOWN, FRESH = "known", "fresh"
@@ -95,10 +93,8 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
 def _section(rows: Sequence[Row], origin: str) -> Section:
     tables = [Table(name if origin == KNOWN else f"{name}, {origin}", own, _COLUMNS)
               for name, own in by(rows, "family")]
-    drawn = [{**mark(row), "hollow": row["entrant"].endswith(" warm")} for row in rows
-             if row["answered"]]
     figure = "time-accuracy" if origin == KNOWN else f"time-accuracy-{origin}"
-    return Section(origin, tables, figures={figure: figures.time_against_error(drawn)})
+    return Section(origin, tables, figures={figure: figures.time_against_error(rows)})
 
 
 def _measured(name: str, problems: Sequence[recorded.Problem], entrants: Sequence[Entrant],
@@ -130,19 +126,13 @@ def asked(name: str, problems: Sequence[recorded.Problem], entrants: Sequence[En
                 own.asked(0)  # loads and compiles
                 running[one.label] = own
         return [judged({"entrant": label, "family": name, "problem": p, **own.asked(p)}, problem.h,
-                       _proof(problem))
+                       problem.proof)
                 for p, problem in enumerate(problems) for label, own in running.items()]
 
 
 def as_problem(h: Hierarchy) -> Problem:
     """Return a hierarchy as entrants have it."""
     return Problem(h.A, h.lower, h.upper, np.asarray(h.sizes), h.reference)
-
-
-def _proof(problem: recorded.Problem) -> Proof | None:
-    """Return a stored answer in the form of a proof, None without one."""
-    count = len(problem.norms) + 1
-    return Proof(problem.x, problem.norms, count, count, 0.0, 0.0) if problem.known else None
 
 
 def _warm(row: Row) -> Row:

@@ -62,7 +62,7 @@ def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collectio
              f"{title}: right over threshold": figures.curves(
                  _THRESHOLDS, right_within(rows, _THRESHOLDS), "largest miss of a right answer"),
              f"{title}: time against miss": figures.time_against_error(
-                 [mark(row) for row in some if row["family"] in chosen and row["answered"]]),
+                 [row for row in some if row["family"] in chosen]),
              f"{title}: share right": figures.heat(some)}
     if at:
         every = {border: {row["entrant"]: row for row in summaries(rows)}
@@ -81,12 +81,6 @@ def _at_borders(title: str, every: Mapping[float, Mapping[str, Row]]) -> Table:
              for row in some.values()]
     return Table(f"{title}: answers called solved that are wrong, over the border of rank",
                  *report.wide(found, "entrant", "border", "wrong", whole))
-
-
-def mark(row: Row) -> Row:
-    """Return a summary of a family as `figures.time_against_error` draws it."""
-    return {**row, "error": row["relative"], "faint": row["right"] < 1.0,
-            "crossed": row["wrong"] > 0}
 
 
 def entrants(versions: Mapping[str, str], limits: Mapping[str, str]) -> Section:

@@ -20,7 +20,7 @@ from benchmark.solve.judge import RIGHT, by, summary
 from benchmark.solve.resolvers import asked
 from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
-from scenarios.problems.recorded import Problem
+from scenarios.problems.recorded import Problem, certified
 from solvers import certify, make, names
 from solvers.problems import Recipe, written
 
@@ -68,7 +68,7 @@ class Family:
     def problems(self, count: int) -> list[Problem]:
         """Return those of the first stacks whose answer is certified."""
         found = [(h, make("hcod").solve(h).x) for h in map(self.problem, range(count))]
-        return [Problem(h, x, h.violations(x)) for h, x in found if certify(h, x).certified]
+        return [Problem(h, certified(h, x)) for h, x in found if certify(h, x).certified]
 
 
 FAMILIES = tuple(
@@ -89,8 +89,8 @@ def main(count: int = 400, resolver: list[str] | None = None) -> None:
     for family in FAMILIES:
         problems, levels = family.problems(count), len(family.sizes)
         raw = asked(family.name, problems, entrants, _SECONDS)
-        bound = np.mean([((one.x <= one.h.lower[:one.h.n]) | (one.x >= one.h.upper[:one.h.n])).sum()
-                         for one in problems])
+        bound = np.mean([((x <= one.h.lower[:one.h.n]) | (x >= one.h.upper[:one.h.n])).sum()
+                         for one in problems if one.proof for x in [one.proof.x]])
         tables.append(Table(
             f"{family.name}: {len(problems)} problems, {bound:.1f} joints at a bound",
             [_row(own, levels) for _, own in by(raw, "entrant")],

@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError, UnknownNameError, file_path
+from hierarchy.errors import HierarchyError, UnknownNameError, check_name, file_path
 from hierarchy.robots.names import in_package, is_file_name
 from scenarios.config.changes import change_all, lay_over, parse_changes
 from scenarios.config.scenario import Scenario
@@ -131,9 +131,8 @@ def _read(source: Source) -> dict[str, Any]:
         raise ScenarioError(f"{source.path}: variants: expected a table of tables")
     if not source.variant:
         return data
-    if source.variant not in variants:
-        error = UnknownNameError("variant", source.variant, variants)
-        raise ScenarioError(f"{source.path}: {error}")
+    with naming(str(source.path)):
+        check_name("variant", source.variant, variants)
     return {"name": f"{source.path.stem}-{source.variant}", "extends": Source(source.path),
             **variants[source.variant]}
 
@@ -175,9 +174,8 @@ def _without(below: dict[str, Any], sections: Any, path: Path) -> dict[str, Any]
     if not isinstance(sections, list):
         raise ScenarioError(f"{path}: replaces: expected a list of sections, got {sections!r}")
     for section in sections:
-        if section not in below:
-            error = UnknownNameError("section", str(section), below)
-            raise ScenarioError(f"{path}: replaces: {error}")
+        with naming(f"{path}: replaces"):
+            check_name("section", section, below)
     return {key: value for key, value in below.items() if key not in sections}
 
 

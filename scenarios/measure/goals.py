@@ -135,12 +135,10 @@ def _distances(recording: Recording) -> Iterator[_Asked]:
 def _limits(recording: Recording) -> Iterator[_Asked]:
     robot, q = recording.facts.robot, true(recording, "q")
     speeds = [f"{unit}/s" for unit in robot.velocity_units]
-    if "joint_lower" in recording:
-        beyond = np.maximum(recording["joint_lower"] - q, q - recording["joint_upper"])
-        yield from _of_units("joint limits", robot.position_units, beyond)
-    if "velocity_limit" in recording:
-        beyond = np.abs(true(recording, "v")) - recording["velocity_limit"]
-        yield from _of_units("speed limits", speeds, beyond)
+    beyond = np.maximum(recording["joint_lower"] - q, q - recording["joint_upper"])
+    yield from _of_units("joint limits", robot.position_units, beyond)
+    beyond = np.abs(true(recording, "v")) - recording["velocity_limit"]
+    yield from _of_units("speed limits", speeds, beyond)
     if "torque_limit" in recording:
         beyond = np.abs(recording["command"]) - recording["torque_limit"]
         yield from _of_units("torque limits", ["N m"] * beyond.shape[1], beyond)

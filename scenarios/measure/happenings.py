@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, whole
+from hierarchy.errors import HierarchyError, refuse, whole
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell, build, stack_resolver
 from scenarios.measure.causes import Cause, Solve, Tick, causes
@@ -55,9 +55,8 @@ def jumps(recording: Recording, tick: int | None = None,
     `least` has, by its unit, the change from which on they are meant. Raises HierarchyError for a
     tick that the run does not have, or the first.
     """
-    if tick is not None and not 0 < whole("tick", tick) < recording.ticks:
-        raise HierarchyError(f"tick {tick}: the run has ticks 0 to {recording.ticks - 1}, and a "
-                             "change needs the one before")
+    refuse(tick is not None and not 0 < whole("tick", tick) < recording.ticks, f"tick {tick}: the "
+           f"run has ticks 0 to {recording.ticks - 1}, and a change needs the one before")
     step = np.nan_to_num(np.abs(np.diff(recording["command"], axis=0))).max(axis=1, initial=0.0)
     above = (least or {}).get(_UNITS[recording.scenario.control.level], 0.0)
     ticks = [k + 1 for k in np.argsort(-step, kind="stable")[:_LARGEST] if step[k] > above]

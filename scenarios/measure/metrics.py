@@ -24,7 +24,7 @@ _AFTER = 0.5     # [s] after the return within reach that do not count as error
 _DONE = {"brake": "Ticks braked", "hold": "Ticks with the last command held",
          "use": "Ticks with trouble, answer sent", "stop": "Ticks that stopped the run",
          "clamp": "Ticks clamped to the limits"}
-_PARTS = {"time_tick": "Whole tick", "time_kinematics": "Kinematics", "time_rows": "Rows",
+PARTS = {"time_tick": "Whole tick", "time_kinematics": "Kinematics", "time_rows": "Rows",
           "time_resolve": "Resolve"}
 _PERCENTILES = {"median": (50.0, "median"), "p95": (95.0, "95 %"), "p999": (99.9, "99.9 %")}
 
@@ -110,10 +110,9 @@ def _returning(recording: Recording, by: Criteria) -> Iterator[Metric]:
                             note=f"from {_AFTER:g} s after the path is within reach")
     jerk = np.diff(recording["a"], axis=0) / np.diff(t)[:, None]
     yield from _rms_and_max("jerk", "Joint jerk", jerk, "rad/s^3", group=group)
-    if "velocity_limit" in recording:
-        excess = np.maximum(np.abs(v) - recording["velocity_limit"], 0.0)
-        yield Metric("speed_limit_excess", "Beyond a speed limit, max", largest(excess), "rad/s",
-                     group=group)
+    excess = np.maximum(np.abs(v) - recording["velocity_limit"], 0.0)
+    yield Metric("speed_limit_excess", "Beyond a speed limit, max", largest(excess), "rad/s",
+                 group=group)
 
 
 def _left_path(recording: Recording) -> tuple[Spans, Array] | None:
@@ -162,16 +161,14 @@ def _troubles(recording: Recording, by: Criteria) -> Iterator[Metric]:
 
 @register("time")
 def _time(recording: Recording, by: Criteria) -> Iterator[Metric]:
-    if "status" in recording:
-        failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
-        yield _timing("ticks_not_solved", "Ticks not solved", float(failed), "")
+    failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
+    yield _timing("ticks_not_solved", "Ticks not solved", float(failed), "")
     simulated = "" if recording.scenario.plant.follows else "with the step of the simulated robot"
-    if "time_tick" in recording:
-        late = np.count_nonzero(recording["time_tick"] > recording.scenario.control.period)
-        yield _timing("ticks_late", "Ticks longer than the period", float(late), "", note=simulated)
-    for signal, part in _PARTS.items():
+    late = np.count_nonzero(recording["time_tick"] > recording.scenario.control.period)
+    yield _timing("ticks_late", "Ticks longer than the period", float(late), "", note=simulated)
+    for signal, part in PARTS.items():
         shared = signal in ("time_kinematics", "time_rows")  # the same code under any resolver
-        for key, (percent, label) in _PERCENTILES.items() if signal in recording else ():
+        for key, (percent, label) in _PERCENTILES.items():
             yield _timing(f"{signal}_{key}", f"{part}, {label}",
                           finite(np.percentile(recording[signal], percent)), "s",
                           lower_is_better=None if shared else True,

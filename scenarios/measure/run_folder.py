@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from hierarchy.archives import read_arrays
-from hierarchy.errors import HierarchyError, expect, file_path, refuse
+from hierarchy.errors import HierarchyError, expect, file_path, naming, refuse
 from scenarios.config import load
 from scenarios.files import OutputError, whole, write_json
 from scenarios.measure import metrics
@@ -26,7 +26,8 @@ from scenarios.recording.recording import DepthView, Event, Recording
 from scenarios.recording.signals import check_shapes
 from solvers.status import Status
 
-_ALWAYS = "t", "q", "v", "a", "command", "order", "status"
+_ALWAYS = ("t", "q", "v", "a", "command", "ee_position", "order", "status", "iterations",
+           "joint_lower", "joint_upper", "velocity_limit")  # what every run has, beside its times
 _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 
 
@@ -91,15 +92,13 @@ def load_run(folder: str | Path) -> Recording:
     facts = _facts(path / "facts.json")
     signals = _arrays(path / "run.npz", *_ALWAYS, "orders", "fault", "events")
     orders, fault, events = (signals.pop(name) for name in ("orders", "fault", "events"))
-    signals |= _arrays(path / "timings.npz")
+    signals |= _arrays(path / "timings.npz", *metrics.PARTS)
     ticks = signals["t"].size
-    try:
+    with naming(f"{path} cannot be read"):
         check_shapes(signals, T=ticks, nq=len(facts.robot.rest), n=len(facts.robot.velocity_names))
         refuse(events.dtype != _EVENT or not _indices(events["tick"], ticks), "an event of no tick")
         refuse(not _indices(signals["order"], orders.size), "signal 'order': no index into orders")
         refuse(not {*signals["status"].tolist()} <= {*Status}, "signal 'status': no Status")
-    except HierarchyError as error:
-        raise HierarchyError(f"{path} cannot be read: {error}") from error
     depth = None
     if (path / "depth.npz").exists():
         seen: dict[str, Any] = _arrays(path / "depth.npz", *DepthView._fields)
@@ -114,26 +113,21 @@ def _indices(values: NDArray[Any], count: int) -> bool:
 
 
 def _arrays(path: Path, *names: str) -> dict[str, NDArray[Any]]:
-    try:
+    with naming(f"{path} cannot be read"):
         found = read_arrays(path)
-    except HierarchyError as error:
-        raise HierarchyError(f"{path} cannot be read: {error}") from error
-    for name in names:
-        if name not in found:
-            raise HierarchyError(f"{path} cannot be read: it has no {name!r}")
+        for name in names:
+            refuse(name not in found, f"it has no {name!r}")
     return found
 
 
 def _facts(path: Path) -> Facts:
-    try:
+    with naming(f"{path} cannot be read", of=(OSError, ValueError, RecursionError)):
         text = path.read_text(encoding="utf-8") if path.exists() else ""
-        if '"model"' not in text:  # none, or a tree of joints in its place
-            raise HierarchyError("an earlier version wrote it; run the scenario again")
+        refuse('"model"' not in text,  # none, or a tree of joints in its place
+               "an earlier version wrote it; run the scenario again")
         found = TypeAdapter(Facts).validate_python(json.loads(text))
         found.robot.placements(np.array(found.robot.rest))  # the model can be read
         return found
-    except (OSError, ValueError, RecursionError) as error:
-        raise HierarchyError(f"{path} cannot be read: {error}") from error
 
 
 def versions() -> dict[str, str]:

@@ -91,14 +91,12 @@ def steps(key: str, label: str, values: Array, unit: str, note: str = "", group:
 
 def _joint_limit_excess(recording: Recording) -> Metric:
     value, note = None, "the robot has no joint limits"
-    if "joint_lower" in recording and "joint_upper" in recording:
-        lower, upper, q = (recording["joint_lower"], recording["joint_upper"],
-                           true(recording, "q"))
-        if np.isfinite(lower).any() or np.isfinite(upper).any():
-            excess = passed(np.maximum(np.maximum(q - upper, lower - q), 0.0)).max(axis=0)
-            joint = int(np.argmax(excess))
-            value = largest(excess)
-            note = f"joint {joint + 1}" if excess[joint] > 0.0 else ""
+    lower, upper, q = recording["joint_lower"], recording["joint_upper"], true(recording, "q")
+    if np.isfinite(lower).any() or np.isfinite(upper).any():
+        excess = passed(np.maximum(np.maximum(q - upper, lower - q), 0.0)).max(axis=0)
+        joint = int(np.argmax(excess))
+        value = largest(excess)
+        note = f"joint {joint + 1}" if excess[joint] > 0.0 else ""
     return _metric("joint_limit_excess", "Beyond a joint limit, max", value, "rad", note=note)
 
 

@@ -97,16 +97,13 @@ def spread(values: Array) -> Spread | None:
     return Spread(known.size, median, lower, upper, least, largest)
 
 
-def paired(first: Array, second: Array, same: float = SAME) -> Paired:
-    """Compare two columns (N,) whose rows are the same samples.
-
-    same : relative difference within which two values count as one.
-    """
+def paired(first: Array, second: Array) -> Paired:
+    """Compare two columns (N,) whose rows are the same samples."""
     known = np.isfinite(first) & np.isfinite(second)
     alone = int((np.isfinite(first) != np.isfinite(second)).sum())
     a, b = first[known], second[known]
     apart = b - a
-    apart[np.abs(apart) <= np.maximum(same * np.maximum(np.abs(a), np.abs(b)), NOTHING)] = 0.0
+    apart[np.abs(apart) <= np.maximum(SAME * np.maximum(np.abs(a), np.abs(b)), NOTHING)] = 0.0
     if not apart.size:
         return Paired(0, alone, 0, 0, 0, np.nan, (np.nan, np.nan), 1.0, 0.0)
     low, median, high = np.percentile(apart, [25.0, 50.0, 75.0])

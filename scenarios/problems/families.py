@@ -17,7 +17,7 @@ from typing import final
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, check_name
+from hierarchy.errors import check_name, refuse
 from hierarchy.problem import Array, Hierarchy
 from scenarios.files import named, written
 from scenarios.problems import made, recorded
@@ -61,9 +61,8 @@ class Family:
     def half(self, seed: int = 0, count: int | None = None) -> Collection:
         """Return the public set (seed 0), or a fresh one; raises HierarchyError."""
         count = self.usual if count is None else count
-        if seed < 0 or count < 1:
-            raise HierarchyError(f"family {self.name!r}: seed {seed} and count {count}; expected a "
-                                 "seed of at least 0 and a count of at least 1")
+        refuse(seed < 0 or count < 1, f"family {self.name!r}: seed {seed} and count {count}; "
+               "expected a seed of at least 0 and a count of at least 1")
         source = f"task-hierarchy {version('task-hierarchy')}"
         head = Head(self.name, self.what, FRESH if seed else PUBLIC, seed, self.period > 0.0,
                     self.period, source)

@@ -12,7 +12,6 @@ Singular postures of arms and humanoids: straight limbs, aligned wrists, feet fl
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import final
 
 import numpy as np
@@ -21,14 +20,13 @@ from hierarchy import Robot, State
 from hierarchy.paths import Still
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.tasks import CentreOfMass, Pose
+from scenarios.problems.recorded import DATA
 from solvers.problems.files import read
 
 _UNKNOWNS = 4, 20       # of-soth, of-lexls: least and most
 _CONDITION = 100.0      # of-daqp: of the Hessian
 _BOUNDS, _ROWS, _ACTIVE, _SIZE = 6, 24, 8, 12  # of-daqp: simple bounds, all rows, acting, unknowns
 _GAP = 0.01, 1.01       # of-daqp: from a side that acts, or from the answer, to the other sides
-
-_DATA = Path(__file__).parent / "data"
 
 Level = tuple[Array, Array, Array]
 
@@ -105,7 +103,7 @@ def of_examples(name: str, seed: int, count: int) -> list[Hierarchy]:
     A new target of an equality below the first level is between -s and s, with s the largest
     target of its level, or 1 where all are zero.
     """
-    kept = read(_DATA / f"{name}.npz").problems
+    kept = read(DATA / f"{name}.npz").problems
     if not seed:
         return list(kept[:count])
     return [_aimed(kept[i % len(kept)], np.random.default_rng([seed, i])) for i in range(count)]

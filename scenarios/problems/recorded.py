@@ -14,10 +14,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
-from hierarchy.archives import read_arrays
-from hierarchy.errors import refuse
 from hierarchy.problem import Array, Hierarchy
 from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.sampling import changed, drawn
@@ -25,6 +22,8 @@ from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
 from solvers import Status, certify, make
 from solvers.problems import family as make_problem
+from solvers.problems.files import FRESH, Collection, Head, read
+from solvers.proof import Proof
 from solvers.qp.backends import BACKENDS, installed
 
 EQUALITIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10")
@@ -36,7 +35,6 @@ SCENARIO = "stand-push"
 SEED, COUNT, TOGETHER = 60, 100, 10  # of the stored set; ticks in a row of one run
 LEFT_OUT = "joint limits"            # a level of the scenario that the family lacks
 _FIRST, _LAST = 0.3, 1.0             # [s] between which the ticks lie: the push begins at 0.3 s
-_MISSING = 1e9                       # marks a missing side in the data
 _NEAREST = 1e-9                      # tolerance of `certify`
 _AGREE = 1e-6                        # of answers, relative to 1 + |x|
 
@@ -84,21 +82,6 @@ def answer(h: Hierarchy) -> Array | None:
                         for x in found):
         return None
     return found[0]
-
-
-def packed(problems: list[tuple[Hierarchy, Array]]) -> dict[str, Array]:
-    """Return problems of one shape as the arrays of a family's file."""
-    hs, x = [h for h, _ in problems], np.array([x for _, x in problems])
-    first = hs[0]
-    found = {"n": np.array(first.n), "L": np.array(len(first.sizes)), "m": first.sizes, "x": x,
-             "norms": np.array([h.violations(y) for h, y in problems]),
-             "violation": np.array([h.slacks(y) for h, y in problems]),
-             "sequence": np.arange(len(hs)) // TOGETHER}
-    for k, (i, j) in enumerate(zip(first.offsets[:-1], first.offsets[1:], strict=True)):
-        found |= {f"A{k}": np.array([h.A[i:j] for h in hs]),
-                  f"lb{k}": np.array([np.maximum(h.lower[i:j], -_MISSING) for h in hs]),
-                  f"ub{k}": np.array([np.minimum(h.upper[i:j], _MISSING) for h in hs])}
-    return found
 
 
 SCENARIOS = {
@@ -155,47 +138,34 @@ def window(scenario: Scenario, first: int, count: int) -> list[Hierarchy]:
 
 @dataclass(frozen=True)
 class Problem:
-    """A hierarchy with its certified answer x (n,) and violations, norms (L,); NaN if unknown.
+    """A hierarchy with its answer, None if unknown.
 
     `before` is the problem of the tick before, of a recorded sequence, or None.
     """
 
     h: Hierarchy
-    x: Array
-    norms: Array
+    proof: Proof | None
     before: Hierarchy | None = None
 
-    @property
-    def known(self) -> bool:
-        """Whether a certified answer is known."""
-        return not bool(np.isnan(self.norms).any())
+
+def certified(h: Hierarchy, x: Array) -> Proof:
+    """Return a certified answer x (n,) in the form of a proved one."""
+    count = len(h.sizes) + 1
+    return Proof(x, h.violations(x), count, count, 0.0, 0.0)
 
 
 def family(name: str) -> list[Problem]:
-    """Read the problems of one reference family.
-
-    Raises
-    ------
-    HierarchyError : there is no file of the family.
-    """
-    file = DATA / f"{name}.npz"
-    refuse(not file.is_file(), f"there are no reference problems at {file}")
-    data, problems = read_arrays(file), []
-    for p in range(len(data["x"])):
-        levels = []
-        for k in range(int(data["L"])):
-            lower, upper = data[f"lb{k}"][p], data[f"ub{k}"][p]
-            levels.append((data[f"A{k}"][p], np.where(lower <= -_MISSING, -np.inf, lower),
-                           np.where(upper >= _MISSING, np.inf, upper)))
-        problems.append(Problem(Hierarchy.from_levels(levels), data["x"][p], data["norms"][p]))
-    return _in_sequence(problems, data.get("sequence"))
+    """Read the problems of one reference family; raises HierarchyError if there is no file."""
+    one = read(DATA / f"{name}.npz")
+    return _in_sequence(name, [Problem(h, proof) for h, proof in zip(
+        one.problems, one.answers or (), strict=True)])
 
 
-def _in_sequence(problems: list[Problem], sequence: NDArray[Any] | None) -> list[Problem]:
-    """Return problems with those before them, where neighbours are of one sequence."""
-    if sequence is None:
+def _in_sequence(name: str, problems: list[Problem]) -> list[Problem]:
+    """Return problems of a family with those before them, where they are consecutive ticks."""
+    if name not in RECORDED:
         return problems
-    return [replace(one, before=problems[p - 1].h) if p and sequence[p] == sequence[p - 1] else one
+    return [replace(one, before=problems[p - 1].h) if p % TOGETHER else one
             for p, one in enumerate(problems)]
 
 
@@ -206,21 +176,23 @@ def fresh(name: str, seed: int, count: int) -> list[Problem]:
     answers with which they were kept; of the others no answer is known.
     """
     if name in RECORDED:
-        found = [Problem(h, x, h.violations(x)) for h, x in islice(ticks(seed), count)]
-        return _in_sequence(found, np.arange(count) // TOGETHER)
-    made = (make_problem(name, seed + i) for i in range(count))
-    return [Problem(h, np.full(h.n, np.nan), np.full(len(h.sizes), np.nan)) for h in made]
+        return _in_sequence(name, [Problem(h, certified(h, x))
+                                   for h, x in islice(ticks(seed), count)])
+    return [Problem(make_problem(name, seed + i), None) for i in range(count)]
 
 
 def main(out: Annotated[Path, typer.Option(metavar="FILE")], seed: int = SEED,
          count: int = COUNT) -> None:
     """Record problems of the family DYN60 and write its file."""
-    problems: list[tuple[Hierarchy, Array]] = []
-    for one in islice(ticks(seed), count):
-        problems.append(one)
+    problems: list[Hierarchy] = []
+    answers: list[Proof] = []
+    for h, x in islice(ticks(seed), count):
+        problems.append(h)
+        answers.append(certified(h, x))
         if len(problems) % TOGETHER == 0:
             print(f"{len(problems)} of {count}", flush=True)
-    np.savez_compressed(out, allow_pickle=False, **packed(problems))
+    head = Head(*RECORDED, "a pushed humanoid", FRESH, seed, source=f"runs of {SCENARIO}")
+    Collection(head, tuple(problems), tuple(answers)).save(out)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from functools import partial
 from threading import Lock
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, naming
 from scenarios.results.plan import Job, Outcome, digest
 
 _PATIENCE = 30.0  # [s] for a scheduler to answer and to have a worker
@@ -34,10 +34,8 @@ def ended(work: Callable[[Job], Outcome], jobs: Sequence[Job], scheduler: str
     except ImportError as error:
         raise HierarchyError("--scheduler needs dask.distributed: "
                              "pip install 'task-hierarchy[sweep]'") from error
-    try:
+    with naming(f"no Dask scheduler answers at {scheduler}", of=(OSError, ValueError, TypeError)):
         client = Client(scheduler, timeout=_PATIENCE)
-    except (OSError, ValueError, TypeError) as error:
-        raise HierarchyError(f"no Dask scheduler answers at {scheduler}: {error}") from error
     with client:
         try:
             client.wait_for_workers(1, timeout=_PATIENCE)

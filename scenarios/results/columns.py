@@ -99,9 +99,9 @@ class Results:
         """Return the spread of a metric under a resolver; None if it has no value."""
         return statistics.spread(self.column(name, label))
 
-    def paired(self, name: str, label: str, first: str | None = None) -> Paired:
-        """Return the paired differences of a metric from a column, by default the first."""
-        return paired(self.compared(name, first or self.labels[0]), self.compared(name, label))
+    def paired(self, name: str, label: str) -> Paired:
+        """Return the paired differences of a metric from the first column."""
+        return paired(self.compared(name, self.labels[0]), self.compared(name, label))
 
     def best(self, metric: Metric, of: int = 1) -> tuple[str, ...]:
         """Return the labels that are better than all others; empty where a test cannot tell.
@@ -113,11 +113,10 @@ class Results:
         return statistics.best({label: self.compared(metric.name, label) for label in self.labels},
                                metric.lower_is_better, statistics.LEVEL / of)
 
-    def shares(self, tolerance: float = _TOLERANCE) -> dict[str, dict[str, Share]]:
+    def shares(self) -> dict[str, dict[str, Share]]:
         """Return the share of each resolver's runs that meet a criterion, by criterion and label.
 
-        Those are the criteria that can be judged; a failed run meets none. Up to `tolerance` [rad]
-        beyond a joint limit counts as within it.
+        Those are the criteria that can be judged; a failed run meets none.
         """
         met = {"Reached the end": self._ended}
         near = [self.values[name] for name in ("body_distance_min", "ee_distance_min")
@@ -127,7 +126,7 @@ class Results:
             met["Touched nothing"] = np.all(
                 [*(values > 0.0 for values in near), *(values == 0.0 for values in contacts)],
                 axis=0)
-        for what, name, most in (("Kept the joint limits", "joint_limit_excess", tolerance),
+        for what, name, most in (("Kept the joint limits", "joint_limit_excess", _TOLERANCE),
                                  ("Every tick solved", "ticks_not_solved", 0.0)):
             if name in self.values:
                 met[what] = self.values[name] <= most

@@ -149,8 +149,8 @@ def _about(name: str, runs: Sequence[Run]) -> dict[str, Any]:
 
 
 def _picture(name: str, found: Sequence[Motion], look: Mapping[str, Look]) -> dict[str, Any]:
-    """Return the picture of the paths with its caption; both empty without a path."""
-    moved = {one.label: one.recording for one in found if "ee_position" in one.recording}
+    """Return the picture of the paths with its caption; both empty without a motion."""
+    moved = {one.label: one.recording for one in found}
     if not moved:
         return {"picture": "", "caption": ""}
     first = next(iter(moved.values()))

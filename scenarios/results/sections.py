@@ -93,7 +93,7 @@ def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
 def stack(name: str, runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     """Return the section with the stack over time, one figure for each motion and its events."""
     found = motions(runs, also=lambda one: (one.events, one.fault, tuple(
-        one.get("status", np.zeros(0)).nonzero()[0])))
+        one["status"].nonzero()[0])))
     beside = [one.recording for one in found]
     colours = task_colours(tasks(beside))
     bands = [(one, svg(timeline(one.recording, beside),
@@ -149,12 +149,10 @@ def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
                      _departure(recordings, looks)))
     timings = {run.label: run.timing or recordings[run.label] for run in runs
                if run.label in recordings}
-    if all("time_tick" in one for one in timings.values()):
-        figs.append(("Time per tick: dot: resolve, median; whole tick | median, × 99.9 %",
-                     _computing_time(timings, looks)))
+    figs.append(("Time per tick: dot: resolve, median; whole tick | median, × 99.9 %",
+                 _computing_time(timings, looks)))
     return render("results/overlays.html", looks={label: looks[label] for label in recordings},
-                  drawn=[(title, svg(fig, f"{name}: {title}")) for title, fig in figs]
-                  ) if figs else Markup()
+                  drawn=[(title, svg(fig, f"{name}: {title}")) for title, fig in figs])
 
 
 def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]
@@ -223,8 +221,7 @@ def _computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Loo
         for signal, percent, marker, colour in (("time_resolve", 50.0, "o", looks[label].colour),
                                                 ("time_tick", 50.0, "|", INK),
                                                 ("time_tick", 99.9, "x", INK)):
-            if signal in recording:
-                ax.plot(1e6 * np.percentile(recording[signal], percent), row, marker, color=colour)
+            ax.plot(1e6 * np.percentile(recording[signal], percent), row, marker, color=colour)
     drawing.make_logarithmic(ax, "x")
     ax.set_yticks(range(len(recordings)), list(recordings))
     ax.set_ylim(len(recordings) - 0.5, -0.5)

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy import HierarchyError
 from hierarchy.avoidance import Measurement, Obstacles
 from hierarchy.avoidance.measurement import measure_exactly
-from hierarchy.errors import positive
+from hierarchy.errors import positive, refuse
 from hierarchy.jit import bind
 from hierarchy.problem import Array
 from scenarios.cell.sensors.sensor import make_obstacles, packed_laws
@@ -155,8 +154,7 @@ def _pushes(recording: Recording, ticks: NDArray[np.int64], placements: Array) -
 def _frames(recording: Recording, rate: float) -> NDArray[np.int64]:
     """Return the ticks nearest to the frames' times, including the first and the last tick."""
     finite = np.flatnonzero(np.isfinite(_joints(recording)).all(axis=1))
-    if not finite.size:
-        raise HierarchyError("the recording has no tick: there is nothing to draw")
+    refuse(not finite.size, "the recording has no tick: there is nothing to draw")
     t = recording["t"][finite]
     wanted = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
     after = np.clip(np.searchsorted(t, wanted), 1, max(len(t) - 1, 1)) if len(t) > 1 else [0]

@@ -79,7 +79,7 @@ def gap(x, expected):
 def family(name):
     """Yield (hierarchy, x, norms) of a reference family; see scenarios/problems/data/README.md."""
     for problem in families.family(name):
-        yield problem.h, problem.x, problem.norms
+        yield problem.h, problem.proof.x, problem.proof.least
 
 
 def sequence(h, count, seed=0):

@@ -203,11 +203,11 @@ def test_the_answer_of_equalities_is_that_of_rational_arithmetic(seed):
     name for name in recorded.FAMILIES if name not in ("HUM38", "DEGEN7", "DYN60", "EQ30L8")])
 def test_stored_answers_lead_to_proofs_that_agree_with_them(name):
     for one in recorded.family(name)[:2]:
-        found = prove(one.h, [one.x])
+        found = prove(one.h, [one.proof.x])
         assert found.complete
         assert found.turn < 1e-15
-        np.testing.assert_allclose(found.x, one.x, atol=1e-9)
-        np.testing.assert_allclose(found.least, one.norms, atol=1e-9)
+        np.testing.assert_allclose(found.x, one.proof.x, atol=1e-9)
+        np.testing.assert_allclose(found.least, one.proof.least, atol=1e-9)
 
 
 def test_a_wrong_candidate_proves_nothing_and_a_metric_is_refused():

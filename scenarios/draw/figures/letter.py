@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from hierarchy.errors import HierarchyError, check_name
+from hierarchy.errors import check_name, refuse
 from hierarchy.problem import Array
 from scenarios.cell.sensors.camera import Pinhole
 from scenarios.config import load
@@ -87,8 +87,8 @@ def redraw(runs: Sequence[str | Path], style: str = "screen",
         drawing.STYLES, `out` is missing or cannot be written, or there is nothing to draw.
     """
     check_name("style", style, drawing.STYLES)
-    if len(runs) > 1 and out is None:
-        raise HierarchyError(f"figures of {len(runs)} runs belong to no run's folder: give --out")
+    refuse(len(runs) > 1 and out is None,
+           f"figures of {len(runs)} runs belong to no run's folder: give --out")
     claimed = None if out is None else claim(out)
     recordings = [load_run(run) for run in runs]
     writing = added_to(Path(runs[0])) if claimed is None else whole(claimed)
@@ -107,9 +107,8 @@ def write_all(recordings: Sequence[Recording], folder: Path) -> None:
     """
     with drawing.styled(drawing.present()):
         drawn = dict(figures(recordings))
-        if not drawn and len(recordings) > 1:
-            raise HierarchyError("more than two runs make only the letter's figures 4 to 7, 9 and "
-                                 "10, and its runs are not among these")
+        refuse(not drawn and len(recordings) > 1, "more than two runs make only the letter's "
+               "figures 4 to 7, 9 and 10, and its runs are not among these")
         for name, fig in drawn.items():
             drawing.write(fig, str(folder / name))
 
@@ -141,11 +140,9 @@ def figures(recordings: Sequence[Recording]) -> Iterator[tuple[str, Figure]]:
 def _others(recording: Recording) -> Iterator[tuple[str, Figure]]:
     """Yield the picture of a run, its stack over time, its depth image and its times of ticks."""
     if recording.ticks > 1:
-        if "ee_position" in recording:
-            yield "picture", picture({recording.facts.resolver.label: recording})
+        yield "picture", picture({recording.facts.resolver.label: recording})
         yield "stack", timeline(recording)
-        if "time_tick" in recording:
-            yield "tick-times", tick_times(recording)
+        yield "tick-times", tick_times(recording)
     if recording.depth is not None and np.isfinite(recording.depth.distance[-1]):
         number = "figure-8-" if is_letters(recording, _HUMAN) else ""
         yield f"{number}depth-image", depth_figure(recording.depth)

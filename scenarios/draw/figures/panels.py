@@ -90,7 +90,7 @@ def distance(ax: Axes, recording: Recording, colour: str, signal: str) -> None:
     shown = recording[f"true_{signal}"] if true else measured
     drawing.curve(ax, t, shown, color=colour, label="true" if true else None)
     tip = signal == "ee_distance"
-    if tip and "repulsion_active" in recording:
+    if tip:
         _in_red(ax, t, shown, recording["repulsion_active"])
     if avoidance is not None:
         for symbol, value in (avoidance.tip_thresholds if tip else avoidance.thresholds).items():
@@ -109,8 +109,7 @@ def active_point(ax: Axes, recording: Recording, colour: str) -> None:
         if active[first] > 0:
             ax.plot([t[first], t[min(last, len(t) - 1)]], [active[first]] * 2, color=colour,
                     linewidth=3.0, solid_capstyle="butt")
-    points = recording["control_point_distance"].shape[1] \
-        if "control_point_distance" in recording else max(int(active.max()), 1)
+    points = recording["control_point_distance"].shape[1]
     ax.set_ylim(0.3, points + 0.7)
     ax.set_yticks(range(1, points + 1, 1 + points // 6))
 
@@ -119,8 +118,7 @@ def pointing_error(ax: Axes, recording: Recording, colour: str) -> None:
     """Draw figure 7: cos(alpha_d) - cos(alpha), in red while the task is in the stack."""
     t, error = recording["t"], recording["pointing_error"]
     drawing.curve(ax, t, error, color=colour)
-    if "pointing_active" in recording:
-        _in_red(ax, t, error, recording["pointing_active"])
+    _in_red(ax, t, error, recording["pointing_active"])
     ax.axhline(0.0, color=INK, linewidth=0.6, linestyle=_DASHED)
 
 

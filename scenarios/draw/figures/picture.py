@@ -139,8 +139,7 @@ def _arms(ax: Axes, robot: RobotFacts, recording: Recording) -> None:
             if len(body):
                 ax.plot(*drawing.project(body).T, "o", color=ALERT, markersize=3)
             centres = _obstacles_at(recording, k).centres
-            if (len(body) and centres.size and "control_point_distance" in recording
-                    and _exact(recording)):  # the shortest distance, as in figure 3
+            if len(body) and centres.size and _exact(recording):  # the shortest, as in figure 3
                 point = body[int(np.argmin(recording["control_point_distance"][k]))]
                 end = centres[int(np.argmin(np.linalg.norm(centres - point, axis=1)))]
                 ax.plot(*drawing.project(np.array([point, end])).T, color=ALERT, linewidth=1.2)

@@ -20,7 +20,7 @@ _ON_BAND = "#101214"   # text on a band, in any theme: bands are light
 _LETTER = 0.016        # width of a character, relative to the time axis, in a band's name
 _LEAST = 0.004         # least width of a mark, relative to the time axis
 _MOST_STRETCHES = 600  # of bands in a row; shorter ones may be skipped
-_GRAVE = ("stop", "brake", "contact", "no answer")
+_GRAVE = ("stop", "brake", "contact")
 
 Mask = NDArray[np.bool_]
 
@@ -28,10 +28,10 @@ Mask = NDArray[np.bool_]
 def timeline(recording: Recording, beside: Sequence[Recording] = ()) -> Figure:
     """Return bands that show the place of each task in the stack, and a row for each kind of event.
 
-    Place 1 is the first priority. Below are the ticks with contact, without an answer, and with
-    each kind of trouble and action; a fault is a line at the end of the run. `beside` are the runs
-    shown together with this one, including itself: the figure then has their rows, colours and time
-    axis, and no legend or title of its own.
+    Place 1 is the first priority. Below are the ticks with contact, and with each kind of trouble
+    and action; a fault is a line at the end of the run. `beside` are the runs shown together with
+    this one, including itself: the figure then has their rows, colours and time axis, and no legend
+    or title of its own.
     """
     alone, beside = not beside, beside or (recording,)
     places = max(len(stack) for one in beside for stack in ((), *one.order_names))
@@ -75,11 +75,8 @@ def happened(recording: Recording) -> dict[str, Mask]:
     rows: dict[str, Mask] = {}
     if "contacts" in recording and (touched := recording["contacts"] > 0).any():
         rows["contact"] = touched
-    troubles = recording.troubles()
-    for (kind, action), ticks in troubles.items():
+    for (kind, action), ticks in recording.troubles().items():
         rows[f"{kind.replace('_', ' ')}: {action}"] = np.isin(np.arange(recording.ticks), ticks)
-    if "status" in recording and not troubles and (failed := recording["status"] != 0).any():
-        rows["no answer"] = failed
     return rows
 
 

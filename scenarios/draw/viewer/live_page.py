@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
 from contextlib import suppress
 from functools import reduce
 from queue import SimpleQueue
@@ -12,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, UnknownNameError, number
+from hierarchy.errors import HierarchyError, check_name, number
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.pose import Pose
@@ -172,12 +171,14 @@ class LivePage:
                 kept = obstacles.centres[h] - obstacles.offset[h]
                 self.live.drag(h, np.asarray(value, dtype=float) - kept)
             elif what == "resolver":
-                self.live.switch(self.specs[named("resolver", value, self.specs)])
+                check_name("resolver", value, self.specs)
+                self.live.switch(self.specs[value])
                 self._follow()
             else:
                 position = [] if self.live.scenario.position is None else [_OFFSET]
                 keys = [*position, *(knob.key for knob, _ in knobs(self.live.scenario))]
-                self.live.change({named("setting", what, keys): value})
+                check_name("setting", what, keys)
+                self.live.change({what: value})
                 self._follow()
         except (HierarchyError, TypeError, ValueError, IndexError, OverflowError) as error:
             self.refused, self._refusals = str(error), self._refusals + 1
@@ -209,13 +210,6 @@ class LivePage:
                        if isinstance(task, Position | Pose)]
         first = self._paths[0] if self._paths else np.zeros((1, 3))
         self.middle = (first.min(axis=0) + first.max(axis=0)) / 2 - self._path_offset()
-
-
-def named(what: str, name: Any, known: Collection[str]) -> str:
-    """Return a name that is known; raises UnknownNameError for another."""
-    if name not in known:
-        raise UnknownNameError(what, name, known)
-    return str(name)
 
 
 def resolvers(scenario: Scenario) -> dict[str, str]:

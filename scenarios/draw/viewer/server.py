@@ -14,7 +14,7 @@ from threading import Thread
 from typing import Any
 from urllib.parse import urlsplit
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import naming
 
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost")
@@ -43,10 +43,8 @@ def served(port: int, page: Callable[[], str], answer: Answer | None = None) -> 
 
     Raises HierarchyError if the port cannot be used.
     """
-    try:
+    with naming(f"--port {port} cannot be used", of=(OSError, OverflowError)):
         server = ThreadingHTTPServer((HOST, port), partial(_Handler, page, answer))
-    except (OSError, OverflowError) as error:
-        raise HierarchyError(f"--port {port} cannot be used: {error}") from error
     server.daemon_threads = True
     Thread(target=server.serve_forever, daemon=True).start()
     try:
