@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,7 @@ def write(folder: str | Path, recording: Recording, frames: int | None = None) -
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=False)
     entries: list[dict[str, Any]] = []
+    seen = recording["true_q" if "true_q" in recording else "q"]
     for k, t in enumerate(recording["t"]):
         frame = camera.newest(float(t))
         if frame < 0 or (k > 0 and frame == camera.newest(float(recording["t"][k - 1]))):
@@ -44,6 +46,7 @@ def write(folder: str | Path, recording: Recording, frames: int | None = None) -
         if len(entries) == frames:
             break
         cell.state.move(float(t), recording["q"][k], recording["v"][k])
+        camera.joints = partial(seen.__getitem__, k)
         reading, _ = camera.image(frame, cell.state)
         name = f"{len(entries):04d}.png"
         steps = np.rint(np.minimum(reading / _MILLIMETRE, 65535.0)).astype(np.uint16)

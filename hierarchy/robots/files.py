@@ -133,6 +133,7 @@ def _urdf_shapes(path: Path, root: Element, model: Any, meshes: bool) -> tuple[A
             file = _mesh_file(name, path)
             if meshes and file is not None:
                 mesh.set("filename", str(file))
+                mesh.set("scale", _in_metres(mesh.get("scale", "1 1 1"), file))
                 continue
             link.remove(collision)
             if file is None:
@@ -140,6 +141,15 @@ def _urdf_shapes(path: Path, root: Element, model: Any, meshes: bool) -> tuple[A
     text = ElementTree.tostring(root, encoding="unicode")
     geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
     return geometry.geometryObjects, missing
+
+
+def _in_metres(scale: str, file: Path) -> str:
+    """Return a scale times the unit of a Collada file, which coal does not read."""
+    unit = re.search(rb"<unit\s[^>]*meter\s*=\s*[\"']([\d.eE+-]+)", file.read_bytes()) if (
+        file.suffix.lower() == ".dae") else None
+    factors = urdf.numbers_in(scale, 3)
+    return scale if unit is None or factors is None else " ".join(
+        str(float(unit[1]) * factor) for factor in factors)
 
 
 def _mesh_file(name: str, path: Path) -> Path | None:

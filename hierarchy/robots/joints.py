@@ -56,7 +56,7 @@ def _sizes(joint: Any) -> Sequence[int]:
     kind = joint.shortname().removeprefix("JointModel")
     if kind == "Composite":
         return [size for inner in joint.extract().joints for size in _sizes(inner)]
-    if joint.nq == joint.nv:
+    if joint.nq == joint.nv > 0:
         return [1] * joint.nq
     if (joint.nq, joint.nv) == (2, 1):
         return [2]

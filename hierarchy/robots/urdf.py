@@ -269,6 +269,11 @@ def remarks(root: Element) -> Iterator[str]:
                and joint.get("type") in ("floating", "planar")]
     if ignored:
         yield f"limits of {some(ignored)}: a floating or planar joint has none"
+    endless = [name_of(joint) for joint in root.findall("joint[@type='continuous']")
+               if any(numbers_in(attribute_of(joint, "limit", side) or "0", 1) != [0.0]
+                      for side in ("lower", "upper"))]
+    if endless:
+        yield f"position limits of {some(endless)}: a continuous joint has none"
     plain = [name_of(joint) for joint in root.findall("joint")
              if joint.get("type") == "planar" and joint.find("axis") is None]
     if plain:

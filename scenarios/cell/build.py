@@ -21,9 +21,10 @@ from hierarchy.tasks import Pointing, Separation
 from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.tasks.together import TangentCone
 from scenarios.cell.plants import Plant
-from scenarios.cell.plants.plant import plant_of
+from scenarios.cell.plants.plant import Apart, plant_of
 from scenarios.cell.robot import placed
-from scenarios.cell.sensors import Sensor
+from scenarios.cell.sensors import DepthSensor, Sensor
+from scenarios.cell.sensors.camera import DepthCamera
 from scenarios.cell.sensors.sensor import sensor_of
 from scenarios.cell.tasks import Tasks, tasks_of
 from scenarios.config import Scenario, ScenarioError
@@ -99,6 +100,8 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     sensor = sensor_of(scenario, at.start, (kept.scenario, kept.sensor) if kept else None)
     plant = kept.plant if kept else plant_of(
         scenario, at.start, sensor.obstacles if sensor else Obstacles(), at.contacts)
+    if isinstance(sensor, DepthSensor) and isinstance(sensor.source, DepthCamera):
+        sensor.source.joints = (lambda: plant.true.q) if isinstance(plant, Apart) else None
     tasks = tasks_of(scenario, at)
     differences = scenario.control.jacobian_derivative == "difference"
     state = kept.state if kept else State(at.robot,

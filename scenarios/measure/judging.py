@@ -13,6 +13,7 @@ from hierarchy.jit import compiled
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell, build
 from scenarios.cell.sensors import DepthSensor
+from scenarios.cell.sensors.camera import DepthCamera
 from scenarios.config.sections.plant import KinematicSection
 from scenarios.recording.fate import Fate
 from scenarios.recording.recording import DepthView, Recording
@@ -161,6 +162,8 @@ def depth_view(recording: Recording) -> DepthView | None:
     moved = cell.state.move(float(recording["t"][k]), recording["q"][k], recording["v"][k])
     if not moved or not isinstance(cell.sensor, DepthSensor):
         return None
+    if isinstance(cell.sensor.source, DepthCamera) and "true_q" in recording:
+        cell.sensor.source.joints = lambda: np.asarray(recording["true_q"][k])
     seen, image = cell.sensor.measure(cell.state), cell.sensor.reading
     return None if image is None else DepthView(
         cell.state.t, image.copy(), cell.sensor.space.pinhole.packed(), seen.points.copy(),

@@ -132,6 +132,26 @@ def test_joints_that_turn_on_are_coupled_by_their_angles(turn, values):
     refused("cannot be coupled, but for its turn 'drive 3'", JointCoupling, ROBOT, {"drive": 1.0})
 
 
+@pytest.mark.parametrize("factor", [3.0, -0.02, 1.5, 2.0 / 3.0, 0.6667, -0.3])
+def test_coupled_joints_turn_on_without_a_jump(factor):
+    """At 1.5 the error was to the nearest whole turn, and the joints jumped by half a turn."""
+    task = JointCoupling(ROBOT, {"wheel": 1.0, "drive 3": -factor})
+    for angle in np.linspace(0.0, 20.0, 101):
+        q = ROBOT.configuration({"wheel": factor * angle, "drive": (0.0, 0.0, angle)})
+        assert task.error(State.at(ROBOT, q)) == pytest.approx(0.0, abs=2e-3)
+
+
+def test_a_mimic_joint_of_pinocchio_is_refused_by_its_kind():
+    """It has no velocity of its own, and its columns were missing in every Jacobian."""
+    text = urdf(*(link(f"l{i}") for i in range(3)), joint("a", "revolute", "l0", "l1"),
+                joint("b", "revolute", "l1", "l2", LIMIT + '<mimic joint="a"/>'))
+    try:
+        model = pin.buildModelFromXML(text, mimic=True)
+    except TypeError:
+        pytest.skip("older pinocchio has no such joint")
+    refused("0 velocities of the kind Mimic is not known", Robot, model, "it", error=RobotError)
+
+
 def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_path):
     path = tmp_path / "c.urdf"
     mimic = '<mimic joint="a" multiplier="-2" offset="0.5"/>'

@@ -165,13 +165,30 @@ def test_a_ball_and_a_free_joint_are_locked_where_mujoco_has_them(joint, value, 
     ('<motor joint="a_joint" ctrlrange="0 3"/>', "", np.inf),
     ('<motor joint="a_joint"/>', "", np.inf), ("", "", np.inf),
     ('<position joint="a_joint" kp="9" ctrlrange="-1 1"/>', "", np.inf),
-    ('<orientation joint="b_joint"/><motor joint="a_joint" gear="3" ctrlrange="-2 2"/>', "", 6.0)])
+    ('<orientation joint="b_joint"/><motor joint="a_joint" gear="3" ctrlrange="-2 2"/>', "", 6.0),
+    ('<general joint="a_joint" dyntype="filter" ctrlrange="-2 2" actrange="-1 1"/>', "", 1.0),
+    ('<general joint="a_joint" dyntype="integrator" ctrlrange="-2 2" actrange="-4 4"/>', "", 4.0),
+    ('<motor joint="a_joint" ctrlrange="-2 2"/><motor joint="a_joint" group="3"/>', "", 2.0)])
 def test_effort_limits_are_what_actuators_can_do(actuator, joint, effort, written):
     arm = link("a", f'{joint} axis="0 1 0"', link("b", 'type="ball"'))
-    robot = Robot.load(written(world(arm, f"<actuator>{actuator}</actuator>")))
+    robot = Robot.load(written(world(arm, f"<actuator>{actuator}</actuator>"
+                                     '<option actuatorgroupdisable="3"/>')))
     np.testing.assert_allclose(robot.effort_limit, [effort, *[np.inf] * 3])
     assert (robot.velocity_limit == np.inf).all()
     assert "velocity limits: an MJCF has none" in robot.missing
+
+
+@pytest.mark.parametrize(("inside", "said"), [
+    (link("a", 'stiffness="0 5"'), "stiffness of joints: not in the equations of motion"),
+    (link("a", 'damping="0 5"'), "damping of joints: not in the equations of motion"),
+    (WALKER.replace("<freejoint", '<joint type="free" armature=".1"'),
+     "armature of a free joint: without Coriolis forces: root"),
+    (link("a", 'pos="0 0 .1"').replace("a_joint", "a"),
+     "frames with their kind in the name, which another frame has: a (body)")])
+def test_what_a_robot_is_without_or_calls_otherwise_is_said(inside, said, written):
+    if '"0 5"' in inside and not hasattr(mujoco.MjModel, "dof_dampingpoly"):
+        pytest.skip("older MuJoCo has no polynomials of passive forces")
+    assert said in Robot.load(written(world(inside))).missing
 
 
 def test_inertia_of_a_tendon_is_refused_by_name(written):

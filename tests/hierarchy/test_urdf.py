@@ -122,6 +122,7 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
      "the macros <x:gripper> stand for"),
     ({"limit": '<limit lower="-1" upper="1" velocity="2" effort="0"/>'}, "effort limits of only:"),
     ({"kind": "planar"}, "limits of only: a floating or planar joint has none"),
+    ({"kind": "continuous"}, "position limits of only: a continuous joint has none"),
     ({"kind": "planar", "axis": ""}, "planar joints only: their planes are normal to x"),
     ({"more": link("only") + joint("x", "fixed", "base", "only", "", "")}, "frames called only:")])
 def test_what_a_robot_is_without_is_said(load, changed, said):

@@ -11,11 +11,13 @@ from scene import ROBOT, deproject
 
 from hierarchy import State
 from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles
+from hierarchy.avoidance.body import pack_capsules
 from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
 from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage
+from scenarios.cell.sensors.rendering import draw_robot
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
 from scenarios.config.sections.sensor import CameraSection, ImageSection
 
@@ -139,6 +141,27 @@ def test_a_camera_that_stops_or_is_covered_is_blind_after_its_time_and_sees_agai
 QUICK = ["sensor={kind='camera', position=[0.3, 2.2, 0.8], look_at=[0.0, 0.3, 0.1], width=160, "
          "height=120, fx=131.0, fy=131.0}", "control.duration=0.6", "plant={}",
          "control.resolver=hqp", "control.options={}"]
+
+
+def test_a_camera_sees_the_true_robot_and_not_where_late_joints_say_it_is():
+    """It drew the arm where the controller thought it was, from which it was then removed."""
+    missed: list[int] = []
+
+    def look(tick, controller):
+        cell, camera = controller.cell, controller.cell.sensor.source
+        if cell.sensor.measurement.stamp == cell.state.t:
+            true = State.at(cell.robot, cell.plant.extra["true_q"])
+            drawn = np.empty_like(camera.scene)
+            draw_robot(drawn, camera.pinhole.packed(), true.placements,
+                       *pack_capsules(cell.robot.capsules), 0.0)
+            missed.append(int((np.isfinite(drawn) & (camera.scene > drawn)).sum()))
+        return {}
+
+    run = simulate(load("human", [*QUICK, "start.v=[0.8,0,0,0,0,0,0]", "control.duration=0.3",
+                                  "plant.measurement={delay=0.05}"]), audits=[look])
+    assert np.abs(run["true_q"] - run["q"]).max() > 0.02
+    assert len(missed) > 5
+    assert max(missed) == 0
 
 
 def test_frames_that_cannot_be_used_are_refused_by_name(tmp_path):

@@ -49,7 +49,7 @@ def read(path: Path, base: Base | None, shapes: bool, locked: Mapping[str, Array
         rest=neutral_within_limits(built.model, configuration(built, file.model.qpos0)),
         starts={name: configuration(built, qpos)
                 for name, qpos in zip(file.keys, file.model.key_qpos, strict=True)},
-        missing=(*file.missing, *said, *unkept, *unclosed, *constraints.left_out(part)))
+        missing=(*file.missing, *said, *unkept, *unclosed, *constraints.left_out(built)))
     if not shapes:
         return found
     geometries, without = _shapes(built)

@@ -43,7 +43,9 @@ def effort_limits(built: Built) -> Iterator[str]:
     mj, efforts = file.model, np.full(model.nv, np.inf)
     ranges: dict[int, list[Array]] = defaultdict(list)
     for i, j, gear in joint_actuators(mj):
-        ranges[j].append(np.sort(gear * _force(mj, i)) if gear else np.zeros(2))
+        group = int(mj.actuator_group[i])
+        if gear and not (group >= 0 and mj.opt.disableactuator >> group & 1):
+            ranges[j].append(np.sort(gear * _force(mj, i)))
     idle, uneven = [], []
     for j, joint in built.pairs():
         if joint.nv > 1:
@@ -70,31 +72,45 @@ def effort_limits(built: Built) -> Iterator[str]:
 def _force(mj: Any, i: int) -> Array:
     """Return the least and the most force (2,) of an actuator, before its gear."""
     force = np.array(mj.actuator_forcerange[i]) if mj.actuator_forcelimited[i] else _FREE
-    motor = not mj.actuator_gaintype[i] and not mj.actuator_biastype[i]  # fixed gain, no bias
-    k = address(mj, "ctrl", i)
-    if motor and mj.actuator_dyntype[i] != _INTEGRATOR and mj.actuator_ctrllimited[k]:
-        control = np.sort(mj.actuator_gainprm[i, 0] * mj.actuator_ctrlrange[k])
-        force = np.clip(control, *force)
-    return force
+    if mj.actuator_gaintype[i] or mj.actuator_biastype[i]:  # no motor: fixed gain, no bias
+        return force
+    control, k = _FREE, address(mj, "ctrl", i)
+    if mj.actuator_dyntype[i] != _INTEGRATOR and mj.actuator_ctrllimited[k]:
+        control = mj.actuator_ctrlrange[k]
+    if mj.actuator_actlimited[i]:
+        control = np.clip(control, *mj.actuator_actrange[i])
+    known = np.isfinite(control).all()
+    return np.clip(np.sort(mj.actuator_gainprm[i, 0] * control), *force) if known else force
 
 
 _INTEGRATOR = 1  # mjDYN_INTEGRATOR: control is a rate of the activation
 
 
-def left_out(part: Part) -> Iterator[str]:
-    """Yield a sentence for each thing that the file has and the robot lacks."""
-    mj = part.compiled.model
+_PASSIVE = {"stiffness": ("jnt_stiffness", "jnt_stiffnesspoly"), "friction": ("dof_frictionloss",),
+            "damping": ("dof_damping", "dof_dampingpoly", "actuator_damping",
+                        "actuator_dampingpoly")}  # older MuJoCo has not all
+
+
+def left_out(built: Built) -> Iterator[str]:
+    """Yield a sentence for each thing that the file has and the robot lacks, or calls otherwise."""
+    file, mj = built.part.compiled, built.part.compiled.model
+    frames = ((built.bodies, file.bodies), (built.sites, file.sites))
     yield from each(*((said, [name_of(mj, kind, i) for i in range(n)]) for kind, n, said in (
         ("tendon", mj.ntendon, "of tendons only couplings of joints are here"),
         ("flex", mj.nflex, "of flexes only the joints are here"),
         ("skin", mj.nskin, "skins are left out"))))
     if mj.nplugin:
         yield f"plugins of MuJoCo do nothing here: {mj.nplugin}"
-    yield from each(("compensation of gravity is left out", [
-        part.compiled.bodies[body] for body in np.flatnonzero(mj.body_gravcomp)]))
-    passive = {"stiffness": mj.jnt_stiffness, "damping": mj.dof_damping,
-               "friction": mj.dof_frictionloss}
-    if found := [what for what, values in passive.items() if np.any(values)]:
+    yield from each(
+        ("frames with their kind in the name, which another frame has", [
+            name for here, there in frames for i, name in here.items() if name != there[i]]),
+        ("compensation of gravity is left out", [
+            file.bodies[body] for body in np.flatnonzero(mj.body_gravcomp)]),
+        ("armature of a free joint: without Coriolis forces", [
+            file.joints[j] for j, joint in built.pairs()
+            if file.kind(j) == "free" and built.model.armature[joint.idx_v]]))
+    if found := [what for what, names in _PASSIVE.items()
+                 if any(np.any(getattr(mj, name, 0.0)) for name in names)]:
         yield f"{listed(found)} of joints: not in the equations of motion"
     if mj.opt.density or mj.opt.viscosity:
         yield "drag of the air or fluid around: not in the equations of motion"

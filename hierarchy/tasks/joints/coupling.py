@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from itertools import zip_longest
+from math import lcm, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +29,7 @@ class Terms(NamedTuple):
 
     For each term: its row, the index of the joint in q and in v, whether the joint is continuous,
     and coefficients (t, k), the constant first. `turns` (m,) is what a row may be off by without
-    being missed, because a joint has turned once around [rad]; infinite where none is continuous.
+    being missed, because joints have turned around [rad]; infinite where none is continuous.
     """
 
     rows: NDArray[np.int64]
@@ -54,10 +56,10 @@ class JointCoupling(_Coupling):
     """Keep the sum of factor times position over `joints` at `value` (m = 1) [rad or m].
 
     `joints` has a factor for each joint by name: {"motor": 1.0, "wheel": -50.0} is a gear of ratio
-    50. The position of a continuous joint is its angle; of two angles that are a turn apart, times
-    the smallest factor of such joints, the nearer one counts. Of a joint with several velocities
-    only the turn of a planar one can be coupled, as "NAME 3". Raises HierarchyError for another, an
-    unknown joint, or no factor.
+    50. The position of a continuous joint is its angle; of two sums that differ by full turns of
+    such joints the nearer one counts, if their factors are multiples of a twelfth of the least. Of
+    a joint with several velocities only the turn of a planar one can be coupled, as "NAME 3".
+    Raises HierarchyError for another, an unknown joint, or no factor.
     """
 
     robot: Robot
@@ -120,19 +122,36 @@ class FollowedJoints(_Coupling):
 def _terms(robot: Robot, rows: int,
            terms: Iterable[tuple[int, str, tuple[float, ...]]]) -> Terms:
     """Return terms given by row, joint and coefficients; RobotError for several velocities."""
-    found, turns = [], np.full(rows, np.inf)
+    found, factors = [], [list[float]() for _ in range(rows)]
     for row, name, coefficients in terms:
         part = _part(robot, name)
         continuous = part.size == 2
         slope, *bends = (*coefficients[1:], 0.0)
         if continuous and slope and not any(bends):
-            turns[row] = min(turns[row], 2.0 * np.pi * abs(slope))
+            factors[row].append(abs(slope))
         found.append((row, part.q, part.v, continuous, coefficients))
     rows_of, positions, velocities, around, polynomials = zip(*found, strict=True)
     padded = np.array(list(zip_longest(*polynomials, fillvalue=0.0))).T
+    turns = np.array([2.0 * pi * _part_of(own) if own else np.inf for own in factors])
     return Terms(np.array(rows_of, dtype=np.int64), np.array(positions, dtype=np.int64),
                  np.array(velocities, dtype=np.int64), np.array(around, dtype=np.bool_),
                  np.ascontiguousarray(padded), turns)
+
+
+_LARGEST = 12   # denominator of the ratio of two factors
+_OFF = 1e-3     # of a ratio, as files round it
+
+
+def _part_of(factors: Sequence[float]) -> float:
+    """Return the largest number of which all factors are multiples; else the least of them.
+
+    At a factor of 1.5 beside one of 1, a turn of either is a multiple of half a turn.
+    """
+    least = min(factors)
+    ratios = [Fraction(factor / least).limit_denominator(_LARGEST) for factor in factors]
+    common = all(abs(ratio - factor / least) <= _OFF
+                 for ratio, factor in zip(ratios, factors, strict=True))
+    return least / lcm(*(ratio.denominator for ratio in ratios)) if common else least
 
 
 def _part(robot: Robot, name: str) -> Part:

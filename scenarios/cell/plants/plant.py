@@ -80,12 +80,12 @@ class KinematicArm:
 class Apart:
     """A plant whose q and v are what `sensed` returns for the true ones, once per period.
 
-    The true state at the start of each period is recorded as `true_q`, `true_v`.
+    `true` is the plant; its state at the start of each period is recorded as `true_q`, `true_v`.
     """
 
     def __init__(self, plant: Plant,
                  sensed: Callable[[Array, Array], tuple[Array, Array]]) -> None:
-        self._plant, self._sensed = plant, sensed
+        self.true, self._sensed = plant, sensed
         self._true_q, self._true_v = plant.q.copy(), plant.v.copy()
         self.extra: Mapping[str, NDArray[Any]] = {
             "true_q": self._true_q, "true_v": self._true_v, **plant.extra}
@@ -94,17 +94,17 @@ class Apart:
     @property
     def a(self) -> Array:
         """The acceleration (n,) [rad/s^2] of the last command."""
-        return self._plant.a
+        return self.true.a
 
     @property
     def fault(self) -> str | None:
         """Why the plant cannot go on, or None."""
-        fault: str | None = getattr(self._plant, "fault", None)
+        fault: str | None = getattr(self.true, "fault", None)
         return fault
 
     def act(self, command: Array) -> None:
         """Apply a command (n,) for one period, then measure."""
-        plant = self._plant
+        plant = self.true
         self._true_q[:], self._true_v[:] = plant.q, plant.v
         plant.act(command)
         self.q, self.v = self._sensed(plant.q, plant.v)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import floor, inf
 from pathlib import Path
@@ -98,8 +99,11 @@ class DepthCamera:
     """Takes depth images (h, w) [m] of obstacles and a robot of capsules; 0 means no reading.
 
     Frame i is taken at i / rate plus up to jitter. Its errors depend only on seed and i. `scene`
-    has the true depths of the last frame, infinite where there is nothing.
+    has the true depths of the last frame, infinite where there is nothing. `joints` returns the
+    true q (nq,) of the robot, None where it is what is measured.
     """
+
+    joints: Callable[[], Array] | None = None
 
     def __init__(self, section: CameraSection, pinhole: Pinhole, obstacles: Obstacles,
                  capsules: tuple[Capsule, ...]) -> None:
@@ -109,7 +113,7 @@ class DepthCamera:
         self.pinhole, self.obstacles, self.latency = pinhole, obstacles, section.latency
         self._section, self._backdrop = section, section.backdrop or inf
         self._eye, self._packed = pinhole.packed(), section.packed()
-        self._joints, self._capsules = pack_capsules(capsules)
+        self._links, self._capsules = pack_capsules(capsules)
         size = (pinhole.height, pinhole.width)
         self.scene, self._reading = np.zeros(size, np.float32), np.zeros(size, np.float32)
         self._normal, self._uniform = np.zeros(size, np.float32), np.ones(size, np.float32)
@@ -126,9 +130,12 @@ class DepthCamera:
         return frame - (frame >= 0 and self.time(frame) > t + _ROUNDING)
 
     def image(self, frame: int, state: State) -> tuple[Image, Array]:
-        """Take a frame at a state: the image, valid until the next, and the robot's placements."""
+        """Return an image taken at a state, valid until the next, and the placements measured."""
+        if self.joints is not None:
+            state.beside.move(state.t, self.joints(), state.v)
+        seen = state if self.joints is None else state.beside
         draw_scene(self.scene, self._eye, self._backdrop, self.obstacles.at(state.t),
-                   self._section.point_radius, state.placements, self._joints, self._capsules)
+                   self._section.point_radius, seen.placements, self._links, self._capsules)
         rng = self._rng(frame, 0)
         if self._section.random:
             rng.standard_normal(out=self._normal, dtype=np.float32)
