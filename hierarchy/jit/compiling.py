@@ -121,6 +121,10 @@ class Cached(CPUDispatcher):  # type: ignore[misc]
         else:
             super().add_overload(made)
 
+    def get_call_template(self, arguments: Any, named: Any) -> Any:
+        """Return what numba infers a call from: a constant is a number like any other."""
+        return super().get_call_template(tuple(map(numba.types.unliteral, arguments)), named)
+
     def compile(self, signature: Any) -> Any:
         """Return the function that Python calls, compiled now or loaded from the cache."""
         with global_compiler_lock:

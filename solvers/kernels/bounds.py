@@ -12,7 +12,7 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined, inner_product, internal
 from solvers.kernels.active_set.exact import DAMPING, solve, work_size
-from solvers.kernels.linalg.rows import ZERO, all_equal, finish, only_entry
+from solvers.kernels.linalg.rows import all_equal, finish, only_entry
 from solvers.kernels.linalg.space import View, fill, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET
@@ -41,7 +41,7 @@ def solve_within_bounds(A, lower, upper, sizes, reference, x, record, settings, 
     """
     (m, n), inner, known = A.shape, record[x.size + sizes.size:], False
     if work_size(n, m, sizes.size, settings[DAMPING] > 0.0) > work.size:
-        return ZERO + TOO_SMALL
+        return TOO_SMALL
     for i in range(record.size):
         known |= record[i] != 0.0
     if known:
@@ -82,7 +82,7 @@ def _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work):
     Other codes: NUMERICAL_FAILURE, or -(i + 1) if row i is an inequality but not a bound.
     """
     n = x.size
-    sides, at = vector(work, ZERO, 2 * n)
+    sides, at = vector(work, 0, 2 * n)
     box = _first_level(sizes, sides, n)
     code = _refused(A, lower, upper, box.end)
     if code != SOLVED:
@@ -94,7 +94,7 @@ def _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work):
     for c in range(n):
         within &= box.low[c] <= x[c] <= box.high[c]
     inner[inner.size - 3] = 1.0 if within else 0.0
-    return ZERO + (SOLVED if within else UNPROVED)
+    return SOLVED if within else UNPROVED
 
 
 @internal
@@ -130,7 +130,7 @@ def _is_at_bound(A, lower, upper, sizes, x, record, work):
 @inlined
 def _first_level(sizes, sides, n):
     """Return a Box for the first level that has rows, its sides not yet written."""
-    top = ZERO
+    top = 0
     while sizes[top] == 0:
         top += 1
     return Box(sides[:n], sides[n:2 * n], sizes[top], top)
@@ -143,7 +143,7 @@ def _refused(A, lower, upper, end):
     An inequality that is not a bound is rejected. If the first level also has an equality with
     several entries, its bounds do not count as bounds, and the first of them is rejected.
     """
-    sane, mixed, refused, bound = True, False, ZERO, ZERO
+    sane, mixed, refused, bound = True, False, 0, 0
     for i in range(lower.size):
         only = only_entry(A[i])
         single, entry = only >= 0, A[i, only] if only >= 0 else 1.0
@@ -156,14 +156,14 @@ def _refused(A, lower, upper, end):
         if lower[i] == upper[i]:
             continue
         if i < end and single and bound == 0:
-            bound = -(ZERO + i + 1)
+            bound = -(i + 1)
         elif refused == 0 and (i >= end or not single):
-            refused = -(ZERO + i + 1)
+            refused = -(i + 1)
     if not sane:
-        return ZERO + NUMERICAL_FAILURE
+        return NUMERICAL_FAILURE
     if refused == 0 and mixed:
         refused = bound
-    return refused if refused < 0 else ZERO + SOLVED
+    return refused if refused < 0 else SOLVED
 
 
 @inlined
@@ -181,7 +181,7 @@ def _intersect(A, lower, upper, box):
 @inlined
 def _scale(A, b, sizes, box, x, record):
     """Write the scaling of each level: 1 - |A_k x - b_k| / |b_k|, not below zero."""
-    begin, n = ZERO + box.end, x.size
+    begin, n = box.end, x.size
     fill(record[n:n + sizes.size], 1.0)
     for c in range(n):
         if box.low[c] > box.high[c]:

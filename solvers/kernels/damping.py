@@ -20,9 +20,6 @@ from typing import NamedTuple
 from hierarchy.jit import add_multiple, inlined, inner_product, internal
 from solvers.kernels.linalg.block import level_damping
 from solvers.kernels.linalg.rows import (
-    NO,
-    YES,
-    ZERO,
     factor_level,
     inequalities_hold,
     length_of,
@@ -87,7 +84,7 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
 
     The second number is the code of the staircase. x: the reference.
     """
-    first, count, fixed = ZERO, ZERO, False
+    first, count, fixed = 0, 0, False
     for k in range(sizes.size):
         d.sizes[k], begin = sizes[k], count
         for i in range(first, first + sizes[k]):
@@ -103,9 +100,9 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
     code = solve_by_staircase(E, b, b, d.ends, d.free, settings, work)
     if code == NUMERICAL_FAILURE or (not fixed and inequalities_hold(A, lower, upper, d.free)):
         return True, code
-    _factor_equalities(d, A, sizes, settings, work, YES)
+    _factor_equalities(d, A, sizes, settings, work, True)
     _take_out_exceeded(d, E, A, lower, upper, x)
-    _factor_equalities(d, A, sizes, settings, work, NO)
+    _factor_equalities(d, A, sizes, settings, work, False)
     return False, code
 
 
@@ -142,14 +139,14 @@ def _take_out_exceeded(d, E, A, lower, upper, reference):
 def _factor_equalities(d, A, sizes, settings, work, whole):
     """Write what each level adds to the staircase, if `whole`, else its lambda."""
     m, n = d.E.shape
-    (basis, rows, _, _, of_block), _ = carve_staircase(work, ZERO, m, n)
-    settings, rank, first, begin = shared(settings), ZERO, ZERO, ZERO
+    (basis, rows, _, _, of_block), _ = carve_staircase(work, 0, m, n)
+    settings, rank, first, begin = shared(settings), 0, 0, 0
     for k in range(sizes.size):
         end, last = begin + d.ends[k], first + sizes[k]
         for e in range(begin, end):
             assign(rows.W[e], d.E[e])
             rows.zero[e] = (settings.rank_tolerance * length_of(d.E[e])) ** 2
-        reflect(basis, ZERO, rank, rows.W, begin, end)
+        reflect(basis, 0, rank, rows.W, begin, end)
         above, rank = rank, factor_level(rows, basis, begin, end, rank)
         if whole:
             d.ranks[k] = rank - above
@@ -167,7 +164,7 @@ def _factor_equalities(d, A, sizes, settings, work, whole):
 @internal
 def damp_level(d, k):
     """Write the rows of damping below level k; return the number of rows up to them."""
-    n, end, begin = d.free.size, ZERO, ZERO
+    n, end, begin = d.free.size, 0, 0
     for j in range(k + 1):
         begin, end = begin + (d.ends[j] if j < k else 0), end + d.sizes[j]
     for t in range(n):
@@ -188,7 +185,7 @@ def keep_reached(d, A, lower, upper, x, k, end):
     """
     for i in range(end, lower.size):
         _copy_row(d, A, lower, upper, i)
-    begin, t = ZERO, ZERO
+    begin, t = 0, 0
     for j in range(k):
         begin, t = begin + d.sizes[j], t + d.ends[j]
     last = t + d.ranks[k]

@@ -23,7 +23,7 @@ from solvers.kernels.active_set.working_set import (
     restore,
     start_from,
 )
-from solvers.kernels.linalg.rows import ZERO, finish, length_of
+from solvers.kernels.linalg.rows import finish, length_of
 from solvers.kernels.linalg.space import View, assign, fill
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
@@ -77,10 +77,10 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
     """
     (m, n), whole = A.shape, record.size - 3 * A.shape[0] - 3
     if exact_size(n, m, sizes.size) > work.size:
-        return ZERO + TOO_SMALL
+        return TOO_SMALL
     s, code, at = open_working_set(A, lower, upper, sizes, x[:n], record[whole:], settings, work)
     for i in range(m):
-        code = code if x[n + i] >= 0.0 else ZERO + NUMERICAL_FAILURE
+        code = code if x[n + i] >= 0.0 else NUMERICAL_FAILURE
     if code != SOLVED:
         return finish(x[:n], code)
     g = Giving(A, lower, upper, x[n:n + m], as_matrix(x[n + m:], (x.size - n - m) // n, n))
@@ -96,9 +96,9 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
 @inlined
 def _find_witnesses(s, g, record, settings, work):
     """Write the witnesses and move the sides; return a code, and where the last record ends."""
-    code, count, found, at, room, accurate = ZERO + SOLVED, ZERO, ZERO, ZERO, ZERO, True
+    code, count, found, at, room, accurate = SOLVED, 0, 0, 0, 0, True
     for k in range(s.multiplier.shape[0] - 1):
-        count = ZERO + k + 1 if _gives(s, g, k) else count
+        count = k + 1 if _gives(s, g, k) else count
     part, size = _first_levels(s, count), record.size // g.witnesses.shape[0]
     for k in range(count):
         if code in (SOLVED, INACCURATE) and _gives(s, g, k):

@@ -20,7 +20,7 @@ import numpy as np
 
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product, internal
 from solvers.kernels.active_set.exact import DAMPING, solve, work_size
-from solvers.kernels.linalg.rows import ZERO, only_entry
+from solvers.kernels.linalg.rows import only_entry
 from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, vector
 from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
 
@@ -84,9 +84,9 @@ def merged(A, lower, upper, sizes, x, record, settings, work):
     s, at = _carve(settings, work, m, n, levels)
     strict, damped = count_strict(lower, upper, sizes, s.strict), settings[DAMPING] > 0.0
     if strict >= levels > 0 and s.strict != TOP_LIMITS:
-        return ZERO + NOTHING
+        return NOTHING
     if merged_size(n, m, levels, damped) > work.size:
-        return ZERO + TOO_SMALL
+        return TOO_SMALL
     y, last = record[:m], min(strict + 1, levels)
     if damped:
         assign(s.centre, x)
@@ -115,14 +115,14 @@ def count_strict(lower, upper, sizes, given):
     inequalities. TOP_LIMITS: the top level, if it has inequalities.
     """
     if given >= 0.0:
-        return ZERO + np.int64(given)
-    first, strict = ZERO, ZERO
+        return np.int64(given)
+    first, strict = 0, 0
     for k in range(sizes.size):
         last, bounded = first + sizes[k], False
         for i in range(first, last):
             bounded |= lower[i] < upper[i]
         if bounded:
-            strict = ZERO + k + 1
+            strict = k + 1
         if sizes[k] > 0 and (given == TOP_LIMITS or (strict > 0 and not bounded)):
             break
         first = last
@@ -134,7 +134,7 @@ def _carve(settings, work, m, n, levels):
     """Return Merged without content, and where it ends in the work space."""
     strict, regularisation, step = settings[EXACT], settings[EXACT + 1], settings[EXACT + 2]
     weights, caps = settings[OWN:OWN + levels], settings[OWN + levels:]
-    A, at = matrix(work, ZERO, m + n, n)
+    A, at = matrix(work, 0, m + n, n)
     lower, at = vector(work, at, m + n)
     upper, at = vector(work, at, m + n)
     sizes, at = integers(work, at, levels)
@@ -147,7 +147,7 @@ def _carve(settings, work, m, n, levels):
 @internal
 def _merge(s, A, lower, upper, sizes, strict, y, damped):
     """Write the rows of all levels, those to merge times their weights and at moved sides."""
-    first, hard = ZERO, ZERO
+    first, hard = 0, 0
     fill(s.own, 0.0)
     for k in range(sizes.size):
         hard, cap = first if k == strict else hard, _cap(s, sizes, k, strict)
@@ -207,7 +207,7 @@ def _draw(s, m, x):
 @internal
 def _carry(s, A, lower, upper, sizes, x, y, strict):
     """Move the memory of each row, (a)."""
-    first = ZERO
+    first = 0
     for k in range(sizes.size):
         cap = _cap(s, sizes, k, strict)
         for i in range(first, first + sizes[k]):

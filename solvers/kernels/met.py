@@ -6,7 +6,6 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.linalg.rows import (
-    ZERO,
     all_equal,
     factor_level,
     inequalities_hold,
@@ -29,7 +28,7 @@ def plainly_met(A, lower, upper, offsets, least):
     level end in a triangle L: its step is L^-1 (b - A x), its multiplier L^-T of that. False where
     this is not so.
     """
-    (m, n), last, rank = A.shape, 0, ZERO
+    (m, n), last, rank = A.shape, 0, 0
     for k in range(len(least)):
         if least[k] >= 0.0:
             last = k + 1
@@ -42,7 +41,7 @@ def plainly_met(A, lower, upper, offsets, least):
                 return False
             for i in range(first, end):
                 rows.zero[i] = (_PIVOT * length_of(A[i])) ** 2
-            reflect(basis, ZERO, rank, rows.W, first, end)
+            reflect(basis, 0, rank, rows.W, first, end)
             above, rank = rank, factor_level(rows, basis, first, end, rank)
             if rank - above < end - first:
                 return False
@@ -52,7 +51,7 @@ def plainly_met(A, lower, upper, offsets, least):
             if least[k] >= 0.0 and not _is_short(rows, mu, first, end, above, least[k]):
                 return False
             assign(x[0], y)
-            reflect_back(basis, rank, x, ZERO, ZERO + 1)
+            reflect_back(basis, rank, x, 0, 1)
         if not inequalities_hold(A[:end], lower[:end], upper[:end], x[0]):
             return False
     return True

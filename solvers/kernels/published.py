@@ -14,7 +14,6 @@ import numpy as np
 from hierarchy.jit import as_matrix, compiled, inlined, inner_product, internal
 from solvers.kernels.linalg.block import invert_triangle, orthogonalise_rows, smallest_square
 from solvers.kernels.linalg.rows import (
-    ZERO,
     finish,
     load_rows,
     make_reflector,
@@ -100,7 +99,7 @@ def _add_inverse(matrices, x):
     for i in range(m):
         u[i] = (u[i] - inner_product(u[:i], matrices.R[i])) / matrices.R[i, i]
         of_x[0, i] = u[i]
-    reflect_back(matrices.basis, m, of_x, ZERO, ZERO + 1)
+    reflect_back(matrices.basis, m, of_x, 0, 1)
     for c in range(x.size):
         x[c] += of_x[0, c]
 
@@ -127,12 +126,12 @@ def _fill(A, lower, upper, sizes, x, matrices, settings):
     if code != SOLVED:
         return code
     _factor(R, basis, zero, n)  # (8)
-    invert_triangle(R, T, ZERO, ZERO, m)
+    invert_triangle(R, T, 0, 0, m)
     for i in range(m):
         for k in range(m):
             F[i, k] = R[k, i] if k >= i else 0.0  # (9)
     entries, of_pivot, tolerance = rest[:m], rest[m:], _tolerance(A, settings.rank_tolerance)
-    first = ZERO
+    first = 0
     for level in range(sizes.size):
         last = first + sizes[level]
         p = last - first

@@ -21,7 +21,6 @@ from solvers.kernels.linalg.block import (
     solve_level,
 )
 from solvers.kernels.linalg.rows import (
-    ZERO,
     finish,
     largest_row,
     length_of,
@@ -79,12 +78,12 @@ def recursion(A, lower, upper, sizes, x, settings, work):
     settings: those of `Recursive`. Other arguments and the codes are those of `solve_by_staircase`.
     """
     m, n = A.shape
-    rows, at = _carve(work, ZERO, m, n)
+    rows, at = _carve(work, 0, m, n)
     y, at = vector(work, at, n)
     q, at = vector(work, at, n)
     of_block, at = vector(work, at, 2 * (m + n) * (n + 1))
     if at > work.size:
-        return ZERO + TOO_SMALL
+        return TOO_SMALL
     inverse = Inverse(settings[3], settings[0], settings[1], settings[4], settings[5])
     settings = shared(settings)
     code = load_rows(rows.W, rows.zero, A, lower, upper, x, settings.rank_tolerance)
@@ -92,7 +91,7 @@ def recursion(A, lower, upper, sizes, x, settings, work):
         return finish(x, code)
     _begin(rows, q)
 
-    rank = first = ZERO
+    rank = first = 0
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
         _see(rows, A, lower, q, first, last, above)
@@ -137,7 +136,7 @@ def _see(rows, A, b, q, first, last, above):
 def _decompose(rows, A, first, last, rank, rank_tolerance):
     """Decompose the rows of a level into unit vectors, largest first; return the rank."""
     for i in range(first, last):
-        pivot, square = largest_row(rows.W, rows.zero, i, last, ZERO)
+        pivot, square = largest_row(rows.W, rows.zero, i, last, 0)
         if pivot < 0 or rank == A.shape[1]:
             break
         if pivot != i:
@@ -225,7 +224,7 @@ def invert(rows, y, at, inverse, work):
 def _decomposed(rows, at, work):
     """Decompose the block of a level; return it and the rest of `work`."""
     p, r, n = at.i1 - at.i0, at.k1 - at.k0, rows.V.shape[1]
-    S, end = matrix(work, ZERO, r, p)
+    S, end = matrix(work, 0, r, p)
     Y, end = matrix(work, end, r, r)
     sizes, end = vector(work, end, n)
     step, end = vector(work, end, n)
@@ -254,11 +253,11 @@ def _filtered(rows, y, at, inverse, space):
     rank has s_m = 0, and nothing remains in that direction.
     """
     r, lost = at.k1 - at.k0, at.i1 - at.i0 > at.k1 - at.k0
-    least, smallest = np.inf, ZERO
+    least, smallest = np.inf, 0
     for k in range(r):
         square, _ = _along(rows, at, space, k)
         if square < least:
-            least, smallest = square, ZERO + k
+            least, smallest = square, k
     ratio = least / (inverse.threshold * inverse.threshold)
     extra = inverse.damping * inverse.damping * max(0.0, 1.0 - ratio)  # lambda^2
     fill(y[at.k0:at.k1], 0.0)

@@ -16,7 +16,6 @@ import numpy as np
 from hierarchy.jit import compiled, inlined, inner_product, internal
 from solvers.kernels.linalg.block import solve_level
 from solvers.kernels.linalg.rows import (
-    ZERO,
     all_finite,
     factor_level,
     finish,
@@ -181,13 +180,13 @@ def _touches(x, side):
 @inlined
 def _bounds_above(lower, upper, sizes):
     """Return the rows of the first level with rows, 0 if it has no inequality; the next level."""
-    top = ZERO
+    top = 0
     while top < sizes.size and sizes[top] == 0:
         top += 1
-    for i in range(sizes[top] if top < sizes.size else ZERO):
+    for i in range(sizes[top] if top < sizes.size else 0):
         if lower[i] < upper[i]:
             return sizes[top], top + 1
-    return ZERO, top
+    return 0, top
 
 
 @inlined
@@ -227,7 +226,7 @@ def _saturate(J, lower, upper, sizes, x, space, record):
         return code
     for c in range(x.size):
         x[c] = min(max(0.0, space.low[c]), space.up[c])  # x_0, zero in the paper
-    first = above = tried = ZERO
+    first = above = tried = 0
     for k in range(sizes.size):
         last = first + sizes[k]
         task = Task(J[first:last], lower[first:last], space.zero[first:last])
@@ -246,7 +245,7 @@ def _level(task, x, space, above):
     seen, tolerance = space.seen[:task.b.size], space.shared.rank_tolerance
     _begin(task, x, space)
     _see(task, space.basis, seen, above)
-    rank, taken, largest, sets = above, ZERO, -1.0, 0
+    rank, taken, largest, sets = above, 0, -1.0, 0
     while sets < 2 * x.size + 2:  # the basic form saturates at most n joints
         sets += 1
         begin = above + taken
@@ -290,7 +289,7 @@ def _see(task, basis, seen, above):
     """Write the rows of the task, reflected by the columns of the tasks above."""
     for i in range(task.b.size):
         assign(seen[i], task.J[i])
-    reflect(basis, ZERO, above, seen, ZERO, task.b.size)
+    reflect(basis, 0, above, seen, 0, task.b.size)
 
 
 @inlined
@@ -300,7 +299,7 @@ def _factor(task, space, begin):
     for i in range(task.b.size):
         rows.row[i], rows.zero[i] = i, task.zero[i]
         assign(rows.W[i], space.seen[i])
-    return factor_level(rows, space.basis, ZERO, task.b.size, begin)
+    return factor_level(rows, space.basis, 0, task.b.size, begin)
 
 
 @inlined
@@ -320,7 +319,7 @@ def _write_line(task, x, space, at):
     """
     rows, now, y, y_a, of_miss = space.rows, space.now, space.y, space.y_a, space.of_miss
     size, line = task.b.size, space.line
-    block = Block(ZERO, size, at.joints, at.task)
+    block = Block(0, size, at.joints, at.task)
     for i in range(size):
         rows.miss[i] = task.b[rows.row[i]] - (now[rows.row[i]] if of_miss else 0.0)
     solve_level(rows.W, rows.miss, y_a, block, space.shared, space.of_block)
@@ -332,7 +331,7 @@ def _write_line(task, x, space, at):
     for k in range(x.size):
         line[0, k] = y_a[k] if at.joints <= k < at.task else 0.0
         line[1, k] = y[k] if at.above <= k < at.task else 0.0
-    reflect_back(space.basis, at.task, line, ZERO, ZERO + 2)
+    reflect_back(space.basis, at.task, line, 0, 2)
     for j in range(x.size):
         line[1, j] += x[j]
 
@@ -355,7 +354,7 @@ def _improves(x, space, at, s):
         trial[0, k] = 0.0
         if at.above <= k < at.task:
             trial[0, k] = y[k] + s * y_a[k] if k >= at.joints else y[k]
-    reflect_back(space.basis, at.task, trial, ZERO, ZERO + 1)
+    reflect_back(space.basis, at.task, trial, 0, 1)
     for j in range(x.size):
         low, up, value = space.low[j], space.up[j], x[j] + trial[0, j]
         inside = inside and not value > up + 10.0 * BOUND_KEPT * (1.0 + abs(up))
@@ -441,14 +440,14 @@ def _hold(space, seen, j, way, above, count, least):
     k, e, basis = above + count, space.E[count], space.basis
     fill(e, 0.0)
     e[j] = 1.0
-    reflect(basis, ZERO, k, space.E, count, count + 1)
+    reflect(basis, 0, k, space.E, count, count + 1)
     square = inner_product(e[k:], e[k:])
     if not square > least * least:
         space.side[j] = 0.0
         return count
     make_reflector(basis, k, e, square)
     reflect(basis, k, k + 1, space.E, count, count + 1)
-    reflect(basis, k, k + 1, seen, ZERO, seen.shape[0])
+    reflect(basis, k, k + 1, seen, 0, seen.shape[0])
     space.y[k] = (way - inner_product(e[above:k], space.y[above:])) / e[k]
     space.joint[count] = j
     return count + 1
@@ -457,7 +456,7 @@ def _hold(space, seen, j, way, above, count, least):
 @internal
 def _hold_again(space, seen, x, above, count, least):
     """Give columns of Q to the joints among the first `count` that remain held; see `_hold`."""
-    holding = ZERO
+    holding = 0
     for t in range(count):
         j = space.joint[t]
         if space.side[j] != 0.0:
@@ -477,7 +476,7 @@ def _to_reference(space, x, rank):
     d, target, no_rows = ways[0], ways[1], ways[:0]
     for j in range(n):
         space.side[j], target[j] = 0.0, space.reference[j] + (0.0 if release else x[j])
-    count, steps = ZERO, 0
+    count, steps = 0, 0
     while steps < 4 * n + 2:
         steps += 1
         begin = rank + count
@@ -501,10 +500,10 @@ def _free_way(space, x, target, begin):
     ways, d = space.line, space.line[0]
     for j in range(x.size):
         d[j] = target[j] - x[j]
-    reflect(space.basis, ZERO, begin, ways, ZERO, ZERO + 1)
+    reflect(space.basis, 0, begin, ways, 0, 1)
     for k in range(begin):
         space.y[k], d[k] = d[k], 0.0
-    reflect_back(space.basis, begin, ways, ZERO, ZERO + 1)
+    reflect_back(space.basis, begin, ways, 0, 1)
 
 
 @inlined

@@ -15,7 +15,6 @@ import numpy as np
 from hierarchy.jit import compiled, inlined, inner_product, internal
 from solvers.kernels.linalg.block import solve_level
 from solvers.kernels.linalg.rows import (
-    ZERO,
     factor_level,
     finish,
     has_outlier,
@@ -73,7 +72,7 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
     """
     code, least = climb(A, lower, upper, sizes, x, settings, work)
     if code == SOLVED and least < UNCLEAR_PIVOT and settings[0] == 0.0:
-        return ZERO + INACCURATE
+        return INACCURATE
     return code
 
 
@@ -86,16 +85,16 @@ def climb(A, lower, upper, sizes, x, settings, work):
     m, n = A.shape
     (basis, rows, y, of_x, of_block), at = carve_staircase(work, 0, m, n)
     if at > work.size:
-        return ZERO + TOO_SMALL, 0.0
+        return TOO_SMALL, 0.0
     settings = shared(settings)
     code = load_rows(rows.W, rows.zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
         return finish(x, code), 0.0
 
-    rank, first, least = ZERO, ZERO, np.inf
+    rank, first, least = 0, 0, np.inf
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
-        reflect(basis, ZERO, above, rows.W, first, last)  # J_i Q: the level as seen from above
+        reflect(basis, 0, above, rows.W, first, last)  # J_i Q: the level as seen from above
         assign(rows.miss[first:last], lower[first:])
         rank = factor_level(rows, basis, first, last, rank)
         block = Block(first, last, above, rank)
@@ -141,7 +140,7 @@ def _to_unknowns(basis, y, rank, x, of_x):
         of_x[0, c] = x[c]
         zero_reference &= x[c] == 0.0
     if not zero_reference:
-        reflect(basis, ZERO, rank, of_x, ZERO, ZERO + 1)
+        reflect(basis, 0, rank, of_x, 0, 1)
     assign(of_x[0, :rank], y)
-    reflect_back(basis, rank, of_x, ZERO, ZERO + 1)
+    reflect_back(basis, rank, of_x, 0, 1)
     assign(x, of_x[0])

@@ -18,7 +18,7 @@ from hierarchy.jit.exporting import INTEGER, STATUS, Entry, integers_at, numbers
 from solvers.kernels.active_set.exact import keep_staircase, solve, verify_answer
 from solvers.kernels.active_set.exact import work_size as exact_size
 from solvers.kernels.bounds import solve_within_bounds
-from solvers.kernels.linalg.rows import ZERO, all_equal
+from solvers.kernels.linalg.rows import all_equal
 from solvers.kernels.linalg.space import View, fill
 from solvers.kernels.merged import BY_RULE, OWN, merged, merged_size, write_levels
 from solvers.kernels.merged import record_size as merged_record
@@ -109,7 +109,7 @@ def can_open(problem, settings, record, x, work, size):
             code = TOO_SMALL
         elif state[VALUES] == 0:
             code = INVALID
-    return ZERO + code
+    return code
 
 
 @inlined
@@ -123,7 +123,7 @@ def judged_problem(problem):
         return INVALID
     if m > 0 and (words[A] == 0 or words[LOWER] == 0 or words[UPPER] == 0):
         return INVALID
-    sizes, rows, sane = integers_at(words[SIZES], levels), ZERO, True
+    sizes, rows, sane = integers_at(words[SIZES], levels), 0, True
     for k in range(levels):
         sane &= 0 <= sizes[k] <= m
         rows += sizes[k]
@@ -172,7 +172,7 @@ def opened(problem, record, x, work, size, n, m, levels):
     room, reference = numbers_at(work, size), words[REFERENCE]
     return Call(as_matrix(numbers_at(words[A], m * n), m, n), numbers_at(words[LOWER], m),
                 numbers_at(words[UPPER], m), integers_at(words[SIZES], levels),
-                numbers_at(reference, n if reference != 0 else ZERO), numbers_at(x, n),
+                numbers_at(reference, n if reference != 0 else 0), numbers_at(x, n),
                 numbers_at(state[VALUES], record_size(n, m, levels)), state,
                 room[:SETTINGS], room[SETTINGS:])
 
@@ -297,7 +297,7 @@ def solve_hcod(call, s):
 def solve_recursive(call, s):
     """Solve like `Recursive`."""
     call.settings[3], call.settings[4], call.settings[5] = s.method, s.isotropic, s.largest
-    begun(call, ZERO)
+    begun(call, 0)
     return recursion(call.A, call.lower, call.upper, call.sizes, call.x, call.settings, call.work)
 
 
@@ -318,13 +318,13 @@ def solve_merged(call, s):
     (m, n), levels = call.A.shape, call.sizes.size
     own, scale = call.work[:OWN + 2 * levels], call.work[OWN + 2 * levels:OWN + 3 * levels]
     begun(call, merged_record(n, m))
-    given_scale = numbers_at(s.scales, levels if s.scales != 0 else ZERO)
+    given_scale = numbers_at(s.scales, levels if s.scales != 0 else 0)
     for k in range(levels):
         scale[k] = given_scale[k] if s.scales != 0 else 1.0
         if not 0.0 < scale[k] < np.inf:
-            return ZERO + INVALID
+            return INVALID
     if s.damping > 0.0:
-        return ZERO + INVALID
+        return INVALID
     write_exact(own, s)
     own[5], own[6], own[7] = s.strict_levels, s.regularisation, s.step
     write_levels(own, s.ratio, s.cap, scale)
@@ -354,7 +354,7 @@ def violations_at(problem, x, norms):
     """Write like `Hierarchy.violations`; infinity where that is not finite."""
     if judged_problem(problem) != SOLVED or x == 0 or norms == 0:
         return np.int32(INVALID)
-    words, row, finite = integers_at(problem, PROBLEM), ZERO, True
+    words, row, finite = integers_at(problem, PROBLEM), 0, True
     n, m, levels = words[N], words[M], words[LEVELS]
     rows, x = as_matrix(numbers_at(words[A], m * n), m, n), numbers_at(x, n)
     lower, upper = numbers_at(words[LOWER], m), numbers_at(words[UPPER], m)

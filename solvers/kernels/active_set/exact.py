@@ -47,7 +47,7 @@ from solvers.kernels.damping import (
     keep_reached,
     open_damped,
 )
-from solvers.kernels.linalg.rows import NO, YES, ZERO, all_equal, finish, length_of
+from solvers.kernels.linalg.rows import all_equal, finish, length_of
 from solvers.kernels.linalg.space import assign, fill, matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import (
@@ -101,8 +101,8 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
     """
     n = x.size
     if n + exact_size(n, lower.size, sizes.size) > work.size:
-        return ZERO + TOO_SMALL
-    reference, at = vector(work, ZERO, n)
+        return TOO_SMALL
+    reference, at = vector(work, 0, n)
     if all_equal(lower, upper):
         assign(reference, x)
         code = solve_by_staircase(A, lower, upper, sizes, x, settings, work[at:])
@@ -116,12 +116,12 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
 @compiled
 def solve_damped(A, lower, upper, sizes, x, record, settings, work):
     """Like `solve_hierarchy`, level by level with damping; the record is no memory."""
-    (m, n), code, last = A.shape, ZERO + SOLVED, sizes.size - 1
+    (m, n), code, last = A.shape, SOLVED, sizes.size - 1
     if work_size(n, m, sizes.size, True) > work.size:
-        return ZERO + TOO_SMALL
+        return TOO_SMALL
     if all_equal(lower, upper):
         return solve_hierarchy(A, lower, upper, sizes, x, record, settings, work)
-    d, at = carve_damped(work, ZERO, m, n, sizes.size)
+    d, at = carve_damped(work, 0, m, n, sizes.size)
     reference, at = vector(work, at, n)
     limits, at = vector(work, at, settings.size)
     inner, at = vector(work, at, 3 * (m + n) + 3)
@@ -152,7 +152,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
         _add_record(record, inner, lower, upper, d, rows, end, k)
         limits[MOST] -= inner[3 * rows] + inner[3 * rows + 1]
         if limits[MOST] < 1.0 and k <= last and code == SOLVED:
-            code = ZERO + ITERATION_LIMIT
+            code = ITERATION_LIMIT
         if k <= last:
             keep_reached(d, A, lower, upper, x, k, end)
     return code
@@ -200,18 +200,18 @@ def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
 def answer(s, record, settings, work):
     """Find the working set of the answer, beginning with the rows that act; see `solve_exactly`."""
     (m, n), levels, x = s.A.shape, s.multiplier.shape[0] - 1, s.x
-    current, at = matrix(work, ZERO, levels + 1, m)
+    current, at = matrix(work, 0, levels + 1, m)
     saved, at = vector(work, at, n)
-    most, code, steps, blocks = np.int64(settings[MOST]), ZERO + UNPROVED, ZERO, ZERO
+    most, code, steps, blocks = np.int64(settings[MOST]), UNPROVED, 0, 0
     limit = min(most, SOLVE_STEPS * max(m, 1))
-    warm, level = record[3 * m] + record[3 * m + 1] > 0.0, ZERO - 1
+    warm, level = record[3 * m] + record[3 * m + 1] > 0.0, -1
     s.count[FINISHED], s.count[SOUND] = 0, 0
     if warm:
         level = _resumed_at(record[3 * m + 2], levels)
     if warm and level < 0:
-        code, blocks = pivot_in_blocks(s, limit, ZERO)
+        code, blocks = pivot_in_blocks(s, limit, 0)
         steps = blocks
-    for seeded in range(s.count[SOUND] if level < 0 else ZERO - 1, -1, -1):
+    for seeded in range(s.count[SOUND] if level < 0 else -1, -1, -1):
         if code in (UNPROVED, INACCURATE) and steps < limit:
             code, level, more = _pass(s, saved, settings, 1.0, seeded == 1, limit - steps,
                                       work[at:])
@@ -221,7 +221,7 @@ def answer(s, record, settings, work):
                                                         level, work[at:])
                 steps, blocks = steps + more + tries, blocks + tries
             if code in (UNPROVED, INACCURATE) and steps < limit:
-                code, tries = pivot_in_blocks(s, limit - steps, ZERO + PATIENCE)
+                code, tries = pivot_in_blocks(s, limit - steps, PATIENCE)
                 steps, blocks = steps + tries, blocks + tries
     if code in (UNPROVED, INACCURATE) and steps < limit:
         restore(s)
@@ -230,12 +230,12 @@ def answer(s, record, settings, work):
     if code == SOLVED and neglects(s):
         code, tries, more = _solve_with_light_rows(s, current, saved, limit - steps)
         steps, blocks = steps + tries + more, blocks + tries
-        code = ZERO + (ITERATION_LIMIT if code != SOLVED and steps >= most else code)
+        code = ITERATION_LIMIT if code != SOLVED and steps >= most else code
     elif code not in (SOLVED, NUMERICAL_FAILURE):
         finished = s.count[FINISHED]
         if finished == levels or (code == UNPROVED and finished > 0):
             assign(x, saved)
-        code = ZERO + (ITERATION_LIMIT if steps >= most else INACCURATE)
+        code = ITERATION_LIMIT if steps >= most else INACCURATE
     _keep(s, record, blocks, steps - blocks)
     record[3 * m + 2] = -1.0
     if code == ITERATION_LIMIT and s.count[FINISHED] <= levels:  # not for want of light rows
@@ -253,13 +253,13 @@ def _pass(s, saved, settings, share, seeded, most, work):
     """
     declared, rows = s.scalar[RANK], s.A.shape[0] + 1
     restore(s)
-    t, _ = carve_tableau(s, work, ZERO)
+    t, _ = carve_tableau(s, work, 0)
     s.scalar[RANK] = share * declared
     limit = min(most, PASS_STEPS * rows)
     code, level = pass_through_levels(t, settings[TOLERANCE], limit, seeded)
     s.scalar[RANK] = declared
     save(s, saved, s.multiplier.shape[0] - 1 if code == SOLVED else level)
-    code = ZERO + (INACCURATE if code == SOLVED and not verify(s, NO) else code)
+    code = INACCURATE if code == SOLVED and not verify(s, False) else code
     return code, level, t.count[STEPS]
 
 
@@ -272,16 +272,16 @@ def _second_pass(s, current, saved, settings, most, level, work):
     """
     for i in range(s.A.shape[0]):
         current[0, i] = s.index[STATE, i]
-    code, blocks = pivot_in_blocks(s, ZERO + 1, ZERO)
+    code, blocks = pivot_in_blocks(s, 1, 0)
     if code == SOLVED or level >= 0 or blocks >= most:
-        return code, level, ZERO, blocks
+        return code, level, 0, blocks
     code, level, steps = _pass(s, saved, settings, INDEPENDENT, s.count[SOUND] == 1, most - blocks,
                                work)
     if code != SOLVED and steps + blocks < most:
-        code, tries = pivot_in_blocks(s, most - steps - blocks, ZERO + PATIENCE)
+        code, tries = pivot_in_blocks(s, most - steps - blocks, PATIENCE)
         blocks += tries
     if code == SOLVED and _costs_more(s, saved):
-        code = ZERO + UNPROVED
+        code = UNPROVED
     if code != SOLVED:
         for i in range(s.A.shape[0]):
             s.index[STATE, i] = np.int64(current[0, i])
@@ -334,19 +334,19 @@ def _solve_with_light_rows(s, current, saved, limit):
 
     Else INACCURATE, with x as it was; and the tries in blocks and row by row.
     """
-    steps, largest = ZERO, LARGER * (1.0 + length_of(s.x))
+    steps, largest = 0, LARGER * (1.0 + length_of(s.x))
     assign(saved, s.x)
     s.count[FINISHED] = s.multiplier.shape[0]  # nothing else is saved
     restore(s)
     take_up(s)
-    code, tries = pivot_in_blocks(s, limit, ZERO + PATIENCE)
+    code, tries = pivot_in_blocks(s, limit, PATIENCE)
     if code != SOLVED and tries < limit:
         restore(s)
-        code, steps, _ = pivot_one_by_one(s, current, saved, limit - tries, ZERO)
+        code, steps, _ = pivot_one_by_one(s, current, saved, limit - tries, 0)
     if code == SOLVED and length_of(s.x) <= largest:
         return code, tries, steps
     assign(s.x, saved)
-    return ZERO + INACCURATE, tries, steps
+    return INACCURATE, tries, steps
 
 
 @compiled
@@ -358,8 +358,8 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
     """
     (m, n), proved = A.shape, False
     if n + exact_size(n, m, sizes.size) > work.size:
-        return ZERO + TOO_SMALL
-    found, at = vector(work, ZERO, n)
+        return TOO_SMALL
+    found, at = vector(work, 0, n)
     assign(found, x[n:])
     s, code, _ = open_working_set(A, lower, upper, sizes, found, record, settings, work[at:])
     for reading in range(1 + (s.count[NEGLECTED] > 0) if code == SOLVED else 0):
@@ -370,15 +370,15 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
             meet(s, sizes.size)
             write_multipliers(s, MET)
             assign(s.x, x[:n])
-            proved = verify(s, YES) and not neglects(s)
-    return ZERO + (SOLVED if proved else INACCURATE if code == SOLVED else code)
+            proved = verify(s, True) and not neglects(s)
+    return SOLVED if proved else INACCURATE if code == SOLVED else code
 
 
 @inlined
 def open_working_set(A, lower, upper, sizes, x, record, settings, work):
     """Return a WorkingSet with the data, rescaled if need be; a code; where it ends."""
     m, n = A.shape
-    multiplier, at = matrix(work, ZERO, sizes.size + 1, m)
+    multiplier, at = matrix(work, 0, sizes.size + 1, m)
     own, end = carve_working_set(A, sizes, x, multiplier, work, at)
     s, own.scalar[SCALE] = own, 1.0
     code = load(s, lower, upper, sizes, record, settings[RANK_TOLERANCE])
@@ -413,7 +413,7 @@ def _resume(s, level):
 def _resumed_at(number, levels):
     """Return the level at which an earlier search ended, -1 for none."""
     at = -2.0 - number if number <= -2.0 else number
-    return np.int64(at) if 0.0 <= at < levels else ZERO - 1
+    return np.int64(at) if 0.0 <= at < levels else -1
 
 
 @inlined

@@ -89,7 +89,7 @@ from solvers.kernels.active_set.working_set import (
     row_times_x,
     side_at,
 )
-from solvers.kernels.linalg.rows import ZERO, length_of
+from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import assign, fill
 from solvers.kernels.tolerances import (
     CANCELLED,
@@ -123,7 +123,7 @@ def pass_through_levels(t, tolerance, limit, seeded):
         solved = not _begin(t, k, last, whole, tolerance)
         while not solved:
             if t.count[STEPS] >= limit:
-                return ZERO + UNPROVED, ZERO + k
+                return UNPROVED, k
             t.count[STEPS] += 1
             rank = _aim(t, whole)
             entering = _advance(t, rank, last, tolerance)
@@ -139,7 +139,7 @@ def pass_through_levels(t, tolerance, limit, seeded):
         if whole and k < levels:
             s.count[WHOLE] = k
             break
-    return ZERO + SOLVED, ZERO - 1
+    return SOLVED, -1
 
 
 @inlined
@@ -169,7 +169,7 @@ def _start(t, seeded):
             s.index[STATE, i] = FREE
     if not seeded:
         fill(s.x, 0.0)
-    fill(t.count, ZERO)
+    fill(t.count, 0)
     fill(t.scalar, 0.0)
     for p in range(s.multiplier.shape[0]):
         fill(s.multiplier[p], 0.0)
@@ -231,14 +231,14 @@ def _write_multipliers(t, k, whole):
     s, end, largest = t.of, t.count[FIX] + t.count[HARD], 0.0
     fill(s.number[PULL, :end], 0.0)
     if whole:
-        _pull_of_goal(t, ZERO, end)
+        _pull_of_goal(t, 0, end)
     for i in range(0 if whole else s.index[FIRST, k], 0 if whole else s.index[FIRST, k + 1]):
         push = s.multiplier[k, i]
         if push != 0.0:
             largest = max(largest, abs(push) * s.number[NORM, i])
             push_by(t, i, push, 0, end)
     t.scalar[ROUNDING] = t.scalar[ROUNDING] if whole else CANCELLED * largest
-    balance(t, ZERO, end)
+    balance(t, 0, end)
     for c in range(end):
         if s.index[OWNER, c] >= 0:
             s.multiplier[k, s.index[OWNER, c]] = s.number[FORCE, c]
@@ -389,21 +389,21 @@ def _held_wrongly(t, whole, tolerance):
 
 @inlined
 def _misses_goal(t, tolerance):
-    """Whether x is not at the goal, as 0 or 1."""
+    """Whether x is not at the goal."""
     s, gap, square = t.of, 0.0, 0.0
     for c in range(s.x.size):
         gap += (s.x[c] - s.number[GOAL, c]) ** 2
         square += s.number[GOAL, c] ** 2
     size, scale = max(t.scalar[SIZE], np.sqrt(square)), max(t.scalar[SCALE], np.sqrt(square))
     t.scalar[ROUNDING] = CANCELLED * t.scalar[WEIGHT] * size
-    return 0 if np.sqrt(gap) <= tolerance * scale else 1
+    return not np.sqrt(gap) <= tolerance * scale
 
 
 @inlined
 def _misses_rows(t, tolerance):
-    """Whether a soft row violates its side by more than rounding, as 0 or 1."""
+    """Whether a soft row violates its side by more than rounding."""
     weigh_rows(t)
-    return 0 if t.scalar[WORST] <= tolerance else 1
+    return not t.scalar[WORST] <= tolerance
 
 
 @inlined
@@ -550,7 +550,7 @@ def _close_columns(t):
     for at in range(t.count[TURNING], t.count[BASE]):
         kind = t.of.index[KIND, t.of.index[ROW, at]]
         if kind in (WATCHED, FIXED, PARALLEL):
-            close_column(t, at, np.int64(kind == FIXED))
+            close_column(t, at, kind == FIXED)
 
 
 @inlined

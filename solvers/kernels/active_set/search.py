@@ -43,7 +43,7 @@ from solvers.kernels.active_set.working_set import (
     restore,
     value_at,
 )
-from solvers.kernels.linalg.rows import YES, ZERO, length_of
+from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import View, assign, fill
 from solvers.kernels.tolerances import (
     MET,
@@ -72,9 +72,9 @@ def judge(s, last, newest):
 
     newest: a row that entered because it was violated, so that it pushes; -1 for none.
     """
-    wrong, leaving, most, worst = ZERO, ZERO, ZERO - 1, 0.0
+    wrong, leaving, most, worst = 0, 0, -1, 0.0
     reach = length_of(s.x) + SHADOW * s.scalar[SIZE]
-    fill(s.index[CHANGE], ZERO)
+    fill(s.index[CHANGE], 0)
     for q in range(s.index[BEGIN, s.multiplier.shape[0] - 1]):
         i = s.index[LIST, q]
         if s.index[SIGN, q] == INWARD and i == newest:
@@ -94,7 +94,7 @@ def judge(s, last, newest):
             s.index[CHANGE, i] = 1 if value > up else -1
             wrong += 1
             if over > worst * norm:
-                most, worst = ZERO + i, over / norm
+                most, worst = i, over / norm
     return Found(wrong + leaving, leaving, most)
 
 
@@ -124,7 +124,7 @@ def pivot_in_blocks(s, limit, patience):
     fall, and the working set is the one that it began with, or with its x the last that violates
     nothing and is then SOUND. patience: tries that may not reduce it.
     """
-    levels, best, left, tries = s.multiplier.shape[0] - 1, ZERO + s.A.shape[0] + 1, patience, ZERO
+    levels, best, left, tries = s.multiplier.shape[0] - 1, s.A.shape[0] + 1, patience, 0
     s.count[SOUND] = 0
     _copy_states(s, STATE, SEED)
     while tries < limit:
@@ -132,13 +132,13 @@ def pivot_in_blocks(s, limit, patience):
         meet(s, levels)
         write_multipliers(s, MET)
         if not _points_inward(s):
-            if verify(s, YES):
-                return ZERO + SOLVED, tries
+            if verify(s, True):
+                return SOLVED, tries
             _heed(s)
-        found = judge(s, levels, ZERO - 1)
+        found = judge(s, levels, -1)
         if found.wrong == 0:
             s.count[SOUND] = 0  # x is no longer that of an earlier set
-            return ZERO + INACCURATE, tries
+            return INACCURATE, tries
         if found.wrong == found.leaving < s.index[BEGIN, levels]:
             _keep_sound(s)
         left = max(left, patience) if found.wrong < best else left - 1
@@ -152,7 +152,7 @@ def pivot_in_blocks(s, limit, patience):
     _copy_states(s, SEED, STATE)
     if s.count[SOUND] == 1:
         assign(s.x, s.number[KEPT])
-    return ZERO + UNPROVED, tries
+    return UNPROVED, tries
 
 
 @inlined
@@ -184,9 +184,9 @@ def pivot_one_by_one(s, current, saved, limit, level):
     level: where an earlier search ended.
     """
     levels, last, newest, fresh = (
-        s.multiplier.shape[0] - 1, _next_level(s, max(level, 0)), ZERO - 1, True)
-    clean, accepted, tries, recurred = ZERO, ZERO, ZERO, ZERO
-    fill(s.index[ENTERED], ZERO)
+        s.multiplier.shape[0] - 1, _next_level(s, max(level, 0)), -1, True)
+    clean, accepted, tries, recurred = 0, 0, 0, 0
+    fill(s.index[ENTERED], 0)
     while tries < limit:
         tries += 1
         recurred = _count_recurrences(s, last, tries, recurred)
@@ -196,7 +196,7 @@ def pivot_one_by_one(s, current, saved, limit, level):
         write_multipliers(s, MET)
         found = judge(s, last, newest)
         if not np.isfinite(length_of(s.x)):
-            return ZERO + NUMERICAL_FAILURE, tries, last - 1
+            return NUMERICAL_FAILURE, tries, last - 1
         if found.leaving > 0 and fresh:
             _release_all(s)
         elif found.leaving > 0:
@@ -207,17 +207,17 @@ def pivot_one_by_one(s, current, saved, limit, level):
             newest, fresh, accepted = found.most, False, accepted + 1
         elif last < levels:
             save(s, saved, last)
-            last, newest, fresh = _next_level(s, last), ZERO - 1, True
-        elif verify(s, YES):
-            return ZERO + SOLVED, tries, last - 1
+            last, newest, fresh = _next_level(s, last), -1, True
+        elif verify(s, True):
+            return SOLVED, tries, last - 1
         elif s.count[DIRTY] == 1 and clean < RESTORED:  # free of what other working sets cut
             restore(s)
-            newest, fresh, clean, recurred = ZERO - 1, True, clean + 1, ZERO
+            newest, fresh, clean, recurred = -1, True, clean + 1, 0
         else:
-            return ZERO + INACCURATE, tries, last - 1
+            return INACCURATE, tries, last - 1
     if accepted > 1:  # go on later from the last accepted set; if this step is long, from within
         _copy_states(s, SEED, STATE)
-    return ZERO + UNPROVED, tries, last - 1
+    return UNPROVED, tries, last - 1
 
 
 @inlined
@@ -226,7 +226,7 @@ def _count_recurrences(s, last, tries, recurred):
     if tries & (tries - 1) == 0:
         s.count[SEEN_LAST] = last
         _copy_states(s, STATE, SEEN)
-        return ZERO
+        return 0
     same = s.count[SEEN_LAST] == last
     for i in range(s.A.shape[0] if same else 0):
         same = same and s.index[STATE, i] == s.index[SEEN, i]

@@ -32,7 +32,7 @@ from solvers.kernels.active_set.working_set import (
     UPPER,
     note_pivot,
 )
-from solvers.kernels.linalg.rows import ZERO, swap
+from solvers.kernels.linalg.rows import swap
 from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CLEAR_SQUARE, FLOOR, NEGLIGIBLE
 from solvers.status import EQUAL
@@ -80,7 +80,7 @@ def tableau_size(n, m):
 def carve_tableau(s, work, at):
     """Return a Tableau of a WorkingSet, and where it ends."""
     m, n = s.A.shape
-    general = ZERO
+    general = 0
     for i in range(m):
         general += s.index[UNIT, i] < 0
     count, at = integers(work, at, 9)

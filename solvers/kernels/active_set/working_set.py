@@ -19,7 +19,7 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, inlined, inner_product, internal
 from solvers.kernels.linalg.least_squares import substitute_back, triangularise, turn
-from solvers.kernels.linalg.rows import ZERO, factor_level, only_entry, reflect, swap
+from solvers.kernels.linalg.rows import factor_level, only_entry, reflect, swap
 from solvers.kernels.linalg.space import Rows, View, assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE, SPARED
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
@@ -117,7 +117,7 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
     A row counts as zero beside a far larger one of its level; beside one of another level it has a
     negative norm, takes no part, and `neglects` says whether x meets it all the same.
     """
-    number, index, first, sane = s.number, s.index, ZERO, True
+    number, index, first, sane = s.number, s.index, 0, True
     s.scalar[TOLERANCE] = rank_tolerance
     s.count[DIRTY] = s.count[FACTORED] = s.count[PICKED] = 0
     for c in range(s.x.size):
@@ -140,9 +140,9 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
     most = neglect(s)
     start_from(s, record)
     if not sane:
-        return ZERO + NUMERICAL_FAILURE
+        return NUMERICAL_FAILURE
     in_range = most == 0.0 or LEAST_SQUARE < most * most < 1.0 / LEAST_SQUARE
-    return ZERO + (SOLVED if in_range else UNPROVED)
+    return SOLVED if in_range else UNPROVED
 
 
 @inlined
@@ -167,7 +167,7 @@ def start_from(s, record):
     for i in range(s.A.shape[0]):
         above = record[i] == 1.0 and upper[i] < np.inf
         below = record[i] == -1.0 and lower[i] > -np.inf
-        state[i] = EQUAL if lower[i] == upper[i] else ZERO + above - below
+        state[i] = EQUAL if lower[i] == upper[i] else int(above) - int(below)
 
 
 @inlined
@@ -201,7 +201,7 @@ def rescale(s, lower, upper, scaled):
         sane &= np.isfinite(scaled.lower[i]) == np.isfinite(lower[i])
         sane &= np.isfinite(scaled.upper[i]) == np.isfinite(upper[i])
     s.scalar[SCALE] = factor
-    return ZERO + (SOLVED if sane else NUMERICAL_FAILURE)
+    return SOLVED if sane else NUMERICAL_FAILURE
 
 
 @inlined
@@ -291,7 +291,7 @@ def meet(s, last):
 @inlined
 def _keep_factors(s, last):
     """Return how many levels keep their factors, and go back to where they end."""
-    index, number, scalar, kept, same = s.index, s.number, s.scalar, ZERO, True
+    index, number, scalar, kept, same = s.index, s.number, s.scalar, 0, True
     while same and kept < min(last, s.count[FACTORED]):
         for i in range(index[FIRST, kept], index[FIRST, kept + 1]):
             same = same and index[STATE, i] == index[ACTED, i]
@@ -339,10 +339,10 @@ def gives_all(s, k, goal, seen):
 
 @inlined
 def _is_short(s, begin, end, rank):
-    """Whether a level has so few columns left that these cost less than its rows, as 0 or 1."""
+    """Whether a level has so few columns left that these cost less than its rows."""
     left = s.x.size - rank
     few = rank > s.count[PICKED]
-    return ZERO + (few and 2 * left < s.x.size and left + SPARED < end - begin)
+    return few and 2 * left < s.x.size and left + SPARED < end - begin
 
 
 @inlined

@@ -6,7 +6,6 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inner_product, internal
 from solvers.kernels.linalg.least_squares import least_squares
-from solvers.kernels.linalg.rows import ZERO
 from solvers.kernels.linalg.space import matrix
 from solvers.kernels.tolerances import ORTHOGONAL, SWEEPS
 
@@ -150,7 +149,7 @@ def _least_squares(M, r, y, at, damped, work):
     """Write the minimiser into y, by reflections of [M r; lambda I 0]."""
     p, rows = at.k1 - at.k0, at.i1 - at.i0
     height = rows + p if damped > 0.0 else rows
-    T, _ = matrix(work, ZERO, p + 1, height)
+    T, _ = matrix(work, 0, p + 1, height)
     for k in range(p + 1):
         for i in range(rows):
             T[k, i] = M[at.i0 + i, at.k0 + k] if k < p else r[at.i0 + i]

@@ -2,8 +2,7 @@
 
 The inner loops run over views of whole rows with unit stride, so that the compiler can vectorise
 them without fastmath. numba does not inline across functions, so each function here handles a range
-of rows. It also compiles a function again for a literal argument, so counters start from ZERO
-and flags are YES or NO.
+of rows.
 """
 
 from __future__ import annotations
@@ -15,9 +14,7 @@ from solvers.kernels.linalg.space import fill
 from solvers.kernels.tolerances import LEAST_SQUARE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
-ZERO = np.int64(0)
 LANES = 8  # numbers that the inner loops take at a time
-YES, NO = np.bool_(True), np.bool_(False)
 
 
 @internal
@@ -81,12 +78,12 @@ def inequalities_hold(A, lower, upper, x):
 @inlined
 def only_entry(a):
     """Return the unknown that a row names alone, -1 if it has none or several."""
-    entries, only = ZERO, ZERO
+    entries, only = 0, 0
     for c in range(a.size):
         entries += a[c] != 0.0
     while entries == 1 and a[only] == 0.0:
         only += 1
-    return only if entries == 1 else ZERO - 1
+    return only if entries == 1 else -1
 
 
 @inlined
