@@ -165,17 +165,17 @@ def _time(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "status" in recording:
         failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
         yield _timing("ticks_not_solved", "Ticks not solved", float(failed), "")
-    simulated = "" if recording.scenario.plant.follows else "with the step of the simulated robot"
+    beside = recording.beside_computing
     if "time_tick" in recording:
         late = np.count_nonzero(recording["time_tick"] > recording.scenario.control.period)
-        yield _timing("ticks_late", "Ticks longer than the period", float(late), "", note=simulated)
+        yield _timing("ticks_late", "Ticks longer than the period", float(late), "", note=beside)
     for signal, part in _PARTS.items():
         shared = signal in ("time_kinematics", "time_rows")  # the same code under any resolver
         for key, (percent, label) in _PERCENTILES.items() if signal in recording else ():
             yield _timing(f"{signal}_{key}", f"{part}, {label}",
                           finite(np.percentile(recording[signal], percent)), "s",
                           lower_is_better=None if shared else True,
-                          note=simulated if signal == "time_tick" else "",
+                          note=beside if signal == "time_tick" else "",
                           detail=shared and key != "median")
 
 
