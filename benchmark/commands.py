@@ -18,9 +18,10 @@ from scenarios.cli.terminal import shown
 _ACCURACY, _GROWTH = "solve.first_paper:accuracy", "solve.first_paper:growth"
 _STRICTNESS = "peers.moving:strictness"
 _USUAL = ("solve.resolvers", "tick", _ACCURACY, _GROWTH, _STRICTNESS, "start")
+_DAY = 86_400.0  # [s]
 _SCENES = {"ellipse": "peers.moving", "stand": "peers.standing"}
 
-Seconds = Annotated[float, typer.Option("--seconds", min=0.001, metavar="S",
+Seconds = Annotated[float, typer.Option("--seconds", min=0.001, max=_DAY, metavar="S",
                                         help="Time for all measurements together.")]
 Arms = Annotated[int, typer.Option("--arms", min=1, metavar="N", help="Arms of each case.")]
 Checked = Annotated[int, typer.Option("--checked", min=1, metavar="N",
@@ -89,7 +90,8 @@ _add("start", "Measure start-up time, compilation and memory.", "start")
 _add("strictness", "Measure whether lower tasks disturb upper ones.", _STRICTNESS)
 _add("resolvers", "Time every resolver on the reference problems.", "solve.resolvers",
      seed=(Annotated[int | None, typer.Option(
-         "--fresh", metavar="SEED", help="Also time fresh problems, from this seed on.")], None),
+         "--fresh", min=0, metavar="SEED", help="Also time fresh problems, from this seed on.")],
+         None),
      count=(Annotated[int, typer.Option(
          "--count", min=1, metavar="N", help="Fresh problems of each family.")], 200),
      families=(Family, None),
@@ -97,7 +99,8 @@ _add("resolvers", "Time every resolver on the reference problems.", "solve.resol
          "--resolver", metavar="NAME", help="Only this resolver, with its variants and backends, "
          "beside the yardsticks. May be repeated.")], None),
      seconds=(Annotated[float, typer.Option(
-         "--seconds", min=0.001, metavar="S", help="Time for each resolver in each family.")], 0.5))
+         "--seconds", min=0.001, max=_DAY, metavar="S",
+         help="Time for each resolver in each family.")], 0.5))
 _add("accuracy", "Measure errors on random arms against proved answers.", _ACCURACY,
      arms=(Arms, 10_000), checked=(Checked, 300))
 _add("growth", "Time a solve as the numbers of tasks and joints grow.", _GROWTH,
@@ -212,7 +215,8 @@ def stress(count: Annotated[int, typer.Option(
            resolver: Annotated[str, typer.Option(
                metavar="NAME", help="Resolver to test.")] = "hcod",
            kind: Annotated[str, typer.Option(metavar="KIND", help="Kind of problems.")] = "all",
-           first: Annotated[int, typer.Option(min=0, metavar="SEED", help="First seed.")] = 0,
+           first: Annotated[int, typer.Option(
+               min=0, max=2**53, metavar="SEED", help="First seed.")] = 0,
            processes: Annotated[int | None, typer.Option(
                "--processes", min=1, metavar="N", help="Default: one for each core.")] = None,
            out: Annotated[Path, output("Where failing problems are saved.")

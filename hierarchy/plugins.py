@@ -165,7 +165,7 @@ def _import(module: str, what: str) -> None:
         import_module(module)
     except HierarchyError as error:
         raise HierarchyError(f"{what}: {error}") from error
-    except Exception as error:  # a plugin is the user's code and may fail in any way
+    except (Exception, SystemExit) as error:  # a user's code, which may fail in any way
         raise HierarchyError(f"{what} cannot be imported: {type(error).__name__}: "
                              f"{error}") from error
 

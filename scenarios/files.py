@@ -118,8 +118,8 @@ def _hidden(path: Path) -> str:
 
 
 def _absolute(path: str | Path) -> Path:
-    """Return a path without links; one in a loop of links stays, and cannot be opened."""
-    return Path(os.path.realpath(Path(path).expanduser()))
+    """Return a path without links; a loop of links and an unknown ~user stay as they are."""
+    return Path(os.path.realpath(os.path.expanduser(path)))  # noqa: PTH111 - raises for no user
 
 
 def _locked(stream: TextIO) -> bool:

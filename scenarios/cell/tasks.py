@@ -62,8 +62,10 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
     tasks = [*first, *(task for task in avoiding if task not in moved),
              *(task for task in (position, pointing, *listed, last) if task)]
     reference = _reference(scenario, at, None if last else posture)
+    frozen = scenario.control.stack == "set-based"  # inequalities, which then use no gain or rate
     for task in (*tasks, *((reference,) if reference else ())):
-        check_period(task, scenario.control.period, scenario.control.level)
+        if not (frozen and task.kind == "inequality"):
+            check_period(task, scenario.control.period, scenario.control.level)
     return Tasks(tasks, first if areas else [*first, *avoiding], position, pointing, limits,
                  tuple(task for task in listed if task not in moved), areas,
                  reference, {task.title: task.give for task in scenario.tasks if task.give})

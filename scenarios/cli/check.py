@@ -17,7 +17,7 @@ from hierarchy.errors import UnknownNameError, file_path
 from hierarchy.robots import TABLES
 from hierarchy.robots.found import remarks
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
-from hierarchy.words import some
+from hierarchy.words import counted, some
 from scenarios.cli.options import loaded
 from scenarios.config import Scenario, ScenarioError, is_shipped, shipped, shipped_groups
 from scenarios.config.changes import change_all, parse_changes
@@ -262,8 +262,8 @@ def _sections(scenario: Scenario) -> Iterator[str]:
         asked = scenario.avoidance
         body, tip = (" and ".join(f"{distance:g}" for distance in thresholds.values())
                      for thresholds in (asked.thresholds, asked.tip_thresholds))
-        yield (f"  avoidance {asked.kind}, {len(asked.obstacles)} obstacles; within {body} m of "
-               f"the body, {tip} m of the end effector")
+        yield (f"  avoidance {asked.kind}, {counted(len(asked.obstacles), 'obstacle')}; within "
+               f"{body} m of the body, {tip} m of the end effector")
     if scenario.limits is not None:
         yield (f"  limits    positions and velocities of the robot, {scenario.limits.acceleration} "
                f"rad/s^2, "

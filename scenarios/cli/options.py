@@ -54,7 +54,7 @@ def output(help: str, metavar: str = "FOLDER") -> Any:
 
 def _part(text: str) -> tuple[int, int]:
     i, slash, count = text.partition("/")
-    if not (slash and i.isdigit() and count.isdigit()):
+    if not (slash and i.isdecimal() and count.isdecimal()):
         raise typer.BadParameter(f"expected I/N such as 1/8, got {text!r}")
     return int(i), int(count)
 

@@ -136,9 +136,11 @@ def replay(folders: Runs,
                "--rate", metavar="HZ", help="Frames per second.")] = 30.0,
            plugin: Plugins = None) -> None:
     """Write runs as one HTML file that plays without a server."""
+    from hierarchy.errors import refuse
     from scenarios.files import named, write_text
 
     target = out if out is not None else folders[0] / "replay.html"
+    refuse(target.suffix != ".html", f"{target} is no .html file")  # which another may be
     text = _replay(folders, rate)
     with named(target):
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -99,7 +99,9 @@ def _unmet(controller: Controller) -> Iterator[str]:
     h = controller.hierarchy
     exact = make("hcod").solve(h)
     lines = explain(h, exact, _MET, controller.cell.stack.row_names(h.names)).splitlines()
-    yield from (lines[k] for k in range(len(h.sizes)) if is_missed(h, exact.x, k, _MET))
+    crossed = len(lines) < len(h.sizes)  # sides of rows, which is all that is said
+    yield from (line for k, line in enumerate(lines[:len(h.sizes)])
+                if crossed or is_missed(h, exact.x, k, _MET))
 
 
 def _distances(controller: Controller) -> dict[str, float]:

@@ -74,11 +74,15 @@ class Fates:
 def completed(recording: Recording, cell: Cell) -> Recording:
     """Return a run with the states of its levels and, if it has a camera, a depth image.
 
-    `cell` is built from the run's scenario; its state is moved, its plant is not used.
+    `cell` is built from the run's scenario; its state is moved, its plant is not used. Ctrl-C ends
+    it: the levels of the ticks that are left stay UNKNOWN.
     """
-    if recording.scenario.sensor.kind == "exact":
-        judge(recording, cell)
-    return replace(recording, depth=depth_view(recording))
+    try:
+        if recording.scenario.sensor.kind == "exact":
+            judge(recording, cell)
+        return replace(recording, depth=depth_view(recording))
+    except KeyboardInterrupt:
+        return replace(recording, fault=recording.fault or "interrupted after the last tick")
 
 
 def judge(recording: Recording, cell: Cell) -> None:
@@ -91,11 +95,13 @@ def judge(recording: Recording, cell: Cell) -> None:
     fates = Fates(recording.task_names, recording.ticks, cell.robot.n)
     accuracy, commands = recording.facts.resolver.accuracy, rows.meant
     changed = recording.get("changed", np.zeros(recording.ticks, bool))
-    for k in range(recording.ticks):
-        h = None if changed[k] else rows.hierarchy(k)
-        if h is not None and not np.isnan(commands[k, 0]):
-            fates.judge(k, cell, h, commands[k], accuracy)
-    recording.signals.update(fates.signals(recording))
+    try:
+        for k in range(recording.ticks):
+            h = None if changed[k] else rows.hierarchy(k)
+            if h is not None and not np.isnan(commands[k, 0]):
+                fates.judge(k, cell, h, commands[k], accuracy)
+    finally:
+        recording.signals.update(fates.signals(recording))
 
 
 class Rows:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy import plugins
+from hierarchy.errors import expect_each
 from hierarchy.problem import Array
 from scenarios.measure import safety  # noqa: F401, registers metrics
 from scenarios.measure.metric import NOTHING, Criteria, finite, known, largest, register, true
@@ -163,16 +165,16 @@ def _troubles(recording: Recording, by: Criteria) -> Iterator[Metric]:
 def _time(recording: Recording, by: Criteria) -> Iterator[Metric]:
     failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
     yield _timing("ticks_not_solved", "Ticks not solved", float(failed), "")
-    simulated = "" if recording.scenario.plant.follows else "with the step of the simulated robot"
+    beside = recording.beside_computing
     late = np.count_nonzero(recording["time_tick"] > recording.scenario.control.period)
-    yield _timing("ticks_late", "Ticks longer than the period", float(late), "", note=simulated)
+    yield _timing("ticks_late", "Ticks longer than the period", float(late), "", note=beside)
     for signal, part in PARTS.items():
         shared = signal in ("time_kinematics", "time_rows")  # the same code under any resolver
         for key, (percent, label) in _PERCENTILES.items():
             yield _timing(f"{signal}_{key}", f"{part}, {label}",
                           finite(np.percentile(recording[signal], percent)), "s",
                           lower_is_better=None if shared else True,
-                          note=simulated if signal == "time_tick" else "",
+                          note=beside if signal == "time_tick" else "",
                           detail=shared and key != "median")
 
 
@@ -187,16 +189,29 @@ def measure(recording: Recording, settle: float = 2.0,
 
     Distances, joint speeds and joint limits are judged by the true state where it is known apart
     from the measured one. A plugin adds metrics with `register("metrics", NAME)` on a function of
-    a recording and Criteria that yields them.
+    a recording and Criteria that yields them; if it fails, a warning says so.
     """
     if recording.ticks == 0:
         return {}
     by = Criteria(settle, cone_tolerance_deg)
-    found = [metric for measured in plugins.known("metrics").values()
-             for metric in measured(recording, by)]
+    found = [metric for name in plugins.known("metrics") for metric in _found(name, recording, by)]
     groups = {group: place for place, group in enumerate(_GROUPS)}
     found.sort(key=lambda metric: groups.get(metric.group, len(groups)))
     return {metric.name: metric for metric in found}
+
+
+def _found(name: str, recording: Recording, by: Criteria) -> list[Metric]:
+    """Return the metrics of a registered function; a plug-in's failure must not cost the run."""
+    try:
+        found = list(plugins.known("metrics")[name](recording, by))
+        expect_each(f"metrics {name!r}", found, Metric, "yield these")
+    except Exception as error:
+        if name not in plugins.own("metrics"):
+            raise
+        warnings.warn(f"metrics {name!r} are left out: {type(error).__name__}: {error}",
+                      stacklevel=2)
+        return []
+    return found
 
 
 def as_plain_data(recording: Recording) -> dict[str, Any]:

@@ -62,13 +62,17 @@ def save(recording: Recording, folder: str | Path) -> Path:
 def kept(recording: Recording, folder: Path) -> str | None:
     """Save a run, where `folder` cannot be written in the system's temporary folder.
 
-    Returns None, or why and where.
+    Returns None, or why and where; or why in neither.
     """
     try:
         save(recording, folder)
     except OutputError as error:
-        other = save(recording, Path(tempfile.mkdtemp(prefix="hierarchy-")) / "run")
-        return f"{error}; the run is in {other}"
+        spare = Path(tempfile.mkdtemp(prefix="hierarchy-"))
+        try:
+            return f"{error}; the run is in {save(recording, spare / 'run')}"
+        except OutputError as too:
+            spare.rmdir()
+            return f"{error}; {too}"
     return None
 
 

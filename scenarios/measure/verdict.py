@@ -60,18 +60,16 @@ class Verdict:
 
 def verdict(recording: Recording, label: str = "") -> Verdict:
     """Return what a run came to."""
-    control, facts = recording.scenario.control, recording.facts
-    planned, seconds = control.duration, recording.ticks * control.period
-    seconds = planned if abs(seconds - planned) <= control.period else seconds  # whole ticks
-    return Verdict(label, seconds, planned, recording.fault, facts.robot.base == "floating",
-                   goals(recording), len({event.tick for event in recording.events}))
+    return Verdict(label, recording.seconds, recording.scenario.control.lasts, recording.fault,
+                   recording.facts.robot.base == "floating", goals(recording),
+                   len({event.tick for event in recording.events}))
 
 
 def verdicts(runs: Sequence[Run]) -> tuple[Verdict, ...]:
     """Return the verdict of each run; one that could not begin has no goals."""
     return tuple(
         verdict(run.recording, run.label) if run.recording is not None else
-        Verdict(run.label, 0.0, run.scenario.control.duration, run.error, False, ())
+        Verdict(run.label, 0.0, run.scenario.control.lasts, run.error, False, ())
         for run in runs)
 
 

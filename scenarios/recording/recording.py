@@ -190,6 +190,16 @@ class Recording:
         return len(self.signals["t"])
 
     @property
+    def seconds(self) -> float:
+        """How long the run lasted [s], to the end of its last tick."""
+        return self.ticks * self.scenario.control.period
+
+    @property
+    def beside_computing(self) -> str:
+        """What the times of whole ticks have beside the controller's, in words."""
+        return "" if self.scenario.plant.follows else "with the step of the simulated robot"
+
+    @property
     def order_names(self) -> tuple[tuple[str, ...], ...]:
         """The tasks of each of the orders, most important first."""
         return tuple(tuple(name for name in order.split(" > ") if name) for order in self.orders)

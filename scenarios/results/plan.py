@@ -18,6 +18,7 @@ from hierarchy import plugins
 from hierarchy.errors import UnknownNameError, file_path, refuse
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, is_shipped, load
+from scenarios.config import sections as keys
 from scenarios.config.distributions import Parameters
 from scenarios.config.resolvers import check_names, usable
 from scenarios.config.sampling import changed, drawn
@@ -137,10 +138,10 @@ class Sweep(Section):
     title: str = ""
     scenarios: Annotated[tuple[str, ...], Field(min_length=1)]
     resolvers: tuple[str, ...] = ()
-    duration: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
-    samples: Annotated[int, Field(ge=1)]
-    seed: Annotated[int, Field(ge=0)] = 0
-    variation: bool = False
+    duration: keys.Span | None = None
+    samples: Annotated[keys.Number, Field(le=1_000_000)]  # some kB each in memory
+    seed: keys.Count = 0
+    variation: keys.Flag = False
     parameters: Parameters = Field(default_factory=dict)
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from hierarchy.errors import expect_each, file_path, refuse
 from hierarchy.words import listed
 from scenarios.config import Scenario, load
+from scenarios.config.validation import validated
 from scenarios.files import finite, write_text
 from scenarios.measure.run_folder import versions
 from scenarios.results import cluster, pool
@@ -91,10 +92,11 @@ def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str]
     """
     chosen = [load(one) if isinstance(one, str) else one for one in scenarios]
     expect_each("compare_starts", chosen, Scenario, "give names, or what `load` returns")
-    asked = Sweep(name="-".join(one.name for one in chosen)[:80], samples=starts, seed=seed,
-                  scenarios=tuple(one.name for one in chosen), resolvers=tuple(resolvers or ()),
-                  title=f"{listed([one.name for one in chosen])} from {starts} sampled starts",
-                  variation=True)
+    names = [one.name for one in chosen]
+    asked = validated(Sweep, {
+        "name": "-".join(names)[:80], "samples": starts, "seed": seed, "variation": True,
+        "title": f"{listed(names)} from {starts} sampled starts",
+        "scenarios": names, "resolvers": resolvers or ()}, "compare_starts")
     said = command or shlex.join(
         ["hierarchy", "compare", *asked.scenarios, "--resolvers", ",".join(asked.resolvers),
          "--starts", str(starts), "--seed", str(seed), "--out", str(out)])

@@ -69,8 +69,8 @@ def _marks(runs: Sequence[Run]) -> str:
 def _stopped(run: Run) -> str:
     if run.fault is None:
         return ""
-    t = run.recording["t"] if run.recording else np.zeros(0)
-    return f"stopped at {t[-1]:.2f} s" if len(t) else "did not start"
+    ran = run.recording
+    return f"stopped at {ran.seconds:.2f} s" if ran and ran.ticks else "did not start"
 
 
 def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:

@@ -64,7 +64,8 @@ class Page:
             self.complaints.append(details.get("exception", {}).get("description", str(details)))
         elif kind == "Runtime.consoleAPICalled" and data["type"] in ("error", "warning", "assert"):
             self.complaints.append(str([arg.get("value") for arg in data["args"]]))
-        elif kind == "Log.entryAdded" and data["entry"]["level"] in ("error", "warning"):
+        elif kind == "Log.entryAdded" and data["entry"]["level"] in ("error", "warning") and (
+                "GPU stall due to ReadPixels" not in data["entry"]["text"]):  # of screenshots
             self.complaints.append(data["entry"]["text"])
 
     def look_at(self, address, width=1400, height=900, dark=False):

@@ -162,6 +162,11 @@ def test_a_folder_that_cannot_be_made_is_said_before_the_run(name, tmp_path):
         claim(tmp_path / name)
 
 
+def test_an_unknown_user_in_a_path_is_the_name_of_a_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert claim("~nobody of this name/a") == tmp_path / "~nobody of this name" / "a"
+
+
 @pytest.mark.parametrize(("text", "files", "said"), [
     ("no such task", ["own.toml"], "own.toml: no such task"), ("no such task", ["a.toml", "b.toml"],
      "no such task"), ("own.toml: key", ["own.toml"], "own.toml: key")])

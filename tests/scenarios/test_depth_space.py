@@ -171,9 +171,12 @@ def test_frames_that_cannot_be_used_are_refused_by_name(tmp_path):
     refused("has no frames", RecordedFrames, tmp_path, ROBOT)
     text = (folder / "frames.toml").read_text()
     for wrong, said in ((text.replace("width = 160", "width = 161"), "0000.png"),
-                        (text.replace("fx = ", "gx = "), "fx is missing"),
+                        (text.replace("fx = ", "gx = "), "fx: Field required"),
                         (text.replace("0001.png", "9999.png"), "9999.png"),
-                        (text.replace("time = ", "at = "), "time"), ("x = [", "frames.toml")):
+                        (text.replace("time = ", "at = "), "time"), ("x = [", "frames.toml"),
+                        (text.replace("scale = 0.001", "scale = -1.0"), "scale"),
+                        (text.replace("q = [", "q = [0.0, "), "frame.0.q"),
+                        (text.replace("time = 0.0\n", "time = 9.0\n"), "increase")):
         (tmp_path / "frames.toml").write_text(wrong)
         for png in folder.glob("*.png"):
             (tmp_path / png.name).write_bytes(png.read_bytes())

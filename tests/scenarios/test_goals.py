@@ -81,6 +81,12 @@ def test_the_table_has_a_row_for_each_goal_and_a_cell_for_each_run():
     assert Verdict("a", 4.0, 4.0, None, False, ()).end == "ran the whole 4 s"
 
 
+def test_a_run_lasts_as_long_as_its_whole_ticks():
+    scenario = load("ellipse", {"control.period": 0.3, "control.duration": 1.0})
+    (found,) = verdicts([Run(scenario, "a", "a", recording(scenario, t=[0.0, 0.3, 0.6]))])
+    assert found.end == "ran the whole 0.9 s"
+
+
 @pytest.mark.parametrize(("name", "asked"), [
     ("dual-arm", {"right hand": "on its path", "right hand ahead": "on a cone of 10°",
                   "posture": "at its target", "speed limits": ""}),

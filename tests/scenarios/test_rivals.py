@@ -56,6 +56,10 @@ def test_the_tangent_cone_of_the_letters_cone_has_its_jacobian_and_refuses_accel
     refused("kind = 'equality'", lambda: TangentCone(Pointing(FRAME, (1.0, 0.0, 0.0), 0.3)))
 
 
+def test_a_frozen_task_has_no_rate_that_could_be_too_fast_for_the_period():
+    assert build(load("ellipse-set-based", {"control.period": 0.11})).tasks.position
+
+
 def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
     for controller in near_obstacles("ellipse-smooth", "avoidance.rate=3.0",
                                      "avoidance.recovery=0.1"):

@@ -9,7 +9,9 @@ import pytest
 
 import scenarios.loop.simulation
 from benchmark.studies.reference_runs import EVERY, RIGHT, RUNS, differences, reference
-from scenarios import load, save, simulate
+from scenarios import load, load_run, save, simulate
+from scenarios.measure.judging import Rows
+from scenarios.recording.fate import Fate
 
 SHORT = ["control.duration=3.0"]
 
@@ -69,6 +71,15 @@ def test_progress_is_told_and_an_interrupted_run_keeps_what_was_run():
     seen = []
     simulate(load("ellipse", ["control.duration=1.2"]), lambda *args: seen.append(args))
     assert seen == [(0, 1200), (500, 1200), (1000, 1200), (1200, 1200)]
+
+
+def test_a_run_interrupted_while_its_levels_are_judged_is_kept(monkeypatch, tmp_path):
+    rows = Rows.hierarchy
+    monkeypatch.setattr(Rows, "hierarchy", lambda self, k: rows(self, k) if k < 5 else
+                        signal.raise_signal(signal.SIGINT))
+    run = load_run(save(simulate(load("ellipse", ["control.duration=0.01"])), tmp_path / "run"))
+    assert (run.ticks, run.fault) == (10, "interrupted after the last tick")
+    assert ((run["level_fate"] == Fate.UNKNOWN).all(axis=1) == (np.arange(10) >= 5)).all()
 
 
 @pytest.mark.parametrize(("speed", "acceleration", "said"), [

@@ -260,4 +260,6 @@ def test_the_command_takes_several_runs_and_a_name(runs, tmp_path, command):
     folders = [save(run, tmp_path / label) for label, run in runs.items()]
     file = tmp_path / "new" / "two.html"
     command("replay", *folders, "--out", file)
+    kept = folders[0] / "scenario.toml"
+    assert "no .html file" in command("replay", *folders, "--out", kept, code=2).err
     assert len(data_of(file.read_text(encoding="utf-8"))["runs"]) == 2

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import floor, inf
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +21,8 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.rendering import draw_scene
 from scenarios.config.reading import LIBRARY
-from scenarios.config.sections.sensor import CameraSection
+from scenarios.config.sections.sensor import CameraSection, FramesFile
+from scenarios.config.validation import validated
 from scenarios.toml_text import read_toml
 
 Image = NDArray[np.float32]
@@ -151,11 +151,8 @@ class DepthCamera:
 class RecordedFrames:
     """Depth images from a folder, or a shipped set by name, in place of a camera.
 
-    The folder has 16-bit PNG files, in which 0 means no reading, and `frames.toml` with width,
-    height, fx, fy, cx, cy [px], position [m], rotation (rows; its columns are the camera's axes in
-    the world), scale [m] of one step of a pixel, and a table `[[frame]]` for each image: file, time
-    [s], and optionally q [rad or m], the robot's joints when it was taken.
-    `examples/record_frames.py` writes it.
+    The folder has 16-bit PNG files, in which 0 means no reading, and `frames.toml` with the keys of
+    a `FramesFile`. `examples/record_frames.py` writes it.
 
     Image i is taken at its time and available `latency` [s] later. If the folder has no joints for
     it, the robot is removed in its current state. After the last image there are no more frames.
@@ -165,20 +162,17 @@ class RecordedFrames:
     def __init__(self, folder: str | Path, robot: Robot, latency: float = 0.0) -> None:
         self.folder, self.latency = _found(folder), latency
         self.obstacles = Obstacles()
-        about = read_toml(self.folder / ABOUT, "file of frames", HierarchyError)
-        self.pinhole, self._scale = _pinhole(about, self.folder), about.get("scale", 1e-3)
-        frames = about.get("frame") or []
-        try:
-            self.times = [float(frame["time"]) for frame in frames]
-            files = [self.folder / frame["file"] for frame in frames]
-        except (KeyError, TypeError, ValueError) as error:
-            raise HierarchyError(f"{self.folder / ABOUT}: each frame needs a file and a time "
-                                 f"({error!r})") from error
-        if not frames or any(a >= b for a, b in zip(self.times, self.times[1:], strict=False)):
-            raise HierarchyError(f"{self.folder / ABOUT}: needs frames, at increasing times")
-        self._images = [_read_png(file, self.pinhole) for file in files]
-        self._placements = [State.at(robot, frame["q"]).placements.copy() if "q" in frame else None
-                            for frame in frames]
+        file = self.folder / ABOUT
+        about = validated(FramesFile, read_toml(file, "file of frames", HierarchyError), str(file))
+        with naming(str(file)):
+            self.pinhole = Pinhole(**{key: getattr(about, key) for key in INTRINSICS})
+        self._scale, self.times = about.scale, [frame.time for frame in about.frame]
+        self._images = [_read_png(self.folder / one.file, self.pinhole) for one in about.frame]
+        self._placements: list[Array | None] = []
+        for i, one in enumerate(about.frame):
+            with naming(f"{file}: frame.{i}.q"):
+                self._placements.append(
+                    None if one.q is None else State.at(robot, one.q).placements.copy())
         self._reading = np.zeros((self.pinhole.height, self.pinhole.width), np.float32)
 
     def newest(self, t: float) -> int:
@@ -200,13 +194,6 @@ def _found(folder: str | Path) -> Path:
         raise HierarchyError(f"folder {str(folder)!r} has no {ABOUT}")
     raise UnknownNameError("folder of frames", str(folder),
                            sorted(path.name for path in SHIPPED.glob("*")))
-
-
-def _pinhole(about: dict[str, Any], folder: Path) -> Pinhole:
-    for key in INTRINSICS:
-        if key not in about and key not in ("cx", "cy"):
-            raise HierarchyError(f"{folder / ABOUT}: {key} is missing")
-    return Pinhole(**{key: about[key] for key in INTRINSICS if key in about})
 
 
 def _read_png(file: Path, pinhole: Pinhole) -> NDArray[np.uint16]:

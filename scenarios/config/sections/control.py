@@ -99,6 +99,11 @@ class ControlSection(keys.Section):
         """Number of ticks of a run, at least one."""
         return max(1, round(min(self.duration / self.period, 1e18)))
 
+    @property
+    def lasts(self) -> float:
+        """How long those ticks last [s], which need not be the duration."""
+        return self.ticks * self.period
+
     def settings(self) -> dict[str, Any]:
         """Return the resolver's settings: those of its table, overridden by plain ones."""
         from solvers import names, variants

@@ -6,6 +6,7 @@ All but the exact one see obstacles in depth images: a simulated camera, or reco
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -140,6 +141,33 @@ class FramesSection(ImageSection):
 
     is_recorded: ClassVar[bool] = True
     folder: str  #: Their folder, relative to the scenario's file, or a shipped set.
+
+
+class FrameSection(keys.Section):
+    """One of the images of a `FramesFile`."""
+
+    file: str  #: A 16-bit PNG file, in which 0 means no reading.
+    time: keys.Finite  #: When it was taken [s].
+    q: tuple[keys.Finite, ...] | None = None  #: The robot's joints then [rad or m].
+
+
+class FramesFile(keys.Section):
+    """What recorded images say of their camera, and of each."""
+
+    width: Pixels  #: As of a `CameraSection`, and so on.
+    height: Pixels
+    fx: Focal
+    fy: Focal
+    cx: Middle | None = None
+    cy: Middle | None = None
+    position: keys.Point
+    rotation: keys.Rows3  #: Its columns are the camera's axes in the world.
+    scale: keys.Length = 1e-3  #: Depth of one step of a pixel.
+    frame: Annotated[tuple[FrameSection, ...], Field(min_length=1)]
+
+    def _wrong(self) -> Iterator[str]:
+        if any(a.time >= b.time for a, b in pairwise(self.frame)):
+            yield "the times of the frames must increase"
 
 
 class OwnSensor(AnySensor, OwnSection):

@@ -215,8 +215,7 @@ def tick_times(recording: Recording) -> Figure:
     ax.axvline(period, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
     ax.annotate("period", (period, 1.0), xycoords=("data", "axes fraction"), fontsize="small",
                 va="top", ha="right", color=INK, rotation=90)
-    simulated = "" if recording.scenario.plant.follows else ", with the step of the simulated robot"
-    ax.set_xlabel(f"whole tick{simulated} [µs]")
+    ax.set_xlabel(f"{', '.join(filter(None, ('whole tick', recording.beside_computing)))} [µs]")
     ax.set_ylabel("ticks")
     run = f"{_run_of(recording)}: " if drawing.present().titled else ""
     ax.set_title(f"{run}{np.mean(times <= period):.2%} of {recording.ticks} ticks within the "
