@@ -55,7 +55,7 @@ def fake(name, **options):
 
 @pytest.mark.parametrize(("name", "limit", "most", "expected"), [
     ("Crashing", 10.0, 5, [None, None, CRASHED, None, None]),
-    ("Hanging", 1.0, 5, [None, None, HUNG, None, None]),
+    ("Hanging", 0.3, 5, [None, None, HUNG, None, None]),
     ("Doomed", 10.0, 2, [CRASHED, CRASHED, LEFT_OUT, LEFT_OUT, LEFT_OUT])])
 def test_an_end_costs_one_problem_and_too_many_the_rest_of_a_file(
         equalities, monkeypatch, name, limit, most, expected):

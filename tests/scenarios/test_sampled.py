@@ -146,7 +146,8 @@ def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path, 
         command(*sweep, tmp_path / "b", "--part", part, "--workers", 1)
     assert not (tmp_path / "b" / "results.csv").exists()
     command(*sweep, tmp_path / "b", "--scheduler", "tcp://127.0.0.1:1")
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=None) as one:
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False,
+                                  protocol="tcp", dashboard_address=None) as one:
         command(*sweep, tmp_path / "c", "--scheduler", one.scheduler_address)
     first, second, third = (table(tmp_path / out / "results.csv") for out in "abc")
     assert first == second == third
