@@ -46,7 +46,7 @@ def test_a_fault_is_reported_and_the_run_kept(tmp_path, command, monkeypatch):
     assert (tmp_path / "a" / "run.npz").exists()
 
 
-def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, command):
+def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, command, undrawn):
     def breaks_under_recursive(scenario, progress=None):
         if scenario.control.resolver == "recursive":
             raise ArithmeticError("[bold]no[/bold] answer")
@@ -81,7 +81,7 @@ terminal.bar = lambda: contextlib.nullcontext(
 
 @pytest.mark.parametrize(("page", "workers"), [("whole", 2), ("broken", 1)])
 def test_an_interrupted_comparison_keeps_what_ended_and_names_the_folder(
-        page, workers, tmp_path, monkeypatch, command):
+        page, workers, tmp_path, monkeypatch, command, undrawn):
     def add_and_interrupt(written, i, run, add=comparing._Written.add):
         add(written, i, run)
         raise KeyboardInterrupt
