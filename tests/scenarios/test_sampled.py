@@ -138,7 +138,7 @@ def test_a_run_has_every_metric_of_its_scenario_as_sampled(tmp_path):
         m.name: m.value for m in expected.values() if m.group != "Computing"}
 
 
-def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path, command):
+def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path, command, undrawn):
     distributed = pytest.importorskip("distributed", reason="needs the extra sweep")
     sweep = "sweep", write(tmp_path), "--out"
     command(*sweep, tmp_path / "a", "--workers", 2)
@@ -244,7 +244,8 @@ with Store(Path(sys.argv[1])).opened(): print(flush=True); time.sleep(60)"""
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("starts") / "out"
-    with mock.patch("scenarios.results.cluster.ended"):  # which needs another package
+    with (mock.patch("scenarios.results.cluster.ended"),  # which needs another package
+          mock.patch("scenarios.results.sampled_page.svg", lambda fig, title: title)):
         found = compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], 7, 3,
                                folder, workers=Workers(1))
     return found, json.loads((folder / "results.json").read_text()), folder
