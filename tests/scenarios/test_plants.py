@@ -4,16 +4,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scene import FRAME, ROBOT, place_of
+from scene import ROBOT
 
 from hierarchy import Hierarchy, State
 from hierarchy.avoidance import Obstacles
-from scenarios import load, load_run, save, simulate
+from scenarios import load, simulate
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.config.sections.plant import MeasurementSection, PhysicsSection
 from scenarios.loop.audit import ActiveSets
 from scenarios.loop.controller import Controller
-from scenarios.measure.metrics import measure
 from solvers import Resolution, Status, make
 
 START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
@@ -113,23 +112,6 @@ def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
         np.testing.assert_array_equal(command, run["command"][k])
 
 
-def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
-    def touching(centre):
-        return simulate(load("ellipse", [*PHYSICS, *sphere(0.05, centre)]))
-
-    forearm = State.at(ROBOT, START).placements[5]  # a capsule along the z axis
-    run = touching((forearm[9:] + 0.195 * forearm[6:9] + 0.105 * forearm[:3]).tolist())
-    found = measure(run)
-    assert found["contact_ticks"].value == np.count_nonzero(run["contacts"]) > 0
-    assert found["contact_depth_max"].value == run["contact_depth"].max() > 4e-3
-    assert found["contact_force_max"].value == run["contact_force"].max() > 1.0
-    again = load_run(save(run, tmp_path / "run"))
-    np.testing.assert_array_equal(again["contact_force"], run["contact_force"])
-    away = measure(touching([0.0, -2.0, 0.0]))
-    assert away["contact_ticks"].value == away["contact_force_max"].value == 0.0
-    assert "contact_ticks" not in measure(simulate(load("ellipse", SHORT)))
-
-
 @pytest.mark.parametrize("level", ["acceleration", "velocity"])
 @pytest.mark.parametrize("far", [0.05, 0.3])
 def test_the_servos_of_a_joint_beyond_its_limit_are_led_back_without_a_jump(mujoco, far, level):
@@ -145,31 +127,6 @@ def test_the_servos_of_a_joint_beyond_its_limit_are_led_back_without_a_jump(mujo
     assert np.abs(np.diff(reference, prepend=0.0)).max() <= 0.01 + 1e-12
     assert arm.q[3] == pytest.approx(arm.reference_q[3], abs=0.01)
     assert arm.q[3] < q[3] - 0.1
-
-
-def sphere(radius, centre):
-    return [f"avoidance.obstacles=[{{shape='sphere', radius={radius}, centre={list(centre)}}}]"]
-
-
-NEAR, BESIDE = (0.1, 0.5, 0.1), (0.1, 0.75, 0.3)
-
-
-@pytest.mark.parametrize(("name", "changes", "centre", "radius", "q"), [
-    ("ellipse", ["control.duration=0.05", *sphere(0.05, NEAR),
-                 "plant.measurement.position_noise=0.01"], NEAR, 0.05, "true_q"),
-    pytest.param("human-hqp", [
-        "control.duration=0.2", "plant.kind=kinematic", "plant.measurement.velocity_noise=0.0",
-        "plant.measurement.quantisation=0.0", *sphere(0.06, BESIDE)], BESIDE, 0.06, "q",
-        marks=pytest.mark.slow)], ids=["noise of the joints", "camera"])
-def test_true_distances_are_on_record_beside_the_measured(name, changes, centre, radius, q):
-    run, points = simulate(load(name, changes)), (*ROBOT.control_points, FRAME)
-    for k in (0, 7, run.ticks - 1):
-        places = np.array([place_of(point, run[q][k]) for point in points])
-        wanted = np.linalg.norm(places - centre, axis=1) - radius
-        np.testing.assert_allclose(run["true_control_point_distance"][k], wanted[:-1], atol=1e-12)
-        assert run["true_ee_distance"][k] == pytest.approx(wanted[-1], abs=1e-12)
-        assert run["true_minimal_distance"][k] == pytest.approx(wanted[:-1].min(), abs=1e-12)
-    assert np.abs(run["true_ee_distance"] - run["ee_distance"]).max() > 1e-3
 
 
 def bounded(target):
