@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from refusals import refused
+from scipy.spatial.transform import Rotation
 
+from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacle
 from scenarios import load, save, simulate
 from scenarios.export import export, foxglove
@@ -75,6 +77,25 @@ def assert_fits(value, schema, where):
     if isinstance(value, list):
         for part in value:
             assert_fits(part, schema["items"], f"{where}[]")
+
+
+def test_frames_are_where_the_robot_is(run, messages):
+    found, _, _ = messages
+    robot = Robot.named("kuka_lwr")
+    for at, message in found["/tf"]:
+        frames = {one["child_frame_id"]: one for one in message["transforms"]}
+        tick = int(np.abs(run["t"] - at * 1e-9).argmin())
+        state = State.at(robot, run["q"][tick])
+        placed = [*frames["end_effector"]["translation"].values()]
+        np.testing.assert_allclose(placed, run["ee_position"][tick], atol=1e-9)
+        np.testing.assert_allclose([*frames["desired"]["translation"].values()],
+                                   run["desired_position"][tick], atol=1e-9)
+        for i, name in enumerate(robot.joint_names, 1):
+            np.testing.assert_allclose([*frames[name]["translation"].values()],
+                                       state.placements[i, 9:], atol=1e-12)
+            turned = Rotation.from_quat([frames[name]["rotation"][axis] for axis in "xyzw"])
+            np.testing.assert_allclose(turned.as_matrix(),
+                                       state.placements[i, :9].reshape(3, 3).T, atol=1e-9)
 
 
 def test_the_layout_shows_only_what_the_file_has(messages):

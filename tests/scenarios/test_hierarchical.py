@@ -31,6 +31,14 @@ def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
     assert not certified or run["certified"].all()
 
 
+def test_the_order_is_fixed_and_limits_come_first():
+    assert names_of() == ("joint limits", "separation", "position", "pointing")
+    assert names_of("limits.torque=0.5") == ("joint limits", "torque limits", "separation",
+                                             "position", "pointing")
+    assert names_of("avoidance.self_collision=0.02")[1:3] == ("separation", "self-separation")
+    assert names_of("posture={role='task', target=[0,0,0,0,0,0,0]}")[-1] == "posture"
+
+
 def test_the_strictness_scenario_measures_what_a_lower_task_moves():
     scenario = load("strictness", ["control.duration=0.3"])
     strict, weighted = (measure(simulate(one))["moved_by_lower_max"].value for one in (

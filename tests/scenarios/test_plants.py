@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scene import ROBOT
+from scene import FRAME, ROBOT, place_of
 
 from hierarchy import Hierarchy, State
 from hierarchy.avoidance import Obstacles
@@ -127,6 +127,31 @@ def test_the_servos_of_a_joint_beyond_its_limit_are_led_back_without_a_jump(mujo
     assert np.abs(np.diff(reference, prepend=0.0)).max() <= 0.01 + 1e-12
     assert arm.q[3] == pytest.approx(arm.reference_q[3], abs=0.01)
     assert arm.q[3] < q[3] - 0.1
+
+
+def sphere(radius, centre):
+    return [f"avoidance.obstacles=[{{shape='sphere', radius={radius}, centre={list(centre)}}}]"]
+
+
+NEAR, BESIDE = (0.1, 0.5, 0.1), (0.1, 0.75, 0.3)
+
+
+@pytest.mark.parametrize(("name", "changes", "centre", "radius", "q"), [
+    ("ellipse", ["control.duration=0.05", *sphere(0.05, NEAR),
+                 "plant.measurement.position_noise=0.01"], NEAR, 0.05, "true_q"),
+    pytest.param("human-hqp", [
+        "control.duration=0.2", "plant.kind=kinematic", "plant.measurement.velocity_noise=0.0",
+        "plant.measurement.quantisation=0.0", *sphere(0.06, BESIDE)], BESIDE, 0.06, "q",
+        marks=pytest.mark.slow)], ids=["noise of the joints", "camera"])
+def test_true_distances_are_on_record_beside_the_measured(name, changes, centre, radius, q):
+    run, points = simulate(load(name, changes)), (*ROBOT.control_points, FRAME)
+    for k in (0, 7, run.ticks - 1):
+        places = np.array([place_of(point, run[q][k]) for point in points])
+        wanted = np.linalg.norm(places - centre, axis=1) - radius
+        np.testing.assert_allclose(run["true_control_point_distance"][k], wanted[:-1], atol=1e-12)
+        assert run["true_ee_distance"][k] == pytest.approx(wanted[-1], abs=1e-12)
+        assert run["true_minimal_distance"][k] == pytest.approx(wanted[:-1].min(), abs=1e-12)
+    assert np.abs(run["true_ee_distance"] - run["ee_distance"]).max() > 1e-3
 
 
 def bounded(target):
