@@ -168,7 +168,6 @@ class ListedPosture(base.Listed, base.PostureTask):
     """All joints to a posture."""
 
 
-
 @register("tasks", "coupling", shipped=True)
 class ListedCoupling(base.Listed, base.TaskSection):
     """A weighted sum of joint positions (1 row)."""
