@@ -18,6 +18,9 @@ BIN        := .venv/bin
 # Small matrices: threads of the linear algebra library only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
+# Without compiled modules each of the hundreds of processes of a test would compile them again.
+unexport PYTHONDONTWRITEBYTECODE
+
 # What kernels need is installed first: those of the solvers, then of robots. The rest follows while
 # they are compiled.
 MAKEFLAGS  += --jobs=3

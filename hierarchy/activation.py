@@ -7,8 +7,6 @@ Inequality Control Objectives and Task Transitions in Priority Based Control", J
 Intelligent and Robotic Systems (2016), which asks for a sigmoid and leaves its form open.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import final
 

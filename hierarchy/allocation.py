@@ -1,7 +1,5 @@
 """Algorithm 1 of the letter: from measured distances to the order of the stack."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import NamedTuple
 

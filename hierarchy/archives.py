@@ -1,7 +1,5 @@
 """Archives of arrays (.npz) from anywhere: their headers are checked before they are read."""
 
-from __future__ import annotations
-
 import io
 import math
 import zipfile

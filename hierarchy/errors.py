@@ -1,7 +1,5 @@
 """Errors for a caller's mistakes; each names what was wrong and where."""
 
-from __future__ import annotations
-
 import difflib
 import os
 from collections.abc import Collection, Container, Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Checks of arrays before they reach kernels, which check nothing."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any

@@ -41,8 +41,6 @@ rounding:
   than `velocity`; within a distance `ROUNDING` of the limit counts as back.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from math import sqrt
 

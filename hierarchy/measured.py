@@ -4,8 +4,6 @@ What a task measures is apart from what is asked of it: one kernel, here, makes 
 of all such tasks, for their gains and at each level.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable
 from types import FunctionType

@@ -3,8 +3,6 @@
 String building is enough here: the core does not import a template engine.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from html import escape
 

@@ -1,6 +1,5 @@
 """Fields that a frozen dataclass computes from its others."""
 
-from __future__ import annotations
 
 
 def set_frozen(record: object, **values: object) -> None:

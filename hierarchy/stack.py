@@ -1,7 +1,5 @@
 """Stack: named tasks in order of priority, turned into a Hierarchy at a State."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Literal, NamedTuple, get_args

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from ast import literal_eval
 from collections.abc import Callable, Iterator
 from dataclasses import Field, fields, is_dataclass
 from functools import wraps
+from inspect import formatannotation
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -250,8 +252,9 @@ def check_parts(task: Task) -> None:
     check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
     parts: tuple[Field[Any], ...] = fields(task) if is_dataclass(task) else ()
     for part in parts:
-        written = part.type if isinstance(part.type, str) else part.type.__name__
-        named, value = written.removesuffix(" | None"), getattr(task, part.name, None)
+        value: Any = getattr(task, part.name, None)
+        written = _written(part)
+        named = written.removesuffix(" | None")
         if not part.init or (value is None and named != written):
             continue
         if named in _PARTS:
@@ -268,9 +271,14 @@ def check_parts(task: Task) -> None:
                          literal_eval(named.removeprefix("Literal")))
         refuse(named == "Barrier" and task.kind != "inequality", f"task {task.name!r}: its rows "
                "are inequalities")
-    if any(part.type == "Sequence[ControlPoint]" for part in parts) and not len(
-            pack_points(task.points)[0]):  # type: ignore[attr-defined]
-        raise HierarchyError(f"task {task.name!r}: needs at least one control point")
+        refuse(written == "Sequence[ControlPoint]" and not len(pack_points(value)[0]),
+               f"task {task.name!r}: needs at least one control point")
+
+
+def _written(part: Field[Any]) -> str:
+    """Return the type of a field as text, without modules."""
+    text = part.type if isinstance(part.type, str) else formatannotation(part.type)
+    return re.sub(r"\b(\w+\.)+", "", text)
 
 
 def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:

@@ -1,7 +1,5 @@
 """Names and numbers as they stand in a sentence."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")

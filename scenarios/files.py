@@ -1,7 +1,5 @@
 """Files and folders: output is written whole or not at all."""
 
-from __future__ import annotations
-
 import atexit
 import glob
 import hashlib

@@ -1,7 +1,5 @@
 """Jinja templates of the pages: every value is escaped unless it is markup already."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from importlib.resources import files

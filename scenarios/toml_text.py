@@ -1,7 +1,5 @@
 """Read TOML; an error shows the line, a caret and the likely mend."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 import unicodedata

@@ -1,7 +1,5 @@
 """Resolving a hierarchy whose levels may give, around a resolver's own `solve`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 

@@ -4,8 +4,6 @@ With W = L L^T and x = reference + L^-T y, d^T W d = y^T y for the step d = x - 
 nearest to the reference in W is that of the y nearest to zero, and the rows over y are A L^-T.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import sqrt
 from typing import TypeVar

@@ -1,7 +1,5 @@
 """`Resolution`: the result of a solve."""
 
-from __future__ import annotations
-
 from typing import Any, final
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Enums for the outcome of a solve and the state of a row, and their integers for kernels."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

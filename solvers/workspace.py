@@ -4,8 +4,6 @@ Kernels allocate no memory, since an allocation costs more than many of their lo
 one array; it grows when a kernel returns TOO_SMALL. Its old contents never matter.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from functools import cache

@@ -64,6 +64,13 @@ def no_plugins(monkeypatch):
 
 
 @pytest.fixture
+def undrawn(monkeypatch):
+    """Figures of pages are made and not drawn, which takes longer than most runs."""
+    for module in ("page", "sections", "sampled_page"):
+        monkeypatch.setattr(f"scenarios.results.{module}.svg", lambda fig, title: title)
+
+
+@pytest.fixture
 def with_mujoco(tmp_path, monkeypatch):
     """MuJoCo is there, and logs runs that diverge into a folder of the test's own."""
     pytest.importorskip("mujoco")

@@ -1,7 +1,5 @@
 """Points and capsules fixed to the links of a robot, and the distances between capsules."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -16,8 +16,6 @@ Ames et al., "Control barrier functions: theory and applications" (2019); Nguyen
 "Exponential control barrier functions" (2016).
 """
 
-from __future__ import annotations
-
 from dataclasses import astuple, dataclass
 from math import exp
 

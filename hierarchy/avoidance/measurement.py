@@ -1,7 +1,5 @@
 """Measurements of one tick: distances, directions and magnitudes of repulsion; and of all pairs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import inf, sqrt
 

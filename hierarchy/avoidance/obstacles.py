@@ -1,7 +1,5 @@
 """Obstacles: points, spheres, capsules and boxes, at rest or moving on a path."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, sqrt

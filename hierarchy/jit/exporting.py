@@ -6,8 +6,6 @@ compiled as it would be when called, for a processor that numba is told by its e
 process starts; only the machine code is made once, of all of them together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What this package takes from inside numba and llvmlite, beyond what their documents promise."""
 
-from __future__ import annotations
-
 import numba
 
 _KNOWN = "0.61 to 0.68"

@@ -4,8 +4,6 @@ numba keeps the order of a sum, so it adds one number after the other; `reshape`
 calls of their own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

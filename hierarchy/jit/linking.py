@@ -3,8 +3,6 @@
 numba links the code of all callees into a caller and optimises the whole again, at every level.
 """
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager

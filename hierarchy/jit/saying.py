@@ -1,7 +1,5 @@
 """What a program that waits for kernels says on stderr."""
 
-from __future__ import annotations
-
 import os
 import sys
 from functools import cache

@@ -3,8 +3,6 @@
 What a file imports counts for all its kernels: a helper further down may use it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Callable, Iterable

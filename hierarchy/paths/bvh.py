@@ -1,7 +1,5 @@
 """Motions of a skeleton from a BVH file: where each joint is in each frame."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path as File

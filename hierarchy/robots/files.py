@@ -1,7 +1,5 @@
 """Models and shapes from URDF and MJCF files; a missing mesh is reported and not an error."""
 
-from __future__ import annotations
-
 import os
 import re
 import sys

@@ -1,7 +1,5 @@
 """What a file or a table says of a robot, and what is proposed where it does not."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping

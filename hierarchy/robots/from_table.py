@@ -1,7 +1,5 @@
 """Models of robots that are given as tables."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -6,8 +6,6 @@ coordinates are (cos, sin), and the rotation vector of a ball, whose coordinates
 rotation vector.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 

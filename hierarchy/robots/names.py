@@ -1,7 +1,5 @@
 """Robots by their names in packages of robot descriptions."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Capsules: around collision geometry, and around the links of a robot given as a table."""
 
-from __future__ import annotations
-
 from collections import Counter
 from itertools import product
 from typing import Any

@@ -16,8 +16,6 @@
   posture of the start, each below its hip.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import cos, radians
 from typing import Any

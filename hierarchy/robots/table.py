@@ -1,7 +1,5 @@
 """Robots as tables of numbers: a serial arm by its Denavit-Hartenberg parameters, or any tree."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

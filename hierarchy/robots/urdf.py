@@ -1,7 +1,5 @@
 """Checks of a URDF before pinocchio, which names no joint; what a robot made of it lacks."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator

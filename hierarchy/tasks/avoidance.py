@@ -23,8 +23,6 @@ avoidance", ICRA 2012, reference [10] of the letter; there f is g, which leaves 
 velocity at contact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal

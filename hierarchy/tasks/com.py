@@ -1,7 +1,5 @@
 """The whole robot: its centre of mass along a path, its linear and angular momentum."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal

@@ -5,8 +5,6 @@ Mechanisms", 1985). A joint turns the columns of those after it, and moves the f
 before it turn, so the gradient of w and its time derivative are known without differences.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

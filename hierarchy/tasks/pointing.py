@@ -1,7 +1,5 @@
 """An axis of a frame: on a cone or inside it (eqs. 16-21), or toward a point of the world."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import cos

@@ -1,7 +1,5 @@
 """Pose of a frame: by a rotation vector and a line, by the logarithm of SE(3), in another frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

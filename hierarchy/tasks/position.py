@@ -1,7 +1,5 @@
 """Position of a frame along a path, in all directions or some, with the repulsion of eq. (30)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

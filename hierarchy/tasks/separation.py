@@ -21,8 +21,6 @@ bend falls without bound; `barrier.limit` then limits the row, and d may fall be
 `limit` at acceleration level.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

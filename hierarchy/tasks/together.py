@@ -1,7 +1,5 @@
 """Tasks that are made of others: several as one level, and the rows of a set-based one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 

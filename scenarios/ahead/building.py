@@ -8,8 +8,6 @@ numba and scipy.
 call: each kind of call of the documents, once.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """Build the parts of the control loop from a scenario, and the stack of `control.stack`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache

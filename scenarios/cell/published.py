@@ -5,8 +5,6 @@ other end of each link than the points do, and entry (2, 1) of the upper-arm Jac
 -l c1 c2 instead of -l c1 s2. Only the KUKA LWR of the letter has these Jacobians.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

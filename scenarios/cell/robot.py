@@ -5,8 +5,6 @@ a closed contact from the first tick on. A point 2 mm above the floor takes 20 m
 while contacts that stand give way by 0.1 mm; until then the robot does not do what was planned.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Make the tasks of a scenario, in their order: from its sections, its list and its contacts."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """`hierarchy check`: a scenario and its first tick, or a robot and a proposed [robot] section."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """`hierarchy doctor`: check versions, backends and kernels, and run a self-test."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator

@@ -6,8 +6,6 @@ run stopped with a reported fault, 2 the command line or a file is invalid, 130 
 SIGTERM or SIGHUP.
 """
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The entry of the command `hierarchy`: what has to be set before anything large is imported."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

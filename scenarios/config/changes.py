@@ -4,8 +4,6 @@ A key is dotted, `control.period`; in a list an entry has its number from 0, and
 every entry: `avoidance.obstacles.*.radius`. `--set`, sweeps and `[variation]` have the same keys.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

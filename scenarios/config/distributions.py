@@ -1,7 +1,5 @@
 """Distributions of values at dotted keys of a scenario, as a file gives them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any
 

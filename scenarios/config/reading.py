@@ -1,7 +1,5 @@
 """Read a scenario by name or file, with what it extends and with changes; groups of scenarios."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path

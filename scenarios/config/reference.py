@@ -4,8 +4,6 @@ Types, bounds, units and defaults are those that files are checked against; the 
 the text below it in its section, or behind it after "#:".
 """
 
-from __future__ import annotations
-
 import ast
 import inspect
 import json

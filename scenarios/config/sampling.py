@@ -1,7 +1,5 @@
 """Draw the values of a sample, and put them into a scenario."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 

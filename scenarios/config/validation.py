@@ -1,7 +1,5 @@
 """Validate plain data as a section; errors name the key, the value and its unit."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from math import inf, tau

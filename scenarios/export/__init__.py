@@ -1,7 +1,5 @@
 """A recording as an MCAP file with every tick and a 3D scene, and a layout of panels for it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from importlib.util import find_spec

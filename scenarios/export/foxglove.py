@@ -5,8 +5,6 @@ message types, as far as they are used here. Its reader takes one type per field
 may be null is declared as a number.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

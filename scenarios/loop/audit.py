@@ -1,7 +1,5 @@
 """What is computed after each tick, outside the measured times, and becomes signals of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, final
 

@@ -1,7 +1,5 @@
 """One tick of control: from a measured joint state to a command."""
 
-from __future__ import annotations
-
 from math import inf, nan
 from time import perf_counter
 from typing import Any

@@ -1,7 +1,5 @@
 """Injected faults, placed between plant, sensor, resolver and controller."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from time import perf_counter

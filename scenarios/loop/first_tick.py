@@ -1,7 +1,5 @@
 """The first tick of a scenario: does it fit together, and what can its stack meet?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite

@@ -1,7 +1,5 @@
 """What is sent in a tick with trouble, and the guard that every command passes through."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from math import inf

@@ -1,7 +1,5 @@
 """Writes one row per tick while the loop runs; nothing is computed from it there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The simulation loop: a controller and a plant, recorded tick by tick."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 

@@ -8,8 +8,6 @@ with the task, its target b replaced by h b + (1 - h) J x, where x is the answer
 holds for undamped answers; damping is not linear in b.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple, final
 
 from hierarchy import Stack, State

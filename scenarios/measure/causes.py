@@ -11,8 +11,6 @@ change of the answer.
   the resolver's answer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """How far a run was from each thing that its scenario asked for, in that thing's own unit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any

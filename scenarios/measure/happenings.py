@@ -1,7 +1,5 @@
 """What happened in a run, and why: trouble, contacts, large changes of command, missed levels."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

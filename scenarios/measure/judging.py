@@ -1,7 +1,5 @@
 """The fate of each level: the rows of every tick, and the command that was sent judged by them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import nan, sqrt
 from typing import Any, final

@@ -1,7 +1,5 @@
 """What a metric is: a number about a run with a unit, a plain name and a direction."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """What is measured on a recording, in the order in which tables show it."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator, Sequence
 from functools import partial

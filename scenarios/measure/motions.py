@@ -1,7 +1,5 @@
 """Which runs are the same motion, drawn once and named together, and where others diverge."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

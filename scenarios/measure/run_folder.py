@@ -1,7 +1,5 @@
 """The folder of one run: its recording, its metrics, and the versions that it was made with."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import os

@@ -1,7 +1,5 @@
 """Runs of scenarios side by side: what was measured, in rows with the best values marked."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

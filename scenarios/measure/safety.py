@@ -1,7 +1,5 @@
 """Distances, touches, limits, how jerkily joints moved; slip, margins and torques on contacts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 

@@ -4,8 +4,6 @@ A closed loop amplifies small differences, so that one run says little. Two reso
 on the same samples, sample by sample, and a difference counts only if a test tells it from chance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What runs came to, also side by side: who reached the end, which promise broke, how far off."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import shlex

@@ -6,8 +6,6 @@ everybody may tune on; any other seed is fresh. Resolvers give candidates for an
 `solvers.proof` decides.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

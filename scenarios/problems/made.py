@@ -9,8 +9,6 @@ were recorded in the examples of packages that own the robot's model: `data/READ
 Singular postures of arms and humanoids: straight limbs, aligned wrists, feet flat together.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

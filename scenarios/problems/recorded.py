@@ -4,8 +4,6 @@ DYN60 is recorded from `stand-push` (extra `sim`): `python -m scenarios.problems
 FILE` writes the stored set again, with another seed a fresh one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice

@@ -1,7 +1,5 @@
 """What a reader of a run needs beside its signals: facts about the robot and the resolver."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The fate of each level under the command that was sent: its rows are met, inactive or missed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum

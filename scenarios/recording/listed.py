@@ -1,7 +1,5 @@
 """The errors of the tasks that a scenario lists, tick by tick."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 

@@ -5,8 +5,6 @@ acceleration that this command means. T ticks, n velocities, c commands (n, or a
 actuated joints), K control points, N tasks, P contact points, C contacts, H obstacles.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

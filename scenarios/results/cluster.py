@@ -1,7 +1,5 @@
 """Runs on many machines: the only module that knows Dask."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from threading import Lock

@@ -1,7 +1,5 @@
 """Results of a sweep: runs as columns, success rates, worst cases, failures."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

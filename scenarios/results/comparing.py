@@ -1,7 +1,5 @@
 """Run scenarios under several resolvers, write the runs and report the comparison."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """A comparison as one self-contained HTML page: summary, replay, metrics, figures, commands."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Mapping, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """A sweep: the validated form of its file, its runs, each with a key of its content; one run."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections import Counter

@@ -4,8 +4,6 @@ They are fresh interpreters, so that a caller needs no main module that can be i
 one that dies costs only its own run.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal

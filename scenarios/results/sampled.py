@@ -1,7 +1,5 @@
 """Run scenarios from samples, from the file of a sweep or `compare --starts` to the page."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The page of a sweep: success, numbers, distributions, worst cases, failures."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The sections of the page: numbers with the best marked, events, settings, figures."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@
 `read_csv("results.csv").pivot_table("value", ["scenario", "resolver", "sample"], "metric")`.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import os

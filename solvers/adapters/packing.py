@@ -5,8 +5,6 @@ the solve. All that is given stands in one table, a row for each row of a limit 
 of G or J, then h or e, and of a task its cost, gain and lm_damping.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hierarchy.jit import compiled, inlined

@@ -6,8 +6,6 @@ kernels release the GIL, so that other threads run their own part. Each returns 
 solves anything if `work` is too small.
 """
 
-from __future__ import annotations
-
 from hierarchy.jit import unlocked
 from solvers.kernels.active_set.exact import DAMPING, solve, work_size
 from solvers.kernels.bounds import solve_within_bounds

@@ -4,8 +4,6 @@ Where no bound is active the staircase solves them, else the exact resolver, in 
 cost nothing. This file also finds the saturation of each unknown and the scaling of each level.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

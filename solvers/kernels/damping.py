@@ -13,8 +13,6 @@ it. So each level alone has that x for its minimum, and keeps it where inequalit
 depends on which of them act, and what a level hands down is unique: x is continuous in the sides.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from hierarchy.jit import add_multiple, inlined, inner_product, internal

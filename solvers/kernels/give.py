@@ -4,8 +4,6 @@
 the exact kernel: rows are loaded once, and levels in which the same rows act are factored once.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

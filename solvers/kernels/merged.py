@@ -12,8 +12,6 @@ does to a multiplier, y + step (b - a x), in the unit of the row; a miss beyond 
 step times cap. docs/theory/merged.md has the bounds.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

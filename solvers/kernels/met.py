@@ -1,7 +1,5 @@
 """Whether levels are plainly met: with short steps, and without any inequality in the way."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, inner_product

@@ -5,8 +5,6 @@ remains: a level occupies as many columns of Q as it has rows, whether it can us
 m > n, zero columns extend J to a square matrix.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

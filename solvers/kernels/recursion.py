@@ -7,8 +7,6 @@ The dampings of Nakamura, Chiaverini, and Buss and Kim act in the singular value
 B = J_i P_{i-1} = sum_k s_k u_k v_k^T. Projectors stay undamped: no level disturbs those above it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -9,8 +9,6 @@ hierarchy of two levels: the rows of k with their residual, and all rows below w
 staircase finds it at any rank, and no pseudoinverse is formed.
 """
 
-from __future__ import annotations
-
 from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.linalg.rows import finish
 from solvers.kernels.linalg.space import assign, fill, integers, vector

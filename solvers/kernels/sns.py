@@ -7,8 +7,6 @@ joints, loses rank, the set with the largest s is the answer. Each task starts w
 No projector is formed here: saturated joints and the task have columns of Q, see `Space`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ levels are solved from the top by block forward substitution, least squares in e
 recursion (5), (13) in other coordinates. The columns of Q that no level takes carry (14).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ Addresses are checked as far as they can be, then become arrays. The structs are
 `task_hierarchy.h`; every field of them has 8 bytes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import inf
 from typing import NamedTuple

@@ -5,8 +5,6 @@ with the kernels of Python when the package was built; if not, numba makes it no
 gets the same code through its own back end, which splits vectors that are too wide for it.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import struct

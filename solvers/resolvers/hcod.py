@@ -1,7 +1,5 @@
 """The exact resolver: lexicographic least squares with inequalities at every level."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import isnan
 from typing import Any, ClassVar, final

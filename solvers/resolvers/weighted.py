@@ -1,7 +1,5 @@
 """Priorities as weights: one least-squares problem."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -12,9 +12,9 @@ from scenarios.cell.build import build
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Seconds of the run; at most this with strict levels, and at least that otherwise [mm, deg, ...].
-PROMISES = {"humanoid": (3.0, 0.6, 10.0), "iiwa": (2.0, 0.3, 0.6), "mobile": (2.5, 0.5, 2.0),
-            "panda": (2.5, 0.1, 4.0), "policy": (1.5, 0.6, 100.0), "quadruped": (1.5, 1.0, 2.0),
-            "retarget": (0.3, 0.12, 1.0), "so101": (1.6, 0.1, 10.0),
+PROMISES = {"humanoid": (1.8, 0.6, 2.5), "iiwa": (1.2, 0.3, 0.9), "mobile": (1.2, 0.5, 1.5),
+            "panda": (1.2, 0.1, 0.9), "policy": (1.5, 0.6, 100.0), "quadruped": (1.0, 1.0, 1.5),
+            "retarget": (0.1, 0.12, 5.0), "so101": (0.8, 0.1, 4.5),
             "teleop": (1.5, 15.001, 100.0), "wall": (1.6, 0.01, 100.0)}
 
 

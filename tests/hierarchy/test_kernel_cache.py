@@ -1,6 +1,7 @@
 """The cache of kernels is a convenience: whatever becomes of it, every number is right."""
 
 import os
+import shutil
 import subprocess
 import sys
 from types import FunctionType
@@ -33,27 +34,31 @@ pytestmark = [
     pytest.mark.skipif(sys.platform == "win32", reason="owners and modes of files")]
 
 
-@pytest.fixture
-def ask(tmp_path):
-    """Runs a kernel in a new process with settings; returns what it prints on both streams."""
+def asked(folder, code=SOLVE, **settings):
+    """Run a kernel of a folder in a new process; return what it prints on both streams."""
+    kept = {name: value for name, value in os.environ.items()
+            if name not in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, text=True, check=True,
+                          capture_output=True, env={**kept, **settings})
+    return done.stdout.split(), done.stderr
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with the kernels, and with a cache of them."""
+    folder = tmp_path_factory.mktemp("kernels")
     for name, text in MODULES.items():
-        (tmp_path / name).write_text(text)
-
-    def asked(code=SOLVE, **settings):
-        kept = {name: value for name, value in os.environ.items()
-                if name not in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
-        done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, text=True, check=True,
-                              capture_output=True, env={**kept, **settings})
-        return done.stdout.split(), done.stderr
-
-    return asked
+        (folder / name).write_text(text)
+    assert asked(folder, XDG_CACHE_HOME=str(folder / "cache"))[0] == ["11.0", "1"]
+    return folder
 
 
 @pytest.fixture
-def cache(ask, tmp_path):
-    """The folder of a cache that has the kernels."""
-    ask(XDG_CACHE_HOME=str(tmp_path / "cache"))
-    return tmp_path / "cache"
+def ask(made, tmp_path):
+    """Runs a kernel as `asked`, in a copy of the folder and its cache of the test's own."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    return lambda code=SOLVE, **settings: asked(
+        tmp_path, code, **{"XDG_CACHE_HOME": str(tmp_path / "cache"), **settings})
 
 
 def files(folder):
@@ -69,33 +74,39 @@ def test_the_files_of_a_kernel_are_found_though_its_code_names_them_relative_to_
 @pytest.mark.parametrize(("file", "old", "new"), [
     ("helper.py", "x + ONE", "x + 91.0"), ("numbers_here.py", "1.0", "91.0")])
 def test_a_changed_helper_or_number_is_noticed(ask, tmp_path, file, old, new):
-    folder = str(tmp_path / "cache")
-    assert ask(XDG_CACHE_HOME=folder)[0] == ["11.0", "1"]
     (tmp_path / file).write_text((tmp_path / file).read_text().replace(old, new))
-    assert ask(XDG_CACHE_HOME=folder)[0] == ["101.0", "1"]
+    assert ask()[0] == ["101.0", "1"]
 
 
-@pytest.mark.parametrize("damage", [lambda kept: kept[:50],
-                                    lambda kept: kept[:-1] + bytes([kept[-1] ^ 1])])
-def test_a_damaged_cache_is_compiled_again(ask, cache, damage):
-    (kept,) = (file for file in files(cache) if file.name.startswith("user.g-"))
-    kept.write_bytes(damage(kept.read_bytes()))
-    assert ask(XDG_CACHE_HOME=str(cache))[0] == ["11.0", "1"]
+@pytest.mark.parametrize("change", [
+    lambda path: path.write_bytes(path.read_bytes()[:50]),
+    lambda path: path.write_bytes(path.read_bytes()[:-1] + bytes([path.read_bytes()[-1] ^ 1])),
+    lambda path: path.chmod(0o666), lambda path: os.chown(path, 12345, 12345)],
+    ids=["short", "damaged", "anybody's", "another user's"])
+def test_a_file_that_is_damaged_or_that_another_can_have_written_is_compiled_again(
+        ask, tmp_path, change):
+    (kept,) = (file for file in files(tmp_path / "cache") if file.name.startswith("user.g-"))
+    try:
+        change(kept)
+    except PermissionError:
+        pytest.skip("only root can give files away")
+    assert ask()[0] == ["11.0", "1"]
 
 
-def test_a_helper_that_was_compiled_again_is_found_by_its_callers(ask, cache):
+def test_a_helper_that_was_compiled_again_is_found_by_its_callers(ask, tmp_path):
     """Its symbol has the number of functions that a process compiled before it."""
-    (stored,) = (file for file in files(cache) if file.name.startswith("helper.f-"))
+    (stored,) = (file for file in files(tmp_path / "cache") if file.name.startswith("helper.f-"))
     stored.unlink()
     later = f"import numba; [numba.njit(lambda x: x)(1) for _ in range(9)]; {SOLVE}"
-    assert ask(later, XDG_CACHE_HOME=str(cache))[0] == ["11.0", "1"]
-    for path in cache.rglob("*"):  # which then cannot be written, and is read
+    assert ask(later)[0] == ["11.0", "1"]
+    for path in (tmp_path / "cache").rglob("*"):  # which then cannot be written, and is read
         path.chmod(0o555 if path.is_dir() else 0o444)
-    assert ask(XDG_CACHE_HOME=str(cache)) == (["11.0", "0"], "")
+    assert ask() == (["11.0", "0"], "")
 
 
-@pytest.mark.parametrize("settings", [{"XDG_CACHE_HOME": "here"}, {"HOME": "/proc/nowhere"},
-                                      {"XDG_CACHE_HOME": "/dev/null"}], ids=str)
+@pytest.mark.parametrize("settings", [
+    {"XDG_CACHE_HOME": "here"}, {"XDG_CACHE_HOME": "", "HOME": "/proc/nowhere"},
+    {"XDG_CACHE_HOME": "/dev/null"}], ids=str)
 def test_without_a_usable_folder_nothing_is_written_here_and_one_line_says_so(
         ask, tmp_path, settings):
     before = files(tmp_path)
@@ -104,18 +115,7 @@ def test_without_a_usable_folder_nothing_is_written_here_and_one_line_says_so(
     assert files(tmp_path) == before
 
 
-@pytest.mark.parametrize("change", [lambda path: path.chmod(0o666),
-                                    lambda path: os.chown(path, 12345, 12345)])
-def test_a_file_that_another_user_can_have_written_is_not_loaded(ask, cache, change):
-    try:
-        for path in files(cache):
-            change(path)
-    except PermissionError:
-        pytest.skip("only root can give files away")
-    assert ask(XDG_CACHE_HOME=str(cache))[0] == ["11.0", "1"]
-
-
-def test_a_kept_kernel_loads_without_what_compiling_needs_and_others_compile_after_it(ask, cache):
+def test_a_kept_kernel_loads_without_what_compiling_needs_and_others_compile_after_it(ask):
     code = f"""import sys
 import numpy as np
 {SOLVE}
@@ -123,7 +123,7 @@ print("numba.np.npyimpl" in sys.modules, "scipy.linalg" in sys.modules)
 import numba
 print(float(numba.njit(lambda x: np.cumsum(x)[-1])(np.arange(3.0))))
 """
-    assert ask(code, XDG_CACHE_HOME=str(cache))[0] == ["11.0", "0", "False", "False", "3.0"]
+    assert ask(code)[0] == ["11.0", "0", "False", "False", "3.0"]
 
 
 def test_python_cannot_call_what_is_compiled_for_other_kernels():

@@ -1,7 +1,9 @@
 """Wrong values given to robots, states, paths, tasks and stacks: each with what it says."""
 
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from hierarchy.gate import check_rotation
 from hierarchy.limits import Limits
 from hierarchy.loop import Loop
 from hierarchy.paths import Blended, Jittered, Still, circle, read_bvh
+from hierarchy.robot import Frame
 from hierarchy.robots import TABLES, link_capsules
 
 NAN, INF = float("nan"), float("inf")
@@ -30,6 +33,14 @@ HAND = tasks.Position(FRAME, THERE)
 LIMITS, POINTS = tasks.JointLimits(ROBOT, 10.0, 0.01), ROBOT.control_points
 ARM, KEPT = link_capsules(TABLES["kuka_lwr"], foot=0.3105), Barrier(0.02)
 TIMES, CORNERS = (0.5, 1.2), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2))
+
+
+@dataclass(frozen=True)
+class Own(tasks.Position):
+    """A task of a user, with types that are not text."""
+
+    other: Frame | None = None
+    side: Literal["left", "right"] = "left"
 
 
 def limits(**settings):
@@ -47,6 +58,8 @@ def limits(**settings):
     (lambda: Hierarchy.from_levels([(A, B)] * 2, names=["a"] * 2), "2 levels are named 'a'"),
     (lambda: State.at("kuka_lwr", np.zeros(7)), "State.at: robot: expected a Robot, got str"),
     (lambda: tasks.Position("hand", THERE), "'position': frame is the name 'hand'; give"),
+    (lambda: Own(FRAME, THERE, other="hand"), "'position': other is the name 'hand'; give"),
+    (lambda: Own(FRAME, THERE, side="up"), "side = 'up': expected one of 'left', 'right'"),
     (lambda: tasks.JointLimits("kuka_lwr", 10.0, 0.01), "give Robot.load('kuka_lwr')"),
     (lambda: Stack(["position"]), "a stack: expected a Task, got str 'position'"),
     (lambda: Stack([HAND]).hierarchy(ROBOT), "state: expected a State, got Rob"),

@@ -234,7 +234,7 @@ def check_hierarchy(command, arguments):
 
 
 @pytest.mark.parametrize("document", FOLLOWED)
-def test_a_tutorial_can_be_followed_from_top_to_bottom(document, tmp_path):
+def test_a_tutorial_can_be_followed_from_top_to_bottom(document, tmp_path, undrawn):
     """Files get the name in their first line, commands are run, Python goes on."""
     if "standing" in document:
         pytest.importorskip("mujoco")

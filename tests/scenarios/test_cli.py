@@ -17,6 +17,7 @@ from scenarios.cli import doctor
 from scenarios.cli.main import _with_its_file, app
 from scenarios.files import OutputError, claim, in_runs, slug
 from scenarios.measure import run_folder
+from scenarios.results import comparing
 
 
 @pytest.fixture(autouse=True)
@@ -45,7 +46,7 @@ def test_a_fault_is_reported_and_the_run_kept(tmp_path, command, monkeypatch):
     assert (tmp_path / "a" / "run.npz").exists()
 
 
-def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, command):
+def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, command, undrawn):
     def breaks_under_recursive(scenario, progress=None):
         if scenario.control.resolver == "recursive":
             raise ArithmeticError("[bold]no[/bold] answer")
@@ -78,26 +79,19 @@ terminal.bar = lambda: contextlib.nullcontext(
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
-@pytest.mark.parametrize("page", ["whole", "broken"])
-def test_a_signal_in_a_comparison_side_by_side_keeps_what_ended_and_names_the_folder(page,
-                                                                                     tmp_path):
-    done = ended("""import sys
-from scenarios.results import comparing
+@pytest.mark.parametrize(("page", "workers"), [("whole", 2), ("broken", 1)])
+def test_an_interrupted_comparison_keeps_what_ended_and_names_the_folder(
+        page, workers, tmp_path, monkeypatch, command, undrawn):
+    def add_and_interrupt(written, i, run, add=comparing._Written.add):
+        add(written, i, run)
+        raise KeyboardInterrupt
 
-if sys.argv.pop() == "broken":
-    comparing._Written._write = lambda *_: 1 / 0
-
-add = comparing._Written.add
-
-def add_and_interrupt(written, i, run):
-    add(written, i, run)
-    os.kill(os.getpid(), signal.SIGTERM)
-
-comparing._Written.add = add_and_interrupt
-""", tmp_path, "compare", "ellipse", "--resolvers", "tpm,hcod", "--workers", "2", "--duration",
-                 "0.02", "--out", "b", page)
-    assert done.returncode == 130
-    assert "the runs made so far are in b\n" in done.stderr
+    monkeypatch.setattr(comparing._Written, "add", add_and_interrupt)
+    if page == "broken":
+        monkeypatch.setattr(comparing._Written, "_write", mock.Mock(side_effect=ArithmeticError))
+    said = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers",
+                   workers, code=130).err
+    assert "the runs made so far are in b\n" in said
     assert list((tmp_path / "b").rglob("run.npz"))
     pages = {"index.html", "comparison.json"} if page == "whole" else set()
     assert {"results.csv", *pages} <= {path.name for path in (tmp_path / "b").iterdir()}
@@ -136,22 +130,15 @@ def test_a_command_that_is_interrupted_or_refused_ends_without_a_traceback(
     assert command("doctor", code=code).err == said
 
 
-RUN = [sys.executable, "-m", "scenarios.cli.start", "run", "ellipse", "--duration", "0.02",
-       "--out", "a"]
-
-
-def test_a_terminal_that_cannot_show_a_character_gets_a_replacement(tmp_path):
-    done = subprocess.run(RUN, cwd=tmp_path, capture_output=True, check=False,
-                          env={**os.environ, "PYTHONIOENCODING": "ascii"})
-    assert (done.returncode, done.stderr) == (0, b"")
-    assert b"20 ticks in a" in done.stdout
-
-
-@pytest.mark.parametrize("closed", ["1>&-", "0<&- 1>&- 2>&-"])
-def test_closed_streams_cost_no_run(closed, tmp_path):
-    done = subprocess.run(["sh", "-c", f'"$@" {closed}', "sh", *RUN], cwd=tmp_path, check=False,
-                          stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    assert (done.returncode, load_run(tmp_path / "a").ticks) == (0, 20)
+@pytest.mark.parametrize(("closed", "out"), [("0<&-", b"20 ticks in a"), ("1>&- 2>&-", b"")])
+def test_closed_streams_and_a_terminal_that_cannot_show_a_character_cost_no_run(
+        closed, out, tmp_path):
+    done = subprocess.run(
+        ["sh", "-c", f'"$@" {closed}', "sh", sys.executable, "-m", "scenarios.cli.start", "run",
+         "ellipse", "--duration", "0.02", "--out", "a"], cwd=tmp_path, capture_output=True,
+        check=False, env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.stderr, load_run(tmp_path / "a").ticks) == (0, b"", 20)
+    assert out in done.stdout
 
 
 @pytest.mark.parametrize("name", ["x" * 300, "loop", "loop/a", "file/a"])

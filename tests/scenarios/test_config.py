@@ -94,7 +94,7 @@ def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them
 
 
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
-        tmp_path, monkeypatch, command):
+        tmp_path, monkeypatch, command, undrawn):
     monkeypatch.chdir(tmp_path)
     said = command("compare ladder --duration 0.02 --workers 1").out
     assert "Step 2: joint limits above all tasks (tpm)" in said
@@ -119,7 +119,7 @@ def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch
         compare("mine")
 
 
-def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_path):
+def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_path, undrawn):
     limited = load("ellipse", {"name": "limited", "control.duration": 0.01,
                                "control.options": {}, "limits.acceleration": 20.0})
     free = load("ellipse", ["control.duration=0.01"])

@@ -85,14 +85,6 @@ def test_times_are_given_by_median_and_tails_for_each_part():
     assert {name for name in found if name.startswith("time_") and found[name].detail} == shared
 
 
-def test_a_scenario_without_a_task_has_no_metric_of_it():
-    full = recording(asked(pointing=None))
-    for signal in ("minimal_distance", "ee_distance", "position_error"):
-        del full.signals[signal]
-    assert {"cone_violation_max", "body_distance_min", "ee_distance_min", "position_error_rms",
-            "joint_limit_excess"} & measure(full).keys() == {"joint_limit_excess"}
-
-
 def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_as_one():
     data = as_plain_data(recording(a=np.full((5, 2), np.nan), fault="diverged at tick 5"))
     assert data["metrics"]["acceleration_max"]["value"] is None

@@ -11,7 +11,6 @@ import pytest
 from headless import Balanced
 from refusals import refused
 
-from hierarchy import Hierarchy
 from hierarchy.notebook import html_table
 from scenarios import compare, load, simulate
 
@@ -29,13 +28,6 @@ def test_a_table_escapes_every_value_marks_the_best_and_says_how_much_is_left_ou
         assert shown in text
     assert "<b>" not in html_table("t", ("n",), [(1,)])
     assert "... and 70 more" in html_table("t", ("n",), [(i,) for i in range(100)])
-
-
-def test_a_hierarchy_shows_its_levels():
-    levels = [(np.eye(2), [-1, -1], [1, 1]), ([[1.0, 2.0]], [9.0])]
-    h = Hierarchy.from_levels(levels, names=["<limits>", "hand & arm"])
-    cells = Balanced(h._repr_html_()).cells
-    assert cells[-8:] == ["<limits>", "2", "0", "2", "hand & arm", "1", "1", "0"]
 
 
 def test_a_recording_shows_its_signals_and_a_comparison_a_column_for_each_run(run):

@@ -8,12 +8,11 @@ from scene import FRAME, ROBOT, place_of
 
 from hierarchy import Hierarchy, State
 from hierarchy.avoidance import Obstacles
-from scenarios import load, load_run, save, simulate
+from scenarios import load, simulate
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.config.sections.plant import MeasurementSection, PhysicsSection
 from scenarios.loop.audit import ActiveSets
 from scenarios.loop.controller import Controller
-from scenarios.measure.metrics import measure
 from solvers import Resolution, Status, make
 
 START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
@@ -111,23 +110,6 @@ def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
     for k in range(run.ticks):
         command = controller.command(run["t"][k], run["q"][k], run["v"][k])
         np.testing.assert_array_equal(command, run["command"][k])
-
-
-def test_contacts_are_measured_in_a_run(mujoco, tmp_path):
-    def touching(centre):
-        return simulate(load("ellipse", [*PHYSICS, *sphere(0.05, centre)]))
-
-    forearm = State.at(ROBOT, START).placements[5]  # a capsule along the z axis
-    run = touching((forearm[9:] + 0.195 * forearm[6:9] + 0.105 * forearm[:3]).tolist())
-    found = measure(run)
-    assert found["contact_ticks"].value == np.count_nonzero(run["contacts"]) > 0
-    assert found["contact_depth_max"].value == run["contact_depth"].max() > 4e-3
-    assert found["contact_force_max"].value == run["contact_force"].max() > 1.0
-    again = load_run(save(run, tmp_path / "run"))
-    np.testing.assert_array_equal(again["contact_force"], run["contact_force"])
-    away = measure(touching([0.0, -2.0, 0.0]))
-    assert away["contact_ticks"].value == away["contact_force_max"].value == 0.0
-    assert "contact_ticks" not in measure(simulate(load("ellipse", SHORT)))
 
 
 @pytest.mark.parametrize("level", ["acceleration", "velocity"])

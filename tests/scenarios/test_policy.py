@@ -96,15 +96,6 @@ def test_without_a_measurement_the_last_state_is_carried_on_by_the_commands_sent
     assert np.abs(plant.v).max() < 0.06 * speed
 
 
-def test_a_measurement_is_stale_only_after_its_time():
-    c, q, v = controller("control.policy.stale_after=0.005")
-    for k in range(12):
-        c.command(k * PERIOD, q, v, min(k, 3) * PERIOD)
-        assert list(c.policy.events) == ([("stale", "brake")] if k > 8 else [])
-    c.command(0.012, q, v, 0.012)
-    assert list(c.policy.events) == []
-
-
 @pytest.mark.parametrize(("deadline", "kinds"), [(0.31, []), (0.29, ["overrun"])])
 def test_a_tick_over_its_deadline_is_told_by_the_clock(deadline, kinds):
     c, q, v = controller(f"control.policy.deadline={deadline}")

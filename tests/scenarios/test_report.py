@@ -11,9 +11,7 @@ from hand_made import asked, recording
 from headless import Balanced, chromium
 
 from scenarios import load, save, simulate
-from scenarios.config.sections.kinds import ListedPosition
-from scenarios.draw.figures import letter, palette, panels
-from scenarios.draw.figures.timeline import timeline
+from scenarios.draw.figures import letter, palette
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
@@ -70,7 +68,9 @@ def test_times_are_those_of_a_run_that_was_alone_and_nothing_else_is():
                                  avoidance=None))],
 ], ids=["one", "three", "a fault", "an error", "only an error", "one tick", "two scenarios",
         "no tasks but position, and markup"])
-def test_a_page_is_whole_and_needs_nothing_outside_itself(runs):
+def test_a_page_is_whole_and_needs_nothing_outside_itself(runs, request):
+    if len(runs) != 3:  # the same figures
+        request.getfixturevalue("undrawn")
     text = page(comparison(*runs))
     Balanced(text)
     assert "<script>alert" not in text
@@ -143,32 +143,6 @@ def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
     assert (looks["hqp proxqp"].dash, len(set(looks.values()))) == (palette.SOLID, 5)
 
 
-@pytest.mark.parametrize("panel", panels.PANELS, ids=lambda panel: panel.name)
-def test_every_panel_draws_a_run_that_has_its_signal(panel):
-    run = recording()
-    assert panel.fits(run)
-    drawn = beside(panel, {"tpm-published": run, "hqp": run})
-    assert list(drawn) == ["tpm-published", "hqp"]
-    assert drawn["hqp"].axes[0].get_ylim() == drawn["tpm-published"].axes[0].get_ylim()
-
-
-def test_the_errors_of_listed_tasks_are_drawn_with_a_line_for_each():
-    feet = asked(tasks=(ListedPosition(name="left foot", kind="position", frame=""),
-                        ListedPosition(name="right foot", kind="position", frame="")))
-    run = recording(feet, task_error_left_foot=np.ones((5, 3)),
-                    task_error_right_foot=np.full((5, 3), 1e-3))
-    (ax,) = beside(panels.PANEL["task-errors"], {"hqp": run})["hqp"].axes
-    assert [line.get_label() for line in ax.lines] == ["left foot", "right foot"]
-    np.testing.assert_allclose(ax.lines[1].get_ydata(), np.sqrt(3.0))  # [mm]
-
-
-def test_a_run_far_beyond_the_others_is_cut_and_says_so():
-    quiet, wild = (recording(v=speed * np.eye(5, 7)) for speed in (1.0, 1000.0))
-    drawn = beside(panels.PANELS[0], {"a": quiet, "b": quiet, "c": wild})
-    assert any("cut" in text.get_text() for text in drawn["c"].axes[0].texts)
-    assert drawn["a"].axes[0].get_ylim()[1] < 10.0
-
-
 def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, monkeypatch):
     run_folder = save(recording(), tmp_path / "run")
     for text in ("old", "new"):
@@ -178,25 +152,6 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, 
     assert (run_folder / "b.svg").read_text() == "new"
     assert (run_folder / "run.npz").exists()
     assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
-
-
-def test_tick_times_are_drawn_in_microseconds_beside_the_period():
-    (ax,) = letter.tick_times(recording(time_tick=[4e-6, 4e-6, 4e-6, 4e-6, 2e-3])).axes
-    few, one = (bar for bar in ax.patches if bar.get_height() > 0.0)
-    assert (few.get_height(), one.get_height()) == (4.0, 1.0)
-    for bar, time in ((few, 4.0), (one, 2000.0)):
-        assert bar.get_x() <= time * (1.0 + 1e-9) <= bar.get_x() + bar.get_width()
-    assert ax.lines[0].get_xdata()[0] == pytest.approx(1000.0)
-
-
-def test_the_stack_over_time_has_a_band_for_each_place_and_a_row_for_each_event():
-    run = dataclasses.replace(recording(orders=("a > b", "b"), order=[0, 0, 1, 1, 0]),
-                              fault="stopped", events=(Event(2, "overrun", "use"),))
-    (ax,) = timeline(run).axes
-    assert [text.get_text() for text in ax.get_yticklabels()] == ["1", "2", "overrun: use"]
-    assert ax.get_title(loc="left") == "Place in the stack, 2 changes"
-    assert ax.get_ylim() == (2.5, -0.5)  # half a row around the three
-    assert "fault" in [text.get_text() for text in ax.texts]
 
 
 def test_the_letters_pairs_are_made_of_its_runs_in_its_order():

@@ -21,7 +21,6 @@ from scenarios.draw.replay import NOTHING, html
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.live_page import LivePage
 from scenarios.draw.viewer.server import is_own, served
-from scenarios.recording.fate import Fate
 from scenarios.scene import scene
 
 LIMITED = load("ellipse-limits", ["control.duration=0.6"])
@@ -52,47 +51,6 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_
     assert not live.obstacles.offset.any()
     ticks(live, 1)
     np.testing.assert_array_equal(live.recording()["q"][0], recording["q"][0])
-
-
-def test_an_obstacle_that_is_dragged_goes_there_no_faster_than_a_hand():
-    live = Live(load("ellipse", ["control.duration=0.6"]))
-    ticks(live, 10)
-    live.drag(0, (0.0, 0.0, 0.1))
-    ticks(live, 50)
-    assert live.obstacles.centres[0] == pytest.approx([0.1, 0.5, 0.15])
-    ticks(live, 100)
-    assert live.obstacles.centres[0] == pytest.approx([0.1, 0.5, 0.2])
-    found = live.recording()
-    assert found["changed"].tolist() == [False] * 10 + [True] * 150
-    drawn = scene(found)
-    assert drawn.centres[-1, 0] == pytest.approx([0.1, 0.5, 0.2])
-    assert Fate.UNKNOWN not in drawn.levels.fate[0]
-    assert Fate.UNKNOWN in drawn.levels.fate[-1]
-
-
-def test_a_live_page_does_what_is_asked_for():
-    page = LivePage(Live(LIMITED))
-    higher = (page.middle + np.array([0.0, 0.02, 0.0])).tolist()
-    for asked in ({"resolver": "hcod"}, {"obstacle 0": [0.1, 0.5, 0.2]},
-                  {"path": higher, "pointing.alpha_d": 15.0}):
-        page.answer(asked)
-    for _ in range(4):
-        page.step(0.03)
-    shown = json.loads(page.now)
-    assert page.live.t == pytest.approx(0.12, abs=0.02)
-    assert shown["runs"][0]["label"] == shown["resolver"] == "hcod"
-    assert shown["handles"]["path"] == pytest.approx(higher)
-    assert page.live.scenario.position.offset == pytest.approx((0.0, 0.02, 0.0))
-    assert page.live.obstacles.offset[0, 2] > 0.05
-    assert page.refused == ""
-    assert {one["key"]: one["value"] for one in json.loads(page.now)["settings"]}[
-        "avoidance.near"] == 0.05
-    page.answer({"toggle": None})
-    page.step(0.03)
-    t = page.live.t
-    page.step(0.03)
-    assert page.live.t == t
-    assert any("cone" in goal for goal in json.loads(page.now)["runs"][0]["goals"])
 
 
 def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_motion():

@@ -63,7 +63,7 @@ def test_what_cannot_slide_or_is_no_direction_is_refused():
 def test_it_presses_and_wipes_on_a_table_of_unknown_height(height):
     """Friction known: within 1 N of 20 N most of the time, and a few mm of its circle."""
     pytest.importorskip("mujoco")
-    run = simulate(load("wipe", {"plant.height": height, "control.duration": 3.0}))
+    run = simulate(load("wipe", {"plant.height": height, "control.duration": 2.4}))
     assert run.fault is None
     after = run["t"] > 1.0
     assert np.median(np.abs(run["floor_force"][after, 0, 2] - 20.0)) < 2.0

@@ -1,7 +1,5 @@
 """Robots of MJCF files: compiled by MuJoCo (extra `sim`), rebuilt for pinocchio, and compared."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

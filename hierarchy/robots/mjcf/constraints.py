@@ -1,7 +1,5 @@
 """What an MJCF limits and couples: ranges, efforts, joints, closed chains; what a robot lacks."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any

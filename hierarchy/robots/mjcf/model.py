@@ -6,8 +6,6 @@ order of quaternions: x, y, z, w here and w, x, y, z there. The velocity of a fr
 frame of the body, in MuJoCo its linear part is in the world's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """An MJCF as MuJoCo compiles it, with a name for everything in it; which part is the robot."""
 
-from __future__ import annotations
-
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

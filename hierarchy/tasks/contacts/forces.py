@@ -1,7 +1,5 @@
 """Rows over contact forces and of the equations of motion: forces, floating base, torque limits."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass

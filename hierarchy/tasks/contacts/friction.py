@@ -1,7 +1,5 @@
 """What contacts can transmit: forces in the friction cone, pressure inside the sole."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial

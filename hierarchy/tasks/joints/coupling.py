@@ -1,7 +1,5 @@
 """Couplings of joints: gears, mimic joints, fingers that close together."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction

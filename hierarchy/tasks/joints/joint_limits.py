@@ -1,7 +1,5 @@
 """Limits of joint positions, velocities and accelerations, with a row for every joint."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

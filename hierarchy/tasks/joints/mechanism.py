@@ -4,8 +4,6 @@ A model of a robot is a tree. What its file says beyond that holds whatever the 
 these rows stand at the top of a stack.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -3,8 +3,6 @@
 An arm under servos among obstacles, or a robot on a floor: torque motors, soles, friction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, final
 from xml.etree import ElementTree

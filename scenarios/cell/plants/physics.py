@@ -1,7 +1,5 @@
 """An arm in MuJoCo with position servos, commanded in joint positions as through KUKA's FRI."""
 
-from __future__ import annotations
-
 from math import ceil
 from typing import Any, NamedTuple
 

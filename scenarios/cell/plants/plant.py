@@ -1,7 +1,5 @@
 """What a plant is, one that follows its commands exactly, how joints are measured, and [plant]."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol

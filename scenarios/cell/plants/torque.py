@@ -1,7 +1,5 @@
 """A robot on a floor in MuJoCo, moved by joint torques, and how its contacts touch the floor."""
 
-from __future__ import annotations
-
 from collections import deque
 from math import acos, ceil, cos, exp, pi, sin
 from typing import Any, final

@@ -1,7 +1,5 @@
 """Sources of depth images: a simulated camera with errors of its readings, and recorded images."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The depth sensors of [sensor]: a camera or recorded frames in the loop, and their distances."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from math import inf

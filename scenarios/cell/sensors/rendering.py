@@ -6,8 +6,6 @@ frame, so that its point at share t has the depth t. Only the rectangle around t
 shape is visited. A shape that the camera is inside of is not seen.
 """
 
-from __future__ import annotations
-
 from math import ceil, floor, sqrt
 
 import numpy as np

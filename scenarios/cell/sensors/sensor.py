@@ -1,7 +1,5 @@
 """What a sensor is, exact distances, and the sensor that [avoidance] and [sensor] ask for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 

@@ -1,7 +1,5 @@
 """Common parts of sections: numbers with bounds and units, what says a kind, and the error."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

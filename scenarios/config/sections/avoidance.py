@@ -1,7 +1,5 @@
 """The keys of [avoidance]: obstacles, thresholds, repulsion or separation."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """The keys of [control], what goes with each kind of its stack, and the keys of [[faults]]."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 

@@ -1,7 +1,5 @@
 """Paths in a scenario file: the keys of each kind, and the path that they make."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal

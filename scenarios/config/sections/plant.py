@@ -1,7 +1,5 @@
 """The keys of [plant]: those of every kind, and the kinds; scenarios.cell.plants has the plants."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """What the names in sections refer to: frames, joints, contacts and capsules of the robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The keys of [robot], [start], [[contacts]] and [forces]: what there is, and what it touches."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Literal
 

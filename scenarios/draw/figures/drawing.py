@@ -1,7 +1,5 @@
 """The style of all figures: colours, thinning of long curves, projection, SVG for a page."""
 
-from __future__ import annotations
-
 import io
 import itertools
 import re

@@ -4,8 +4,6 @@ A figure has the letter's number only where every part of it is drawn from the r
 shows there, as shipped.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple

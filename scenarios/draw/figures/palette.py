@@ -5,8 +5,6 @@ tritanopia (simulated after Machado, Oliveira, Fernandes 2009), and each is legi
 near-black; tests/scenarios/test_report.py checks this.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """The panels of the letter's figures, each one quantity of a run over time."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass

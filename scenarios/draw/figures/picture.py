@@ -1,7 +1,5 @@
 """The scene of a run in space: the robot, its desired and actual paths, the obstacles."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

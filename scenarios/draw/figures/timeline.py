@@ -1,7 +1,5 @@
 """The stack over time: the place of each task in it, and events."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The replay as one HTML document: scenes as plain numbers and base64, template, style, script."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Iterable, Mapping

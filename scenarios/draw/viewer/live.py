@@ -1,7 +1,5 @@
 """A run that is changed by hand while it goes on; nothing here depends on a page."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Mapping

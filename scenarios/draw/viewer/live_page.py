@@ -1,7 +1,5 @@
 """A live run on a page, where it is drawn and changed."""
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 from functools import reduce

@@ -1,7 +1,5 @@
 """A page's server, for this machine only: requests of others fail."""
 
-from __future__ import annotations
-
 import json
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping

@@ -7,8 +7,6 @@ independent. It is factored anew and pivoted in blocks, at the end row by row. A
 the claims are verified, and nothing is SOLVED otherwise.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, internal

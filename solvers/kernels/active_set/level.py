@@ -5,8 +5,6 @@ independent, and the least squares problem if they are not. The force lambda_t o
 by back substitution in sum_t lambda_t a_t = -A_k^T w_k, says whether that row holds the level back.
 """
 
-from __future__ import annotations
-
 from hierarchy.jit import as_matrix, inlined
 from solvers.kernels.active_set.tableau import (
     COLUMN,

@@ -16,8 +16,6 @@ The basis vectors of the tableau belong, in this order, to rows that are permane
 `hard` rows held at their side, to the `soft` rows of the level, and to none.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hierarchy.jit import add_multiple, inlined, internal

@@ -11,8 +11,6 @@ W_a^T mu = -W_p^T v_p, level by level from p - 1 up; among dependent rows the sh
 of the series. Each entry of a gradient carries what of it may be rounding: less counts as zero.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hierarchy.jit import inlined, internal

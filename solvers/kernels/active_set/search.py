@@ -8,8 +8,6 @@ raises a strictly convex dual, so in exact arithmetic none recurs; where one doe
 decide, and the search ends.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -12,8 +12,6 @@ Saunders 1974), never a new factorisation. The columns of a row depend on that r
 very different norm do not disturb each other.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

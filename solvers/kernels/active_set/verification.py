@@ -14,8 +14,6 @@ are held against the row of least norm, so a heavy row excuses no light one. So 
 exactly optimal for a problem this close to the data.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -11,8 +11,6 @@ is cut from it, and stays so for the rest of the solve: so all working sets belo
 within `rank_tolerance` of each row.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

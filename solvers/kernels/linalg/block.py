@@ -1,7 +1,5 @@
 """The small problem of one level: min ||M y - r||^2 + lambda^2 ||y||^2, lambda from damping."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inner_product, internal

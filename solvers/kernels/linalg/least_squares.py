@@ -4,8 +4,6 @@ T (r, s) has the columns of the problem as its rows. With the equations in pivot
 first, each residual is as accurate as its own equation (Cox, Higham 1998).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hierarchy.jit import inlined, internal

@@ -5,8 +5,6 @@ them without fastmath. numba does not inline across functions, so each function 
 of rows.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hierarchy.jit import add_multiple, inlined, inner_product, internal

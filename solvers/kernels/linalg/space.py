@@ -10,8 +10,6 @@ learns how much it needs before it uses any of it. Such a tuple of views, made i
 passed to inlined helpers, costs nothing.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from hierarchy.jit import as_integers, as_matrix, inlined
