@@ -1,7 +1,5 @@
 """Whose fault an error is that ended a run."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from traceback import walk_tb
