@@ -48,7 +48,7 @@ def claim(folder: str | Path) -> Path:
     path = _absolute(folder)
     with named(f"output folder {folder}"):
         if not path.parent.exists():
-            atexit.register(_remove_empty, path.parent)  # if nothing is written in the end
+            atexit.register(remove_empty, path.parent)  # if nothing is written in the end
         path.parent.mkdir(parents=True, exist_ok=True)
         with suppress(FileNotFoundError):
             if os.listdir(path):  # noqa: PTH208 - raises for a loop of links, a name too long
@@ -61,7 +61,8 @@ def claim(folder: str | Path) -> Path:
     return path
 
 
-def _remove_empty(folder: Path) -> None:
+def remove_empty(folder: Path) -> None:
+    """Remove a folder if there is nothing in it."""
     with suppress(OSError):
         folder.rmdir()
 

@@ -15,6 +15,7 @@ from scenarios.config.sections.references import inseparable_pairs
 from scenarios.config.validation import doubtful_units
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import check
+from scenarios.recording.blame import blaming
 from solvers import Status, explain, make
 from solvers.explain import is_missed
 
@@ -66,10 +67,11 @@ def contact_warnings(scenario: Scenario) -> tuple[str, ...]:
 
 def _after_one(scenario: Scenario) -> Controller:
     """Return a controller after its first tick."""
-    controller = Controller(scenario)
-    check(scenario.faults, controller.cell.robot)
-    plant = controller.cell.plant
-    controller.command(0.0, plant.q, plant.v)
+    with blaming():
+        controller = Controller(scenario)
+        check(scenario.faults, controller.cell.robot)
+        plant = controller.cell.plant
+        controller.command(0.0, plant.q, plant.v)
     return controller
 
 

@@ -13,6 +13,7 @@ from scenarios.loop.controller import Controller
 from scenarios.loop.faults import Faults, with_room
 from scenarios.loop.recorder import FASTEST, Recorder
 from scenarios.measure.judging import Fates, completed
+from scenarios.recording.blame import blamed, blaming
 from scenarios.recording.recording import Recording
 
 _REPORT_EVERY = 500  # ticks between two calls of `progress`
@@ -24,13 +25,13 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
 
     `progress(done, total)` is called every 500 ticks. A run ends early if it is interrupted
     (Ctrl-C), if its policy stops it, if its plant cannot go on, such as a robot that has fallen, if
-    its state is no longer finite, or if a joint is faster than `recorder.FASTEST`: the Recording
-    then has all ticks so far and says why in `fault`. With `certified`, `solvers.certify` judges
-    every answer after its tick was timed, and the Recording has the verdicts as its signal
-    `certified`; with `control.strictness` it has `moved_by_lower`, see
+    its state is no longer finite, if a joint is faster than `recorder.FASTEST`, or if a tick raises
+    an error: the Recording then has all ticks so far and says why in `fault`. With `certified`,
+    `solvers.certify` judges every answer after its tick was timed, and the Recording has the
+    verdicts as its signal `certified`; with `control.strictness` it has `moved_by_lower`, see
     scenarios.loop.audit.Strictness; `audits` are further checks of that kind. What became of each
     level is judged after the last tick, or, with a camera, after each tick. Raises HierarchyError
-    where the scenario does not fit its robot or resolver.
+    where the scenario does not fit its robot or resolver, or a plug-in fails in a first tick.
     """
     if isinstance(scenario, (str, Path)):
         scenario = load(scenario)
@@ -64,9 +65,10 @@ def rehearsed(scenario: Scenario) -> Cell:
 
     Raises HierarchyError where the scenario does not fit its robot or resolver.
     """
-    controller = Controller(scenario)
-    controller.rehearse()
-    Recorder(controller, 1).write()
+    with blaming():
+        controller = Controller(scenario)
+        controller.rehearse()
+        Recorder(controller, 1).write()
     return controller.cell
 
 
@@ -87,15 +89,18 @@ def _run(controller: Controller, recorder: Recorder, period: float, ticks: int,
 
 def tick(controller: Controller, recorder: Recorder, t: float,
          faults: Faults | None = None) -> str | None:
-    """Command, act and record once at time t [s]; return what is wrong with the state, or None."""
+    """Command, act and record once at time t [s]; return what went wrong, or None."""
     plant = controller.cell.plant
-    if faults is None:
-        plant.act(controller.command(t, plant.q, plant.v))
-    else:
-        plant.act(controller.command(t, *faults.measure(t)))
-    sound = recorder.write()
-    recorder.stamp(controller.clock())
-    recorder.look()
+    try:
+        if faults is None:
+            plant.act(controller.command(t, plant.q, plant.v))
+        else:
+            plant.act(controller.command(t, *faults.measure(t)))
+        sound = recorder.write()
+        recorder.stamp(controller.clock())
+        recorder.look()
+    except (Exception, SystemExit) as error:  # a user's code, which may fail in any way
+        return blamed(error)
     if not sound or (controller.policy.events and not (
             np.isfinite(plant.q).all() and np.isfinite(plant.v).all())):
         return _unsound(controller)

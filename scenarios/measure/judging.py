@@ -13,6 +13,7 @@ from scenarios.cell.build import Cell, build
 from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera
 from scenarios.config.sections.plant import KinematicSection
+from scenarios.recording.blame import blamed
 from scenarios.recording.fate import Fate
 from scenarios.recording.recording import DepthView, Recording
 from solvers.certificate import TOLERANCE
@@ -72,15 +73,16 @@ class Fates:
 def completed(recording: Recording, cell: Cell) -> Recording:
     """Return a run with the states of its levels and, if it has a camera, a depth image.
 
-    `cell` is built from the run's scenario; its state is moved, its plant is not used. Ctrl-C ends
-    it: the levels of the ticks that are left stay UNKNOWN.
+    `cell` is built from the run's scenario; its state is moved, its plant is not used. Ctrl-C or an
+    error ends it: the levels of the ticks that are left stay UNKNOWN.
     """
     try:
         if recording.scenario.sensor.kind == "exact":
             judge(recording, cell)
         return replace(recording, depth=depth_view(recording))
-    except KeyboardInterrupt:
-        return replace(recording, fault=recording.fault or "interrupted after the last tick")
+    except (KeyboardInterrupt, Exception) as error:
+        why = "interrupted" if isinstance(error, KeyboardInterrupt) else blamed(error)
+        return replace(recording, fault=recording.fault or f"{why} after the last tick")
 
 
 def judge(recording: Recording, cell: Cell) -> None:

@@ -14,6 +14,7 @@ from scenarios.measure import safety  # noqa: F401, registers metrics
 from scenarios.measure.metric import NOTHING, Criteria, finite, known, largest, register, true
 from scenarios.measure.metric import Metric as Metric
 from scenarios.recording import listed
+from scenarios.recording.blame import blamed
 from scenarios.recording.recording import Recording
 from solvers import Status
 
@@ -206,8 +207,7 @@ def _found(name: str, recording: Recording, by: Criteria) -> list[Metric]:
     except Exception as error:
         if name not in plugins.own("metrics"):
             raise
-        warnings.warn(f"metrics {name!r} are left out: {type(error).__name__}: {error}",
-                      stacklevel=2)
+        warnings.warn(f"metrics {name!r} are left out: {blamed(error)}", stacklevel=2)
         return []
     return found
 

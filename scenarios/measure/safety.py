@@ -12,6 +12,7 @@ from scenarios.recording.recording import Recording
 
 _ON_IT = 1e-4  # [m] below a distance that still counts as keeping it
 STEPS = {"rad/s": 0.1, "rad/s^2": 50.0, "N m": 5.0}  # from one tick to the next: larger ones count
+_ROUNDING = 1e-9   # of such a step that still counts as not larger, as at a limit of acceleration
 _LOAD = 1.0        # [N] from which a contact counts as loaded
 _AT_LIMIT = 0.999  # share of a torque limit that counts as being at it
 _BEYOND = 0.01     # [rad] by which a joint may press into its stop
@@ -82,7 +83,7 @@ def steps(key: str, label: str, values: Array, unit: str, note: str = "", group:
     step, bound = np.abs(np.diff(values, axis=0)), STEPS[unit]
     yield Metric(f"{key}_step_max", f"{label} step, max", largest(known(step)), unit, group=group,
                  note=note)
-    large = float(np.count_nonzero((step > bound).any(axis=1)))
+    large = float(np.count_nonzero((step > bound * (1.0 + _ROUNDING)).any(axis=1)))
     yield Metric(f"{key}_step_ticks", f"{label} steps above {bound:g} {unit.replace('^2', '²')}",
                  large, "", group=group, note="ticks")
 

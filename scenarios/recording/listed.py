@@ -1,10 +1,11 @@
 """The errors of the tasks that a scenario lists, tick by tick."""
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 
 import numpy as np
 
-from hierarchy import HierarchyError, Robot, State, Task
+from hierarchy import Robot, State, Task
 from hierarchy.problem import Array
 from hierarchy.tasks import Along, CentreOfMass, Position
 from hierarchy.tasks.pose import Pose
@@ -25,7 +26,7 @@ def position_of(name: str) -> str:
 def signals(robot: Robot, tasks: Iterable[Task], t: Array, q: Array, v: Array) -> dict[str, Array]:
     """Return error and position of listed tasks at t (T,) [s], q (T, nq), v (T, n).
 
-    Rows of a state that is not finite are NaN.
+    Rows of a state that is not finite, and those in which a task's error raises, are NaN.
     """
     tasks = tuple(task for task in tasks if not task.of_forces)  # what x is, not where the robot is
     state = State(robot)
@@ -37,7 +38,8 @@ def signals(robot: Robot, tasks: Iterable[Task], t: Array, q: Array, v: Array) -
         if not state.move(t[k], q[k], v[k]):
             continue
         for task, read in zip(tasks, readers, strict=True):
-            found[error_of(task.name)][k] = read()
+            with suppress(Exception):  # a user's code, which must not cost the run
+                found[error_of(task.name)][k] = read()
             if (position := _position(task, state)) is not None:
                 found[position_of(task.name)][k] = position
     return found
@@ -48,7 +50,7 @@ def _error_reader(task: Task, state: State) -> Callable[[], Array | float]:
     try:
         read = task.error_reader(state)
         read()
-    except (AttributeError, TypeError, HierarchyError):
+    except Exception:
         return lambda: np.nan
     return read
 

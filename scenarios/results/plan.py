@@ -20,6 +20,7 @@ from scenarios.config import sections as keys
 from scenarios.config.distributions import Parameters
 from scenarios.config.resolvers import check_names, usable
 from scenarios.config.sampling import changed, drawn
+from scenarios.config.scenario import OWN
 from scenarios.config.sections import Name, Section
 from scenarios.config.validation import validated
 from scenarios.measure.metrics import Metric, measure
@@ -211,6 +212,9 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
             values = drawn(scenario, own, sweep.seed, index) | drawn(
                 scenario, sweep.parameters, sweep.seed, index, f"sweep {sweep.name!r}: parameters")
             what = f"sweep {sweep.name!r}: sample {index} of scenario {scenario.name!r}"
+            refuse("control.resolver" in values and {run.spec for run in columns} != {OWN},
+                   f"{what}: control.resolver is drawn, but the resolvers of the sweep replace it; "
+                   f"give it the one resolver {OWN!r}")
             text = changed(scenario, values, what).to_toml()
             for run in columns:
                 if run.scenario.name == scenario.name:

@@ -159,11 +159,14 @@ def _spread(results: Results, metric: Metric) -> Figure:
 def _limits(rows: list[Array], reach: float = 2.0) -> tuple[float, float]:
     """Return the ends of the values near the middle 90 % of all rows.
 
-    Those are at most `reach` times its width away.
+    Those are at most `reach` times its width away. The ends are at least a hundredth of the
+    values apart: what differs by less is drawn as the same, on an axis without an offset.
     """
     values = np.concatenate(rows)
     low = min(float(np.percentile(row, 5.0)) for row in rows)
     high = max(float(np.percentile(row, 95.0)) for row in rows)
     far = reach * (high - low) or reach * max(abs(high), 1e-12)
     near = values[(values >= low - far) & (values <= high + far)]
-    return float(near.min()), float(max(near.max(), near.min() + 1e-12))
+    low, high = float(near.min()), float(near.max())
+    room = max(0.0, 0.01 * (max(-low, high) or 1.0) - (high - low)) / 2.0
+    return low - room, high + room

@@ -69,6 +69,7 @@ class Store:
             yield
         finally:
             files.unlock(self.file.resolve())
+            files.remove_empty(self.file.parent)  # before any run, such as without a scheduler
 
     def add(self, job: Job, outcome: Outcome) -> None:
         """Append the rows of a run, which are on the disk on return; raises FullError."""

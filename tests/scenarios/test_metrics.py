@@ -58,6 +58,7 @@ SOLVED, FAILED = int(Status.SOLVED), int(Status.NUMERICAL_FAILURE)
     ("acceleration_step_max", {"a": PULSES}, 60.0),
     ("acceleration_step_ticks", {"a": PULSES}, 1.0),  # above 50 rad/s²
     ("velocity_step_ticks", {"a": PULSES}, 0.0),
+    ("acceleration_step_ticks", {"a": PULSES * (50.0 + 1e-14) / 60.0}, 0.0),  # but for rounding
     ("joint_limit_excess", {"q": np.outer(np.eye(5)[1], (2.125, -2.25))}, 0.25),  # beyond 2
     ("ticks_not_solved", {"status": [SOLVED, FAILED, FAILED, SOLVED, SOLVED]}, 2),
     ("active_set_changes", {"active_set": [0, 0, 1, 1, 0]}, 2),

@@ -11,7 +11,7 @@ import pytest
 from refusals import refused
 
 from hierarchy import Robot, plugins
-from scenarios import Scenario, load, simulate
+from scenarios import Scenario, load, load_run, simulate
 from solvers import make
 
 MODULE = '''
@@ -58,6 +58,29 @@ class Weak(KinematicArm):
         super().act(self.share * command)
 '''
 
+BRITTLE = '''
+import numpy as np
+from hierarchy import Task
+
+@register("tasks", "brittle")
+@dataclass(frozen=True)
+class Brittle(Task):
+    since: float
+    fault: str = "1 / 0"
+    name: str = "brittle"
+    gain = 2.0
+    dimension = 1
+
+    def error(self, state):
+        return np.array([eval(self.fault) if state.t >= self.since else 1.0 - state.q[3]])
+
+    def jacobian(self, state):
+        return np.eye(7)[3:4]
+
+    def jacobian_derivative(self, state):
+        return np.zeros((1, 7))
+'''
+
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch, no_plugins):
@@ -93,6 +116,27 @@ def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():
                                rtol=1e-9)
     exact = simulate(scenario.with_resolver("hcod"))
     np.testing.assert_allclose(exact["command"][0], 2.0 * run["command"][0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("fault", "said"), [
+    ("1 / 0", "task 'brittle': ZeroDivisionError: division by zero ({file}, line {line})"),
+    ("np.linalg.inv([[0.0]])[0]", "task 'brittle': LinAlgError: Singular matrix ({file}, line "
+                                  "{line})"),
+    ("np.nan", "task 'brittle', row 0: lower is nan"),
+    ("exit('bye')", "task 'brittle': SystemExit: bye ({file}, line {line})")])
+def test_a_task_that_fails_is_named_and_what_was_run_is_kept(fault, said, command, folder):
+    file, scenario = folder / "doors_of_mine.py", folder / "own.toml"
+    file.write_text(MODULE + BRITTLE)
+    said = said.format(file=file, line=file.read_text().partition("eval")[0].count("\n") + 1)
+    asked = f'[[tasks]]\nkind = "brittle"\nfault = "{fault}"\n'
+    scenario.write_text(scenario.read_text() + asked + "since = 0.1")
+    text = command("run own.toml --plugin doors_of_mine --out a", code=1).err
+    assert text.strip() == f"hierarchy: fault: {said} from tick 10 on (t = 0.100 s)"
+    assert load_run("a").ticks == 10
+    scenario.write_text(scenario.read_text().replace("since = 0.1", "since = 0.0"))
+    for what in ("check", "run"):
+        assert command(f"{what} own.toml --plugin doors_of_mine", code=2).err.strip() == (
+            f"hierarchy: error: own.toml: {said}")
 
 
 def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(command):

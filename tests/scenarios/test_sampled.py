@@ -60,6 +60,7 @@ def table(file):
     ("start.q = { around = [0.1, 0.2] }", {}, "parameters.start.q: scenario 'ellipse': around"),
     ("position.gain = { uniform = [2.0, 1.0] }", {}, "parameters.position.gain.uniform: "),
     ("position.gian = { uniform = [1.0, 2.0] }", {}, "unknown key 'position.gian'; did you"),
+    ('control.resolver = { choice = ["hqp", "sns"] }', {}, "control.resolver is drawn, but the"),
     ("position.damping = { normal = [-9.0, 0.0] }", {}, "sample 0 of scenario 'ellipse'")])
 def test_a_wrong_file_is_refused_before_anything_is_run(parameters, changed, says, tmp_path,
                                                         command):
@@ -138,6 +139,8 @@ def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path, 
         command(*sweep, tmp_path / "b", "--part", part, "--workers", 1)
     assert not (tmp_path / "b" / "results.csv").exists()
     command(*sweep, tmp_path / "b", "--scheduler", "tcp://127.0.0.1:1")
+    command(*sweep, tmp_path / "d", "--scheduler", "nowhere://", code=2)
+    assert not any((tmp_path / "d").iterdir())
     with distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False,
                                   protocol="tcp", dashboard_address=None) as one:
         command(*sweep, tmp_path / "c", "--scheduler", one.scheduler_address)
