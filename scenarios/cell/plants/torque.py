@@ -108,7 +108,7 @@ class TorqueRobot:
     def fault(self) -> str | None:
         """Why the robot cannot go on: it has fallen, or a joint has passed its stop; or None."""
         fallen = self._height - float(self._com[2])
-        if fallen > self._section.fall:
+        if self._floating and fallen > self._section.fall:
             return f"the robot has fallen by {fallen:.2g} m"
         tilt = acos(float(np.clip(self._vertical() @ self._upright, -1.0, 1.0)))
         if tilt > self._section.tilt:
