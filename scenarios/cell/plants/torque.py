@@ -58,6 +58,7 @@ class TorqueRobot:
         joints = [self.model.joint(name) for name in robot.joint_names[int(self._floating):]]
         self._places = [int(joint.qposadr[0]) for joint in joints]
         self._rates = [*range(robot.actuated), *(int(joint.dofadr[0]) for joint in joints)]
+        self._drives = self.model.dof_armature[self._rates] - robot.model.armature
         self._write()
         mujoco.mj_forward(self.model, self.data)
         delay = whole_periods(section.delay, period, "plant.delay")
@@ -98,7 +99,7 @@ class TorqueRobot:
         self._read()
         if self._mechanism:  # MuJoCo keeps it to some 1e-6
             self.q[:] = self._mechanism.closed(self.q)
-            self.v[:] = self._mechanism.moving(self.q, self.v)
+            self.v[:] = self._mechanism.moving(self.q, self.v, self._drives)
             self._write()
         self.a[:] = (self.v - before) / self._period
         self._com[:] = self.data.subtree_com[0]
