@@ -96,14 +96,14 @@ class Controller:
         self._sense(troubles)
         if self._outside > 0.0:
             begin, moved = begin + self._outside, moved + self._outside
-        x = self._answer(troubles)
+        x, forces = self._answer(troubles), None
         if cell_contacts is not None:
-            x = cell_contacts.torques(state, x)
+            x, forces = cell_contacts.torques(state, x), x[state.n:]
         resolved = clock()
         self.stamps = (begin, moved, self._written, resolved)
         if resolved - begin > self._deadline:
             troubles.append("overrun")
-        self.sent = sent = self.policy.choose(t, troubles, x, state.v)
+        self.sent = sent = self.policy.choose(t, troubles, x, state.v, forces)
         if self.level != "acceleration":
             state.commanded = sent
         if cell_contacts is not None and self.answered:
@@ -139,7 +139,8 @@ class Controller:
         """Return q (nq,), v (n,) after `dt` [s] under the last command sent."""
         state, x = self.cell.state, self.sent
         if self.level == "torque":
-            x = self.resolution.x[:state.n]
+            slowing = self.policy.slowing
+            x = -slowing * state.v if slowing else self.resolution.x[:state.n]
         if self.level == "velocity":
             return state.robot.integrate(state.q, x * dt), x
         return state.robot.integrate(state.q, state.v * dt + x * (dt * dt / 2)), state.v + x * dt

@@ -7,10 +7,12 @@ from typing import final
 
 import numpy as np
 
+from hierarchy.contacts import Contacts
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level
+from hierarchy.task import Level, Rows
+from hierarchy.tasks import BaseDynamics
 from scenarios.cell.build import Cell
 from scenarios.config.sections.control import ControlSection, PolicySection
 
@@ -25,31 +27,36 @@ class Policy:
     """Chooses the command of each tick.
 
     `clamp` moves a command (n,) to the nearest one that the robot's limits allow in this tick; None
-    for a robot without limits. `damping` [N m s/rad] of each joint brakes at level "torque". After
-    `choose`: `events` are the (kind, action) pairs of the tick; `fault` is the reason for ending
-    the run, once a "stop" was requested, and `stopped` is whether the robot has come to rest since
-    then, or at level "torque" is to be left to itself.
+    for a robot without limits. At level "torque" `torques` returns those, within their limits, of
+    accelerations (n,) and contact forces, None for none. After `choose`: `events` are the (kind,
+    action) pairs of the tick; `slowing` [1/s] is the deceleration per velocity where it brakes,
+    else 0; `fault` is the reason for ending the run, once a "stop" was requested, and `stopped` is
+    whether the robot has come to rest since then, or at level "torque" is to be left to itself.
     """
 
     def __init__(self, section: PolicySection, level: Level, period: float,
                  clamp: Callable[[Array], Array] | None = None,
-                 damping: Array | None = None) -> None:
+                 torques: Callable[[Array, Array | None], Array] | None = None) -> None:
         self.events: Sequence[tuple[str, str]] = ()
         self.fault: str | None = None
-        self.stopped = False
+        self.stopped, self.slowing = False, 0.0
         self._section, self._clamp, self._period = section, clamp, period
-        self._acceleration, self._damping = level == "acceleration", damping
+        self._acceleration, self._torques = level == "acceleration", torques
         self._good: Array | None = None
+        self._forces: Array | None = None
 
-    def choose(self, t: float, troubles: Sequence[str], x: Array, v: Array) -> Array:
+    def choose(self, t: float, troubles: Sequence[str], x: Array, v: Array,
+               forces: Array | None = None) -> Array:
         """Return the command (n,) to send at time t [s].
 
         `troubles` are the kinds of trouble of the tick, x (n,) the answer, v (n,) the joint
-        velocity as far as known. The command is finite and within the limits.
+        velocity as far as known, `forces` those planned with x. The command is finite and within
+        the limits.
         """
+        self.slowing = 0.0
         if troubles or self.fault is not None or not finite(x):
             return self._otherwise(t, troubles, x, v)
-        self.events, self._held = (), 0
+        self.events, self._held, self._forces = (), 0, forces
         self._good = command = x if self._clamp is None else self._within_limits(x)
         return command
 
@@ -65,8 +72,7 @@ class Policy:
             return self._within_limits(self._good)
         if action == "stop" and self.fault is None:
             self.fault = f"stopped by its policy at t = {t:.3f} s: {', '.join(troubles)}"
-        return self._slower(action, v) if self._damping is None else self._damped(
-            action, v, self._damping)
+        return self._slower(action, v)
 
     def _action(self, troubles: Sequence[str]) -> str:
         if self.fault is not None:
@@ -76,10 +82,16 @@ class Policy:
         return "brake" if action == "hold" and spent else action
 
     def _slower(self, action: str, v: Array) -> Array:
-        """Return the command that brings v toward zero: at once for "stop", else at `_BRAKE`."""
-        rate = 1.0 / self._period
-        if action == "brake":
-            rate = min(rate, _BRAKE)
+        """Return the command that brings v toward zero: at once for "stop", else at `_BRAKE`.
+
+        At level "torque" that is under the last good contact forces, and "stop" ends the run.
+        """
+        rate = self.slowing = 1.0 / self._period
+        if action == "brake" or self._torques is not None:
+            rate = self.slowing = min(rate, _BRAKE)
+        if self._torques is not None:
+            self.stopped = action == "stop"
+            return self._torques(-rate * v, self._forces)
         command = -rate * v if self._acceleration else np.zeros_like(v)
         if self._clamp is not None:
             command = self._clamp(command)
@@ -87,12 +99,6 @@ class Policy:
             after = v + command * self._period if self._acceleration else command
             self.stopped = bool(np.abs(after).max() <= _AT_REST)
         return command
-
-    def _damped(self, action: str, v: Array, damping: Array) -> Array:
-        """Return the last good torques and a damping of the joints; "stop" ends the run."""
-        good = np.zeros_like(damping) if self._good is None else self._good
-        self.stopped = action == "stop"
-        return self._within_limits(good - damping * v[len(v) - len(damping):])
 
     def _within_limits(self, x: Array) -> Array:
         """Return x moved within the limits; a change is an event."""
@@ -106,16 +112,35 @@ class Policy:
 
 def policy_of(cell: Cell, control: ControlSection) -> Policy:
     """Return the policy of a cell, with the limits of its robot."""
-    if control.level != "torque":
+    if cell.contacts is None:
         joints = cell.tasks.limits
         clamp = partial(joints.clamp, cell.state, control.level) if joints else None
         return Policy(control.policy, control.level, control.period, clamp)
     limits, limit = cell.scenario.limits, cell.torque_limit
-    speed = cell.robot.velocity_limit[cell.robot.actuated:]
-    step = (limits and not cell.scenario.forces_in_stack and limits.torque_step) or inf
+    step = (limits and limits.torque_step) or inf
+    soft = inf if cell.scenario.forces_in_stack else step  # a level of the stack keeps the step
     return Policy(control.policy, control.level, control.period,
-                  partial(_clamped, cell.state, limit, step),
-                  np.where(np.isfinite(limit), limit, 0.0) / speed)
+                  partial(_clamped, cell.state, limit, soft),
+                  _slowed(cell.state, cell.contacts, partial(_clamped, cell.state, limit, step)))
+
+
+def _slowed(state: State, contacts: Contacts, clamp: Callable[[Array], Array]
+            ) -> Callable[[Array, Array | None], Array]:
+    """Return a function for the torques of joint accelerations under contact forces, clamped.
+
+    A floating base accelerates as the forces make it, whatever the first entries ask for.
+    """
+    base, n = contacts.robot.actuated, state.n
+    x, rows = np.zeros(contacts.unknowns), Rows.empty(base, contacts.unknowns)
+    write = BaseDynamics(contacts).writer(state, "torque", rows)
+
+    def torques(accelerations: Array, forces: Array | None) -> Array:
+        write()
+        x[:n], x[n:] = accelerations, 0.0 if forces is None else forces
+        x[:base] = np.linalg.solve(rows.A[:, :base], rows.lower - rows.A[:, base:] @ x[base:])
+        return clamp(contacts.torques(state, x))
+
+    return torques
 
 
 def _clamped(state: State, limit: Array, step: float, torques: Array) -> Array:

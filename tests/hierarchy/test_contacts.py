@@ -112,6 +112,16 @@ def test_an_open_contact_has_no_force_and_is_free_to_move(faces):
         assert not rows.any()
 
 
+@pytest.mark.parametrize("task", [tasks.BaseDynamics(opening()), tasks.TorqueLimits(
+    ROBOT, contacts=opening()), tasks.TorqueStep(ROBOT, 1.0, contacts=opening())])
+def test_an_open_contact_moves_neither_the_base_nor_a_motor(task):
+    """An open foot pushed with 1.5 N to spare motors that were too weak."""
+    closed, opened = (task.rows(State.at(ROBOT, ROBOT.rest, t=t)) for t in (0.0, 1.5))
+    closed[0][:, opening().blocks["right_foot"]] = 0.0
+    for now, plain in zip(opened, closed, strict=True):
+        np.testing.assert_array_equal(now, plain)
+
+
 @pytest.mark.parametrize("largest", [100.0, 1e5, np.inf])
 def test_the_load_of_a_sole_falls_in_its_ramp_from_what_it_carried(largest):
     """The last row has all of its normal force."""

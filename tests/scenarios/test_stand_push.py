@@ -68,18 +68,35 @@ class Failing:
 
 
 @pytest.mark.parametrize(("action", "patience"), [("hold", 10), ("brake", 0)])
-def test_without_an_answer_the_last_torques_are_held_or_damped(action, patience):
+def test_without_an_answer_the_last_torques_are_held_or_joints_slowed_down(action, patience):
     scenario = SHORT.with_changes({"control.policy.backend_failure": action})
     controller = Controller(scenario, resolver=Failing(Status.BACKEND_FAILURE, 8))
     recorder = Recorder(controller, 10)
     for k in range(10):
         assert tick(controller, recorder, k * 1e-3) is None
     run = recorder.finish(scenario, None)
-    limit, fastest = run["torque_limit"], run["velocity_limit"][6:]
-    damping = np.zeros(30) if action == "hold" else limit / fastest
-    expected = np.clip(run["command"][7] - damping * run["v"][9, 6:], -limit, limit)
-    np.testing.assert_allclose(run["command"][9], expected)
+    contacts, state = controller.cell.contacts, controller.cell.state
+    M, h = state.dynamics
+    efforts = contacts.jacobian(state).T @ run["planned_force"][7].ravel() - h
+    efforts[6:] += run["command"][9]
+    slowed, held = np.linalg.solve(M, efforts)[6:], (run["command"][9] == run["command"][7]).all()
+    assert held if action == "hold" else np.allclose(slowed, -10.0 * state.v[6:], atol=1e-8)
     assert run.events[-1] == (9, "backend_failure", action)
+
+
+@pytest.mark.parametrize("kind", ["stale", "status"])
+def test_an_arm_that_moves_brakes_to_rest_at_its_torque_step(kind):
+    """A damping by the velocity limits, at the last velocity known, drove a wrist to 139 rad/s."""
+    status = {"status": "numerical_failure"} if kind == "status" else {}
+    run = simulate(load("wipe", {
+        "control.duration": 0.8, "control.policy.stale_after": 0.0, "limits.torque_step": 1.0,
+        "faults": [{"kind": kind, "at": 0.4, "duration": 0.5, **status}]}))
+    speed = np.linalg.norm(np.diff(run["com"], axis=0), axis=1)[400:]  # true, also if v is stale
+    assert run.fault is None
+    assert run.events[-1] == (799, run.events[0].kind, "brake")
+    assert speed.max() < 1.05 * speed[0]
+    assert speed[-1] < 0.35 * speed[0]
+    assert np.abs(np.diff(run["command"][399:], axis=0)).max() < 1.0 + 1e-9
 
 
 # Not of robots of packages: the certificate rejects 13 of 150 answers of stand-g1, and 2 of

@@ -9,7 +9,7 @@ import pytest
 from refusals import refused
 from scipy.spatial.transform import Rotation
 from standing import IDEAL, ROBOT, accelerations, feet, moving_state
-from urdf_text import INERTIAL, joint, link
+from urdf_text import INERTIAL, joint, link, urdf
 
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
@@ -109,6 +109,19 @@ def test_a_joint_stops_at_its_limit_unless_it_has_no_stop():
     torque, limit = 20.0 * np.eye(robot.n)[2], robot.upper[2]
     assert driven(with_stops, torque, 2.0).q[2] < limit + 0.1
     assert driven(without, torque, 2.0).q[2] > limit + 0.5
+
+
+def test_a_continuous_joint_has_no_stop_and_an_arm_that_sinks_does_not_fall(tmp_path):
+    """The limits of its cosine, 1.01, were those of its angle."""
+    (tmp_path / "wheel.urdf").write_text(urdf(link("base"), link("arm"), joint(
+        "only", "continuous", "base", "arm", "")))
+    robot = Robot.load(tmp_path / "wheel.urdf")
+    plant = TorqueRobot(robot, Contacts(robot, ()), robot.rest, np.full(1, 3.0),
+                        section=plant_with())
+    for _ in range(1000):
+        plant.act(State.at(robot, plant.q).bias_effort())
+    assert robot.vector(plant.q) > 2.9
+    assert plant.fault is None
 
 
 def test_torques_follow_with_the_bandwidth_of_the_motors():

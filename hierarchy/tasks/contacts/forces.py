@@ -181,10 +181,8 @@ class TorqueRows(JointRows):
 
     def write_within(self, limit: Array, state: State, rows: Rows) -> Writer:
         """Return what writes rows of torques from -limit to limit (n,) [N m or N]."""
-        M, h = state.dynamics
         contacts = Contacts(self.robot) if self.contacts is None else self.contacts
-        parameters = M, h, state.kinematics, contacts.points, self.robot.actuated
-        return bind(write_torques, parameters, limit, *rows)
+        return _efforts(contacts, self.robot.actuated, limit, state, rows)
 
 
 @dataclass(frozen=True)
@@ -264,6 +262,14 @@ class TorqueStep(TorqueRows):
         return write
 
 
+def _efforts(contacts: Contacts, first: int, limit: Array, state: State, rows: Rows) -> Writer:
+    """Return what writes M a + h - J_c^T f from -limit to limit; open contacts transmit nothing."""
+    M, h = state.dynamics
+    write_rows = bind(write_torques, (M, h, state.kinematics, contacts.points, first), limit, *rows)
+    forces = [(rows.A[:, contacts.blocks[contact.name]],) for contact in contacts.contacts]
+    return zero_while_open(write_rows, state, contacts, forces)
+
+
 @compiled
 def write_torques(parameters, limit, A, lower, upper):
     """Write rows of M a + h - J_c^T f from -limit to limit, of the velocities from `first` on."""
@@ -295,9 +301,4 @@ class BaseDynamics(NamedRows, ForceTask):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        M, h = state.dynamics
-        parameters = M, h, state.kinematics, self.contacts.points, 0
-        write_rows = bind(write_torques, parameters, np.zeros(self.dimension), *rows)
-        forces = [(rows.A[:, self.contacts.blocks[contact.name]],)
-                  for contact in self.contacts.contacts]
-        return zero_while_open(write_rows, state, self.contacts, forces)
+        return _efforts(self.contacts, 0, np.zeros(self.dimension), state, rows)

@@ -177,13 +177,23 @@ class Mechanism:
         error = np.abs(self._rows(self._robot.normalised(q))[1])
         return float(error.max()), self._tasks[0].whole.row_names[int(error.argmax())]
 
-    def moving(self, q: ArrayLike, v: Array) -> Array:
-        """Return the velocity (n,) nearest to v that it allows at q."""
+    def moving(self, q: ArrayLike, v: Array, drives: Array | None = None) -> Array:
+        """Return the velocity (n,) nearest to v that it allows at q.
+
+        With the inertia of `drives` (n,) [kg m^2 or kg] it is nearest in kinetic energy, as forces
+        of constraint make it: they do no work.
+        """
         if not self:
             return v
         J = self._rows(self._robot.normalised(q))[0]
         beside = J @ v
-        return v - self._solved(J, beside, 0.0) if np.abs(beside).max() > _EXACT else v
+        if np.abs(beside).max() <= _EXACT:
+            return v
+        if drives is None:
+            return v - self._solved(J, beside, 0.0)
+        V = self._tasks[0].parts(J, beside).V
+        given = np.linalg.solve(self._state.mass_matrix() + np.diag(drives), V.T)
+        return np.asarray(v - given @ np.linalg.solve(V @ given, V @ v))
 
     def bend(self, q: ArrayLike, v: Array, period: float) -> Array:
         """Return what to add to the sides of the first k rows of `model_rows` at q (k,).

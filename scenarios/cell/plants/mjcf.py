@@ -91,15 +91,17 @@ def each(value: float | tuple[float, ...], n: int, name: str) -> Array:
     return values
 
 
-def _stop(robot: Robot, k: int, q: Array) -> dict[str, ArrayLike]:
-    """Return the limits of coordinate k; where q (nq,) is beyond one, its stop is there."""
-    range_ = min(robot.lower[k], q[k]), max(robot.upper[k], q[k])
-    return {"limited": "true", "range": range_} if np.isfinite(range_).all() else {}
+def _stops(robot: Robot, q: Array) -> list[dict[str, ArrayLike]]:
+    """Return the limits of each velocity (n); where q (nq,) is beyond one, its stop is there."""
+    (lower, upper), at = robot.position_limits(), robot.vector(q)
+    ranges = np.array([np.minimum(lower, at), np.maximum(upper, at)]).T
+    return [{"limited": "true", "range": range_} if np.isfinite(range_).all() else {}
+            for range_ in ranges]
 
 
 def _arm(world: Element, robot: Robot, q: Array, joints: JointsSection,
          servo: ServoSection) -> None:
-    elements = [world]
+    elements, stops = [world], _stops(robot, q)
     friction, damping, armature = (
         each(getattr(joints, key), robot.n, f"plant.joints.{key}")
         for key in ("friction", "damping", "armature"))
@@ -110,7 +112,7 @@ def _arm(world: Element, robot: Robot, q: Array, joints: JointsSection,
                    } if np.isfinite(effort) else {}
         add(elements[-1], "joint", name=body.name, type="hinge", axis=(0, 0, 1),
             frictionloss=friction[i], damping=damping[i], armature=armature[i],
-            actuatorgravcomp="true", **_stop(robot, i, q), **efforts)
+            actuatorgravcomp="true", **stops[i], **efforts)
     for capsule in robot.capsules:
         add(elements[capsule.joint], "geom", name=capsule.name, type="capsule",
             fromto=(*capsule.start, *capsule.end), size=capsule.radius, contype="1",
@@ -180,6 +182,7 @@ def _capsules(elements: list[Element], contact: Element, robot: Robot, q: Array)
 def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> list[Element]:
     of_joint, own, elements = _axes(robot), robot.model.armature, [world]
     friction, damping, armature = (_of_drives(robot, key, getattr(floor, key)) for key in _DRIVE)
+    stops = _stops(robot, q) if floor.stops else [{}] * robot.n
     for i, body in enumerate(robot.bodies()):
         element = add_body(elements[body.parent], body, _LEAST)
         elements.append(element)
@@ -187,9 +190,8 @@ def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> lis
             add(element, "joint", type="free", armature=own[0])
             continue
         kind, axis, v = of_joint[i + 1]
-        stop = _stop(robot, robot.coordinates[v], q) if floor.stops else {}
         add(element, "joint", name=body.name, type=kind, axis=axis, damping=damping[v],
-            armature=own[v] + armature[v], frictionloss=friction[v], **stop)
+            armature=own[v] + armature[v], frictionloss=friction[v], **stops[v])
     return elements
 
 
@@ -255,8 +257,8 @@ class Stops:
     def __init__(self, robot: Robot, q: Array, beyond: float) -> None:
         self._names, self._units = robot.velocity_names, robot.velocity_units
         self._of, self._beyond = robot.coordinates, beyond
-        self._lower = np.minimum(robot.lower, q)[self._of]
-        self._upper = np.maximum(robot.upper, q)[self._of]
+        lower, upper = robot.position_limits()
+        self._lower, self._upper = np.minimum(lower, q[self._of]), np.maximum(upper, q[self._of])
 
     def passed(self, q: Array) -> str | None:
         """Return which joint at q (nq,) is farthest beyond its stop, None if none is too far."""

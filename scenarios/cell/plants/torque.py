@@ -56,6 +56,7 @@ class TorqueRobot:
         joints = [self.model.joint(name) for name in robot.joint_names[int(self._floating):]]
         self._places = [int(joint.qposadr[0]) for joint in joints]
         self._rates = [*range(robot.actuated), *(int(joint.dofadr[0]) for joint in joints)]
+        self._drives = self.model.dof_armature[self._rates] - robot.model.armature
         self._write()
         mujoco.mj_forward(self.model, self.data)
         delay = whole_periods(section.delay, period, "plant.delay")
@@ -96,7 +97,7 @@ class TorqueRobot:
         self._read()
         if self._mechanism:  # MuJoCo keeps it to some 1e-6
             self.q[:] = self._mechanism.closed(self.q)
-            self.v[:] = self._mechanism.moving(self.q, self.v)
+            self.v[:] = self._mechanism.moving(self.q, self.v, self._drives)
             self._write()
         self.a[:] = (self.v - before) / self._period
         self._com[:] = self.data.subtree_com[0]
@@ -106,7 +107,7 @@ class TorqueRobot:
     def fault(self) -> str | None:
         """Why the robot cannot go on: it has fallen, or a joint has passed its stop; or None."""
         fallen = self._height - float(self._com[2])
-        if fallen > self._section.fall:
+        if self._floating and fallen > self._section.fall:
             return f"the robot has fallen by {fallen:.2g} m"
         tilt = acos(float(np.clip(self._vertical() @ self._upright, -1.0, 1.0)))
         if tilt > self._section.tilt:

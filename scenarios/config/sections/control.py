@@ -23,9 +23,9 @@ class PolicySection(keys.Section):
 
     "use": send the answer, if any. "hold": repeat the last good command for at most `patience`
     ticks, then brake. "brake": decelerate to rest. "stop": brake as fast as the limits allow and
-    end the run with a fault. The last in this order wins. At level "torque" braking sends the last
-    good torques and a damping, a joint's effort limit at its velocity limit; "stop" ends the run at
-    once.
+    end the run with a fault. The last in this order wins. At level "torque" braking sends the
+    torques that slow all joints down at 10 / s under the last good contact forces; "stop" ends the
+    run at once.
     """
 
     iteration_limit: AnswerPolicy = "brake"  #: Status of the resolver: too many iterations.

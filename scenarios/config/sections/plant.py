@@ -151,7 +151,7 @@ class TorqueSection(AnyPlant):
     stops: keys.Flag = True  #: Whether joints have a stop at their position limit.
     self_collision: keys.Flag = False
     """Whether capsules collide, except neighbours and those that overlap initially."""
-    fall: keys.Length = 0.2  #: How far the centre of mass may sink before a fault.
+    fall: keys.Length = 0.2  #: How far a floating base's centre of mass may sink before a fault.
     tilt: keys.PositiveAngle = 1.0  #: How far the base may tilt before a fault.
     beyond_stop: keys.PositiveAngle = 0.2  #: How far a joint may pass its limit before a fault.
     pushes: tuple[PushSection, ...] = ()  #: Forces that disturb the robot.
