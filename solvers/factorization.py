@@ -277,9 +277,9 @@ class Factorization:
 
     def _checked(self, name: str, A: ArrayLike) -> Array:
         block = readable(f"{name}: A", A)
-        if block.ndim != 2 or block.shape[1] != self._n or self._n < 1:
-            raise HierarchyError(f"{name}: A has shape {block.shape}, expected (rows, "
-                                 f"{self._n if self._n > 0 else 'n'})")
+        if block.ndim != 2 or block.shape[1] != self._n or not self._n:
+            raise HierarchyError(f"{name}: A has shape {block.shape}, expected "
+                                 f"(rows, {self._n or 'n'})")
         check_rows(name, block, np.zeros(len(block)), np.zeros(len(block)))
         return block
 

@@ -54,7 +54,6 @@ class Controller:
         unknowns = cell.robot.n if cell.contacts is None else cell.contacts.unknowns
         self.resolution = self._unanswered = Resolution(np.zeros(unknowns),
                                                         Status.NUMERICAL_FAILURE, 0)
-        self.stamps = (0.0, 0.0, 0.0, 0.0)
         self._memory: Any = None
         self._outside = 0.0
         self._deadline = control.policy.deadline or inf

@@ -18,7 +18,7 @@ from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.sampling import changed, drawn
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import simulate
-from solvers import Status, certify, make
+from solvers import certify, make
 from solvers.problems import family as make_problem
 from solvers.problems.files import FRESH, Collection, Head, read
 from solvers.proof import Proof
@@ -73,9 +73,8 @@ def answer(h: Hierarchy) -> Array | None:
     Where rows are parallel up to the angle at which they count as dependent, there are two.
     """
     tried = [make("hcod"), *(make("hqp", backend=name) for name in BACKENDS if installed(name))]
-    found = [res.x for res in (resolver.solve(h) for resolver in tried)
-             if res.status in (Status.SOLVED, Status.INACCURATE)
-             and certify(h, res.x, _NEAREST).certified]
+    found = [x for x in (resolver.solve(h).x for resolver in tried)
+             if certify(h, x, _NEAREST).certified]
     if not found or any(np.abs(x - found[0]).max() > _AGREE * (1.0 + np.abs(x).max())
                         for x in found):
         return None

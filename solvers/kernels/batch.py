@@ -7,7 +7,7 @@ solves anything if `work` is too small.
 """
 
 from hierarchy.jit import unlocked
-from solvers.kernels.active_set.exact import DAMPING, solve, work_size
+from solvers.kernels.active_set.exact import solve
 from solvers.kernels.bounds import solve_within_bounds
 from solvers.kernels.linalg.space import assign
 from solvers.kernels.merged import merged
@@ -30,11 +30,11 @@ def batch_within_bounds(problems, x, codes, records, settings, which, work):
 def batch_exact(problems, x, codes, records, settings, which, work):
     """Solve the problems `which` with the exact kernel."""
     A, lower, upper, sizes, references = problems
-    if work_size(A.shape[2], A.shape[1], sizes.size, settings[DAMPING] > 0.0) > work.size:
-        return TOO_SMALL
     for p in which:
         assign(x[p], references[p])
         codes[p] = solve(A[p], lower[p], upper[p], sizes, x[p], records[p], settings, work)
+        if codes[p] == TOO_SMALL:
+            return TOO_SMALL
     return SOLVED
 
 

@@ -135,11 +135,11 @@ def test_what_a_robot_is_without_is_said(load, changed, said):
 
 
 def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
-    parts = (*map(link, ("base", "wrist", "tool")), joint("tool", "revolute", "base", "wrist"),
-             joint("mount", "fixed", "wrist", "tool", "", "", PLACED))
+    parts = (*map(link, ("base", "wrist", "tool")), joint("mount", "revolute", "wrist", "tool"),
+             joint("tool", "fixed", "base", "wrist", "", "", PLACED))
     robot = load(*parts)
-    refused("2 frames are called 'tool', a joint on the body of joint 'tool' and a link on the body"
-            " of joint 'tool'", robot.frame, "tool", error=RobotError)
+    refused("2 frames are called 'tool', a fixed joint fixed to the world and a link on the body of"
+            " joint 'mount'", robot.frame, "tool", error=RobotError)
     assert "tool" not in robot.frame_names
     assert robot.end_effector == "mount", "not the tool, which is two"
     parts = (*map(link, ("base", "gripper", "last")), joint("far", "revolute", "gripper", "last"),

@@ -125,8 +125,12 @@ def test_what_was_solved_and_wrong_is_right_or_inaccurate(name, kind, seeds):
         assert res.status is Status.INACCURATE or is_right(h, res.x), seed
 
 
-def test_rows_violated_by_a_little_on_the_way_are_assumed_to_hold_nearby():
-    assert make("hqp").solve(problems.structured(10, ("chain",))).status is Status.SOLVED
+@pytest.mark.parametrize(("name", "seed", "kinds"), [
+    ("hqp", 10, ["chain"]),  # rows violated by a little on the way are assumed to hold nearby
+    ("hqp", 5000281, []),  # |x| = 1e8
+    ("hcod", 7102002, ["nearly_parallel"])])  # rows are cut more than once
+def test_what_rounding_makes_hard_is_solved(name, seed, kinds):
+    assert make(name).solve(problems.structured(seed, kinds)).status is Status.SOLVED
 
 
 def test_a_row_that_holds_a_level_back_by_its_difference_from_others_is_certified():
