@@ -24,6 +24,8 @@ def test_an_answer_found_by_hand():
     assert res.status is Status.SOLVED
     assert (res.active.tolist(), res.holds_back[:2].tolist()) == ([1, 1, 2, 2, 2], [1, 1])
     assert res.multipliers[:2] == pytest.approx([1.5, 0.75])
+    h = Hierarchy.from_levels([([[1.0, 0.5]], [3.0]), (np.eye(2), [-9.0, 2.0], [9.0, 9.0])])
+    assert make("hcod", damping=0.1).solve(h).multipliers[1] == 0.0, "of a row that does not act"
 
 
 @pytest.mark.parametrize("limit", [1, 3, 6, 11])
