@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from ast import literal_eval
 from collections.abc import Callable, Iterator
 from dataclasses import Field, fields, is_dataclass
-from functools import wraps
+from functools import cache, wraps
 from inspect import formatannotation
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
@@ -250,10 +250,8 @@ def check_parts(task: Task) -> None:
     refuse(not isinstance(task.name, str) or not task.name, f"{type(task).__name__}: name: "
            f"expected a text, got {brief(task.name)}")
     check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
-    parts: tuple[Field[Any], ...] = fields(task) if is_dataclass(task) else ()
-    for part in parts:
+    for part, written in _typed(type(task)):
         value: Any = getattr(task, part.name, None)
-        written = _written(part)
         named = written.removesuffix(" | None")
         if not part.init or (value is None and named != written):
             continue
@@ -275,10 +273,12 @@ def check_parts(task: Task) -> None:
                f"task {task.name!r}: needs at least one control point")
 
 
-def _written(part: Field[Any]) -> str:
-    """Return the type of a field as text, without modules."""
-    text = part.type if isinstance(part.type, str) else formatannotation(part.type)
-    return re.sub(r"\b(\w+\.)+", "", text)
+@cache
+def _typed(kind: type[Task]) -> list[tuple[Field[Any], str]]:
+    """Return the fields of a dataclass with their types as text, without modules."""
+    parts: tuple[Field[Any], ...] = fields(kind) if is_dataclass(kind) else ()
+    return [(part, re.sub(r"\b(\w+\.)+", "", part.type if isinstance(part.type, str) else
+                          formatannotation(part.type))) for part in parts]
 
 
 def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:
