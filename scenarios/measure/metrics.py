@@ -26,7 +26,7 @@ _DONE = {"brake": "Ticks braked", "hold": "Ticks with the last command held",
          "use": "Ticks with trouble, answer sent", "stop": "Ticks that stopped the run",
          "clamp": "Ticks clamped to the limits"}
 PARTS = {"time_tick": "Whole tick", "time_kinematics": "Kinematics", "time_rows": "Rows",
-          "time_resolve": "Resolve"}
+         "time_resolve": "Resolve"}
 _PERCENTILES = {"median": (50.0, "median"), "p95": (95.0, "95 %"), "p999": (99.9, "99.9 %")}
 
 _GROUPS = ("Tracking", "Safety", "Contacts", "Torques", "Levels", "Singularities", "Switching",
