@@ -92,6 +92,7 @@ def test_a_push_gives_the_whole_robot_its_momentum():
 
 def plant(**keys):
     robot = Robot.named("dual_arm")
+    robot.lower[2] = -np.inf  # and a stop above
     q = robot.configuration(np.zeros(robot.n))
     return robot, TorqueRobot(robot, Contacts(robot, ()), q, section=plant_with(
         beyond_stop=1e3, fall=1e3, tilt=3.0, **keys))

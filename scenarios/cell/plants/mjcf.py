@@ -25,6 +25,7 @@ _LEAST = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
 _SKIN = 0.3             # friction of a link on another
 # Of a joint's effort limit, as gears and motors grow with it; plausible, not identified.
 _DRIVE = {"joint_friction": 0.005, "joint_damping": 0.002, "armature": 0.0001}
+_FAR = 1e9           # [rad or m] where the stop of a joint without one is
 _THICKNESS = 0.01    # [m] half of that of a sole
 _SLIDING = 0.15      # [s] time constant of the friction of what slides
 BALL = 0.001         # [m] radius of a point that touches
@@ -95,8 +96,8 @@ def _stops(robot: Robot, q: Array) -> list[dict[str, ArrayLike]]:
     """Return the limits of each velocity (n); where q (nq,) is beyond one, its stop is there."""
     (lower, upper), at = robot.position_limits(), robot.vector(q)
     ranges = np.array([np.minimum(lower, at), np.maximum(upper, at)]).T
-    return [{"limited": "true", "range": range_} if np.isfinite(range_).all() else {}
-            for range_ in ranges]
+    return [{"limited": "true", "range": np.nan_to_num(range_, posinf=_FAR, neginf=-_FAR)}
+            if np.isfinite(range_).any() else {} for range_ in ranges]
 
 
 def _arm(world: Element, robot: Robot, q: Array, joints: JointsSection,
