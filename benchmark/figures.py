@@ -83,8 +83,10 @@ def _dot(ax: Axes, row: Row, look: Look, mark: str) -> None:
 def curves(at: Array, found: Mapping[str, Array], words: str) -> Figure:
     """Return shares of problems solved over a logarithmic axis; words : its label.
 
-    One panel for each kind of entrants, with a colour for each and dashes for its settings.
+    One panel for each kind of entrants, with a colour for each and dashes for its settings. Where a
+    panel is of one kind, which has one colour elsewhere, they have others.
     """
+    style = looks(found)
     kinds: dict[str, list[str]] = {}
     for label in found:
         first = label.partition(" ")[0]
@@ -96,8 +98,10 @@ def curves(at: Array, found: Mapping[str, Array], words: str) -> Figure:
             names = list(dict.fromkeys(label.partition(", ")[0] for label in labels))
             for label in labels:
                 name, _, setting = label.partition(", ")
-                ax.plot(at, 100.0 * found[label], label=label, linewidth=1.2,
-                        color=_HUES(names.index(name) % _HUES.N), linestyle=_DASHES[setting])
+                colour, line = (_HUES(names.index(name) % _HUES.N), _DASHES[setting]
+                                ) if kind in _KINDS else (style[label].colour, style[label].line)
+                ax.plot(at, 100.0 * found[label], label=label, linewidth=1.2, color=colour,
+                        linestyle=line)
             drawing.make_logarithmic(ax, "x")
             ax.set(title=kind if len(kinds) > 1 else "", xlim=(at[0], at[-1]), ylim=(0.0, 102.0))
             ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), fontsize=7.0)
