@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from textwrap import fill
 from typing import Any
 
 import matplotlib
@@ -21,6 +22,7 @@ from scenarios.draw.figures.palette import Look, looks
 
 _LEAST, _MOST = 1e-17, 1e-2  # errors beyond are drawn at the edge
 _SHADES = LinearSegmentedColormap.from_list("share", ["#b42318", "#f0c66b", "#e9f4ee", "#7cc4a0"])
+_NARROWEST = 5.0             # [inch], for a page that scales figures to its width
 STRICT = 1e-9                # [m per tick], also of `hierarchy bench strictness`
 _MARKS = "osD^v<P>X"
 _KINDS = "hqp", "cascade"  # with panels of their own
@@ -31,7 +33,7 @@ _DASHES = defaultdict(lambda: "-", {"defaults": ":", "tight": "--", "as hqp": "-
 @contextmanager
 def _figure(width: float, height: float, style: Any = ()) -> Iterator[Figure]:
     with matplotlib.rc_context({**drawing.style(), **dict(style)}):
-        yield Figure(figsize=(width, height), layout="constrained")
+        yield Figure(figsize=(max(width, _NARROWEST), height), layout="constrained")
 
 
 def time_against_error(rows: Sequence[Row]) -> Figure:
@@ -43,6 +45,9 @@ def time_against_error(rows: Sequence[Row]) -> Figure:
     rows = [row for row in rows if row["answered"]]
     names = list(dict.fromkeys(row["family"] for row in rows))
     style = looks(dict.fromkeys(row["entrant"].removesuffix(" warm") for row in rows))
+    colours = [look.colour for look in style.values()]
+    marks = {label: _MARKS[colours[:i].count(look.colour) % len(_MARKS)]
+             for i, (label, look) in enumerate(style.items())}
     columns = min(4, max(1, len(names)))
     lines = max(1, -(-len(names) // columns))
     with _figure(2.6 * columns + 0.4, 2.35 * lines + 1.1, {"font.size": 8.5}) as fig:
@@ -50,23 +55,25 @@ def time_against_error(rows: Sequence[Row]) -> Figure:
         for ax, name in zip(axes, names, strict=False):
             for row in rows:
                 if row["family"] == name:
-                    _dot(ax, row, style[row["entrant"].removesuffix(" warm")])
-            ax.set(xscale="log", yscale="log", title=name, xlim=(_LEAST / 4.0, _MOST * 4.0))
+                    label = row["entrant"].removesuffix(" warm")
+                    _dot(ax, row, style[label], marks[label])
+            drawing.make_logarithmic(ax, "y")
+            ax.set(xscale="log", title=name, xlim=(_LEAST / 4.0, _MOST * 4.0))
             ax.set_xticks([1e-16, 1e-12, 1e-8, 1e-4])
         for ax in axes[len(names):]:
             ax.set_axis_off()
         fig.supxlabel("largest miss of an answer called solved", fontsize=9.0)
         fig.supylabel("median time of a solve [µs]", fontsize=9.0)
-        fig.legend(handles=[Line2D([], [], color=look.colour, marker="o", linestyle="",
+        fig.legend(handles=[Line2D([], [], color=look.colour, marker=marks[label], linestyle="",
                                    markersize=5.0, label=label) for label, look in style.items()],
                    loc="outside upper center", ncols=min(6, max(1, len(style))), fontsize=8.0)
     return fig
 
 
-def _dot(ax: Axes, row: Row, look: Look) -> None:
+def _dot(ax: Axes, row: Row, look: Look, mark: str) -> None:
     x = float(np.clip(np.nan_to_num(row["relative"], nan=_MOST), _LEAST, _MOST))
     y = row["median_us"]
-    ax.plot(x, y, "o", color=look.colour, markersize=5.0, clip_on=False,
+    ax.plot(x, y, mark, color=look.colour, markersize=5.0, clip_on=False,
             alpha=0.4 if row["right"] < 1.0 else 1.0,
             markerfacecolor="none" if row["entrant"].endswith(" warm") else look.colour)
     if row["wrong"]:
@@ -76,8 +83,10 @@ def _dot(ax: Axes, row: Row, look: Look) -> None:
 def curves(at: Array, found: Mapping[str, Array], words: str) -> Figure:
     """Return shares of problems solved over a logarithmic axis; words : its label.
 
-    One panel for each kind of entrants, with a colour for each and dashes for its settings.
+    One panel for each kind of entrants, with a colour for each and dashes for its settings. Where a
+    panel is of one kind, which has one colour elsewhere, they have others.
     """
+    style = looks(found)
     kinds: dict[str, list[str]] = {}
     for label in found:
         first = label.partition(" ")[0]
@@ -89,12 +98,14 @@ def curves(at: Array, found: Mapping[str, Array], words: str) -> Figure:
             names = list(dict.fromkeys(label.partition(", ")[0] for label in labels))
             for label in labels:
                 name, _, setting = label.partition(", ")
-                ax.plot(at, 100.0 * found[label], label=label, linewidth=1.2,
-                        color=_HUES(names.index(name) % _HUES.N), linestyle=_DASHES[setting])
+                colour, line = (_HUES(names.index(name) % _HUES.N), _DASHES[setting]
+                                ) if kind in _KINDS else (style[label].colour, style[label].line)
+                ax.plot(at, 100.0 * found[label], label=label, linewidth=1.2, color=colour,
+                        linestyle=line)
             drawing.make_logarithmic(ax, "x")
-            ax.set(title=kind, xlim=(at[0], at[-1]), ylim=(0.0, 102.0))
+            ax.set(title=kind if len(kinds) > 1 else "", xlim=(at[0], at[-1]), ylim=(0.0, 102.0))
             ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), fontsize=7.0)
-        fig.supxlabel(words, fontsize=9.0)
+        fig.supxlabel(fill(words, 45 * len(kinds)), fontsize=9.0)
         fig.supylabel("problems solved [%]", fontsize=9.0)
     return fig
 

@@ -153,7 +153,7 @@ def report(name: str, found: Mapping[str, Tally], out: Path) -> Report:
     columns = [*(Column(key, key, whole) for key in ("problems", CERTIFIED, "failed", "lost")),
                *(Column(what.lower().replace("_", "\n").replace(" ", "\n"), what,
                         lambda n: whole(n or 0)) for what in others),
-               *(Column(f"steps / row\n{key}", key) for key in ("median", "most"))]
+               *(Column(f"steps\n/ row\n{key}", key) for key in ("median", "most"))]
     return Report(f"{name} on generated problems", [Section("", [Table(
         f"{name}: outcomes, each answer certified",
         [one.row(kind) for kind, one in every.items()], columns, "kind")], "\n".join(lines))],

@@ -308,9 +308,10 @@ def register_variant(name: str, resolver: str, **settings: Any) -> None:
     _VARIANTS[name] = resolver, settings
 
 
-def variants() -> tuple[str, ...]:
-    """Return the names of resolvers of `names` with settings of their own, sorted."""
-    return tuple(sorted(_VARIANTS))
+def variants() -> dict[str, str]:
+    """Return what resolvers of `names` with settings of their own stand for, by name, sorted."""
+    return {name: ":".join((resolver, *(f"{key}={value}" for key, value in settings.items())))
+            for name, (resolver, settings) in sorted(_VARIANTS.items())}
 
 
 def names() -> tuple[str, ...]:

@@ -49,7 +49,8 @@ def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collectio
     total, some = summaries(rows, steps), cells(rows, steps)
     families = list(dict.fromkeys(row["family"] for row in rows))
     count = len({(row["family"], row["problem"]) for row in rows})
-    tables = [Table(f"{title}: {count} problems of {len(families)} families", total, _ANSWERS),
+    of = "one family" if len(families) == 1 else f"{len(families)} families"
+    tables = [Table(f"{title}: {count} problems of {of}", total, _ANSWERS),
               Table(f"{title}: quality", total, _QUALITY), _times(title, some, families)]
     inside = [row for row in some if not isnan(row["inside_median_us"])]
     if inside:

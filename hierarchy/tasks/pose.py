@@ -85,7 +85,7 @@ _STEP = 1e-30    # of a complex step: no difference is formed, so it may be this
 
 @dataclass(frozen=True)
 class FrameLog(Pose):
-    """The same pose with another error.
+    """A pose whose error is a screw from the frame to its target (m = 6).
 
     It is e = log(T^-1 T_d), with the poses T of the frame and T_d of its target: the twist
     in the axes of the frame, linear part first, that takes it to the target in unit time. The frame

@@ -77,8 +77,10 @@ def list_(plugin: opt.Plugins = None, as_json: opt.AsJson = False) -> None:
     entries = {"scenarios": {name: load(name).title for name in shipped()},
                "groups": {name: load_group(name).title for name in shipped_groups()},
                "sweeps": {name: load_sweep(name).title for name in shipped_sweeps()},
-               "resolvers": {name: f"{first_line(one)} Damps {one.damps}."
-                             for name in (*solvers.names(), *solvers.variants())
+               "resolvers": {name: f"{meant or first_line(one)} Damps {one.damps}."
+                             for name, meant in (dict.fromkeys(solvers.names(), "") | {
+                                 name: f"The same as {spec}."
+                                 for name, spec in solvers.variants().items()}).items()
                              for one in [solvers.make(name)]},
                "tasks": {name: first_line(task) for name, task in TASKS.items()},
                "robots": {name: in_words(table) for name, table in ROBOTS.items()}}

@@ -98,7 +98,8 @@ def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of p
         print_json({**_about(collection), "wrong": wrong})
     else:
         known = len(collection.answers or ())
-        print(f"{shown(file)}: {len(collection.problems)} problems, {known} answers")
+        print(f"{shown(file)}: {len(collection.problems)} problems, {known} answers "
+              f"proved again, {len(wrong) or 'none'} differ")
     for p, why in wrong.items():
         print(f"problem {p}: {why}", file=sys.stderr if as_json else sys.stdout)
     return int(bool(wrong))

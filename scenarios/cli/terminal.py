@@ -63,7 +63,7 @@ def print_table(runs: list[Run]) -> None:
     goals = [fill(f"  {goal}", _WIDTH, subsequent_indent="    ") for goal in found[0].goals
              ] if len(found) == 1 else []
     _print_rows(dict.fromkeys(run.title for run in runs), "", [run.label for run in runs],
-                table(runs, details=False),
+                table(runs, details=False), "best of its row, or within 1 % of that",
                 ["", *map(str, partings(runs)), *flags(runs), *lines(found), *goals])
 
 
@@ -75,12 +75,16 @@ def print_samples(name: str, results: Results) -> None:
     shares = [Row(what, "", "", "", tuple(Cell(str(share)) for share in by.values()))
               for what, by in results.shares().items()]
     _print_rows([f"{name}: {results.samples} samples, paired", *verdict(results)],
-                "median [quartiles]", results.labels, [*shares, *rows(results)])
+                "median [quartiles]", results.labels, [*shares, *rows(results)],
+                "separated from all others by the tests of its row alone")
 
 
 def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: Sequence[Row],
-                below: Iterable[str] = ()) -> None:
-    """Print lines and a table of labelled columns, in as many tables as 80 columns need."""
+                best: str, below: Iterable[str] = ()) -> None:
+    """Print lines and a table of labelled columns, in as many tables as 80 columns need.
+
+    `best` says what a star means.
+    """
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -103,6 +107,8 @@ def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: 
         for row, some in zip(rows, cells, strict=True):
             laid_out.add_row(Text(row.heading), *some[first:first + beside])
         console.print("", laid_out)
+    if any(cell.kind == "best" for row in rows for cell in row.cells):
+        console.print("", f"* {best}", sep="\n")
     console.print(*below, sep="\n", end="\n" if below else "")
 
 

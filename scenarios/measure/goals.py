@@ -62,7 +62,7 @@ class Goal:
         """Median and worst, and the share of time outside, for a table."""
         if self.promise and self.met:
             return self.flag
-        numbers = f"{shown(self.median, self.unit)}, worst {shown(self.worst, self.unit)}"
+        numbers = f"{shown(self.median, self.unit)} off, worst {shown(self.worst, self.unit)}"
         return numbers if self.met else f"{numbers}, out {percent(self.share)}"
 
     def __str__(self) -> str:

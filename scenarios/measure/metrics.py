@@ -165,14 +165,17 @@ def _time(recording: Recording, by: Criteria) -> Iterator[Metric]:
     failed = np.count_nonzero(recording["status"] != int(Status.SOLVED))
     yield _timing("ticks_not_solved", "Ticks not solved", float(failed), "")
     beside = recording.beside_computing
-    late = np.count_nonzero(recording["time_tick"] > recording.scenario.control.period)
-    yield _timing("ticks_late", "Ticks longer than the period", float(late), "", note=beside)
+    physics = " with physics" * bool(beside)
+    late = recording["time_tick"] > recording.scenario.control.period
+    yield _timing("late_share", f"Ticks{physics} longer than the period", finite(np.mean(late)),
+                  "share", lower_is_better=None, note=beside)  # the operating system interrupts
     for signal, part in PARTS.items():
         shared = signal in ("time_kinematics", "time_rows")  # the same code under any resolver
         for key, (percent, label) in _PERCENTILES.items():
-            yield _timing(f"{signal}_{key}", f"{part}, {label}",
+            yield _timing(f"{signal}_{key}",
+                          f"{part}{physics if signal == 'time_tick' else ''}, {label}",
                           finite(np.percentile(recording[signal], percent)), "s",
-                          lower_is_better=None if shared else True,
+                          lower_is_better=None if shared or key == "p999" else True,
                           note=beside if signal == "time_tick" else "",
                           detail=shared and key != "median")
 

@@ -71,7 +71,7 @@ class Run:
         found = metrics.measure(self.recording) if self.recording else {}
         timed = metrics.measure(self.timing) if self.timing else {}
         return found | {name: one for name, one in timed.items()
-                        if name in found and name.startswith(("time_", "ticks_late"))}
+                        if name in found and name.startswith(("time_", "late_share"))}
 
     def as_plain_data(self) -> dict[str, Any]:
         """Return the run for a JSON file."""

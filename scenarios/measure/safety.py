@@ -95,7 +95,7 @@ def _joint_limit_excess(recording: Recording) -> Metric:
         excess = passed(np.maximum(np.maximum(q - upper, lower - q), 0.0)).max(axis=0)
         joint = int(np.argmax(excess))
         value = largest(excess)
-        note = f"joint {joint + 1}" if excess[joint] > 0.0 else ""
+        note = recording.facts.robot.coordinate_names[joint] if excess[joint] > 0.0 else ""
     return _metric("joint_limit_excess", "Beyond a joint limit, max", value, "rad", note=note)
 
 

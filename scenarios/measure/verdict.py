@@ -118,9 +118,9 @@ def _promises(found: Sequence[Verdict]) -> str:
     said = []
     for what, who in by.items():
         worst = max((goal for _, goal in who), key=lambda goal: goal.worst)
-        under = "" if len(found) == 1 else " by all" if len(who) == len(found) else (
-            f" by {some([label for label, _ in who], _NAMED)}")
-        said.append(f"{what}{under}, {shown(worst.worst, worst.unit)} at worst, for "
+        under = "" if len(found) == 1 else " under all" if len(who) == len(found) else (
+            f" under {some([label for label, _ in who], _NAMED)}")
+        said.append(f"{what}{under}, by up to {shown(worst.worst, worst.unit)}, for "
                     f"{percent(worst.share)} of the time")
     return _sentence(f"broken: {'; '.join(said)}")
 

@@ -78,6 +78,17 @@ class RobotFacts:
     capsules: tuple[Capsule, ...]
     floor: float
 
+    @property
+    def speed_names(self) -> tuple[str, ...]:
+        """The name of each velocity, with its unit where that is not rad/s."""
+        return tuple(name if unit == "rad" else f"{name} [{unit}/s]" for name, unit in zip(
+            self.velocity_names, self.velocity_units, strict=True))
+
+    @property
+    def coordinate_names(self) -> list[str]:
+        """The joint name of each entry of q (nq,), numbered where a joint has several."""
+        return _bare(self.model, self.digest, self.name).coordinate_names
+
     def placements(self, q: Array) -> Array:
         """Return the placements (..., J + 1, 12) at q (..., nq), as in a State; NaN where q is."""
         state = State(_bare(self.model, self.digest, self.name))

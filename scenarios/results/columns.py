@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from hierarchy.words import listed
 from scenarios.measure import statistics
+from scenarios.measure.metric import NOTHING
 from scenarios.measure.metrics import Metric
 from scenarios.measure.runs import Cell, Row, grouped
 from scenarios.measure.statistics import Paired, Spread, paired, wilson
@@ -145,12 +146,17 @@ class Results:
         return [metric for name, metric in self.metrics.items()
                 if metric.group != "Computing" and np.isfinite(self.values[name]).any()]
 
+    def varied(self) -> list[Metric]:
+        """Return those to compare that differ between runs by more than rounding."""
+        return [metric for metric in self.shown()
+                if np.nanmax(values := self.values[metric.name]) - np.nanmin(values) > NOTHING]
+
     def worst(self) -> list[tuple[Metric, Job]]:
-        """Return the worst run for each metric that has a direction and differs between runs."""
+        """Return the worst run for each metric that has a direction and is `varied`."""
         found = []
-        for metric in self.shown():
+        for metric in self.varied():
             values = self.values[metric.name]
-            if metric.lower_is_better is None or np.nanmin(values) == np.nanmax(values):
+            if metric.lower_is_better is None:
                 continue
             i = int(np.nanargmax(values) if metric.lower_is_better else np.nanargmin(values))
             found.append((valued(metric, values[i]), self.runs[i]))

@@ -3,6 +3,7 @@
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from scenarios.results.plan import Job, Plan
 from scenarios.templates import render, resource
 
 _FAILURES = 20  # reasons listed
+_NARROW = 18  # letters of a label beside a narrow figure
 _BETTER = {True: "lower is better", False: "higher is better", None: ""}
 _ABOUT_ROWS = ("After an interruption, the same command continues. Computing times are only in the "
                "table, since many runs shared the machine.")
@@ -84,8 +86,7 @@ def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, A
         "more_failures": max(0, len(failures) - _FAILURES),
         "spreads": [(metric, _BETTER[metric.lower_is_better],
                      svg(_spread(results, metric), f"{name}: {metric.label}"))
-                    for metric in results.shown() if np.nanmin(results.values[metric.name])
-                    < np.nanmax(results.values[metric.name])],
+                    for metric in results.varied()],
         "worst": [(metrics, of_key[key], *_again(of_key[key], folder))
                   for key, metrics in worst.items()],
         "numbers": rows(results), "looks": looks(results.labels),
@@ -133,7 +134,9 @@ def _spread(results: Results, metric: Metric) -> Figure:
     columns = {label: results.column(metric.name, label) for label in results.labels}
     known = {label: metric.scale * values[np.isfinite(values)]
              for label, values in columns.items() if np.isfinite(values).any()}
-    fig, (ax,) = drawing.figure(width=3.9, height=0.5 + 0.3 * len(known))
+    names = [fill(label, _NARROW) for label in known]
+    lines = max(name.count("\n") for name in names) + 1
+    fig, (ax,) = drawing.figure(width=3.9, height=0.5 + max(0.3, 0.17 * lines) * len(known))
     colours = drawing.colours(results.labels)
     low, high = _limits(list(known.values()))
     for y, (label, values) in enumerate(known.items()):
@@ -146,13 +149,13 @@ def _spread(results: Results, metric: Metric) -> Figure:
         if beyond := values.size - seen.size:
             ax.text(1.0, y, f"{beyond} beyond, to {max(values, key=abs):.3g}", fontsize=7.5,
                     ha="right", va="bottom", transform=ax.get_yaxis_transform())
-    ax.set_yticks(range(len(known)), list(known))
+    ax.set_yticks(range(len(known)), names)
     ax.set_ylim(len(known) - 0.5, -0.5)
     ax.set_xlim(low - 0.03 * (high - low), high + 0.03 * (high - low))
     ax.tick_params(axis="y", length=0)
     ax.grid(False, axis="y")
     ax.spines["left"].set_visible(False)
-    ax.locator_params(axis="x", nbins=6)
+    ax.locator_params(axis="x", nbins=4)
     return fig
 
 

@@ -29,7 +29,7 @@ _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_v
           "joint_limit_excess", "speed_max", "velocity_step_max", "velocity_step_ticks",
           "command_step_max", "acceleration_max", "acceleration_step_max",
           "acceleration_step_ticks", "stack_changes", "active_set_changes", "ticks_not_solved",
-          "ticks_brake", "ticks_stop", "ticks_late", "time_resolve_median", "time_resolve_p999",
+          "ticks_brake", "ticks_stop", "late_share", "time_resolve_median", "time_resolve_p999",
           "time_tick_median")
 _USUAL = 4.0  # median widths of the ranges of values: wider ones would flatten all the others
 

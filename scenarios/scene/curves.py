@@ -66,8 +66,8 @@ def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
                            ticks, marks_of(at))
     yield from _task_errors(recording, ticks)
     yield from _forces(recording, ticks)
-    joints = tuple(f"joint {j + 1}" for j in range(recording["v"].shape[1]))
-    yield _sampled("Joint speeds", "rad/s", joints, recording["v"], ticks)
+    yield _sampled("Joint speeds", "rad/s", recording.facts.robot.speed_names, recording["v"],
+                   ticks)
 
 
 def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:

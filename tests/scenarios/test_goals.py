@@ -72,8 +72,8 @@ def test_the_table_has_a_row_for_each_goal_and_a_cell_for_each_run():
     broken = Run(recording().scenario, "c", "c", None, "HierarchyError: no")
     found = verdicts([run("a", **at([2, 0, 1204, 4, 4])), run("b"), broken])
     rows = dict(goal_table(found))
-    assert rows["position, at its target"] == ("4 mm, worst 1204 mm, out 75 %",
-                                               "0 mm, worst 0 mm", "–")
+    assert rows["position, at its target"] == ("4 mm off, worst 1204 mm, out 75 %",
+                                               "0 mm off, worst 0 mm", "–")
     assert rows["joint limits"] == ("kept", "kept", "–")
     assert lines(found)[0] == ("2 of 3 ran to the end; c stopped at 0.00 s of 4 s: "
                                "HierarchyError: no.")

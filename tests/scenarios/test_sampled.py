@@ -47,7 +47,7 @@ def table(file):
     with file.open() as stream:
         return {(row["resolver"], row["sample"], row["metric"]): (row["value"], row["note"])
                 for row in csv.DictReader(stream) if not row["metric"].startswith("time_")
-                and row["metric"] not in ("wall_seconds", "ticks_late")}
+                and row["metric"] not in ("wall_seconds", "late_share")}
 
 
 @pytest.mark.parametrize(("parameters", "changed", "says"), [

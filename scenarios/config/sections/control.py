@@ -65,7 +65,7 @@ class ControlSection(keys.Section):
     duration: keys.Span  #: How long a run lasts.
     jacobian_derivative: Literal["exact", "difference"] = "exact"
     """dJ/dt: "exact", or the "difference" of two ticks."""
-    resolver: str  #: One of `hierarchy list`, or of a plug-in.
+    resolver: str  #: One of `hierarchy list`, of a plug-in, or "smooth".
     options: dict[str, Any] = Field(default_factory=dict)
     """Settings of the resolver. A table with a resolver's name, such as `[control.options.tpm]`, is
     for that resolver only; plain settings override it."""

@@ -66,14 +66,12 @@ def joints(ax: Axes, recording: Recording, colour: str, signal: str, width: floa
     """
     peaks = np.abs(recording["v"]).max(axis=0)
     fastest = np.sort(np.argsort(-peaks, kind="stable")[:len(drawing.JOINTS)]).tolist()
-    values, robot = recording[signal].T, recording.facts.robot
+    values, names = recording[signal].T, recording.facts.robot.speed_names
     for i in {*range(len(values))} - {*fastest}:
         drawing.curve(ax, recording["t"], values[i], color=MEASURED, linewidth=0.3)
     for k, i in enumerate(fastest):
-        name = f"joint {i + 1}" if len(peaks) == len(fastest) else robot.velocity_names[i]
-        unit = f" [{robot.velocity_units[i]}/s]" if robot.velocity_units[i] != "rad" else ""
         drawing.curve(ax, recording["t"], values[i], **drawing.joint_line(k), linewidth=width,
-                      label=name + unit if named else None)
+                      label=names[i] if named else None)
 
 
 def distance(ax: Axes, recording: Recording, colour: str, signal: str) -> None:

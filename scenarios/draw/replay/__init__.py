@@ -73,6 +73,7 @@ def run_data(scene: Scene, scenario: Scenario, label: str, look: Look, **more: A
             "halfAngle": fixed.half_angle,
             "wanted": None if fixed.axis is None else fixed.axis.tolist(),
             "orders": scene.orders, "tasks": levels.names, "units": levels.units,
+            "joints": fixed.robot.velocity_names,
             "paths": [{"task": path.task, "actual": packed(path.actual, steps=True),
                        "wanted": None if path.wanted is None else packed(path.wanted, steps=True)}
                       for path in scene.paths],

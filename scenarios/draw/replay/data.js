@@ -1,5 +1,5 @@
 "use strict";
-// Runs as scenarios/draw/replay/page.py packs them.
+// Runs as scenarios/draw/replay/__init__.py packs them.
 
 const KINDS = {f4: Float32Array, i2: Int16Array, u2: Uint16Array, i1: Int8Array};
 const NOTHING = 65535;

@@ -44,8 +44,7 @@ class StackList {
 
   joint_row() {
     if (!this.run.limited || this.run.fate.values.includes(this.unknown)) return [];
-    this.joints = Array.from({length: this.run.saturated.width}, (_, j) =>
-      element("i", {}, `${j + 1}`));
+    this.joints = this.run.joints.map(name => element("i", {title: name}));
     this.joints_say = element("span");
     return [element("div", {class: "joints"}, element("span", {}, "limits"), ...this.joints,
                     this.joints_say)];
@@ -90,7 +89,7 @@ class StackList {
     this.joints.forEach((joint, j) => {
       joint.hidden = !few && !sides[j];
       joint.className = sides[j] ? "at" : "";
-      joint.textContent = `${j + 1}${sides[j] > 0 ? "↑" : sides[j] < 0 ? "↓" : ""}`;
+      joint.textContent = `${few ? j + 1 : this.run.joints[j]}${sides[j] > 0 ? "↑" : sides[j] < 0 ? "↓" : ""}`;
     });
     const any = sides.some(side => side !== 0);
     this.joints_say.textContent = any ? "saturated" : "no joint is saturated";
