@@ -143,7 +143,7 @@ def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows, rank_toleran
         if not len(changed):
             return None
         if step // AT_ONCE % 2:  # changing all rows at once has cycled
-            changed = changed[step % len(changed), None]
+            changed = changed[step // 2 % len(changed), None]
         sides[changed] = wanted[changed]
     return None
 
@@ -240,7 +240,7 @@ def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:
     Returns z if the rows hold, are violated by more than a little, or cannot all hold.
     """
     off = float(abs(rows.excess(z)).max(initial=0.0))
-    if not EXACT < off < LITTLE or not D.shape[1]:
+    if not ROUNDING < off < LITTLE or not D.shape[1]:
         return z
     value, M = rows.A @ z, rows.A @ D
     up, low = np.isfinite(rows.upper), np.isfinite(rows.lower)

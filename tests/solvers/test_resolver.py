@@ -94,3 +94,12 @@ def test_it_grows_with_the_hierarchy_and_what_was_left_in_it_does_not_matter(res
         for left in (np.nan, np.inf, 1e300):
             monkeypatch.setattr(WORKSPACE, "array", np.full(1_000_000, left))
             np.testing.assert_array_equal(small.x, resolver.solve(h).x)
+
+
+@pytest.mark.parametrize("left", range(-1, 6))
+def test_nor_do_integers_left_in_it_by_a_solve_that_refuted_a_sign(left, monkeypatch):
+    rows = [[-2.0], [-2.0]]
+    memory = make("hcod").solve(Hierarchy.from_levels([(rows, [-np.inf, 1], [1, np.inf])])).memory
+    monkeypatch.setattr(WORKSPACE, "array", np.full(1000, left).view(np.float64))
+    h = Hierarchy.from_levels([(rows, [-np.inf, 2], [-1, np.inf])])
+    assert make("hcod").solve(h, memory).iterations == 2

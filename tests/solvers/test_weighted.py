@@ -9,7 +9,7 @@ from refusals import refused
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make
-from solvers.qp import backends, programs
+from solvers.qp import backends, programs, refinement
 from solvers.resolvers.weighted import lexicographic_weights
 
 EXACT = 1e-9
@@ -112,3 +112,13 @@ def test_a_row_a_million_times_smaller_than_its_neighbours_is_met_as_they_are(ro
     np.testing.assert_allclose(h.slacks(found.x)[:3] / np.linalg.norm(h.A[:3], axis=1), 0.0,
                                atol=1e-9)
     assert certify(h, found.x).certified
+
+
+@pytest.mark.parametrize(("z", "rows", "expected"), [
+    (np.zeros(2), ([[-0.5, 0.0], [1.0, 0.0]], [-1.0, -1.0], [-0.5, 0.5]), [0.6, 0.0]),
+    ([-8e-11 - 1.0, 0.0, 0.0], ([[-1.0, 1.0, 1.0]] * 2, [-np.inf, 1.0], [1.0, np.inf]), [-1, 0, 0])
+])
+def test_refinement_does_not_circle_and_meets_rows_that_are_missed_by_rounding(z, rows, expected):
+    limits, none = refinement.Rows(*map(np.array, rows)), refinement.Rows.none(len(expected))
+    found, _ = refinement.refined(np.array(z), none.A, none.lower, limits, none, 1e-8)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10)

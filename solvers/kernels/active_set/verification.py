@@ -43,6 +43,7 @@ from solvers.kernels.active_set.working_set import (
     row_times_x,
 )
 from solvers.kernels.linalg.rows import length_of
+from solvers.kernels.linalg.space import fill
 from solvers.kernels.tolerances import (
     BAND,
     CANCELLED,
@@ -77,6 +78,7 @@ def verify(s, factored):
     """
     levels, whole = s.multiplier.shape[0] - 1, s.count[WHOLE]
     reach = 1.0 + length_of(s.x)
+    fill(s.index[CHANGE], OPEN)  # whatever ends this early refutes nothing
     if not np.isfinite(reach) or not _rows_hold(s, reach):
         return False
     proved = True
@@ -115,7 +117,8 @@ def _rows_hold(s, reach):
         if not beyond <= (BAND * norm + max(s.number[CUT, i], 0.0)) * reach + EPSILON * terms:
             return False
         cut = max(cut, s.number[CUT, i] / norm)
-        s.index[CHANGE, i] = DECIDED if state in (EQUAL, FREE) else OPEN
+        if state in (EQUAL, FREE):
+            s.index[CHANGE, i] = DECIDED
     return _ranks_are_clear(s, cut)
 
 
