@@ -77,6 +77,20 @@ def test_warm_sequences_give_the_same_bits(library, name):
     assert warm > 40
 
 
+@pytest.mark.parametrize("name", ["hcod", "merged"])
+def test_what_the_work_space_held_changes_nothing(library, name):
+    """Left over was what a verification of another problem had refuted (3 in its integers)."""
+    for seed in range(15):
+        h, left = problems.generate(seed), []
+        for content in (0, 3):
+            memory = library.memory(h)
+            for tick in sequence(h, 4, seed):
+                memory.work[:-1].view(np.int64)[:] = content
+                status, _ = library.solve(name, tick, None, memory)
+                left.append((status, memory.record.iterations, memory.answer.tobytes()))
+        assert left[:4] == left[4:]
+
+
 def test_the_object_loaded_without_a_linker_gives_the_same_bits(folder):
     library = c.Library.unlinked(folder / "lib" / "libtask_hierarchy.a")
     for h in hierarchies(5):

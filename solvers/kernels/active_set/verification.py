@@ -43,6 +43,7 @@ from solvers.kernels.active_set.working_set import (
     row_times_x,
 )
 from solvers.kernels.linalg.rows import length_of
+from solvers.kernels.linalg.space import fill
 from solvers.kernels.tolerances import (
     BAND,
     CANCELLED,
@@ -77,6 +78,7 @@ def verify(s, factored):
     """
     levels, whole = s.multiplier.shape[0] - 1, s.count[WHOLE]
     reach = 1.0 + length_of(s.x)
+    fill(s.index[CHANGE], OPEN)  # also of rows that are not reached
     if not np.isfinite(reach) or not _rows_hold(s, reach):
         return False
     proved = True
