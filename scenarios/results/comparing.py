@@ -157,7 +157,7 @@ def _one_by_one(planned: Sequence[Run], folder: Path | None, _: int, progress: P
                                  partial(progress, f"{run.scenario.name} {run.spec}"))
         made = dataclasses.replace(run, recording=found, error=error)
         yield i, made
-        if str(made.fault).startswith("interrupted"):
+        if made.interrupted:
             return
 
 
@@ -172,14 +172,17 @@ def _together(planned: Sequence[Run], folder: Path | None, workers: int, progres
             made[i] = dataclasses.replace(planned[i], recording=found, error=error)
             yield i, made[i]
             progress("compare", len(made), total)
-        for i, run in made.items():
-            timed = dataclasses.replace(run, timing=_timed(run))
-            if "happened" in vars(run):  # a page has worked it out
-                vars(timed)["happened"] = run.happened
-            yield i, timed
     except KeyboardInterrupt:
         for i in set(range(total)) - made.keys():
             yield i, dataclasses.replace(planned[i], error="interrupted")
+        return
+    for i, run in made.items():
+        timed = dataclasses.replace(run, timing=_timed(run))
+        if dataclasses.replace(run, recording=timed.timing, error=None).interrupted:
+            raise KeyboardInterrupt  # which `simulate` has kept
+        if "happened" in vars(run):  # a page has worked it out
+            vars(timed)["happened"] = run.happened
+        yield i, timed
 
 
 def _asked(asked: tuple[int, Job, Path | None]) -> tuple[Recording | None, str | None]:

@@ -66,13 +66,17 @@ def ended(code, folder, *words):
                           text=True, check=False)
 
 
-def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
+@pytest.mark.parametrize(("words", "folder", "code"), [
+    ("run ellipse", "a", 1),
+    ("compare ellipse --resolvers tpm,hcod --workers 1", "a/ellipse/tpm", 130)])
+def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(
+        words, folder, code, tmp_path):
     done = ended("""import contextlib, scenarios.cli.terminal as terminal
-terminal.bar = lambda: contextlib.nullcontext(
+terminal.bar = lambda *_: contextlib.nullcontext(
     lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGTERM))
-""", tmp_path, "run", "ellipse", "--duration", "20", "--out", "a")
-    assert done.returncode == 1
-    run = load_run(tmp_path / "a")
+""", tmp_path, *words.split(), "--duration", "20", "--out", "a")
+    assert done.returncode == code
+    run = load_run(tmp_path / folder)
     assert 500 <= run.ticks < 20_000
     assert run.fault == f"interrupted at tick {run.ticks}"
     assert run.fault in done.stderr
@@ -95,6 +99,15 @@ def test_an_interrupted_comparison_keeps_what_ended_and_names_the_folder(
     assert list((tmp_path / "b").rglob("run.npz"))
     pages = {"index.html", "comparison.json"} if page == "whole" else set()
     assert {"results.csv", *pages} <= {path.name for path in (tmp_path / "b").iterdir()}
+
+
+def test_an_interruption_while_runs_are_timed_ends_the_comparison(
+        monkeypatch, command, undrawn):
+    monkeypatch.setattr(comparing, "_timed", lambda run: recording(
+        run.scenario, fault="interrupted at tick 3"))
+    said = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers 2",
+                   code=130).err
+    assert "the runs made so far are in b\n" in said
 
 
 def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsys):
