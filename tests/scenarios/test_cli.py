@@ -18,6 +18,7 @@ from scenarios.cli.main import _with_its_file, app
 from scenarios.files import OutputError, claim, in_runs, slug
 from scenarios.measure import run_folder
 from scenarios.results import comparing
+from scenarios.results.store import FullError
 
 
 @pytest.fixture(autouse=True)
@@ -108,6 +109,15 @@ def test_an_interruption_while_runs_are_timed_ends_the_comparison(
     said = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers 2",
                    code=130).err
     assert "the runs made so far are in b\n" in said
+
+
+def test_a_table_that_cannot_be_written_stops_no_run_of_a_comparison(
+        tmp_path, monkeypatch, command):
+    monkeypatch.setattr(comparing, "write_table", mock.Mock(side_effect=FullError("full")))
+    said = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers 1",
+                   code=1).err
+    assert "FullError: full; the runs are in b" in said
+    assert len(list(tmp_path.rglob("run.npz"))) == 2
 
 
 def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsys):
