@@ -191,14 +191,19 @@ def test_names_of_settings_that_differ_late_give_different_folders():
     assert len(f"{in_runs(100 * '日').name}-2".encode()) <= 255
 
 
-def test_an_interruption_that_breaks_the_compiler_is_still_an_interruption(tmp_path):
-    done = ended("""from scenarios.cli import doctor
-def broken(_):
-    try:
+@pytest.mark.parametrize("dropped", ["""try:
         os.kill(os.getpid(), signal.SIGTERM)
     except KeyboardInterrupt:
         raise RuntimeError('no compiled object yet') from None
-doctor.doctor_command = broken
+""", """import ctypes, time
+    ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGTERM))()
+    time.sleep(600)
+"""], ids=["and breaks", "and goes on"])
+def test_an_interruption_that_the_compiler_drops_is_still_an_interruption(dropped, tmp_path):
+    done = ended(f"""from scenarios.cli import doctor
+def compiling(_):
+    {dropped}
+doctor.doctor_command = compiling
 """, tmp_path, "doctor")
     assert (done.returncode, done.stderr) == (130, "hierarchy: interrupted\n")
 
