@@ -2,8 +2,8 @@
 
 Heavy imports happen only when needed, so that `--help` and completion are fast. With `--json` a
 command prints one JSON object on standard output and nothing else there. Exit codes: 0 done, 1 a
-run stopped with a reported fault, 2 the command line or a file is invalid, 130 Ctrl-C,
-SIGTERM or SIGHUP.
+run stopped with a reported fault, such as `run` interrupted, 2 the command line or a file is
+invalid, 130 Ctrl-C, SIGTERM or SIGHUP.
 """
 
 import sys

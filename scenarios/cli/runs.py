@@ -166,7 +166,9 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
             terminal.print_table(runs)
         print("", *comparison.refused, sep="\n" if comparison.refused else "")
         print(f"\nReport: {report}")
-    return max([exit_code(f"{run.label}: {run.fault}") for run in comparison.faults], default=0)
+    codes = [max(exit_code(f"{run.label}: {run.fault}"), opt.INTERRUPTED * run.interrupted)
+             for run in comparison.faults]
+    return max(codes, default=0)
 
 
 @opt.app.command()

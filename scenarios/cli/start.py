@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+from typing import Any
 
 
 def main() -> None:
@@ -27,6 +28,15 @@ def main() -> None:
         asked.append(number)
         raise KeyboardInterrupt  # what is made so far is kept
 
+    def again(about: Any) -> None:
+        """Interrupt a little later what has dropped it, as callbacks of LLVM do."""
+        if about.exc_type is not KeyboardInterrupt:
+            sys.__unraisablehook__(about)
+        elif hasattr(signal, "setitimer"):  # not on Windows
+            signal.signal(signal.SIGALRM, end)
+            signal.setitimer(signal.ITIMER_REAL, 0.01)
+
+    sys.unraisablehook = again
     for number in handled:
         signal.signal(number, end)
     try:
@@ -34,7 +44,7 @@ def main() -> None:
     except Exception:
         if not asked:
             raise
-        sys.exit(interrupted())  # callbacks of LLVM drop the interruption, and compiling breaks
+        sys.exit(interrupted())  # a callback of LLVM dropped it, and compiling breaks
 
 
 def _open_streams() -> None:

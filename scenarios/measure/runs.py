@@ -48,6 +48,11 @@ class Run:
         return self.error or (self.recording.fault if self.recording else None)
 
     @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C or a signal ended it."""
+        return str(self.fault).startswith("interrupted")
+
+    @property
     def title(self) -> str:
         """The scenario's title, with its resolver where each scenario has its own."""
         title = self.scenario.title or self.scenario.name

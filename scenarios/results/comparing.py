@@ -20,7 +20,7 @@ from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Recording
 from scenarios.results import pool
 from scenarios.results.plan import Job, Outcome, digest, key_of, side_by_side
-from scenarios.results.store import TABLE, write_table
+from scenarios.results.store import TABLE, FullError, write_table
 
 Progress = Callable[[str, int, int], None]
 
@@ -92,7 +92,8 @@ class _Written:
         self._runs[i] = run
         if self._folder is None:
             return
-        write_table(self._folder / TABLE, [_row(one) for one in self._found().runs])
+        with suppress(FullError):  # `finish` says so
+            _write_table(self._folder, self._found())
         if 1 < len(self._runs) < self._count and time.monotonic() >= self._next:
             begun = time.monotonic()
             with suppress(Exception):  # `finish` says what is wrong with it
@@ -104,6 +105,7 @@ class _Written:
         found = self._found()
         if self._folder is not None and found.runs:
             try:
+                _write_table(self._folder, found)
                 self._write(self._folder, found)
             except Exception as error:  # of the disk, a style of matplotlib, a user's figure
                 apart = "".join(f"; {run.label}: {run.error}" for run in found.runs if run.error)
@@ -120,6 +122,10 @@ class _Written:
 
         write_json(folder / "comparison.json", found.as_plain_data())
         write_text(folder / "index.html", comparison_page(found, self._count))
+
+
+def _write_table(folder: Path, found: Comparison) -> None:
+    write_table(folder / TABLE, [_row(run) for run in found.runs])
 
 
 def _row(run: Run) -> tuple[Job, Outcome]:
@@ -157,7 +163,7 @@ def _one_by_one(planned: Sequence[Run], folder: Path | None, _: int, progress: P
                                  partial(progress, f"{run.scenario.name} {run.spec}"))
         made = dataclasses.replace(run, recording=found, error=error)
         yield i, made
-        if str(made.fault).startswith("interrupted"):
+        if made.interrupted:
             return
 
 
@@ -172,14 +178,17 @@ def _together(planned: Sequence[Run], folder: Path | None, workers: int, progres
             made[i] = dataclasses.replace(planned[i], recording=found, error=error)
             yield i, made[i]
             progress("compare", len(made), total)
-        for i, run in made.items():
-            timed = dataclasses.replace(run, timing=_timed(run))
-            if "happened" in vars(run):  # a page has worked it out
-                vars(timed)["happened"] = run.happened
-            yield i, timed
     except KeyboardInterrupt:
         for i in set(range(total)) - made.keys():
             yield i, dataclasses.replace(planned[i], error="interrupted")
+        return
+    for i, run in made.items():
+        timed = dataclasses.replace(run, timing=_timed(run))
+        if dataclasses.replace(run, recording=timed.timing, error=None).interrupted:
+            raise KeyboardInterrupt  # which `simulate` has kept
+        if "happened" in vars(run):  # a page has worked it out
+            vars(timed)["happened"] = run.happened
+        yield i, timed
 
 
 def _asked(asked: tuple[int, Job, Path | None]) -> tuple[Recording | None, str | None]:

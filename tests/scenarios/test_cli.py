@@ -18,6 +18,7 @@ from scenarios.cli.main import _with_its_file, app
 from scenarios.files import OutputError, claim, in_runs, slug
 from scenarios.measure import run_folder
 from scenarios.results import comparing
+from scenarios.results.store import FullError
 
 
 @pytest.fixture(autouse=True)
@@ -66,13 +67,17 @@ def ended(code, folder, *words):
                           text=True, check=False)
 
 
-def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(tmp_path):
+@pytest.mark.parametrize(("words", "folder", "code"), [
+    ("run ellipse", "a", 1),
+    ("compare ellipse --resolvers tpm,hcod --workers 1", "a/ellipse/tpm", 130)])
+def test_a_signal_in_the_middle_of_a_run_saves_every_tick_so_far_whole(
+        words, folder, code, tmp_path):
     done = ended("""import contextlib, scenarios.cli.terminal as terminal
-terminal.bar = lambda: contextlib.nullcontext(
+terminal.bar = lambda *_: contextlib.nullcontext(
     lambda label, done, total: done == 500 and os.kill(os.getpid(), signal.SIGTERM))
-""", tmp_path, "run", "ellipse", "--duration", "20", "--out", "a")
-    assert done.returncode == 1
-    run = load_run(tmp_path / "a")
+""", tmp_path, *words.split(), "--duration", "20", "--out", "a")
+    assert done.returncode == code
+    run = load_run(tmp_path / folder)
     assert 500 <= run.ticks < 20_000
     assert run.fault == f"interrupted at tick {run.ticks}"
     assert run.fault in done.stderr
@@ -95,6 +100,24 @@ def test_an_interrupted_comparison_keeps_what_ended_and_names_the_folder(
     assert list((tmp_path / "b").rglob("run.npz"))
     pages = {"index.html", "comparison.json"} if page == "whole" else set()
     assert {"results.csv", *pages} <= {path.name for path in (tmp_path / "b").iterdir()}
+
+
+def test_an_interruption_while_runs_are_timed_ends_the_comparison(
+        monkeypatch, command, undrawn):
+    monkeypatch.setattr(comparing, "_timed", lambda run: recording(
+        run.scenario, fault="interrupted at tick 3"))
+    said = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers 2",
+                   code=130).err
+    assert "the runs made so far are in b\n" in said
+
+
+def test_a_table_that_cannot_be_written_stops_no_run_of_a_comparison(
+        tmp_path, monkeypatch, command):
+    monkeypatch.setattr(comparing, "write_table", mock.Mock(side_effect=FullError("full")))
+    said = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers 1",
+                   code=1).err
+    assert "FullError: full; the runs are in b" in said
+    assert len(list(tmp_path.rglob("run.npz"))) == 2
 
 
 def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsys):
@@ -168,14 +191,19 @@ def test_names_of_settings_that_differ_late_give_different_folders():
     assert len(f"{in_runs(100 * '日').name}-2".encode()) <= 255
 
 
-def test_an_interruption_that_breaks_the_compiler_is_still_an_interruption(tmp_path):
-    done = ended("""from scenarios.cli import doctor
-def broken(_):
-    try:
+@pytest.mark.parametrize("dropped", ["""try:
         os.kill(os.getpid(), signal.SIGTERM)
     except KeyboardInterrupt:
         raise RuntimeError('no compiled object yet') from None
-doctor.doctor_command = broken
+""", """import ctypes, time
+    ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGTERM))()
+    time.sleep(600)
+"""], ids=["and breaks", "and goes on"])
+def test_an_interruption_that_the_compiler_drops_is_still_an_interruption(dropped, tmp_path):
+    done = ended(f"""from scenarios.cli import doctor
+def compiling(_):
+    {dropped}
+doctor.doctor_command = compiling
 """, tmp_path, "doctor")
     assert (done.returncode, done.stderr) == (130, "hierarchy: interrupted\n")
 

@@ -81,7 +81,7 @@ typedef struct th_settings {
   double damping;         /* >= 0; 0 is off. With damping every solve is a cold start. */
   double threshold;       /* > 0, singular value below which damping starts */
   double rank_tolerance;  /* 0 to 1, share of a row below which it depends on the rows above */
-  double tolerance;       /* hcod, tpm, merged: of violations, relative to their terms; up to 1e-3 */
+  double tolerance;       /* hcod, tpm, merged: of violations, relative to their terms; below 1e-3 */
   double isotropic;       /* recursive, TH_CHIAVERINI: damping of all directions */
   double largest;         /* recursive, TH_SELECTIVE: largest step; INFINITY is no damping */
   double ratio;           /* merged: weight of a level over that of the level below, at least 1 */
