@@ -45,7 +45,7 @@ REPIVOT = 1e-4       # share of a row in its own basis vector: smaller ones pivo
 INDEPENDENT = 1e-2   # of rank_tolerance: a second pass counts rows as dependent only below that
 DEARER = 0.25        # violation of a level after the second pass over that after the first, less 1
 UNCLEAR_PIVOT = 1e-5  # of a row in the staircase, or less: the exact engine decides
-LIGHT_ROW = 1e-5     # norm of a row over the largest in a level that is missed: the same
+LIGHT_ROW = 2e-4     # norm of a row over the largest in a level that is missed: the same
 UNCLEAR_CUT = 0.3    # remainder of a dependent row over the smallest pivot: the same
 ORTHOGONAL = 1e-30   # squared cosine of two rows: Jacobi rotations stop
 
