@@ -184,6 +184,10 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
     assert "entry_of_mine" not in sys.modules
     assert use() == line.partition(" ")[0]
     sys.modules.pop("entry_of_mine")
+    plugins._loaded.clear()
+    plugins.require(["entry_of_mine"])  # installed, so allowed; another module is not
+    refused("plugin 'doors_of_mine' is not allowed", plugins.require, ["doors_of_mine"])
+    sys.modules.pop("entry_of_mine")
 
 
 def test_two_things_of_one_name_are_refused():
