@@ -176,6 +176,8 @@ def test_the_distance_was_kept_by_runs_that_were_never_below_it():
 def test_an_axis_shows_values_up_to_twice_the_width_of_their_middle_away(outlier, high):
     values = np.append(np.linspace(10.0, 11.0, 100), outlier)
     assert sampled_page._limits([values]) == pytest.approx((10.0, high))
+    for same, room in ((-8.0, 0.04), (0.0, 0.005)):
+        assert sampled_page._limits([np.full(9, same)]) == pytest.approx((same - room, same + room))
 
 
 @pytest.mark.parametrize(("speed", "stopped", "same", "best"), [
