@@ -94,7 +94,7 @@ SCENES = {
     "no limits, little damping": lambda c: arm_scene(c, lm_damping=50.0, damping=1e-3, limits=[]),
     "barrier": lambda c: arm_scene(c, barriers=[wall(c, 1e-3, 1.0, 0.0)]),
     "barrier with a safe displacement": lambda c: arm_scene(c, barriers=[wall(c, 1e-3, 9.0, 0.7)]),
-    "a barrier alone": lambda c: (c, [], {"barriers": [wall(c, 1.0, 9.0, 0.7)]}),
+    "a barrier alone": lambda c: (c, [], {"barriers": [wall(c, 1.0, 9.0, 0.05)]}),
     "one row": lambda c: (c, [posture_task(Q + 0.1)], {}),
     "humanoid": humanoid_scene}
 
