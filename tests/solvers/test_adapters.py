@@ -284,9 +284,9 @@ def test_a_wrong_argument_of_a_level_out_of_mujoco_is_named(arm, level, settings
 def made_hierarchy(seed):
     """Seven joints in their box, then equalities, inequalities that contradict each other, more."""
     rng = np.random.default_rng(seed)
-    wanted, row = rng.normal(size=3), rng.normal(size=(1, 7))
+    wanted, row = 4.0 * rng.normal(size=3), rng.normal(size=(1, 7))
     return Hierarchy.from_levels([
-        (np.eye(7), np.full(7, -0.5), np.full(7, 0.5)), (rng.normal(size=(3, 7)), 0.4 * wanted),
+        (np.eye(7), np.full(7, -2.0), np.full(7, 2.0)), (rng.normal(size=(3, 7)), 0.4 * wanted),
         (np.vstack([row, row]), [-np.inf, 1.0], [-1.0, np.inf]),
         (rng.normal(size=(2, 7)), [-np.inf, 0.1], [0.2, np.inf]),
         (rng.normal(size=(3, 7)), wanted)], reference=rng.normal(size=7))
