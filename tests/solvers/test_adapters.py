@@ -200,6 +200,8 @@ def rows_at(robot, configuration, level):
      "FrameTask of end_effector: lm_damping = 1"),
     (lambda c, r: pink_hierarchy(c, [posture_task(Q)], DT, barriers=[wall(c, 1.0, 1.0, 2.0)]),
      "Backing: safe_displacement_gain = 2"),
+    (lambda c, r: pink_hierarchy(c, [[frame_task(c)], [posture_task(Q)]], DT, damping=1.0),
+     "FrameTask of end_effector: damped, and not the last level"),
     (lambda c, r: rows_at(r, c, "acceleration"), "pink does not support accelerations"),
     (lambda c, r: rows_at(r, renamed(r), "velocity"), "has the joints other")])
 def test_what_cannot_be_resolved_is_named(robot, configuration, call, said):
