@@ -38,8 +38,9 @@ def save(recording: Recording, folder: str | Path) -> Path:
     Only times are measured: the same scenario and versions give the same bytes of `run.npz`.
     """
     expect("save", recording, Recording, "give what `simulate` returns")
-    times = {name: signal for name, signal in recording.signals.items() if name.startswith("time_")}
-    rest = {name: signal for name, signal in recording.signals.items() if name not in times}
+    signals: dict[str, Any] = recording.signals
+    times = {name: signal for name, signal in signals.items() if name.startswith("time_")}
+    rest = {name: signal for name, signal in signals.items() if name not in times}
     with whole(file_path("save", folder)) as partial:
         np.savez_compressed(partial / "run.npz", **rest,
                             orders=np.array(recording.orders, dtype=np.str_),
