@@ -63,7 +63,7 @@ def print_table(runs: list[Run]) -> None:
     goals = [fill(f"  {goal}", _WIDTH, subsequent_indent="    ") for goal in found[0].goals
              ] if len(found) == 1 else []
     _print_rows(dict.fromkeys(run.title for run in runs), "", [run.label for run in runs],
-                table(runs, details=False), "best of its row, or within 1 % of that",
+                table(runs), "best of its row, or within 1 % of that",
                 ["", *map(str, partings(runs)), *flags(runs), *lines(found), *goals])
 
 

@@ -62,7 +62,7 @@ def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
                          for capsule in scene.stage.robot.capsules]
             if scene.desired is not None:
                 entities.append(line(t, "path asked for", scene.desired, _ASKED))
-        moved = (scene.centres[frame] != scene.centres[max(frame - 1, 0)]).any(axis=1)
+        moved = (scene.centres[frame] != scene.centres[frame - 1]).any(axis=1)
         entities += [obstacle(t, h, body, scene.centres[frame, h])
                      for h, body in enumerate(scene.stage.obstacles.obstacles)
                      if frame == 0 or moved[h]]

@@ -38,17 +38,17 @@ def save(recording: Recording, folder: str | Path) -> Path:
     Only times are measured: the same scenario and versions give the same bytes of `run.npz`.
     """
     expect("save", recording, Recording, "give what `simulate` returns")
-    times = {name: signal for name, signal in recording.signals.items() if name.startswith("time_")}
-    rest = {name: signal for name, signal in recording.signals.items() if name not in times}
+    signals: dict[str, Any] = recording.signals
+    times = {name: signal for name, signal in signals.items() if name.startswith("time_")}
+    rest = {name: signal for name, signal in signals.items() if name not in times}
     with whole(file_path("save", folder)) as partial:
-        np.savez_compressed(partial / "run.npz", allow_pickle=False, **rest,
+        np.savez_compressed(partial / "run.npz", **rest,
                             orders=np.array(recording.orders, dtype=np.str_),
                             fault=np.array(recording.fault or ""),
                             events=np.array(list(recording.events), dtype=_EVENT))
-        np.savez_compressed(partial / "timings.npz", allow_pickle=False, **times)
+        np.savez_compressed(partial / "timings.npz", **times)
         if recording.depth is not None:
-            np.savez_compressed(partial / "depth.npz", allow_pickle=False,
-                                **recording.depth._asdict())
+            np.savez_compressed(partial / "depth.npz", **recording.depth._asdict())
         write_json(partial / "facts.json", dataclasses.asdict(recording.facts))
         write_json(partial / "versions.json", versions())
         (partial / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")

@@ -115,8 +115,8 @@ class Row(NamedTuple):
         return f"{self.label} [{self.unit}]" if self.unit else self.label
 
 
-def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
-    """Return the rows that compare runs of one scenario, best values marked.
+def table(runs: Sequence[Run]) -> list[Row]:
+    """Return the rows that compare runs of one scenario, best values marked, without details.
 
     Only runs of one scenario that reached their end compete: other scenarios ask for other things,
     and a shorter run's numbers cover less time. Values within one percent of the best are as good,
@@ -125,7 +125,7 @@ def table(runs: Sequence[Run], details: bool = True) -> list[Row]:
     one_scenario = len({run.scenario.name for run in runs}) == 1
     competes = [one_scenario and run.fault is None for run in runs]
     known = {name: metric for run in runs for name, metric in run.metrics.items()
-             if details or not metric.detail}
+             if not metric.detail}
     rows = []
     for name, metric in known.items():
         found = [run.metrics.get(name) for run in runs]

@@ -174,7 +174,7 @@ class Comparison:
         """Return a table for each group: a row per metric, the best in bold."""
         found = ""
         for name, runs in self.groups().items():
-            rows = table(runs, details=False)
+            rows = table(runs)
             best = {(i, j + 1) for i, row in enumerate(rows)
                     for j, cell in enumerate(row.cells) if cell.kind == "best"}
             cells = [(row.heading, *(cell.text for cell in row.cells)) for row in rows]

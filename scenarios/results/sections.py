@@ -36,7 +36,7 @@ _USUAL = 4.0  # median widths of the ranges of values: wider ones would flatten 
 
 def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
     """Return the metrics with the best of each row marked; minor ones are folded away."""
-    rows = table(runs, details=False)
+    rows = table(runs)
     first = [row for row in rows if row.name in _FIRST or (
         row.name.startswith("task_") and row.name.endswith("_rms"))]
     marked = caveats({run.label: resolver_facts(run.scenario) for run in runs})

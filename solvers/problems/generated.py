@@ -140,8 +140,8 @@ def save(h: Hierarchy, path: str | Path) -> None:
     """Write a hierarchy as a small .npz file."""
     expect("save: h", h, Hierarchy, "make one with Hierarchy.from_levels")
     more = {name: getattr(h, name) for name in _MORE if getattr(h, name) is not None}
-    np.savez_compressed(file_path("save", path), allow_pickle=False, A=h.A, lower=h.lower,
-                        upper=h.upper, sizes=h.sizes, reference=h.reference,
+    np.savez_compressed(file_path("save", path), A=h.A, lower=h.lower, upper=h.upper,
+                        sizes=h.sizes, reference=h.reference,
                         names=np.array(h.names, dtype=np.str_), **more)
 
 

@@ -49,8 +49,9 @@ def test_distance_is_zero_on_the_surface_with_a_gradient_of_one(shape):
 
 
 def test_an_obstacle_follows_its_path_and_keeps_the_offset_that_it_was_shifted_by():
-    path = Waypoints((1.0, 2.0), ((0, 0, 0), (1, 0, 0)))
+    path = Waypoints((0.5, 2.5), ((0, 0, 0), (1, 0, 0)))
     obstacles = Obstacles([Obstacle("sphere", (9, 9, 9), (0.1,), path=path), SHAPES["box"]])
+    np.testing.assert_array_equal(obstacles.centres[0], 0.0)
     np.testing.assert_allclose(obstacles.at(1.5)[:, 4:7], [[0.5, 0, 0], [0.1, -0.2, 0.3]])
     for offset in ((0.0, 0.0, 0.5), (0.0, 0.1, 0.0)):  # not one on top of the other
         for which in (0, 1):

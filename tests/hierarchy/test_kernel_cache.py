@@ -4,12 +4,13 @@ import os
 import shutil
 import subprocess
 import sys
-from types import FunctionType
+from types import FunctionType, SimpleNamespace
 
 import numba
 import pytest
 from refusals import refused
 
+from hierarchy.jit import saying
 from hierarchy.jit.sources import source_digest
 from solvers.kernels.active_set.exact import solve_hierarchy
 from solvers.kernels.active_set.working_set import meet
@@ -124,6 +125,20 @@ import numba
 print(float(numba.njit(lambda x: np.cumsum(x)[-1])(np.arange(3.0))))
 """
     assert ask(code)[0] == ["11.0", "0", "False", "False", "3.0"]
+
+
+def test_compiling_is_said_once_and_not_by_a_worker(monkeypatch, capsys):
+    listeners = []
+    monkeypatch.setattr(saying.event, "register", lambda kind, one: listeners.append(one))
+    monkeypatch.delenv("TASK_HIERARCHY_WORKER", raising=False)
+    saying.announce_compilation.__wrapped__()
+    (one,) = listeners
+    monkeypatch.setenv("TASK_HIERARCHY_WORKER", "1")
+    saying.announce_compilation.__wrapped__()
+    assert listeners == [one]
+    for _ in range(2):
+        one.on_start(SimpleNamespace(data={"dispatcher": meet}))
+    assert capsys.readouterr().err.count("compiling kernels") == 1
 
 
 def test_python_cannot_call_what_is_compiled_for_other_kernels():

@@ -15,7 +15,7 @@ from standing import ROBOT as HUMANOID
 from hierarchy import Hierarchy, Robot, Stack, State, tasks
 from hierarchy.activation import Activation
 from hierarchy.avoidance import Barrier, Capsule, Obstacle, Repulsion, SurveillanceAreas
-from hierarchy.contacts import Contact, Contacts
+from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.gate import check_rotation
 from hierarchy.limits import Limits
 from hierarchy.loop import Loop
@@ -182,6 +182,7 @@ def limits(**settings):
       for bad in ({"amplitude": -1.0}, {"rate": 0.0}, {"seed": -1})),
     (lambda: circle((0, 0, 0), -0.1), "circle: radius [m] = -0.1"),
     (lambda: circle((0, 0, 0), 0.1, (0, 0, 0)), "normal tuple (0, 0, 0) is no direction"),
+    (lambda: corners((0, 1), (0, 1), (0, 0, 0)), "sole: up (0, 0, 0) is no direction"),
     (lambda: Loop(0.0), "loop: period [s] = 0: expected"), (lambda: Loop(0.1, behind=0), "behind"),
     (lambda: Loop(0.1, overrun="skipp"), "did you mean 'skip'"),
     (lambda: Loop(0.25, watchdog=0.1), "watchdog 0.1 s must be longer than the period 0.25 s"),

@@ -230,3 +230,5 @@ def test_a_run_that_cannot_be_saved_where_it_should_is_saved_elsewhere(tmp_path,
     said = run_folder.kept(simulate(load("ellipse", ["control.duration=0.02"])), tmp_path / "file")
     assert "cannot be written" in said
     assert load_run(said.partition("the run is in ")[2]).ticks == 20
+    monkeypatch.setattr(run_folder, "save", mock.Mock(side_effect=OutputError("full")))
+    assert run_folder.kept(mock.Mock(), tmp_path / "run") == "full; full"

@@ -14,6 +14,7 @@ from hierarchy.avoidance import Obstacle
 from scenarios import load, save, simulate
 from scenarios.export import export, foxglove
 from scenarios.recording.recording import Event
+from scenarios.scene import scene
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +97,16 @@ def test_frames_are_where_the_robot_is(run, messages):
             turned = Rotation.from_quat([frames[name]["rotation"][axis] for axis in "xyzw"])
             np.testing.assert_allclose(turned.as_matrix(),
                                        state.placements[i, :9].reshape(3, 3).T, atol=1e-9)
+
+
+def test_an_obstacle_is_sent_when_it_moves_and_the_path_taken_in_pieces_that_meet(run):
+    still = scene(run, 100.0)
+    moved = replace(still, centres=still.centres + np.minimum(np.arange(16), 1)[:, None, None])
+    sent = {frame: {one["id"]: one for one in update["entities"]}
+            for frame, update in foxglove.scene_updates(moved, 5)}
+    assert [frame for frame, parts in sent.items() if "obstacle 1" in parts] == [0, 1]
+    assert [len(part["lines"][0]["points"]) for parts in sent.values()
+            for name, part in parts.items() if name.startswith("path taken")] == [6, 6, 6]
 
 
 def test_the_layout_shows_only_what_the_file_has(messages):

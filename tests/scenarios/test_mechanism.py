@@ -222,3 +222,6 @@ def test_a_chain_that_is_nearly_flat_is_kept_closed_at_moderate_speeds(crank):
     step = solve_ik(bar, q, [JointCoupling(bar, {"crank": 1.0}, crank + 0.1)], dt=0.02)
     assert np.abs(step.v).max() < 2.0
     assert mechanism.gap(bar.integrate(q, step.v * 0.02))[0] < 1e-6
+    bar.loops = ()  # the thumb alone
+    step = solve_ik(bar, q, [JointCoupling(bar, {"finger": 1.0}, 0.5)], dt=0.02)
+    assert Mechanism(bar).gap(bar.integrate(q, step.v * 0.02))[0] < 1e-12

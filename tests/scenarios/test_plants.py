@@ -173,6 +173,8 @@ def test_a_tick_without_an_answer_or_without_a_report_has_no_set():
     assert sets(0, tick) == {}
     tick.resolution = make("hcod").solve(h)
     assert sets(1, tick) == {"active_set": 0}
+    more = Hierarchy.from_levels([([[0.0, 1.0]], [0.5]), *h.levels()], names=("more", *h.names))
+    assert sets.number(more, make("hcod").solve(more)) == 0, "a level more is no change"
     tick.resolution = make("hcod").solve(h)
     tick.resolution.status = Status.ITERATION_LIMIT
     assert sets(2, tick) == {"active_set": -1}

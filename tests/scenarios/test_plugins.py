@@ -158,6 +158,7 @@ def test_a_scenario_with_own_kinds_is_copied_and_pickled():
 @pytest.mark.parametrize(("change", "said"), [
     ("tasks.0.angel=1.0", "unknown key 'tasks.0.angel'; did you mean 'tasks.0.angle'?"),
     ("tasks.0.angle=true", "tasks.0.angle: Input should be a valid number, got True"),
+    ("tasks.2.angle=1.0", "[tasks] has 2 entries, numbered from 0, and no '2'"),
     ("tasks.1.path.kind=spiral", "tasks.1.path: unknown kind 'spiral'. Known: circle"),
     ("tasks.0.kind=elbwo", "tasks.0: unknown kind 'elbwo'; did you mean 'elbow'?"),
     ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
@@ -183,6 +184,10 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
     plugins._points.cache_clear()
     assert "entry_of_mine" not in sys.modules
     assert use() == line.partition(" ")[0]
+    sys.modules.pop("entry_of_mine")
+    plugins._loaded.clear()
+    plugins.require(["entry_of_mine"])  # installed, so allowed; another module is not
+    refused("plugin 'doors_of_mine' is not allowed", plugins.require, ["doors_of_mine"])
     sys.modules.pop("entry_of_mine")
 
 

@@ -18,7 +18,7 @@ from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
 from scenarios.results import pool, sampled_page
 from scenarios.results.columns import Results, verdict
-from scenarios.results.plan import Job, Outcome, load_sweep, plan, shipped_sweeps
+from scenarios.results.plan import Job, Outcome, load_sweep, outcome, plan, shipped_sweeps
 from scenarios.results.sampled import Workers, compare_starts
 from scenarios.results.store import FullError, Store
 
@@ -176,6 +176,8 @@ def test_the_distance_was_kept_by_runs_that_were_never_below_it():
 def test_an_axis_shows_values_up_to_twice_the_width_of_their_middle_away(outlier, high):
     values = np.append(np.linspace(10.0, 11.0, 100), outlier)
     assert sampled_page._limits([values]) == pytest.approx((10.0, high))
+    for same, room in ((-8.0, 0.04), (0.0, 0.005)):
+        assert sampled_page._limits([np.full(9, same)]) == pytest.approx((same - room, same + room))
 
 
 @pytest.mark.parametrize(("speed", "stopped", "same", "best"), [
@@ -217,6 +219,8 @@ def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path,
         store.add(jobs[1], Outcome("b", 0, "broke,\nfor once", 0.1))
         assert {key: one.reason for key, one in store.outcomes().items()} == {
             "a": None, "c": None, "b": "broke,\nfor once"}
+        failed = outcome(mock.Mock(key="b", load=mock.Mock(side_effect=ValueError("broke"))))
+        assert (failed.key, failed.ticks, failed.reason) == ("b", 0, "ValueError: broke")
         monkeypatch.setattr(os, "fsync", mock.Mock(side_effect=OSError(28, os.strerror(28))))
         with pytest.raises(FullError, match=r"out/runs/all\.csv cannot be written: No space"):
             store.add(jobs[0], Outcome("d", 20, None, 0.1))

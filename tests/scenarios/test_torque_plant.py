@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 import pytest
+from mechanisms import four_bar
 from refusals import refused
 from scipy.spatial.transform import Rotation
 from standing import IDEAL, ROBOT, accelerations, feet, moving_state
@@ -53,13 +54,16 @@ def test_gravity_is_that_of_the_robots_file(tmp_path):
     np.testing.assert_allclose(plant.a, expected, rtol=1e-3)
 
 
-def test_a_robot_whose_inertia_no_body_has_is_named(tmp_path):
+def test_a_robot_whose_inertia_no_body_has_is_named_and_a_joint_of_several_axes(tmp_path):
     arm = link("arm", INERTIAL.replace("0.4", "1.4"))
     (tmp_path / "flat.urdf").write_text(f'<robot name="flat">{link("base")}{arm}' + joint(
         "only", "revolute", "base", "arm") + "</robot>")
     robot = Robot.load(tmp_path / "flat.urdf")
     refused("plant: MuJoCo refuses robot 'flat'", TorqueRobot, robot, Contacts(robot, ()),
             np.zeros(1), section=plant_with(), error=ScenarioError)
+    bar = four_bar(rocker=pin.JointModelSpherical())
+    refused("joint 'rocker' does not turn", TorqueRobot, bar, Contacts(bar, ()), bar.rest,
+            section=plant_with(), error=ScenarioError)
 
 
 def test_torques_arrive_late_by_the_delay_and_are_cut_off_at_their_limits():

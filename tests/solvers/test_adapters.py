@@ -94,7 +94,7 @@ SCENES = {
     "no limits, little damping": lambda c: arm_scene(c, lm_damping=50.0, damping=1e-3, limits=[]),
     "barrier": lambda c: arm_scene(c, barriers=[wall(c, 1e-3, 1.0, 0.0)]),
     "barrier with a safe displacement": lambda c: arm_scene(c, barriers=[wall(c, 1e-3, 9.0, 0.7)]),
-    "a barrier alone": lambda c: (c, [], {"barriers": [wall(c, 1.0, 9.0, 0.7)]}),
+    "a barrier alone": lambda c: (c, [], {"barriers": [wall(c, 1.0, 9.0, 0.05)]}),
     "one row": lambda c: (c, [posture_task(Q + 0.1)], {}),
     "humanoid": humanoid_scene}
 
@@ -200,6 +200,8 @@ def rows_at(robot, configuration, level):
      "FrameTask of end_effector: lm_damping = 1"),
     (lambda c, r: pink_hierarchy(c, [posture_task(Q)], DT, barriers=[wall(c, 1.0, 1.0, 2.0)]),
      "Backing: safe_displacement_gain = 2"),
+    (lambda c, r: pink_hierarchy(c, [[frame_task(c)], [posture_task(Q)]], DT, damping=1.0),
+     "FrameTask of end_effector: damped, and not the last level"),
     (lambda c, r: rows_at(r, c, "acceleration"), "pink does not support accelerations"),
     (lambda c, r: rows_at(r, renamed(r), "velocity"), "has the joints other")])
 def test_what_cannot_be_resolved_is_named(robot, configuration, call, said):
@@ -284,9 +286,9 @@ def test_a_wrong_argument_of_a_level_out_of_mujoco_is_named(arm, level, settings
 def made_hierarchy(seed):
     """Seven joints in their box, then equalities, inequalities that contradict each other, more."""
     rng = np.random.default_rng(seed)
-    wanted, row = rng.normal(size=3), rng.normal(size=(1, 7))
+    wanted, row = 4.0 * rng.normal(size=3), rng.normal(size=(1, 7))
     return Hierarchy.from_levels([
-        (np.eye(7), np.full(7, -0.5), np.full(7, 0.5)), (rng.normal(size=(3, 7)), 0.4 * wanted),
+        (np.eye(7), np.full(7, -2.0), np.full(7, 2.0)), (rng.normal(size=(3, 7)), 0.4 * wanted),
         (np.vstack([row, row]), [-np.inf, 1.0], [-1.0, np.inf]),
         (rng.normal(size=(2, 7)), [-np.inf, 0.1], [0.2, np.inf]),
         (rng.normal(size=(3, 7)), wanted)], reference=rng.normal(size=7))

@@ -127,6 +127,14 @@ def test_the_certificate_shares_no_code_with_any_solver():
                         "hierarchy"}
 
 
+def test_its_search_for_multipliers_finds_the_least_that_scipys_finds():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        C, b = rng.random((9, 8)) + 0.2 * rng.normal(size=(9, 8)), rng.random(9)
+        own, scipys = (certificate._non_negative(C, b, 0.0, by_scipy) for by_scipy in (False, True))
+        np.testing.assert_allclose(own, scipys, atol=1e-9)
+
+
 def test_an_answer_for_rows_turned_until_they_depend_is_certified():
     """Two rows depend up to 1.3e-9 where others are at a side; neither a shift nor a turn alone
     explains x."""

@@ -228,8 +228,7 @@ def rolled(coordinates: Array, by: int) -> Array:
     MuJoCo's are w, x, y, z, ours x, y, z, w: by 1 for MuJoCo, by -1 from it.
     """
     turned = np.array(coordinates)
-    if len(turned) > 1:
-        turned[-4:] = np.roll(turned[-4:], by)
+    turned[-4:] = np.roll(turned[-4:], by)
     return turned
 
 
