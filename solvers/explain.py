@@ -16,6 +16,7 @@ from solvers.status import EQUAL
 _NAMED, _SMALL = 3, 0.1  # missed rows that are named, and the share of the largest that counts
 _AXES = ("x", "y", "z")
 _SINGULAR = 1e-3  # share of |A| |w| below which A^T w counts as nothing
+_ROUNDED = 1e-12  # the same, of a level whose own rows disagree
 _MATTERS = 1e-6  # smallest share of a level's pull for which a level above is named
 
 
@@ -172,8 +173,9 @@ def holders(h: Hierarchy, resolution: ActiveSetResolution, k: int) -> NDArray[np
     sizes = np.linalg.norm(h.A[:first], axis=1)
     own = held == k
     acting = np.flatnonzero(((state == EQUAL) | ((held >= 0) & (held < k))) & (sizes > 0.0))
-    pull = h.A[first:last].T @ h.slacks(resolution.x)[first:last]
-    if len(acting) and pull.any():
+    A, w = h.A[first:last], h.slacks(resolution.x)[first:last]
+    pull, size = A.T @ w, np.linalg.norm(A) * np.linalg.norm(w)
+    if len(acting) and np.linalg.norm(pull) > _ROUNDED * size:
         left = pull + h.A[:first][own].T @ resolution.multipliers[:first][own]
         unit = h.A[acting] / sizes[acting, None]
         forces = np.linalg.lstsq(unit.T, left, rcond=1e-10)[0]

@@ -22,6 +22,7 @@ from solvers.resolvers.settled import Settled
 from solvers.status import Status
 
 _STARTS, _MOST = 20, 200  # starts, and iterations of each
+_PERIOD = 0.1     # [s] for which the velocity of a step is held
 _STEP = 0.3       # [rad or m] the largest change of a joint in one iteration
 _STILL = 1e-3     # relative decrease of the errors in `_PATIENCE` iterations that goes on
 _AT_REST = 1e-9   # the same at the end
@@ -55,11 +56,12 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
           resolver: Resolver, t: float = 0.0, damping: float = 1.0) -> Reached:
     """Return the configuration near q in which the tasks are met, in strict order, at time t.
 
-    Gauss-Newton steps of the same problem as `solve_ik`, each at most 0.3 rad or m, with a gain of
-    1 for the fastest task. Where the errors stop falling, they start again from a random
-    configuration within the limits, the same ones in each call. These steps are undamped, which
-    finds more; from the best of all starts damped ones go on to the nearest. Joint tasks such as a
-    posture are preferences: they do not decide whether the others are met, but where.
+    Gauss-Newton steps of the same problem as `solve_ik`, each at most 0.3 rad or m, for the whole
+    error of each task whatever its gain. Where the errors stop falling, they start again from a
+    random configuration within the limits, the same ones in each call. These steps are undamped,
+    which finds more; from the best of all starts damped ones go on to the nearest. Joint tasks such
+    as a posture are preferences: they do not decide whether the others are met, but where; their
+    gains count relative to the largest of all.
 
     until : largest norm of the error of each task that decides, in its unit.
 
@@ -97,21 +99,20 @@ class _Search:
 
     def __init__(self, state: State, tasks: Sequence[Task], until: float, limits: bool,
                  resolver: Resolver, damping: float) -> None:
-        gains = [np.max(np.asarray(part.gain, dtype=float), initial=0.0)
-                 for task in tasks for part in (task, *parts(task))]
-        rates = [part.barrier.rate for task in tasks for part in (task, *parts(task))
-                 if hasattr(part, "barrier")]
-        self.period, robot = 1.0 / max([*gains, *rates, 1e-3]), state.robot
+        robot, fastest = state.robot, max([1e-3, *map(_fastest, tasks)])
         self.robot, self.until, self.t, self.tasks = robot, until, state.t, list(tasks)
-        self.limits = [StepLimits(robot, self.period, 1.0 / self.period)] if limits else []
-        self.stack, self.settled = stacked(robot, tasks, self.period, self.limits, resolver,
-                                           damping)
+        self.limits = [StepLimits(robot, _PERIOD, 1.0 / _PERIOD)] if limits else []
+        self.stack, self.settled = stacked(robot, tasks, _PERIOD, self.limits, resolver, damping)
         self.mechanism = Mechanism(robot)
         self.deciding = [task for task in tasks if not task.straight]
         if not self.deciding:
             raise HierarchyError("solve_ik: until: only joint tasks are given, which are "
                                  "preferences; give a task of a frame too")
-        self.moving = [task for task in tasks if np.any(task.desired_velocity(state))]
+        # Sides times the factor ask for the whole error of a task that decides, or of the fastest.
+        factors = [1.0 / (_PERIOD * ((not task.straight and _fastest(task)) or fastest))
+                   for task in tasks]
+        self.changed = [(task, factor) for task, factor in zip(tasks, factors, strict=True)
+                        if factor != 1.0 or np.any(task.desired_velocity(state))]
         self.state, self.status = state, Status.SOLVED
 
     def descend(self, q: Array, resolver: Resolver, still: float = _STILL
@@ -129,19 +130,21 @@ class _Search:
                 return (errors, q, k) if done else (*best, k)
             found = resolver.solve(self._rows(), memory)
             self.status, memory = found.status, found.memory
-            step = found.x * self.period
+            step = found.x * _PERIOD
             q = self.mechanism.closed(self.robot.integrate(
                 q, step * min(1.0, _STEP / max(abs(step).max(), 1e-300))))
         return (*best, _MOST)
 
     def _rows(self) -> Hierarchy:
-        """Return the problem at the state as if targets stood still, for t does."""
+        """Return the problem of a step as if targets stood still, for t does."""
         h = self.stack.hierarchy(self.state)
-        ahead = np.zeros(h.m)
-        for task in self.moving:
-            k = h.names.index(task.name)
-            ahead[h.offsets[k]:h.offsets[k + 1]] = task.desired_velocity(self.state)
-        return h.changed(lower=h.lower - ahead, upper=h.upper - ahead) if self.moving else h
+        lower, upper = h.lower.copy(), h.upper.copy()
+        for task, factor in self.changed:
+            k, ahead = h.names.index(task.name), task.desired_velocity(self.state)
+            rows = slice(h.offsets[k], h.offsets[k + 1])
+            lower[rows] = factor * (lower[rows] - ahead)
+            upper[rows] = factor * (upper[rows] - ahead)
+        return h.changed(lower=lower, upper=upper) if self.changed else h
 
     def _errors(self, q: Array) -> list[float]:
         """Move to q and return the norm of the error of each deciding task, `until` if it is met.
@@ -204,6 +207,14 @@ def _above(h: Hierarchy, k: int, wanted: Array, limits: Sequence[Task]) -> list[
         if name not in own and blocks.any():
             names.append(name)
     return names
+
+
+def _fastest(task: Task) -> float:
+    """Return the largest gain or rate [1/s] of a task and of those in it."""
+    both = [task, *parts(task)]
+    gains = [float(np.max(np.asarray(part.gain, dtype=float), initial=0.0)) for part in both]
+    rates: list[float] = [part.barrier.rate for part in both if hasattr(part, "barrier")]
+    return max([*gains, *rates])
 
 
 def _drawn(robot: Robot, q: Array, rng: np.random.Generator) -> Array:

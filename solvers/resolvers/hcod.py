@@ -26,6 +26,7 @@ class ActiveSetResolution(Resolution):
     holds_back : (m,) int16, the first level that this inequality row keeps from being met better:
         its own level where it stays violated, L for the distance to the reference, -1 for none.
     multipliers : (m,) multiplier of each row in that level; in its own level, its violation.
+        Below levels that leave no freedom, and of zeros, a violated inequality counts as inactive.
     unfinished : the level at which the iteration limit was reached, or None.
     """
 

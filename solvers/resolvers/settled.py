@@ -73,7 +73,11 @@ class Settled(Around):
         above = _Above(self.inner, h)
         for k, (A, lower, upper) in enumerate(h.levels()):
             calm = least[k] > 0.0 and len(lower) and (lower == upper).all()
-            above.add(*(above.calm(A, lower, half) if calm else (A, lower, upper)))
+            if calm:
+                A, lower, upper = above.calm(A, lower, half)
+            else:
+                above.behind |= bool(((A @ above.x < lower) | (A @ above.x > upper)).any())
+            above.add(A, lower, upper)
         return above if above.calmed else None
 
 
@@ -93,6 +97,7 @@ class _Above:
         self.inner, self.calmed, self.status, self.names = inner, False, Status.SOLVED, h.names
         self.levels: list[tuple[Array, Array, Array]] = []
         self.x, self._held, self._later = np.zeros(n), np.empty((0, n)), list[Array]()
+        self.behind = False  # whether x misses a level
         self.box = np.full(n, -np.inf), np.full(n, np.inf)
         self.paced = inner.can_resolve("bounds")
         # One that resolves bounds in a first level only needs all of them there.
@@ -118,6 +123,9 @@ class _Above:
 
         half : alpha / |A| [s].
         """
+        if self.behind:
+            self.x = self.inner.solve(self.stacked(self.levels, self.x)).x
+            self.behind = False
         size, out = float(np.linalg.norm(A)), float(np.linalg.norm(b - A @ self.x))
         alpha = half * size
         if not 0.0 < _LEAST * size * size < alpha * out < np.inf:

@@ -100,6 +100,9 @@ EXPLAINED = {
          ([[0.0, 1.0], [0.0, 1.0]], [0.0, 1.0])],
         ["level 1 is met.", "level 2 is missed by 1: held back by level 1.",
          "level 3 has no rows.", "level 4 is missed by 0.707: its own rows disagree."]),
+    "rows that disagree below others that do not hold them back": (
+        [([[1.0, 1.0]], [0.0]), ([[1.0, 0.0]] * 3, [0.1, 0.2, 0.4])],
+        [..., "level 2 is missed by 0.216: its own rows disagree."]),
     "a level that carries next to nothing is left out": (
         [X, Y, ([[1e-8, 1.0]], [1.0])],
         [..., ..., "level 3 is missed by 1: held back by level 2."]),

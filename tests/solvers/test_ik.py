@@ -94,6 +94,16 @@ def test_poses_of_random_configurations_are_found_within_the_limits():
         np.testing.assert_allclose(here.rotation(FRAME), goal.rotation(FRAME), atol=2e-6)
 
 
+def test_a_configuration_does_not_depend_on_the_gains_of_its_tasks():
+    goal, elbow = State.at(ROBOT, Q + 0.4), ROBOT.frame("joint_4")
+    found = [solve_ik(ROBOT, Q, [
+        Position(FRAME, Still(goal.position(FRAME)), gain=hand),
+        Position(elbow, Still(goal.position(elbow)), gain=other, name="elbow")], until=1e-6)
+        for hand, other in ((10.0, 10.0), (10.0, 0.1), (0.1, 10.0), (1000.0, 1000.0))]
+    assert all(one.met and one.iterations == found[0].iterations for one in found)
+    np.testing.assert_allclose([one.q for one in found], [found[0].q] * 4, atol=1e-9)
+
+
 @pytest.mark.parametrize("make_task", [
     lambda path: Position(FRAME, path), lambda path: FrameLog(FRAME, path, np.eye(3)),
     lambda path: Along(Position(FRAME, path), ((0.6, 0.0, 0.8), (0.0, 1.0, 0.0)))])

@@ -110,6 +110,13 @@ def test_one_level_takes_the_minimum_that_scipy_finds(smallest, box):
     assert (np.abs(x) <= box + 1e-9).all()
 
 
+def test_a_level_is_damped_about_the_answer_of_the_levels_above():
+    row = np.array([[1.0, 0.01]])
+    h = Hierarchy.from_levels([(np.eye(2)[:1], [2.0]), (row, [0.0])], names=["joint", "hand"])
+    x = settled("hand").solve(h).x  # exactly, the second joint would go at -200 rad/s
+    np.testing.assert_allclose(x, [2.0, -0.01 / (PERIOD * np.linalg.norm(row) / 2)], rtol=2e-3)
+
+
 @pytest.mark.parametrize("inner", ["hcod", "tpm", "hqp"])
 def test_levels_below_do_not_move_what_a_level_settled_on(inner):
     rng = np.random.default_rng(6)
