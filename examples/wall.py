@@ -65,8 +65,8 @@ def run(kind, duration):
 def main(duration=3.2):
     """Follow the circle both ways and print how far the elbow passes the wall."""
     strict, without = (run(kind, duration)[1].max() for kind in TASKS)
-    print(f"the elbow passes the wall by {strict:.2f} mm with the inequality above the hand, "
-          f"by {without:.0f} mm without it")
+    print(f"the elbow passes the wall by {max(strict, 0.0):.2f} mm with the inequality above the "
+          f"hand, by {without:.0f} mm without it")
     return strict, without
 
 

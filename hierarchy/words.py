@@ -12,9 +12,10 @@ def listed(names: Sequence[str], last_by: str = "and") -> str:
 
 
 def some(names: Sequence[str], most: int = 12) -> str:
-    """Return the first names, and how many more there are."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    """Return the first names, and how many more there are; one more is named."""
+    if len(names) <= most + 1:
+        return ", ".join(names)
+    return f"{', '.join(names[:most])} and {len(names) - most} more"
 
 
 def each(*told: tuple[str, Sequence[str]]) -> list[str]:

@@ -74,7 +74,7 @@ def run(count: int = 1000, seed: int = 0) -> Report:
                                  **judge(answers, robot, model.frames, poses)})
     return Report("Whole inverse kinematics", [Section("", [Table(
         "Poses of hands: robot, poses, package", rows, _COLUMNS)])], {"ik": rows},
-        {**absent, **field.missing})
+        {**absent, **field.missing}, failed=not rows)
 
 
 def judge(answers: list[Row], robot: Robot, frames: tuple[str, ...], poses: Array) -> Row:

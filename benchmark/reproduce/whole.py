@@ -39,7 +39,7 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
            "output of commands; leave --quick out")
     make_folder(out)
     rows, lacking = None, list[str]()
-    with interruptible("the same command continues from here"):
+    with interruptible("the same command continues from here", out):
         for found in _made(asked, out, quick, Workers(workers)):
             rows = found or rows
             lacking = [] if quick else pages.fill(pages.ROOT, Stored.read(pages.ROOT))[1]

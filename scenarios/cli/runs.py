@@ -154,7 +154,7 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
         print(f"skipped: {spec} is not installed; {remedy}",
               file=sys.stderr if as_json else sys.stdout)
     count = workers or cores()
-    with (interruptible(f"the runs made so far are in {shown(folder)}"),
+    with (interruptible(f"the runs made so far are in {shown(folder)}", folder),
           bar("runs" if count > 1 else "ticks") as told):
         comparison = compare(scenarios, resolvers, out=folder, progress=told,
                              command=_command_line(), workers=count)
@@ -198,7 +198,7 @@ def _sampled(make: Callable[..., Finished], folder: Path, as_json: bool) -> int:
 
     begun = perf_counter()
     with (interruptible(f"finished runs are in {folder}, and the same command continues from "
-                        "there"), bar("runs") as told):
+                        "there", folder), bar("runs") as told):
         done = make(progress=told, command=_command_line())
     seconds, runs = perf_counter() - begun, len(done.plan.runs)
     if as_json:

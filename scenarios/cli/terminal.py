@@ -136,12 +136,13 @@ def first_line(thing: Any) -> str:
 
 
 @contextmanager
-def interruptible(kept: str) -> Iterator[None]:
-    """Say at an interruption what is kept, and where."""
+def interruptible(kept: str, folder: Path) -> Iterator[None]:
+    """Say at an interruption what is kept, if the folder is there."""
     try:
         yield
     except KeyboardInterrupt:
-        print(f"hierarchy: {kept}", file=sys.stderr)
+        if folder.is_dir():
+            print(f"hierarchy: {kept}", file=sys.stderr)
         raise
 
 

@@ -14,6 +14,7 @@ _ON_IT = 1e-4  # [m] below a distance that still counts as keeping it
 STEPS = {"rad/s": 0.1, "rad/s^2": 50.0, "N m": 5.0}  # from one tick to the next: larger ones count
 _ROUNDING = 1e-9   # of such a step that still counts as not larger, as at a limit of acceleration
 _LOAD = 1.0        # [N] from which a contact counts as loaded
+_ZERO = 1e-12      # of a share: rounding
 _AT_LIMIT = 0.999  # share of a torque limit that counts as being at it
 _BEYOND = 0.01     # [rad] by which a joint may press into its stop
 REST = 2.0         # [s] at the end of a run in which a robot is to stand at rest
@@ -127,6 +128,7 @@ def _floor(recording: Recording) -> Iterator[Metric]:
         normal, along = force[:, :, 2], np.linalg.norm(force[:, :, :2], axis=2)
         mu = getattr(recording.scenario.plant, "friction", np.nan)
         left = (1.0 - along / (mu * np.maximum(normal, _LOAD)))[sticks & (normal > _LOAD)]
+        left[np.abs(left) < _ZERO] = 0.0  # at the cone
         yield metric("slip_max", "Slip of a contact, max", largest(known(recording["slip"])), "m")
         yield metric("friction_margin_min", "Friction left, min", least(known(left)), "share",
                      False)

@@ -12,7 +12,15 @@ from hierarchy import plugins
 from hierarchy.errors import HierarchyError, brief, expect, file_path, whole
 from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.scenario import OWN
-from scenarios.files import OutputError, claim, make_folder, unlock, write_json, write_text
+from scenarios.files import (
+    OutputError,
+    claim,
+    make_folder,
+    remove_empty,
+    unlock,
+    write_json,
+    write_text,
+)
 from scenarios.loop.simulation import simulate
 from scenarios.measure.run_folder import kept, versions
 from scenarios.measure.runs import Run
@@ -71,6 +79,7 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
         raise
     finally:
         if folder is not None:
+            remove_empty(folder)
             unlock(folder)
 
 
@@ -90,7 +99,7 @@ class _Written:
     def add(self, i: int, run: Run) -> None:
         """Take a run; write the table, and the page of two or more unless it was just written."""
         self._runs[i] = run
-        if self._folder is None:
+        if self._folder is None or not self._made:
             return
         with suppress(FullError):  # `finish` says so
             _write_table(self._folder, self._found())
@@ -101,9 +110,14 @@ class _Written:
             self._next = begun + (time.monotonic() - begun) / _SHARE
 
     def finish(self) -> Comparison:
-        """Write all that is there and return it; raises PageError."""
+        """Write all that is there and return it.
+
+        Raises PageError, and KeyboardInterrupt if that came before the first tick.
+        """
         found = self._found()
-        if self._folder is not None and found.runs:
+        if not self._made:
+            raise KeyboardInterrupt
+        if self._folder is not None:
             try:
                 _write_table(self._folder, found)
                 self._write(self._folder, found)
@@ -112,6 +126,11 @@ class _Written:
                 raise PageError(f"the page cannot be made: {type(error).__name__}: {error}; the "
                                 f"runs are in {found.folder}{apart}") from error
         return found
+
+    @property
+    def _made(self) -> bool:
+        """Whether a run has ticks, or failed."""
+        return any(run.recording or not run.interrupted for run in self._runs.values())
 
     def _found(self) -> Comparison:
         return dataclasses.replace(self._empty, runs=tuple(

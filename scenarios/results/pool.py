@@ -117,8 +117,11 @@ def serve() -> None:
         signal.signal(signal.SIGTERM, _interrupt_once)
         result = work(job)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        pickle.dump(result, answers)
-        answers.flush()
+        try:
+            pickle.dump(result, answers)
+            answers.flush()
+        except BrokenPipeError:
+            os._exit(1)  # whoever asked was killed
 
 
 def _interrupt_once(*_: object) -> None:

@@ -69,7 +69,8 @@ class Store:
             yield
         finally:
             files.unlock(self.file.resolve())
-            files.remove_empty(self.file.parent)  # before any run, such as without a scheduler
+            for made in (self.file.parent, self.folder):  # before any run, such as at Ctrl-C
+                files.remove_empty(made)
 
     def add(self, job: Job, outcome: Outcome) -> None:
         """Append the rows of a run, which are on the disk on return; raises FullError."""

@@ -9,7 +9,7 @@ bit; a batch saves the overhead around each solve and uses all cores.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -70,12 +70,13 @@ class Batch:
                    sizes=checked_sizes(self.sizes, A.shape[1]), reference=reference)
 
     @classmethod
-    def of(cls, hierarchies: Sequence[Hierarchy]) -> Batch:
+    def of(cls, hierarchies: Iterable[Hierarchy]) -> Batch:
         """Stack hierarchies of one shape.
 
         Raises HierarchyError: no hierarchies, one with other sizes or unknowns than the first, or
         one with a metric or levels that give.
         """
+        hierarchies = list(hierarchies)
         if not hierarchies:
             raise HierarchyError("a batch of no hierarchies has no shape; pass arrays instead")
         first = hierarchies[0]

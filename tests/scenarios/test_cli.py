@@ -102,6 +102,14 @@ def test_an_interrupted_comparison_keeps_what_ended_and_names_the_folder(
     assert {"results.csv", *pages} <= {path.name for path in (tmp_path / "b").iterdir()}
 
 
+def test_a_comparison_interrupted_before_the_first_tick_leaves_no_folder(
+        tmp_path, monkeypatch, command):
+    monkeypatch.setattr(comparing, "simulate", mock.Mock(side_effect=KeyboardInterrupt))
+    said = command("compare ellipse --resolvers tpm,hcod --out b --workers 1", code=130).err
+    assert "so far" not in said
+    assert not (tmp_path / "b").exists()
+
+
 def test_an_interruption_while_runs_are_timed_ends_the_comparison(
         monkeypatch, command, undrawn):
     monkeypatch.setattr(comparing, "_timed", lambda run: recording(

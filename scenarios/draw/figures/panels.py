@@ -147,7 +147,7 @@ PANELS = (
           "Continuous at acceleration level, with jumps at velocity level."),
     Panel("joint-accelerations", "Joint accelerations", "rad/s²", "a",
           partial(joints, signal="a", width=0.6),
-          "It jumps where the stack changes."),
+          "It jumps where the stack changes or a limit becomes active."),
     Panel("position-error", "Distance from the desired position", "mm, logarithmic",
           "position_error", position_error,
           "The shipped ellipses start off their path on purpose."),
