@@ -158,6 +158,13 @@ def test_a_level_that_is_rounding_beside_others_counts_where_limits_hold_x():
     np.testing.assert_array_equal(free.x, [0.5, 0.0])
 
 
+def test_a_sign_that_hangs_on_the_rounding_of_a_violated_row_is_left_to_the_levels_below():
+    """The first two rows differ by 3e-13 rad: no reason to hold the third against a level below."""
+    level = [[0.15 - 4.5e-14, 0.15], [-0.45, -0.45], [0.006, -0.162]], [0.05, 0.015, 0.05]
+    res = HCOD.solve(Hierarchy.from_levels([(*level, [np.inf] * 3), ([[0.2, 0.0]], [0.1])]))
+    assert (res.status, res.x[0]) == (Status.SOLVED, pytest.approx(0.5))
+
+
 def test_rows_whose_sides_cross_are_all_that_is_said():
     h = Hierarchy.from_levels([(np.eye(2), [0.0, 0.0], [1.0, 1.0])], names=["box"])
     h.lower[1] = 2.0

@@ -51,6 +51,7 @@ from solvers.kernels.tolerances import (
     CUT_BALANCE,
     CUT_OVER_PIVOT,
     EPSILON,
+    FAINT,
     FREE_ROWS,
     HEAVIER,
     KNOWN_MULTIPLIER,
@@ -281,8 +282,11 @@ def _decide(s, level, error, cut, reach):
     clear = True
     for i in range(level.end):
         if s.index[CHANGE, i] != DECIDED and not _is_rounding(s, level, i, reach):
-            force = abs(s.multiplier[level.p, i]) * s.number[NORM, i]
-            s.index[CHANGE, i] = WEAKLY if force <= error + cut else DECIDED
+            mu = abs(s.multiplier[level.p, i])
+            force = mu * s.number[NORM, i]
+            # Entries of rows are unsure, and with them the least of the violations.
+            faint = i >= level.begin and mu <= FAINT * level.far
+            s.index[CHANGE, i] = WEAKLY if force <= error + cut or faint else DECIDED
             clear = clear and not (error < force <= error + cut)
     return clear
 
