@@ -20,7 +20,8 @@ def array_of(what: str, value: Any) -> Array:
     """Return numbers as a new array; raises a HierarchyError for anything else."""
     try:
         given = np.asarray(value)
-        if given.dtype.kind in _NUMBERS:
+        masked = isinstance(value, np.ndarray) and np.any(getattr(value, "mask", False))
+        if given.dtype.kind in _NUMBERS and not masked:
             return np.array(given, dtype=np.float64, order="C")
     except (TypeError, ValueError, OverflowError) as error:
         raise HierarchyError(f"{what} is not an array of numbers: {brief(value)}") from error

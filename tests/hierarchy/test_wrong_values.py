@@ -54,6 +54,7 @@ def limits(**settings):
     (lambda: ROBOT.integrate(np.zeros(7), np.zeros(6)), "step: expected 7 finite numbers"),
     (lambda: tasks.Avoidance(["x"]), "control points[0]: expected a ControlPoint, got str 'x'"),
     (lambda: Hierarchy.from_levels([(A, ["1", "2"])]), "b is not an array of numbers: list ['1'"),
+    (lambda: Hierarchy.from_levels([(A, np.ma.masked_less([1, 2], 2))]), "of numbers: MaskedArray"),
     (lambda: Hierarchy.from_levels("A"), "levels: expected a list of (A, b)"),
     (lambda: Hierarchy.from_levels([(A, B)] * 2, names=["a"] * 2), "2 levels are named 'a'"),
     (lambda: State.at("kuka_lwr", np.zeros(7)), "State.at: robot: expected a Robot, got str"),
