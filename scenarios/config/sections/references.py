@@ -1,15 +1,17 @@
 """What the names in sections refer to: frames, joints, contacts and capsules of the robot."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hierarchy import Robot, State
 from hierarchy.avoidance.body import measure_capsules, pack_capsules, pairs_of_tree
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
+from hierarchy.tasks import Mechanism
 from scenarios.config.sections import ScenarioError, naming
 
 Pairs = list[tuple[int, int]]
@@ -35,6 +37,11 @@ class References:
         """Return the frame that `key` names, the end effector for None; ScenarioError if none."""
         with naming(key):
             return self.robot.frame(name or self.robot.end_effector)
+
+    def posture(self, joints: Mapping[str, ArrayLike], q: Array) -> Array:
+        """Return q (nq,) with joints by name at their values, and closed chains closed."""
+        moved = self.robot.configuration(joints, q)
+        return Mechanism(self.robot).closed(moved, joints) if joints else moved
 
     def pairs(self, distance: float) -> Pairs:
         """Return the pairs of capsules to keep at a distance [m]; ScenarioError if none can be."""
