@@ -48,12 +48,12 @@ class Posture(Measured):
     """Move every joint to `target` [rad or m]; gains as in `Task`.
 
     The target has the values of all joints, or is a configuration (nq,), or {joint: value, ...}
-    with the other joints at rest, or where a closed chain then has them; see
-    `Robot.configuration` for values, such as the angle of a continuous joint. A floating base does not count as a joint: the rows are those of the other
-    joints, one for each velocity. The error is the shortest way there, `Robot.difference`, and the
-    rows are the identity. For balls, planar and free joints that is the derivative of the error
-    along that way, so that at velocity level they go straight to the target; in other directions it
-    is the derivative only near it.
+    with the other joints at rest, or where a closed chain then has them; see `Robot.configuration`
+    for values, such as the angle of a continuous joint. A floating base does not count as a joint:
+    the rows are those of the other joints, one for each velocity. The error is the shortest way
+    there, `Robot.difference`, and the rows are the identity. For balls, planar and free joints that
+    is the derivative of the error along that way, so that at velocity level they go straight to the
+    target; in other directions it is the derivative only near it.
 
     `robot` is that of the stack unless given. Raises HierarchyError for a target that fits none of
     its forms.
