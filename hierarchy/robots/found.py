@@ -31,7 +31,8 @@ class Coupled:
 
     def at(self, value: ArrayLike) -> float:
         """Return the position of the joint where the other has this value [rad or m]."""
-        return float(np.polyval(self.coefficients[::-1], value))
+        powers = np.asarray(value, dtype=float) ** np.arange(len(self.coefficients))
+        return float(powers @ self.coefficients)
 
     def __str__(self) -> str:
         powers = ["", f" {self.other}", *(f" {self.other}^{i}" for i in range(2, 5))]
