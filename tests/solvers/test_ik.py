@@ -73,7 +73,7 @@ def test_joints_without_a_velocity_limit_are_named_once(tmp_path):
         '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>')
     robot = Robot.from_file(tmp_path / "bare.urdf")
     task = [Position(robot.frame("b"), Still([0, 0, 0]))]
-    with pytest.warns(UserWarning, match="'bare' has no velocity limit for turn"):
+    with pytest.warns(UserWarning, match="no velocity limit for turn.*; set robot.velo"):
         solve_ik(robot, robot.rest, task)
     solve_ik(robot, robot.rest, task)
 
