@@ -327,7 +327,8 @@ def _equal(one: Any, other: Any) -> bool:
 def seen_by(task: Task, state: State) -> Measurement:
     """Return what a state has measured; raise a HierarchyError, naming the task, for nothing."""
     if state.measurement is None:
-        raise HierarchyError(f"task {task.name!r}: the state carries no measurement")
+        raise HierarchyError(f"task {task.name!r}: the state carries no measurement; let a sensor "
+                             "measure it first, see docs/loop.md")
     return state.measurement
 
 

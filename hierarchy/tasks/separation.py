@@ -121,7 +121,8 @@ class Separation(NamedRows, Written):
     def _seen(self, state: State) -> Pairs:
         seen = None if state.measurement is None else state.measurement.pairs
         if seen is None:
-            raise HierarchyError(f"task {self.name!r}: the state carries no measurement of pairs")
+            raise HierarchyError(f"task {self.name!r}: the state carries no measurement of pairs; "
+                                 "let a sensor measure it first, see docs/loop.md")
         points, obstacles, _ = seen.table.shape
         fits = obstacles > 0 if self.obstacles is None else obstacles == self.obstacles
         self.refuse(points != len(self.points) or not fits, f"{points} points are measured "
