@@ -47,7 +47,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, number, positive, refuse
+from hierarchy.errors import HierarchyError, brief, number, positive, refuse
 from hierarchy.gate import array_of
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
@@ -98,20 +98,26 @@ class Limits:
     def box(self, q: Array, v: Array, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at positions q and velocities v.
 
-        Both are finite. The command is a velocity or an acceleration, depending on `level`.
+        Both are finite. The command is a velocity or an acceleration, depending on `level`. Raises
+        HierarchyError for q and v of another size, or a v that is not finite.
         """
-        lower, upper = np.empty(len(v)), np.empty(len(v))
-        write_box(q, v, self.packed, level == "acceleration", lower, upper)
+        lower, upper = np.empty((2, self.packed.shape[1]))
+        if not write_box(q, v, self.packed, level == "acceleration", lower, upper):
+            raise HierarchyError(f"limits: q = {brief(q)} and v = {brief(v)}: expected "
+                                 f"{len(lower)} finite numbers each")
         return lower, upper
 
     def clamp(self, q: Array, v: Array, level: Level, x: ArrayLike) -> Array:
         """Return the command x (n,) with each entry clamped to the box.
 
         This is the last safeguard of a control loop: the result is finite whatever x is. NaN
-        becomes the command in the box that comes nearest to a standstill.
+        becomes the command in the box that comes nearest to a standstill. Raises HierarchyError
+        for q, v or x of another size.
         """
         command = np.array(x, dtype=float)
-        clamp_into_box(q, v, self.packed, level == "acceleration", command)
+        if not clamp_into_box(q, v, self.packed, level == "acceleration", command):
+            raise HierarchyError(f"limits: {len(q)} positions, {len(v)} velocities and a command "
+                                 f"of {len(command)} for {self.packed.shape[1]} joints")
         return command
 
 
@@ -123,20 +129,31 @@ def _refuse(bad: NDArray[np.bool_], why: str, *values: Array) -> None:
 
 @compiled
 def write_box(q, v, limits, acceleration, lower, upper):
-    """Write the box of n joints into lower and upper; limits as `Limits.packed`."""
+    """Write the box of n joints into lower and upper; limits as `Limits.packed`.
+
+    Return whether q and v are of n joints, and v is finite.
+    """
+    if not len(q) == len(v) == len(lower) == limits.shape[1]:
+        return False
+    finite = True
     for i in range(len(v)):
         lower[i], upper[i] = box(q[i], v[i], limits, i, acceleration)
+        finite = finite and np.isfinite(v[i])
+    return finite
 
 
 @compiled
 def clamp_into_box(q, v, limits, acceleration, x):
-    """Clamp x (n,) in place, see `Limits.clamp`."""
+    """Clamp x (n,) in place, see `Limits.clamp`, and return whether all are of n joints."""
+    if not len(q) == len(v) == len(x) == limits.shape[1]:
+        return False
     for i in range(len(v)):
         lower, upper = box(q[i], v[i], limits, i, acceleration)
         rest = -v[i] / limits[4, i] if acceleration else 0.0
         x[i] = clipped(rest if np.isnan(x[i]) else x[i], lower, upper)
         if not np.isfinite(x[i]):  # q or v is not finite either
             x[i] = 0.0
+    return True
 
 
 @inlined

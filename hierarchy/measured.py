@@ -12,6 +12,7 @@ from typing import Any, ClassVar, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy.errors import brief
 from hierarchy.jit import bind, compiled, inlined
 from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import Kinematics
@@ -128,8 +129,7 @@ class Measured(Task):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        task = cast("Measured", self.on(state.robot))
-        function, reads = task.measure(state)
+        task, function, reads = self._function(state)
         asked = task._asked(state, level, np.zeros((8, task.dimension)))
         write_rows = bind(function, state.kinematics, reads, asked, *rows)
         move_goal = task.follow(state, asked.goal)
@@ -141,6 +141,16 @@ class Measured(Task):
             write_rows()
 
         return write
+
+    def _function(self, state: State) -> tuple["Measured", Kernel, Any]:
+        """Return the task of the robot, with what its `measure` returns."""
+        task = cast("Measured", self.on(state.robot))
+        found = task.measure(state)
+        function = found[0] if isinstance(found, tuple) and len(found) == 2 else None
+        code = getattr(getattr(function, "py_func", function), "__code__", None)
+        task.refuse(code is not _rows.__code__, f"measure returned {brief(found)}; expected a "
+                    "function under @measured or @plain, and a tuple of what it reads")
+        return task, *found
 
     def _asked(self, state: State, level: Level, motion: Array) -> _Asked:
         m = self.dimension
@@ -158,8 +168,7 @@ class Measured(Task):
 
     def _reader(self, state: State) -> Callable[[Kinematics], tuple[Array, Motion, Array]]:
         """Return what `_measured` calls, for a state that moves; each call overwrites the last."""
-        task = cast("Measured", self.on(state.robot))
-        function, reads = task.measure(state)
+        task, function, reads = self._function(state)
         m = task.dimension
         J, sides, motion = np.zeros((m, state.n)), np.zeros((2, m)), np.zeros((8, m))
         asked = task._asked(state, "velocity", motion)

@@ -346,15 +346,18 @@ class Robot:
 
         A value has a number for each velocity of the joint: an angle for a continuous one, a
         rotation vector for a ball, (x, y, angle) for a planar one, location and rotation vector for
-        a free one. Or it has the joint's coordinates, with quaternions as (x, y, z, w). Without
-        names `values` are those of all joints but a floating base, or all coordinates (nq,).
-        Raises UnknownNameError, and RobotError, naming the joint, for anything else.
+        a free one. Or it has the joint's coordinates, with quaternions as (x, y, z, w). A joint
+        that follows a named one in the file goes with it, unless it is named too. Without names
+        `values` are those of all joints but a floating base, or all coordinates (nq,). Raises
+        UnknownNameError, and RobotError, naming the joint, for anything else.
         """
         q = self.rest.copy() if q is None else self.normalised(q)
         if isinstance(values, Mapping):
             for name, value in values.items():
                 set_joint(self.parts, q, self.joint(name), name, value)
-            return q
+            led = {one.joint: one.at(self.values(q)[one.other]) for one in self.coupled
+                   if one.other in values and one.joint not in values}
+            return self.configuration({**values, **led}, q) if led else q
         given = finite_numbers(f"robot {self.name!r}: configuration", values)
         joints = self.n - self.actuated
         if len(given) == self.nq:

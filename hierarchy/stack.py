@@ -169,14 +169,25 @@ class Stack:
         writers = [writer_in_stack(self[name], state, self.level, rows.some(first, count))
                    for name, first, count in zip(order, h.offsets, h.sizes, strict=False)]
         if self.reference is not None:
-            m = self.reference.dimension
-            joints = h.reference[state.n - m:state.n]  # without those of a floating base
-            writers.append(writer_in_stack(self.reference, state, self.level,
-                                           Rows(np.empty((m, state.n)), joints, joints)))
+            writers.append(self._reference_writer(self.reference, h, state))
         writers.append(self._sides_checked(h, order))
         prepared = _Prepared(h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared
         return prepared
+
+    def _reference_writer(self, task: Task, h: Hierarchy, state: State) -> Callable[[], object]:
+        """Return what writes the reference of h; HierarchyError for a task of anything but joints.
+
+        Its rows are those of the identity, without those of a floating base or with them.
+        """
+        first = max(state.n - task.dimension, 0)
+        joints, A = h.reference[first:state.n], np.zeros((task.dimension, state.n))
+        write = writer_in_stack(task, state, self.level, Rows(A, joints, joints))
+        if task.dimension in (state.n, state.n - state.robot.actuated):
+            write()
+        task.refuse(task.kind != "equality" or not np.array_equal(A, np.eye(state.n)[first:]),
+                    "the reference of a stack has a row for each joint, as a posture or damping")
+        return write
 
     def _sides_checked(self, h: Hierarchy, order: tuple[str, ...]) -> Callable[[], object]:
         """Return a function that raises a HierarchyError where the sides of a row cross."""

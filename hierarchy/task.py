@@ -12,6 +12,7 @@ from inspect import formatannotation
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.body import pack_points
 from hierarchy.avoidance.laws import Barrier
@@ -160,13 +161,19 @@ class Task(ABC):
 
     def reference_velocity(self, state: State) -> Array:
         """Reference of the task velocity at velocity level: (m,)."""
-        return self.desired_velocity(state) + self.gain * np.asarray(self.error(state))
+        return (self._row("desired_velocity", self.desired_velocity(state))
+                + self.gain * self._row("error", self.error(state)))
 
     def reference_acceleration(self, state: State) -> Array:
         """Reference of the task acceleration at acceleration level: (m,)."""
-        rate = self.desired_velocity(state) - self.jacobian(state) @ state.v
-        return (self.desired_acceleration(state) + self.damping * rate
-                + self.stiffness * np.asarray(self.error(state)))
+        rate = (self._row("desired_velocity", self.desired_velocity(state))
+                - self.jacobian(state) @ state.v)
+        return (self._row("desired_acceleration", self.desired_acceleration(state))
+                + self.damping * rate + self.stiffness * self._row("error", self.error(state)))
+
+    def _row(self, what: str, value: ArrayLike) -> Array:
+        """Return what a method gave for each row (m,), or one number for the only row."""
+        return shaped(f"task {self.name!r}: {what}", np.atleast_1d(value), (self.dimension,))
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """Return a function that writes this task's rows for the present values of the state.
@@ -320,7 +327,8 @@ def _equal(one: Any, other: Any) -> bool:
 def seen_by(task: Task, state: State) -> Measurement:
     """Return what a state has measured; raise a HierarchyError, naming the task, for nothing."""
     if state.measurement is None:
-        raise HierarchyError(f"task {task.name!r}: the state carries no measurement")
+        raise HierarchyError(f"task {task.name!r}: the state carries no measurement; let a sensor "
+                             "measure it first, see docs/loop.md")
     return state.measurement
 
 

@@ -164,4 +164,4 @@ def _warn_of_speeds(robot: Robot) -> None:
     if free and (robot.name, *free) not in _warned:
         _warned.add((robot.name, *free))
         warnings.warn(f"robot {robot.name!r} has no velocity limit for {listed(free)}: limits=True "
-                      "does not limit their speed", stacklevel=3)
+                      "does not limit their speed; set robot.velocity_limit", stacklevel=3)

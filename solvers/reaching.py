@@ -77,7 +77,7 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
         iterations, count = iterations + found[2], count + 1
         best = min(best, found, key=lambda one: one[0])
     if max(best[0]) > until:
-        best = search.descend(best[1], search.settled, _AT_REST)
+        best = search.descend(best[1], search.settled, _AT_REST, min(until, 1.0) ** (0.5 / _MOST))
         iterations += best[2]
     return search.answer(best[1], iterations, count)
 
@@ -115,9 +115,13 @@ class _Search:
                         if factor != 1.0 or np.any(task.desired_velocity(state))]
         self.state, self.status = state, Status.SOLVED
 
-    def descend(self, q: Array, resolver: Resolver, still: float = _STILL
+    def descend(self, q: Array, resolver: Resolver, still: float = _STILL, shrink: float = 1.0
                 ) -> tuple[list[float], Array, int]:
-        """Return the errors of the deciding tasks, where they are least, and the iterations."""
+        """Return the errors of the deciding tasks, where they are least, and the iterations.
+
+        A step takes tasks that are met off by its square. Steps that `shrink` by this factor each
+        let them recover, who else keep the answer where they were met to begin with.
+        """
         best, memory, history = ([np.inf], q), None, list[float]()
         for k in range(_MOST):
             errors = self._errors(q)
@@ -132,7 +136,7 @@ class _Search:
             self.status, memory = found.status, found.memory
             step = found.x * _PERIOD
             q = self.mechanism.closed(self.robot.integrate(
-                q, step * min(1.0, _STEP / max(abs(step).max(), 1e-300))))
+                q, step * min(1.0, _STEP * shrink**k / max(abs(step).max(), 1e-300))))
         return (*best, _MOST)
 
     def _rows(self) -> Hierarchy:

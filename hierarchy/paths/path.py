@@ -44,7 +44,7 @@ class Path(ABC):
 
     def __call__(self, t: float) -> Array:
         """Position, velocity and acceleration at t [s] as rows of a new (3, 3) array."""
-        out = np.empty((3, 3))
+        out = np.zeros((3, 3))
         self.write(t, out)
         return out
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.body import Capsule, ControlPoint
 from hierarchy.problem import Array
@@ -27,6 +28,11 @@ class Coupled:
     joint: str
     other: str
     coefficients: tuple[float, ...]
+
+    def at(self, value: ArrayLike) -> float:
+        """Return the position of the joint where the other has this value [rad or m]."""
+        powers = np.asarray(value, dtype=float) ** np.arange(len(self.coefficients))
+        return float(powers @ self.coefficients)
 
     def __str__(self) -> str:
         powers = ["", f" {self.other}", *(f" {self.other}^{i}" for i in range(2, 5))]

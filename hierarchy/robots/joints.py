@@ -146,7 +146,6 @@ def without(model: Any, coupled: tuple[Coupled, ...], locked: Mapping[str, Array
         with naming(f"robot file {file!r}: locked", RobotError):
             set_joint(parts, q, names.index(name), name, value)
     values = values_of(parts, q)
-    left = tuple(one if one.other not in locked else Coupled(one.joint, "", (float(np.polyval(
-        one.coefficients[::-1], values[model.joints[names.index(one.other)].idx_v])),))
-        for one in coupled)
+    left = tuple(one if one.other not in locked else Coupled(one.joint, "", (one.at(
+        values[model.joints[names.index(one.other)].idx_v]),)) for one in coupled)
     return pin.buildReducedModel(model, [names.index(name) for name in locked], q), left

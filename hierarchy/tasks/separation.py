@@ -21,6 +21,8 @@ bend falls without bound; `barrier.limit` then limits the row, and d may fall be
 `limit` at acceleration level.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -61,8 +63,10 @@ from hierarchy.kinematics import (
 )
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
+from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Kind, Level, NamedRows, Rows, Writer, Written
+from hierarchy.tasks.pairs import separable_pairs
 
 _SHARPEST = 1e-3  # [m] smallest radius of turning that is used
 
@@ -117,7 +121,8 @@ class Separation(NamedRows, Written):
     def _seen(self, state: State) -> Pairs:
         seen = None if state.measurement is None else state.measurement.pairs
         if seen is None:
-            raise HierarchyError(f"task {self.name!r}: the state carries no measurement of pairs")
+            raise HierarchyError(f"task {self.name!r}: the state carries no measurement of pairs; "
+                                 "let a sensor measure it first, see docs/loop.md")
         points, obstacles, _ = seen.table.shape
         fits = obstacles > 0 if self.obstacles is None else obstacles == self.obstacles
         self.refuse(points != len(self.points) or not fits, f"{points} points are measured "
@@ -164,9 +169,10 @@ def _write_points(kinematics, parameters, pairs, A, lower, upper):
 class SelfSeparation(NamedRows, Written):
     """Keep pairs of capsules of the robot at `barrier.distance` or more (m = pairs).
 
-    `pairs` are indices of `capsules`; None takes every pair of the chain except neighbours. No
-    sensor is needed. See the module for the rows. Axes that cross (d is minus the two radii) have
-    no direction; the row then uses z.
+    `pairs` are indices of `capsules`; None takes every pair of a chain except neighbours, and
+    `SelfSeparation.of` those of a robot, which may have several arms. No sensor is needed. See the
+    module for the rows. Axes that cross (d is minus the two radii) have no direction; the row then
+    uses z.
 
     Raises HierarchyError if there is no pair or an index is out of range.
     """
@@ -190,6 +196,14 @@ class SelfSeparation(NamedRows, Written):
             self.refuse(not (i in range(count) and j in range(count) and i != j),
                         f"pair ({i:g}, {j:g}) is no pair among {count} capsules")
         set_frozen(self, indices=np.array(pairs, dtype=np.int64))
+
+    @classmethod
+    def of(cls, robot: Robot, barrier: Barrier) -> SelfSeparation:
+        """Return the task of the capsules of a robot that can be that far apart.
+
+        Which are left out: neighbours on its tree, and see `hierarchy.tasks.pairs`.
+        """
+        return cls(robot.capsules, barrier, separable_pairs(robot, barrier.distance))
 
     @property
     def dimension(self) -> int:

@@ -6,12 +6,12 @@ from math import isfinite
 
 import numpy as np
 
+from hierarchy.tasks.pairs import inseparable_pairs
 from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.words import listed
 from scenarios.cell.build import Cell
 from scenarios.cell.robot import doubts
 from scenarios.config import Scenario
-from scenarios.config.sections.references import inseparable_pairs
 from scenarios.config.validation import doubtful_units
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import check

@@ -12,8 +12,8 @@ from refusals import refused
 from hierarchy import Robot, State
 from hierarchy.avoidance.body import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.tasks.pairs import separable_pairs
 from scenarios.cell.robot import make_robot
-from scenarios.config.sections.references import separable_pairs
 from scenarios.config.sections.robot import RobotSection
 
 ROBOTS = Path(__file__).parents[1] / "data" / "robots"

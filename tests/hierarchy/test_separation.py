@@ -7,7 +7,7 @@ import pytest
 from scene import BODY, ROBOT, TIP, TURN, compiled_rows, states
 from scipy.optimize import lsq_linear
 
-from hierarchy import HierarchyError, State
+from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Barrier, Capsule, Measurement, Obstacle, Obstacles, Pairs
 from hierarchy.avoidance.body import measure_capsules, pack_capsules
 from hierarchy.paths import Ellipse
@@ -111,6 +111,14 @@ def test_distance_of_segments_is_the_least_there_is():
         assert np.linalg.norm(seen[1:4]) == pytest.approx(1)
         if seen[0] > 1e-6:
             np.testing.assert_allclose(seen[0] * seen[1:4], on_a - on_b, atol=1e-9)
+
+
+def test_a_robot_with_arms_keeps_the_pairs_apart_that_can_be():
+    """Of its capsules as one chain, some overlap always: the shoulders with the chest."""
+    humanoid = Robot.load("humanoid")
+    at_rest, kept = State.at(humanoid, humanoid.rest), Barrier(0.02)
+    assert SelfSeparation(humanoid.capsules, kept).distances(at_rest).min() < -0.1
+    assert SelfSeparation.of(humanoid, kept).distances(at_rest).min() > 0.03
 
 
 def test_rows_give_the_second_derivative_with_nearest_points_that_slide():

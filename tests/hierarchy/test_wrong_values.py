@@ -12,13 +12,14 @@ from scene import FRAME, ROBOT, Elbow
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
-from hierarchy import Hierarchy, Robot, Stack, State, tasks
+from hierarchy import Hierarchy, Robot, Stack, State, Task, tasks
 from hierarchy.activation import Activation
 from hierarchy.avoidance import Barrier, Capsule, Obstacle, Repulsion, SurveillanceAreas
 from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.gate import check_rotation
 from hierarchy.limits import Limits
 from hierarchy.loop import Loop
+from hierarchy.measured import Measured
 from hierarchy.paths import Blended, Jittered, Still, circle, read_bvh
 from hierarchy.robot import Frame
 from hierarchy.robots import TABLES, link_capsules
@@ -36,11 +37,51 @@ TIMES, CORNERS = (0.5, 1.2), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2))
 
 
 @dataclass(frozen=True)
+class Given(Task):
+    """A task of a user that returns what it is given."""
+
+    wrong: object = (0.0, 0.0)
+    rate: object = (0.0, 0.0)
+    name: str = "given"
+    dimension = 2
+
+    def error(self, state):
+        return self.wrong
+
+    def desired_velocity(self, state):
+        return self.rate
+
+    def jacobian(self, state):
+        return np.eye(2, state.n)
+
+    jacobian_derivative = jacobian
+
+
+class Kernel(Measured):
+    """The same, of one that is measured."""
+
+    name, dimension = "kernel", 1
+
+    def __init__(self, wrong):
+        self.wrong = wrong
+
+    def measure(self, state):
+        return self.wrong
+
+
+@dataclass(frozen=True)
 class Own(tasks.Position):
     """A task of a user, with types that are not text."""
 
     other: Frame | None = None
     side: Literal["left", "right"] = "left"
+
+
+def rows_after(commanded, task=None):
+    task = task or LIMITS
+    state = State.at(task.robot, task.robot.rest)
+    state.commanded = commanded
+    return task.rows(state)
 
 
 def limits(**settings):
@@ -203,6 +244,25 @@ def limits(**settings):
      "steps of torques need the level torque, not 'acceleration'"),
     (lambda: tasks.DangerBounds(tasks.JointLimits(HUMANOID, 5.0, 0.01), HUMANOID.control_points),
      "floating base"),
+    *((lambda given=given: rows_after(given), f"'joint limits': state.commanded = {said}")
+      for given, said in ((np.zeros(6), "ndarray array([0."), ([0.0] * 7, "list [0.0"),
+                          (np.full(7, NAN), "ndarray array([nan"))),
+    (lambda: rows_after(np.zeros(6), tasks.TorqueStep(HUMANOID, 1.0, contacts=CONTACTS)),
+     "'torque step': state.commanded has shape (6,), expected (30,)"),
+    (lambda: LIMITS.limits.box(np.zeros(6), np.zeros(7), "velocity"), "7 finite numbers each"),
+    (lambda: LIMITS.limits.clamp(np.zeros(7), np.zeros(7), "velocity", np.zeros(8)),
+     "7 positions, 7 velocities and a command of 8 for 7 joints"),
+    *((lambda task=task: Stack([HAND], "velocity", reference=task).hierarchy(STATE),
+       f"{task.name!r}: the reference of a stack has a row for each joint")
+      for task in (tasks.Position(FRAME, THERE), LIMITS, tasks.JointCoupling(
+          ROBOT, {"joint_7": 1.0}))),
+    *((lambda wrong=wrong: Stack([Given(**wrong)], "velocity").hierarchy(STATE), said)
+      for wrong, said in (({"wrong": [1.0, 2.0, 3.0]}, "'given': error has shape (3,), expec"),
+                          ({"wrong": 1.0}, "'given': error has shape (1,), expected (2,)"),
+                          ({"wrong": "a"}, "'given': error is not an array of numbers"),
+                          ({"rate": [0.0]}, "'given': desired_velocity has shape (1,)"))),
+    *((lambda given=given: Kernel(given).error(STATE), f"'kernel': measure returned {said}")
+      for given, said in ((abs, "builtin"), ((abs, ()), "tuple"), (None, "NoneType"))),
     (lambda: Activation(None, (), {"wall": 0.0}), "task 'wall': buffer = 0: expected"),
     (lambda: check_rotation("R", np.diag([1.0, 1.0, -1.0])), "a reflection, of determinant -1"),
     *((lambda off=off: check_rotation("R", np.eye(3) + off * np.eye(3, k=1)),

@@ -10,6 +10,7 @@ import numpy as np
 
 from hierarchy.contacts import Contacts, Points, write_dynamics, zero_while_open
 from hierarchy.errors import HierarchyError, finite_numbers, number, positive
+from hierarchy.gate import shaped
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import less, place
 from hierarchy.problem import Array
@@ -246,6 +247,7 @@ class TorqueStep(TorqueRows):
         if (last := state.commanded) is None:
             unbounded = np.full(self.dimension, inf)
             return -unbounded, unbounded
+        last = shaped(f"task {self.name!r}: state.commanded", last, (self.dimension,))
         return last - self.step, last + self.step
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:

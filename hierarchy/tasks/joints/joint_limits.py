@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, finite_numbers, naming, number, positive
+from hierarchy.errors import HierarchyError, brief, finite_numbers, naming, number, positive
 from hierarchy.gate import array_of
 from hierarchy.jit import bind
 from hierarchy.kinematics import write_identity
@@ -106,7 +106,9 @@ class JointLimits(JointRows):
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
-        return self.limits.box(self._positions(state), self._rates(state, level), level)
+        lower, upper = np.empty((2, self.dimension))
+        self._write_box(state, level, lower, upper)
+        return lower, upper
 
     def clamp(self, state: State, level: Level, x: ArrayLike) -> Array:
         """Return the command x, including the base, clamped to the box; finite even if x is not.
@@ -129,14 +131,22 @@ class JointLimits(JointRows):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; the rows have two sides."""
-        write_rows, limits = bind(write_identity, rows.A), self.limits.packed
+        write_rows = bind(write_identity, rows.A)
 
         def write() -> None:
             write_rows()
-            write_box(self._positions(state), self._rates(state, level), limits,
-                      level == "acceleration", rows.lower, rows.upper)
+            self._write_box(state, level, rows.lower, rows.upper)
 
         return write
+
+    def _write_box(self, state: State, level: Level, lower: Array, upper: Array) -> None:
+        """Raise a HierarchyError for a `State.commanded` that is no velocity of the robot."""
+        rates = self._rates(state, level)
+        if not isinstance(rates, np.ndarray) or not write_box(
+                self._positions(state), rates, self.limits.packed, level == "acceleration", lower,
+                upper):
+            raise HierarchyError(f"task {self.name!r}: state.commanded = {brief(state.commanded)}: "
+                                 f"expected {state.n} finite numbers")
 
     def _positions(self, state: State) -> Array:
         robot = self.robot

@@ -19,6 +19,7 @@ from hierarchy.robot import Robot
 from hierarchy.robots.library import pin
 from hierarchy.state import State
 from hierarchy.task import Level, Rows, Writer, Written
+from hierarchy.tasks.joints.mechanism import Mechanism
 
 
 class JointTask(Written):
@@ -47,12 +48,12 @@ class Posture(Measured):
     """Move every joint to `target` [rad or m]; gains as in `Task`.
 
     The target has the values of all joints, or is a configuration (nq,), or {joint: value, ...}
-    with the other joints at rest; see `Robot.configuration` for values, such as the angle of a
-    continuous joint. A floating base does not count as a joint: the rows are those of the other
-    joints, one for each velocity. The error is the shortest way there, `Robot.difference`, and the
-    rows are the identity. For balls, planar and free joints that is the derivative of the error
-    along that way, so that at velocity level they go straight to the target; in other directions it
-    is the derivative only near it.
+    with the other joints at rest, or where a closed chain then has them; see `Robot.configuration`
+    for values, such as the angle of a continuous joint. A floating base does not count as a joint:
+    the rows are those of the other joints, one for each velocity. The error is the shortest way
+    there, `Robot.difference`, and the rows are the identity. For balls, planar and free joints that
+    is the derivative of the error along that way, so that at velocity level they go straight to the
+    target; in other directions it is the derivative only near it.
 
     `robot` is that of the stack unless given. Raises HierarchyError for a target that fits none of
     its forms.
@@ -75,7 +76,10 @@ class Posture(Measured):
         if self.robot is not None:
             expect(f"task {self.name!r}: robot", self.robot, Robot, "give Robot.load(NAME)")
             with naming(f"task {self.name!r}"):
-                set_frozen(self, rest=self.robot.configuration(self.target))
+                rest = self.robot.configuration(self.target)
+            if isinstance(self.target, Mapping) and self.robot.loops:
+                rest = Mechanism(self.robot).closed(rest, self.target)
+            set_frozen(self, rest=rest)
 
     def on(self, robot: Robot) -> Posture:
         """Return the posture of a robot."""

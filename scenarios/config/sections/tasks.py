@@ -177,7 +177,7 @@ class PostureTask(TaskSection):
     def asked(self, at: References) -> dict[str, Any]:
         """Return the posture, by default that of the start."""
         q = at.start.q if self.target is None else at.robot.configuration(self.target)
-        return {"target": at.robot.configuration(self.joints, q)}
+        return {"target": at.posture(self.joints, q)}
 
 
 class PositionSection(PositionTask):
