@@ -11,6 +11,7 @@ import pytest
 from benchmark import start, stress
 from benchmark.solve import first_paper, resolvers
 from benchmark.solve.entrants import NUMPY
+from benchmark.solve.judge import FAILED, RIGHT, SOLVED, WRONG
 from benchmark.solve.ours import Ours
 from benchmark.start import Case, run
 from benchmark.tick import PlainTick
@@ -148,6 +149,17 @@ def test_a_row_for_everybody_in_every_family_asked(tmp_path, capsys, monkeypatch
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80
     assert "…" not in out
+
+
+def test_a_warm_start_is_judged_by_its_own_answer():
+    """Not by that of the cold one, also where it is not called solved."""
+    one = recorded.family("EQ7")[0]
+    x = one.proof.x
+    for off, solved, expected in ((0.0, True, SOLVED), (1.0, True, WRONG), (1.0, False, FAILED)):
+        row = {"entrant": "one", "solved": True, "x": x, "warm_ns": [1], "warm_iterations": 1,
+               "warm_x": x + off, "warm_solved": solved}
+        found = resolvers._warm(row, one)
+        assert (found["verdict"], found["relative"] > RIGHT) == (expected, off > 0.0)
 
 
 def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
