@@ -78,6 +78,12 @@ _BESIDE = (Column("max per\ntick", "moved_m", power), Column("last\ntick", "last
             Column("final\nerror", "error_m", power), Column("at\nlimit", "at_limit_ticks", whole),
             Column("over\n[rad/s]", "excess_rad_s", power), Column("fail", "failed", whole),
             Column("strict", "strict", yes))
+_SAID = f"""\
+An arm tracks a step that is too fast for its joints: velocity limits, then the position, then a \
+distant posture. Every tick is resolved with and without the posture. limits prevent: largest \
+motion in a tick that the limits prevent. at limit: ticks with a joint at its limit. over: largest \
+velocity beyond a limit. strict: the posture moves the end effector by at most \
+{figures.STRICT:g} m per tick, and no tick is without an answer."""
 
 
 def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: float = 20.0
@@ -93,7 +99,7 @@ def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: fl
                                 lambda log, ask: _judged(log, ask, scenes), seconds)
     title = "One tick of inverse kinematics of a KUKA LWR, and its quality"
     return Report("Inverse kinematics beside other packages", [
-        Section(title, [Table(title, rows, _COLUMNS)], NOTES, {"peers": figures.bars(rows)}),
+        Section("", [Table(title, rows, _COLUMNS)], NOTES, {"peers": figures.bars(rows)}),
         Section("The packages", [Table("", rows, _ABOUT)])], {"peers": rows}, missing)
 
 
@@ -201,6 +207,5 @@ def strictness() -> Report:
         rows, missing = measure(bounded(), QUESTIONS, [
             ("open", asdict(scene), True), ("turn", STEP_TICKS, 0)], judged)
     title = "Motion of the end effector due to the posture, which has lower priority [m]"
-    said = f"strict: at most {figures.STRICT:g} m per tick, and no tick without an answer."
-    return Report("Strictness at the limits", [
-        Section(title, [Table(title, rows, _BESIDE)], said)], {"strictness": rows}, missing)
+    return Report("Strictness at the limits", [Section("", [Table(title, rows, _BESIDE)],
+                                                       _SAID)], {"strictness": rows}, missing)

@@ -70,7 +70,7 @@ def run() -> Report:
                                 lambda log, _: judge(log, of))
     title = "One tick of inverse dynamics of a humanoid on two feet"
     tables = [Table(title, rows, _COLUMNS), Table("Missed by each task", rows, _MISSES)]
-    return Report("Inverse dynamics beside other packages", [Section(title, tables, NOTES)],
+    return Report("Inverse dynamics beside other packages", [Section("", tables, NOTES)],
                   {"stand": rows}, missing, failed=bool(missing))
 
 
