@@ -97,6 +97,9 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
     limit : [s] for one problem. told : gets a line of text now and then.
     """
     store, left = Store(folder), dict[Path, list[str]]()
+    refuse(folder.is_dir() and not store.problems.is_dir() and any(folder.iterdir()),
+           f"output folder {folder} is not empty and is no benchmark's; choose another, or remove "
+           "it first")
     for family, (seed, count) in product(families, counts.items()):
         file = file_of(store.problems, family.name, seed)
         if not file.is_file():
