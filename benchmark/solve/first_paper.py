@@ -227,7 +227,7 @@ LARGER: dict[str, tuple[Size, ...]] = {
     "tasks": tuple((70, count, 3) for count in (1, 2, 3, 4, 5, 7, 10, 14, 20)),
     "rows": tuple((100, 5, each) for each in (1, 2, 3, 4, 6, 9, 14, 20)),
     "joints": tuple((n, 5, 3) for n in (6, 7, 10, 15, 20, 30, 45, 70, 100, 150, 200, 300))}
-LEVEL_LESS = ("augmented", "weighted")  # not timed: no priorities
+LEVEL_LESS = ("augmented", "merged", "weighted")  # not timed: no priorities
 _GROWTH_NOTES = """\
 Times: one call from Python, one core, all resolvers in turns; power: slope of the upper half of \
 sizes, log over log."""
