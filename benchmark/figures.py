@@ -177,7 +177,7 @@ def over_sizes(rows: Sequence[Row], panels: Mapping[str, tuple[str, str, str]]) 
     labels = list(dict.fromkeys(row["entrant"] for row in rows))
     style = looks(labels)
     lines = (len(panels) + 1) // 2
-    with _figure(9.2, 3.8 * lines, {"font.size": 9.0}) as fig:
+    with _figure(9.2, 4.6 * lines, {"font.size": 9.0}) as fig:
         axes = fig.subplots(lines, 2, squeeze=False).ravel()
         for ax in axes[len(panels):]:
             ax.set_axis_off()
@@ -198,7 +198,7 @@ def over_sizes(rows: Sequence[Row], panels: Mapping[str, tuple[str, str, str]]) 
             ax.xaxis.set_minor_locator(NullLocator())
             ax.xaxis.set_major_formatter(ScalarFormatter())
             ax.tick_params(axis="x", labelsize=7.0)
-            ax.legend(fontsize=7.0)
+            ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=7.0)
         for ax in axes[::2]:
             ax.set_ylabel("time [µs]: median, band to the 95th percentile", fontsize=8.0)
     return fig

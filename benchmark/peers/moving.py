@@ -18,7 +18,7 @@ import numpy as np
 from benchmark import figures, packages
 from benchmark.packages import Entrant
 from benchmark.peers.adapters.hierarchy import arm
-from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
+from benchmark.peers.compare import ABOUT, TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
 from benchmark.peers.scenes import Arm
 from benchmark.process import START_LIMIT, EndedError
 from benchmark.report import Column, Report, Row, Section, Table, power, text, whole, yes
@@ -67,8 +67,6 @@ beyond a limit. fail: ticks without a solution, ellipse / step."""
 _COLUMNS = (*TICK, Column("at\nlimit", "at_limit_us"), Column("path", "path_error_m", power),
             Column("moved", "moved_m", power), Column("over", "excess_rad_s", power),
             Column("fail", "fails", str))
-_ABOUT = (Column("version", "version", text), Column("priorities; inequality rows", "kind", text),
-          Column("after a NaN in q", "nan", text))
 _SETTINGS: Mapping[str, Sequence[Mapping[str, Any]]] = {  # of those that have several
     "hqp": [{"backend": backend} for backend in BACKENDS if installed(backend)],
     "weighted": [{"ratio": ratio} for ratio in (10.0, 100.0, 1000.0)],
@@ -98,9 +96,10 @@ def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: fl
         rows, missing = measure(entrants, QUESTIONS, asked,
                                 lambda log, ask: _judged(log, ask, scenes), seconds)
     title = "One tick of inverse kinematics of a KUKA LWR, and its quality"
+    tables = [Table(title, rows, _COLUMNS), Table("The packages", rows, (
+        *ABOUT, Column("after a NaN in q", "nan", text)))]
     return Report("Inverse kinematics beside other packages", [
-        Section("", [Table(title, rows, _COLUMNS)], NOTES, {"peers": figures.bars(rows)}),
-        Section("The packages", [Table("", rows, _ABOUT)])], {"peers": rows}, missing)
+        Section("", tables, NOTES, {"peers": figures.bars(rows)})], {"peers": rows}, missing)
 
 
 def make_scenes(folder: Path) -> dict[str, Arm]:
