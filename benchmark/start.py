@@ -17,7 +17,7 @@ from time import perf_counter
 from typing import Any, NamedTuple
 from zipfile import ZipFile
 
-from benchmark.report import Column, Report, Row, Section, Table, digits, yes
+from benchmark.report import Column, Report, Row, Section, Table, digits, tell, yes
 from benchmark.solve.interface import resident
 
 _ROOT = Path(__file__).parents[1]
@@ -205,7 +205,7 @@ def _measured(case: Case) -> tuple[float, float, Any]:
     It keeps bytecode, as Python does unless it is told otherwise: without, it compiles each module
     that it imports, which takes longer than all else.
     """
-    print(f"{case.what} ...", file=sys.stderr, flush=True)
+    tell(f"{case.what} ...")
     kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     kept["PYTHONPATH"] = os.pathsep.join(filter(None, [str(_ROOT), kept.get("PYTHONPATH")]))
     found = []

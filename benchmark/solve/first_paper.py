@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmark import figures
+from benchmark import figures, report
 from benchmark.packages import OWN, Entrant
 from benchmark.report import Column, Report, Row, Section, Table, percent, power, short, whole, wide
 from benchmark.solve import oracle
@@ -169,6 +169,7 @@ def accuracy(arms: int = 10_000, checked: int = 300) -> Report:
     """
     rows, tables = list[Row](), []
     for case in CASES:
+        report.tell(f"{case.title} ...")
         problems, least = hierarchies(case, arms)
         right = [oracle.solve(h, case.damping, THRESHOLD) if case.damping else answer(h).x
                  for h in problems[:max(1, min(checked, arms))]]

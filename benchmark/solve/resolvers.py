@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmark import figures
 from benchmark.packages import Entrant
-from benchmark.report import TIMES, Column, Report, Row, Section, Table, percent, power, whole
+from benchmark.report import TIMES, Column, Report, Row, Section, Table, percent, power, tell, whole
 from benchmark.solve.entrants import ENTRANTS, HIERARCHICAL, NUMPY
 from benchmark.solve.interface import Problem, Questions
 from benchmark.solve.judge import RIGHT, by, judged, summary
@@ -79,6 +79,7 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
     for origin in (KNOWN,) if seed is None else (KNOWN, FRESH):
         some = []
         for name in families:
+            tell(f"{name}, {origin} ...")
             problems = (recorded.family(name) if seed is None or origin == KNOWN
                         else recorded.fresh(name, seed, count))
             some += [{"family": name, "origin": origin, **row}
