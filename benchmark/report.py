@@ -165,7 +165,7 @@ class Report:
 
     def _page(self) -> str:
         """Return the HTML page, which needs no other file."""
-        shown = [(section, [(name, drawing.svg(figure, name))
+        shown = [(section, [(name, drawing.svg(figure, name), figure.get_figwidth())
                             for name, figure in section.figures.items()])
                  for section in self.sections]
         template = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
