@@ -1,7 +1,6 @@
 """`hierarchy bench`, every benchmark there is, one command each, and `hierarchy reproduce`."""
 
 import os
-import sys
 from importlib import import_module
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -184,6 +183,7 @@ def open_(family: Family = None,
     Run the same command again to resume an interrupted one.
     """
     from benchmark.packages import EMBODIK, HIGHS
+    from benchmark.report import tell
     from benchmark.solve import open as opened
     from benchmark.solve.entrants import chosen, compiled
     from scenarios.problems.families import available, unavailable
@@ -196,10 +196,10 @@ def open_(family: Family = None,
     if check:
         return int(not opened.check(table, limit))
     for left, why in ({} if family else unavailable()).items():
-        print(f"left out: {left}, which {why}", file=sys.stderr)
+        tell(f"left out: {left}, which {why}")
     counts = {0: public or count, **dict.fromkeys(fresh or [1], count)}
     store = opened.run(out, [named(one) for one in family or ()] or available(), table, counts,
-                       limit, lambda text: print(text, file=sys.stderr, flush=True))
+                       limit)
     if borders:
         opened.prove_at_borders(store)
     found = opened.report(store)

@@ -50,7 +50,10 @@ def time_against_error(rows: Sequence[Row]) -> Figure:
              for i, (label, look) in enumerate(style.items())}
     columns = min(4, max(1, len(names)))
     lines = max(1, -(-len(names) // columns))
-    with _figure(2.6 * columns + 0.4, 2.35 * lines + 1.1, {"font.size": 8.5}) as fig:
+    width = max(2.6 * columns + 0.4, _NARROWEST)
+    beside = int(width // 1.8)
+    legend = -(-len(style) // beside)
+    with _figure(width, 2.35 * lines + 0.7 + 0.17 * legend, {"font.size": 8.5}) as fig:
         axes = list(fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).flat)
         for ax, name in zip(axes, names, strict=False):
             for row in rows:
@@ -63,10 +66,11 @@ def time_against_error(rows: Sequence[Row]) -> Figure:
         for ax in axes[len(names):]:
             ax.set_axis_off()
         fig.supxlabel("largest miss of an answer called solved", fontsize=9.0)
-        fig.supylabel("median time of a solve [µs]", fontsize=9.0)
+        for ax in axes[:len(names):columns]:
+            ax.set_ylabel("median time of a solve [µs]")
         fig.legend(handles=[Line2D([], [], color=look.colour, marker=marks[label], linestyle="",
                                    markersize=5.0, label=label) for label, look in style.items()],
-                   loc="outside upper center", ncols=min(6, max(1, len(style))), fontsize=8.0)
+                   loc="outside upper center", ncols=beside, fontsize=8.0)
     return fig
 
 
@@ -177,7 +181,7 @@ def over_sizes(rows: Sequence[Row], panels: Mapping[str, tuple[str, str, str]]) 
     labels = list(dict.fromkeys(row["entrant"] for row in rows))
     style = looks(labels)
     lines = (len(panels) + 1) // 2
-    with _figure(9.2, 3.8 * lines, {"font.size": 9.0}) as fig:
+    with _figure(9.2, 4.6 * lines, {"font.size": 9.0}) as fig:
         axes = fig.subplots(lines, 2, squeeze=False).ravel()
         for ax in axes[len(panels):]:
             ax.set_axis_off()
@@ -198,7 +202,7 @@ def over_sizes(rows: Sequence[Row], panels: Mapping[str, tuple[str, str, str]]) 
             ax.xaxis.set_minor_locator(NullLocator())
             ax.xaxis.set_major_formatter(ScalarFormatter())
             ax.tick_params(axis="x", labelsize=7.0)
-            ax.legend(fontsize=7.0)
+            ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=7.0)
         for ax in axes[::2]:
             ax.set_ylabel("time [µs]: median, band to the 95th percentile", fontsize=8.0)
     return fig

@@ -48,6 +48,11 @@ percent = _known(lambda value: f"{100.0 * value:.0f}%" if value in (0.0, 1.0) el
 """A share in percent; 100 only if it is all."""
 
 
+def tell(line: str) -> None:
+    """Print what is being done, apart from what is found."""
+    print(line, file=sys.stderr, flush=True)
+
+
 class Column(NamedTuple):
     """A heading, the key of a row, and how its value is written."""
 
@@ -160,7 +165,7 @@ class Report:
 
     def _page(self) -> str:
         """Return the HTML page, which needs no other file."""
-        shown = [(section, [(name, drawing.svg(figure, name))
+        shown = [(section, [(name, drawing.svg(figure, name), figure.get_figwidth())
                             for name, figure in section.figures.items()])
                  for section in self.sections]
         template = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")

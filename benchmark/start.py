@@ -17,7 +17,7 @@ from time import perf_counter
 from typing import Any, NamedTuple
 from zipfile import ZipFile
 
-from benchmark.report import Column, Report, Row, Section, Table, digits
+from benchmark.report import Column, Report, Row, Section, Table, digits, tell, yes
 from benchmark.solve.interface import resident
 
 _ROOT = Path(__file__).parents[1]
@@ -125,7 +125,7 @@ def run() -> Report:
                         for name, s in list(kernels.items())[:_KERNELS])
     return Report("Start-up costs", [Section("", [Table("Whole processes", rows, (
         Column("", "shown", str), Column("processor", "processor"),
-        Column("ceiling", "ceiling", digits), Column("", "verdict", str)), "what")],
+        Column("ceiling", "ceiling", digits), Column("met", "met", yes)), "what")],
         f"Slowest to compile [s], without called kernels: {slowest}.")],
         {"start": rows, "compilation": [{"kernel": name, "seconds": s}
                                         for name, s in kernels.items()]})
@@ -168,10 +168,10 @@ def _cases(folder: Path) -> Iterator[Case]:
 
 def _row(what: str, value: float, unit: str, ceiling: float | None = None,
          processor: float | None = None) -> Row:
-    """Return a row of the table: whether the ceiling is met, "" without one."""
-    met = "" if ceiling is None else "met" if value <= ceiling else "not met"
+    """Return a row of the table: whether the ceiling is met, None without one."""
     return {"what": what, "value": value, "unit": unit, "ceiling": ceiling, "processor": processor,
-            "verdict": met, "shown": f"{value:.{2 if unit == 's' else 0}f} {unit}"}
+            "met": None if ceiling is None else value <= ceiling,
+            "shown": f"{value:.{2 if unit == 's' else 0}f} {unit}"}
 
 
 def own_seconds(events: Sequence[Sequence[Any]]) -> dict[str, float]:
@@ -205,7 +205,7 @@ def _measured(case: Case) -> tuple[float, float, Any]:
     It keeps bytecode, as Python does unless it is told otherwise: without, it compiles each module
     that it imports, which takes longer than all else.
     """
-    print(f"{case.what} ...", file=sys.stderr, flush=True)
+    tell(f"{case.what} ...")
     kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     kept["PYTHONPATH"] = os.pathsep.join(filter(None, [str(_ROOT), kept.get("PYTHONPATH")]))
     found = []

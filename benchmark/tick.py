@@ -14,7 +14,7 @@ from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from scenarios.cell.build import Cell, build
 from scenarios.config import Scenario, load
-from scenarios.loop.simulation import simulate
+from scenarios.loop.simulation import uninterrupted
 from scenarios.recording.recording import Recording
 
 SPECS = ("tpm-published", "tpm", "recursive", "augmented")
@@ -33,7 +33,7 @@ def run() -> Report:
     The plain tick is asked at the states of the run, and must command the same.
     """
     scenario, rows = load("ellipse"), list[Row]()
-    path = simulate(scenario)
+    path = uninterrupted(scenario)
     for spec, times in _in_turns({spec: scenario.with_resolver(spec) for spec in SPECS}).items():
         parts = {f"{part}_us": float(np.nanmedian(some)) for part, some in zip(
             PARTS, times.T, strict=False)}
@@ -53,7 +53,8 @@ def _in_turns(scenarios: Mapping[str, Scenario]) -> dict[str, Array]:
     them is not counted: it compiles and fills caches.
     """
     with one_core():
-        runs = [[_times(simulate(one)) for one in scenarios.values()] for _ in range(_ROUNDS + 1)]
+        runs = [[_times(uninterrupted(one)) for one in scenarios.values()]
+                for _ in range(_ROUNDS + 1)]
     return {label: np.concatenate(own) for label, *own in zip(scenarios, *runs[1:], strict=True)}
 
 

@@ -7,13 +7,14 @@ import numpy as np
 
 from benchmark.packages import Entrant
 from benchmark.process import EndedError, Field
-from benchmark.report import Column, Row
+from benchmark.report import Column, Row, text
 from benchmark.timing import times_of
 from hierarchy.problem import Array
 
 TURN_LIMIT = 300.0  # [s]
 TICK = (Column("tick\nmedian", "median_us"), Column("\np95", "p95_us"),
         Column("\np99.9", "p99.9_us"), Column("solve\nmedian", "solve_us"))
+ABOUT = Column("version", "version", text), Column("priorities; inequality rows", "kind", text)
 
 Log = dict[str, Array]
 Ask = Callable[[tuple[Any, ...], float], Any]  # as `Process.ask`

@@ -18,7 +18,7 @@ import numpy as np
 from benchmark import figures, packages
 from benchmark.packages import Entrant
 from benchmark.peers.adapters.hierarchy import arm
-from benchmark.peers.compare import TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
+from benchmark.peers.compare import ABOUT, TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
 from benchmark.peers.scenes import Arm
 from benchmark.process import START_LIMIT, EndedError
 from benchmark.report import Column, Report, Row, Section, Table, power, text, whole, yes
@@ -67,8 +67,6 @@ beyond a limit. fail: ticks without a solution, ellipse / step."""
 _COLUMNS = (*TICK, Column("at\nlimit", "at_limit_us"), Column("path", "path_error_m", power),
             Column("moved", "moved_m", power), Column("over", "excess_rad_s", power),
             Column("fail", "fails", str))
-_ABOUT = (Column("version", "version", text), Column("priorities; inequality rows", "kind", text),
-          Column("after a NaN in q", "nan", text))
 _SETTINGS: Mapping[str, Sequence[Mapping[str, Any]]] = {  # of those that have several
     "hqp": [{"backend": backend} for backend in BACKENDS if installed(backend)],
     "weighted": [{"ratio": ratio} for ratio in (10.0, 100.0, 1000.0)],
@@ -78,6 +76,12 @@ _BESIDE = (Column("max per\ntick", "moved_m", power), Column("last\ntick", "last
             Column("final\nerror", "error_m", power), Column("at\nlimit", "at_limit_ticks", whole),
             Column("over\n[rad/s]", "excess_rad_s", power), Column("fail", "failed", whole),
             Column("strict", "strict", yes))
+_SAID = f"""\
+An arm tracks a step that is too fast for its joints: velocity limits, then the position, then a \
+distant posture. Every tick is resolved with and without the posture. limits prevent: largest \
+motion in a tick that the limits prevent. at limit: ticks with a joint at its limit. over: largest \
+velocity beyond a limit. strict: the posture moves the end effector by at most \
+{figures.STRICT:g} m per tick, and no tick is without an answer."""
 
 
 def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: float = 20.0
@@ -92,9 +96,10 @@ def run(entrants: Sequence[Entrant] = ENTRANTS, ticks: int = 20_000, seconds: fl
         rows, missing = measure(entrants, QUESTIONS, asked,
                                 lambda log, ask: _judged(log, ask, scenes), seconds)
     title = "One tick of inverse kinematics of a KUKA LWR, and its quality"
+    tables = [Table(title, rows, _COLUMNS), Table("The packages", rows, (
+        *ABOUT, Column("after a NaN in q", "nan", text)))]
     return Report("Inverse kinematics beside other packages", [
-        Section(title, [Table(title, rows, _COLUMNS)], NOTES, {"peers": figures.bars(rows)}),
-        Section("The packages", [Table("", rows, _ABOUT)])], {"peers": rows}, missing)
+        Section("", tables, NOTES, {"peers": figures.bars(rows)})], {"peers": rows}, missing)
 
 
 def make_scenes(folder: Path) -> dict[str, Arm]:
@@ -201,6 +206,5 @@ def strictness() -> Report:
         rows, missing = measure(bounded(), QUESTIONS, [
             ("open", asdict(scene), True), ("turn", STEP_TICKS, 0)], judged)
     title = "Motion of the end effector due to the posture, which has lower priority [m]"
-    said = f"strict: at most {figures.STRICT:g} m per tick, and no tick without an answer."
-    return Report("Strictness at the limits", [
-        Section(title, [Table(title, rows, _BESIDE)], said)], {"strictness": rows}, missing)
+    return Report("Strictness at the limits", [Section("", [Table(title, rows, _BESIDE)],
+                                                       _SAID)], {"strictness": rows}, missing)

@@ -1,6 +1,5 @@
 """Whole inverse kinematics beside other packages: success and time on poses of three robots."""
 
-import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,7 +9,7 @@ import numpy as np
 
 from benchmark.packages import MINK, OWN, PINK, PLACO
 from benchmark.process import Field
-from benchmark.report import Column, Report, Row, Section, Table, power
+from benchmark.report import Column, Report, Row, Section, Table, power, tell
 from benchmark.timing import times_of
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
@@ -64,7 +63,7 @@ def run(count: int = 1000, seed: int = 0) -> Report:
                 continue
             robot = Robot.from_file(file, shapes=False)
             for kind in ("reachable", "unreachable"):
-                print(name, kind, "...", file=sys.stderr, flush=True)
+                tell(f"{name}, {kind} ...")
                 poses, starts = problems(robot, model.frames, count, seed, kind == "reachable")
                 asked = [("problem", [str(file), model.frames, TOLERANCE], pose, start)
                          for pose, start in zip(poses.tolist(), starts.tolist(), strict=True)]
@@ -80,7 +79,7 @@ def run(count: int = 1000, seed: int = 0) -> Report:
 def judge(answers: list[Row], robot: Robot, frames: tuple[str, ...], poses: Array) -> Row:
     """Return the shares reached and beyond a limit, the median error, and times [ms]."""
     pairs = [(one, pose) for one, pose in zip(answers, poses, strict=True) if "q" in one]
-    q = np.array([one["q"] for one, _ in pairs])
+    q = np.array([one["q"] for one, _ in pairs]).reshape(len(pairs), robot.nq)
     errors = np.array([error(robot, frames, np.array(one["q"]), pose) for one, pose in pairs])
     inside = ((q >= robot.lower - 1e-9) & (q <= robot.upper + 1e-9)).all(axis=1)
     times = times_of([1e9 * one["seconds"] for one, _ in pairs])

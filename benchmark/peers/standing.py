@@ -13,9 +13,9 @@ from scipy.optimize import nnls
 
 from benchmark.packages import OWN, PLACO, TSID
 from benchmark.peers.adapters.hierarchy import TASKS, robot_of, stack_of
-from benchmark.peers.compare import TICK, Log, measure, times, turns
+from benchmark.peers.compare import ABOUT, TICK, Log, measure, times, turns
 from benchmark.peers.scenes import Stand
-from benchmark.report import Column, Report, Row, Section, Table, power, text, whole
+from benchmark.report import Column, Report, Row, Section, Table, power, whole
 from benchmark.urdf import urdf
 from hierarchy import Robot, Stack, State
 from hierarchy.paths import Ellipse, Still
@@ -45,13 +45,12 @@ NOTES = """\
 tick: kinematics, dynamics, rows, solve, torques, from Python [us]. solve: the solve alone, where \
 it can be called alone. dynamics: largest residual of the equations of motion [N, N m]. contact: \
 of the soles' rest [m/s^2]. torque: beyond a limit [N m]. friction: wrench of a sole that its \
-corners cannot push [N]. Below: median and largest miss of each task [m/s^2, rad/s^2]."""
+corners cannot push [N]. missed: norm of a task's rows [m/s^2, rad/s^2]."""
 _COLUMNS = (*TICK, *(Column(key, f"{key} max", power)
                       for key in ("dynamics", "contact", "torque", "friction")),
             Column("fail", "failed", whole))
-_MISSES = (*(Column("\n".join((*task.split(), of)), f"{task} {of}", power)
-             for task in TASKS for of in ("median", "max")),
-           Column("priorities", "kind", text), Column("version", "version", str))
+_MISSES = [Column("\n".join((*task.split(), of)), f"{task} {of}", "{:.2g}".format)
+           for task in TASKS for of in ("median", "max")]
 
 
 def run() -> Report:
@@ -69,8 +68,9 @@ def run() -> Report:
                                                       *turns(TICKS, TICKS, 250, 20)],
                                 lambda log, _: judge(log, of))
     title = "One tick of inverse dynamics of a humanoid on two feet"
-    tables = [Table(title, rows, _COLUMNS), Table("Missed by each task", rows, _MISSES)]
-    return Report("Inverse dynamics beside other packages", [Section(title, tables, NOTES)],
+    tables = [Table(title, rows, _COLUMNS), Table("Missed by each task", rows, _MISSES),
+              Table("The packages", rows, ABOUT)]
+    return Report("Inverse dynamics beside other packages", [Section("", tables, NOTES)],
                   {"stand": rows}, missing, failed=bool(missing))
 
 

@@ -101,8 +101,7 @@ def cell(output: str, asked: Mapping[str, str]) -> str:
     whose names begin alike, the shortest name counts, that of the row with the fewest words.
     """
     below = dropwhile(lambda line: not line.startswith(asked["table"]), output.splitlines())
-    lines = [re.sub("[│|]", " ", line).strip() for line in takewhile(str.strip, below)]
-    found = [line[len(asked["row"]):].split() for line in lines
+    found = [line[len(asked["row"]):].split() for line in takewhile(str.strip, below)
              if line.startswith(f"{asked['row']} ")]
     refuse(not found, f"the output has no row {asked['row']!r} below {asked['table']!r}")
     return min(found, key=len)[int(asked["place"]) - 1]

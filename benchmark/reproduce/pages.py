@@ -27,7 +27,7 @@ from itertools import dropwhile, takewhile
 from pathlib import Path
 
 from benchmark.reproduce.blocks import Stored, block, cell
-from hierarchy.errors import HierarchyError, refuse
+from hierarchy.errors import HierarchyError, naming, refuse
 from scenarios.files import make_folder, slug, write_text
 
 ROOT = Path(__file__).parents[2]
@@ -121,8 +121,8 @@ def filled(text: str, root: Path, page: str, stored: Stored) -> str:
         try:
             return file_of(command, root).read_text(encoding="utf-8")
         except FileNotFoundError:
-            raise HierarchyError(f"{page}: no output of {command!r} is stored; run "
-                                 f"`hierarchy reproduce {page}`") from None
+            raise HierarchyError(f"no output of {command!r} is stored; run `hierarchy reproduce "
+                                 f"{page}`") from None
 
     def made(found: re.Match[str]) -> str:
         name = found["name"]
@@ -130,18 +130,19 @@ def filled(text: str, root: Path, page: str, stored: Stored) -> str:
             try:
                 return f"{found['mark']}{block(name, stored, output).rstrip()}\n{found['end']}"
             except KeyError as error:
-                raise HierarchyError(f"{page}: block {name!r}: there is no block or claim {error}"
+                raise HierarchyError(f"block {name!r}: there is no block or claim {error}"
                                      ) from None
         said = output(name)
         if found["form"] == "table":
             return f"{found['mark']}{_with_medians(found['text'], said)}{found['end']}"
         ranges = [one.split(" .. ") for one in found["ranges"].split(" | ")[1:]]
-        part = [line for line in _part(said.splitlines(), ranges, f"{page}: the output of {name!r}")
+        part = [line for line in _part(said.splitlines(), ranges, f"the output of {name!r}")
                 if not found["without"] or not re.search(found["without"], line)]
         inside = part if found["form"] == "text" else ["```", *part, "```"]
         return "\n".join([found["mark"].rstrip(), *inside, found["end"]])
 
-    return _MARK.sub(made, text)
+    with naming(page):
+        return _MARK.sub(made, text)
 
 
 def _part(lines: list[str], ranges: Sequence[Sequence[str]], where: str) -> list[str]:

@@ -1,11 +1,11 @@
 """Make the runs of the protocol and the outputs of commands, store them, and write the pages."""
 
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 
+from benchmark.report import tell
 from benchmark.reproduce import fronts, pages, protocol
 from benchmark.reproduce.blocks import POINTS, ROWS, Stored, every, said
 from benchmark.reproduce.protocol import PROTOCOL, Rows
@@ -45,7 +45,7 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
             lacking = [] if quick else pages.fill(pages.ROOT, Stored.read(pages.ROOT))[1]
     if rows is not None:
         _report(rows, as_json)
-    _say(f"{_minutes(begun)} in all")
+    tell(f"{_minutes(begun)} in all")
     refuse(lacking, "; ".join(lacking))
     return 0
 
@@ -69,14 +69,14 @@ def _made(asked: Sequence[str], out: Path, quick: bool, workers: Workers) -> Ite
     found = dict.fromkeys(command for page in asked if page not in (NAME, TUNED)
                           for command in pages.commands((root / page).read_text(encoding="utf-8")))
     for count, command in enumerate(found, 1):
-        _say(f"command {count} of {len(found)}: {command} ...")
+        tell(f"command {count} of {len(found)}: {command} ...")
         begun = perf_counter()
         try:
             write_text(pages.file_of(command, root), pages.run(command, root, out / "output"))
         except pages.CommandError as error:
-            _say(f"left as it is: {error}")
+            tell(f"left as it is: {error}")
             continue
-        _say(f"  {_minutes(begun)}")
+        tell(f"  {_minutes(begun)}")
         yield None
 
 
@@ -94,7 +94,3 @@ def _report(rows: Rows, as_json: bool) -> None:
                            for one in every(rows)])
     for one in every(rows):
         print(f"{one.decided}: {one.claim.text}\n    {said(one, rows)}")
-
-
-def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)

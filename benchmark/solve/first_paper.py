@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmark import figures
+from benchmark import figures, report
 from benchmark.packages import OWN, Entrant
 from benchmark.report import Column, Report, Row, Section, Table, percent, power, short, whole, wide
 from benchmark.solve import oracle
@@ -169,6 +169,7 @@ def accuracy(arms: int = 10_000, checked: int = 300) -> Report:
     """
     rows, tables = list[Row](), []
     for case in CASES:
+        report.tell(f"{case.title} ...")
         problems, least = hierarchies(case, arms)
         right = [oracle.solve(h, case.damping, THRESHOLD) if case.damping else answer(h).x
                  for h in problems[:max(1, min(checked, arms))]]
@@ -227,7 +228,7 @@ LARGER: dict[str, tuple[Size, ...]] = {
     "tasks": tuple((70, count, 3) for count in (1, 2, 3, 4, 5, 7, 10, 14, 20)),
     "rows": tuple((100, 5, each) for each in (1, 2, 3, 4, 6, 9, 14, 20)),
     "joints": tuple((n, 5, 3) for n in (6, 7, 10, 15, 20, 30, 45, 70, 100, 150, 200, 300))}
-LEVEL_LESS = ("augmented", "weighted")  # not timed: no priorities
+LEVEL_LESS = ("augmented", "merged", "weighted")  # not timed: no priorities
 _GROWTH_NOTES = """\
 Times: one call from Python, one core, all resolvers in turns; power: slope of the upper half of \
 sizes, log over log."""

@@ -2,7 +2,7 @@
 
 import gzip
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmark.packages import Entrant
 from benchmark.process import CRASHED, HUNG, Field
-from benchmark.report import Report, Row
+from benchmark.report import Report, Row, tell
 from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
@@ -85,8 +85,7 @@ def _read(file: Path) -> list[Row]:
 
 
 def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
-        counts: Mapping[int, int | None], limit: float = LIMIT,
-        told: Callable[[str], None] = print) -> Store:
+        counts: Mapping[int, int | None], limit: float = LIMIT) -> Store:
     """Write the problems, let all entrants take turns with each, and keep the raw rows.
 
     What is in the folder already stays as it is: an interrupted benchmark goes on, and an entrant
@@ -94,13 +93,16 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
     proof is complete.
 
     counts : problems of each set, by its seed, None for the usual number; 0 is the public set.
-    limit : [s] for one problem. told : gets a line of text now and then.
+    limit : [s] for one problem.
     """
     store, left = Store(folder), dict[Path, list[str]]()
+    refuse(folder.is_dir() and not store.problems.is_dir() and any(folder.iterdir()),
+           f"output folder {folder} is not empty and is no benchmark's; choose another, or remove "
+           "it first")
     for family, (seed, count) in product(families, counts.items()):
         file = file_of(store.problems, family.name, seed)
         if not file.is_file():
-            told(f"{family.name}, seed {seed}: problems and their proofs")
+            tell(f"{family.name}, seed {seed}: problems and their proofs")
             export(family, seed, count, True, store.problems)
         left[file] = [one.label for one in entrants if not store.file_of(one.label, file).is_file()]
     store.note("limits", store.notes("limits") | {one.label: one.limits for one in entrants})
@@ -111,7 +113,7 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
         store.note("missing", missing | field.missing)
         for file, labels in left.items():
             if some := [label for label in labels if label in field.running]:
-                told(f"{file.stem}: {len(some)} entrants")
+                tell(f"{file.stem}: {len(some)} entrants")
                 found = asked(field, file, limit, some)
                 for label, rows in found.items():
                     store.add(rows, store.file_of(label, file))

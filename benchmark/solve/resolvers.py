@@ -12,10 +12,10 @@ import numpy as np
 
 from benchmark import figures
 from benchmark.packages import Entrant
-from benchmark.report import TIMES, Column, Report, Row, Section, Table, percent, power, whole
+from benchmark.report import TIMES, Column, Report, Row, Section, Table, percent, power, tell, whole
 from benchmark.solve.entrants import ENTRANTS, HIERARCHICAL, NUMPY
 from benchmark.solve.interface import Problem, Questions
-from benchmark.solve.judge import RIGHT, SOLVED, WRONG, by, judged, summary
+from benchmark.solve.judge import RIGHT, by, judged, summary
 from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
 from hierarchy.errors import check_name
@@ -79,6 +79,7 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
     for origin in (KNOWN,) if seed is None else (KNOWN, FRESH):
         some = []
         for name in families:
+            tell(f"{name}, {origin} ...")
             problems = (recorded.family(name) if seed is None or origin == KNOWN
                         else recorded.fresh(name, seed, count))
             some += [{"family": name, "origin": origin, **row}
@@ -101,7 +102,7 @@ def _measured(name: str, problems: Sequence[recorded.Problem], entrants: Sequenc
               seconds: float) -> list[Row]:
     """Return a row for each entrant that can be asked, and one for its warm starts."""
     raw = asked(name, problems, entrants, seconds)
-    warm = [_warm(row) for row in raw if row.get("warm_ns")]
+    warm = [_warm(row, problems[row["problem"]]) for row in raw if row.get("warm_ns")]
     rows = [_row(own, problems) for _, own in (*by(raw, "entrant"), *by(warm, "entrant"))]
     medians = {row["entrant"]: row["median_us"] for row in rows}
     return [{**row, "to_daqp": row["median_us"] / medians.get(HIERARCHICAL, nan),
@@ -135,12 +136,11 @@ def as_problem(h: Hierarchy) -> Problem:
     return Problem(h.A, h.lower, h.upper, np.asarray(h.sizes), h.reference)
 
 
-def _warm(row: Row) -> Row:
-    """Return the row of a warm start, as that of a cold one."""
-    verdict = SOLVED if row["warm_right"] else WRONG if row["warm_solved"] else row["verdict"]
+def _warm(row: Row, problem: recorded.Problem) -> Row:
+    """Return the row of a warm start, judged as that of a cold one."""
     warm = {key: row[f"warm_{key}"] for key in ("iterations", "solved", "x")}
-    return {**row, **warm, "entrant": f"{row['entrant']} warm", "cold_ns": row["warm_ns"],
-            "verdict": verdict}
+    return judged({**row, **warm, "entrant": f"{row['entrant']} warm", "cold_ns": row["warm_ns"]},
+                  problem.h, problem.proof)
 
 
 def _row(rows: Sequence[Row], problems: Sequence[recorded.Problem]) -> Row:

@@ -18,7 +18,7 @@ from scenarios.draw.figures import drawing
 from scenarios.draw.figures.letter import write_all
 from scenarios.draw.figures.picture import picture
 from scenarios.files import make_folder, write_bytes
-from scenarios.loop.simulation import simulate
+from scenarios.loop.simulation import uninterrupted
 from scenarios.measure.metrics import measure
 from scenarios.recording.recording import Recording
 
@@ -40,14 +40,14 @@ def main(scenarios: Annotated[list[str] | None, typer.Argument()] = None, out: P
          documents: bool = False) -> None:
     """Run the given scenarios, by default all, and write their pictures."""
     for name in () if documents else scenarios or shipped():
-        recording, drawn = simulate(load(name)), io.BytesIO()
+        recording, drawn = uninterrupted(load(name)), io.BytesIO()
         with matplotlib.rc_context(drawing.style()):
             picture({name: recording}).savefig(drawn, format="png", dpi=130, facecolor="white")
         _write(drawn, make_folder(out) / f"{name}.png")
         print(f"{name}: {'; '.join(_main_numbers(recording))}", flush=True)
     for name, pictures in DOCUMENTS.items() if documents else ():
         with tempfile.TemporaryDirectory() as folder:
-            write_all([simulate(load(name))], Path(folder))
+            write_all([uninterrupted(load(name))], Path(folder))
             for stem, image in pictures.items():
                 _write(Path(folder, f"{stem}.png"), FOLDER.parent / f"{image}.png")
                 print(f"{name}: {image}.png", flush=True)

@@ -27,11 +27,11 @@ from solvers.problems import Recipe, written
 _SECONDS = 0.5  # for each resolver in each family
 _HARD = Recipe(equalities_only=True, near_parallel=0.0, scales=(1.0, 1.0), spread=1.0)
 NOTES = f"""\
-L k: share of problems in which bounds and levels 1 to k miss no more than the exact answer, to \
-{RIGHT:g} |a| (1 + |x|). near: share that is also nearest to the reference. miss: the largest of \
-those called solved, relative. off: number that ended with a status. us: a solve from Python in \
-microseconds, cold; warm: with the memory of the same problem with its targets and sides moved by \
-up to 1 %."""
+L k: share of problems in which bounds and levels 1 to k miss no more than in the answer of hcod, \
+which `certify` accepts, to {RIGHT:g} |a| (1 + |x|). near: share that is also nearest to the \
+reference. miss: the largest of those called solved, relative. off: number that ended with a \
+status. us: a solve from Python in microseconds, cold; warm: with the memory of the same problem \
+with its targets and sides moved by up to 1 %."""
 _COLUMNS = (Column("near", "nearest", percent), Column("miss", "relative", power),
             Column("off", "off", whole), Column("us", "median_us"), Column("p95", "p95_us"),
             Column("warm", "warm_median_us"))

@@ -60,6 +60,14 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     return completed(recording, rehearsal)
 
 
+def uninterrupted(scenario: Scenario, audits: Sequence[Audit] = ()) -> Recording:
+    """Return the recording of a run; KeyboardInterrupt where `simulate` keeps a part of it."""
+    recording = simulate(scenario, audits=audits)
+    if str(recording.fault).startswith("interrupted"):
+        raise KeyboardInterrupt
+    return recording
+
+
 def rehearsed(scenario: Scenario) -> Cell:
     """Call everything of a tick once, so that nothing is loaded later; return a cell at rest.
 

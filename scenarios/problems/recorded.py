@@ -17,7 +17,7 @@ from hierarchy.problem import Array, Hierarchy
 from scenarios.config import Scenario, ScenarioError, load
 from scenarios.config.sampling import changed, drawn
 from scenarios.loop.controller import Controller
-from scenarios.loop.simulation import simulate
+from scenarios.loop.simulation import uninterrupted
 from solvers import certify, make
 from solvers.problems import family as make_problem
 from solvers.problems.files import FRESH, Collection, Head, read
@@ -129,7 +129,7 @@ def window(scenario: Scenario, first: int, count: int) -> list[Hierarchy]:
         return {}  # no signals
 
     lasting = {"control.duration": (first + count) * scenario.control.period}
-    simulate(scenario.with_changes(lasting), audits=[keep])
+    uninterrupted(scenario.with_changes(lasting), audits=[keep])
     return kept[:count]
 
 

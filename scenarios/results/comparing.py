@@ -21,7 +21,7 @@ from scenarios.files import (
     write_json,
     write_text,
 )
-from scenarios.loop.simulation import simulate
+from scenarios.loop.simulation import simulate, uninterrupted
 from scenarios.measure.run_folder import kept, versions
 from scenarios.measure.runs import Run
 from scenarios.measure.verdict import Comparison
@@ -203,8 +203,6 @@ def _together(planned: Sequence[Run], folder: Path | None, workers: int, progres
         return
     for i, run in made.items():
         timed = dataclasses.replace(run, timing=_timed(run))
-        if dataclasses.replace(run, recording=timed.timing, error=None).interrupted:
-            raise KeyboardInterrupt  # which `simulate` has kept
         if "happened" in vars(run):  # a page has worked it out
             vars(timed)["happened"] = run.happened
         yield i, timed
@@ -238,5 +236,5 @@ def _timed(run: Run) -> Recording | None:
     ticks = min(TIMED, run.recording.ticks if run.recording else 0)
     with suppress(Exception):  # a scenario that allows no shorter duration keeps its own times
         lasting = {"control.duration": ticks * run.scenario.control.period}
-        return simulate(run.scenario.with_changes(lasting)) if ticks else None
+        return uninterrupted(run.scenario.with_changes(lasting)) if ticks else None
     return None

@@ -11,6 +11,7 @@ import pytest
 from benchmark import start, stress
 from benchmark.solve import first_paper, resolvers
 from benchmark.solve.entrants import NUMPY
+from benchmark.solve.judge import FAILED, RIGHT, SOLVED, WRONG
 from benchmark.solve.ours import Ours
 from benchmark.start import Case, run
 from benchmark.tick import PlainTick
@@ -150,6 +151,17 @@ def test_a_row_for_everybody_in_every_family_asked(tmp_path, capsys, monkeypatch
     assert "…" not in out
 
 
+def test_a_warm_start_is_judged_by_its_own_answer():
+    """Not by that of the cold one, also where it is not called solved."""
+    one = recorded.family("EQ7")[0]
+    x = one.proof.x
+    for off, solved, expected in ((0.0, True, SOLVED), (1.0, True, WRONG), (1.0, False, FAILED)):
+        row = {"entrant": "one", "solved": True, "x": x, "warm_ns": [1], "warm_iterations": 1,
+               "warm_x": x + off, "warm_solved": solved}
+        found = resolvers._warm(row, one)
+        assert (found["verdict"], found["relative"] > RIGHT) == (expected, off > 0.0)
+
+
 def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
     """Else the benchmark would compare two different jobs."""
     scenario = load("ellipse")
@@ -168,8 +180,8 @@ def test_everything_measured_is_told(monkeypatch):
     monkeypatch.setattr(start, "_cases", lambda folder: cases)
     monkeypatch.setattr(start, "_measured", lambda case: said[case.what])
     found = run()
-    assert [row["verdict"] for row in found.rows["start"]] == [
-        "met", "", "", "not met", "not met", "met", ""]
+    assert [row["met"] for row in found.rows["start"]] == [
+        True, None, None, False, False, True, None]
     assert [row["value"] for row in found.rows["start"]] == [0.1, 20.0, 2.0, 11.0, 301.0, 250.0, 0]
     assert found.rows["compilation"] == [{"kernel": "solvers.kernels.a.b", "seconds": 2.0}]
     assert "a.b 2.0" in found.sections[0].text

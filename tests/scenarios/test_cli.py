@@ -112,8 +112,8 @@ def test_a_comparison_interrupted_before_the_first_tick_leaves_no_folder(
 
 def test_an_interruption_while_runs_are_timed_ends_the_comparison(
         monkeypatch, command, undrawn):
-    monkeypatch.setattr(comparing, "_timed", lambda run: recording(
-        run.scenario, fault="interrupted at tick 3"))
+    simulation_is(lambda scenario, **_: recording(scenario, fault="interrupted at tick 3"),
+                  monkeypatch)
     said = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers 2",
                    code=130).err
     assert "the runs made so far are in b\n" in said

@@ -40,7 +40,7 @@ def test_halves_are_reproducible_and_never_the_same(name):
 def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
     from scenarios.config import ScenarioError
 
-    monkeypatch.setattr(recorded, "simulate", lambda *_, **__: None)
+    monkeypatch.setattr(recorded, "uninterrupted", lambda *_, **__: None)
     with pytest.raises(ScenarioError, match="ellipse-limits: no run with seed 3 has 2 problems"):
         recorded.recorded("ellipse-limits", 3, 2)
 

@@ -73,6 +73,15 @@ def test_progress_is_told_and_an_interrupted_run_keeps_what_was_run():
     assert seen == [(0, 1200), (500, 1200), (1000, 1200), (1200, 1200)]
 
 
+def test_what_needs_a_whole_run_is_interrupted_with_it():
+    """Such as a benchmark of ticks, or the recording of problems, which tried the next run."""
+    def interrupt(tick, controller):
+        return signal.raise_signal(signal.SIGINT) or {}
+
+    with pytest.raises(KeyboardInterrupt):
+        scenarios.loop.simulation.uninterrupted(load("ellipse", SHORT), [interrupt])
+
+
 def test_a_run_interrupted_while_its_levels_are_judged_is_kept(monkeypatch, tmp_path):
     rows = Rows.hierarchy
     monkeypatch.setattr(Rows, "hierarchy", lambda self, k: rows(self, k) if k < 5 else
