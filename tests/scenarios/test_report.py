@@ -17,7 +17,6 @@ from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
 from scenarios.results.page import comparison_page as page
 from scenarios.results.page import run_command
-from scenarios.results.sections import side_by_side
 
 LETTER = "tpm-published"
 
@@ -129,10 +128,6 @@ def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(tmp_path):
         tab.run("document.querySelector('.command button').click()")
         tab.wait("/copied|selected/.test(document.querySelector('.command button').textContent)")
         assert tab.complaints == []
-
-
-def beside(panel, recordings):
-    return side_by_side(panel, recordings, palette.looks(recordings))
 
 
 def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
