@@ -87,19 +87,6 @@ def test_a_run_lasts_as_long_as_its_whole_ticks():
     assert found.end == "ran the whole 0.9 s"
 
 
-@pytest.mark.parametrize(("name", "asked"), [
-    ("dual-arm", {"right hand": "on its path", "right hand ahead": "on a cone of 10°",
-                  "posture": "at its target", "speed limits": ""}),
-    ("singular", {"pose": "on its path", "pose turned": "as asked"}),
-    ("ellipse-hqp", {"pointing": "in a cone of 5°", "body": "50 mm or more from obstacles"}),
-    ("wipe", {"force": "20 N", "upright": "at its target", "torque limits": ""})])
-def test_what_a_scenario_asks_is_in_its_words(name, asked):
-    if name == "wipe":
-        pytest.importorskip("mujoco")
-    found = {one.name: one.asked for one in goals(simulate(load(name, ["control.duration=0.02"])))}
-    assert found.items() >= asked.items()
-
-
 def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
     position, posture = given_up(simulate(load("strictness", ["control.duration=0.3"])))
     assert (position.level, posture.level) == ("position", "posture")
