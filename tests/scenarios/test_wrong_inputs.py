@@ -22,7 +22,9 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
 @pytest.mark.parametrize(("name", "changes"), [
     ("ellipse", ["start.end_effector=[5, 5, 5]"]), ("ellipse", ["robot.model=ur5"]),
     ("stand-push", ["contacts.0.frame=left_fot"])])
-def test_what_does_not_fit_the_robot_is_said_by_check_and_run(name, changes, command, tmp_path):
+def test_what_does_not_fit_the_robot_is_said_by_check_and_run(
+        name, changes, command, tmp_path, monkeypatch):
+    monkeypatch.setattr("scenarios.cell.robot._REACH_STEPS", 20)
     sets = [part for change in changes for part in ("--set", change)]
     checked = command("check", name, *sets, code=2).err
     run = command("run --duration 0.01", name, "--out", tmp_path / "run", *sets, code=2)
