@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -36,6 +37,14 @@ def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
     assert (loaded.orders, loaded.fault) == (saved.orders, saved.fault)
     assert {"python", "numpy", "pin", "task-hierarchy"} <= json.loads(
         (tmp_path / "run" / "versions.json").read_text()).keys()
+
+
+@pytest.mark.parametrize(("told", "said"), [("arm", "arm"), ("", "unknown processor")])
+def test_the_processor_is_the_one_that_python_tells_where_the_system_has_no_list(
+        told, said, monkeypatch):
+    monkeypatch.setattr(run_folder, "Path", mock.Mock(side_effect=FileNotFoundError))
+    monkeypatch.setattr(run_folder.platform, "processor", lambda: told)
+    assert run_folder.versions()["processor"] == f"{said}, {os.cpu_count()} cores"
 
 
 def test_a_file_that_is_cut_off_or_has_wrong_bits_is_named(tmp_path):
