@@ -149,7 +149,7 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, 
     assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
 
 
-def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
+def test_the_letters_pairs_are_made_of_its_runs_in_its_order(tmp_path):
     names = ("ellipse-35deg-equality", "ellipse", "ellipse-velocity", "ellipse-35deg", "ellipse-3d")
     runs = [recording(load(name), v=np.full((5, 7), float(i))) for i, name in enumerate(names)]
     drawn = dict(letter.figures(runs))
@@ -159,3 +159,4 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
     assert headings == ["(a) ", "(b) ", "Body"]
     speeds = [ax.lines[0].get_ydata()[0] for ax in drawn["figure-4-joint-velocities"].axes]
     assert speeds == [2.0, 1.0]  # the velocity level is (a)
+    letter.write_all([recording(t=[0.0])], tmp_path)  # a run of one tick has no figure
