@@ -9,7 +9,7 @@ from standing import WEIGHT, feet, standing_stack
 
 from hierarchy import Robot, State
 from hierarchy.paths import Still, circle
-from hierarchy.tasks import Along, FrameLog, JointLimits, Pose, Position, Posture
+from hierarchy.tasks import Along, FrameLog, JointCoupling, JointLimits, Pose, Position, Posture
 from solvers import Status, certify, explain, make, solve_ik
 
 Q = np.array([0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3])
@@ -118,9 +118,10 @@ def test_what_holds_a_target_out_of_reach_back_is_said():
     assert found.verdict.startswith("unreachable: nearest found, position is missed by")
     assert "no joint moves position along z" in found.verdict
     here = State.at(ROBOT, Q).position(FRAME)
-    both = [Position(FRAME, Still(here)), Position(FRAME, Still(here + 0.1), name="other")]
+    tasks = [JointCoupling(ROBOT, {"joint_7": 1.0}, Q[6]),  # which holds nothing back
+             Position(FRAME, Still(here)), Position(FRAME, Still(here + 0.1), name="other")]
     assert "other is missed by 0.173, held back by position" in solve_ik(
-        ROBOT, Q, both, until=1e-6).verdict
+        ROBOT, Q, tasks, until=1e-6).verdict
 
 
 CONTACTS = feet()
