@@ -89,6 +89,9 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
 @pytest.mark.parametrize(("call", "said"), [
     (lambda: load(""), "load: expected a path, got str ''"),
     (lambda: load("ellipse", "control.period=1"), "expected a list of \"key=value\", got str"),
+    (lambda: load("ellipse", ["control.duration=2\nx = 3"]), "expected one value"),
+    (lambda: simulate(load("ellipse-smooth").with_resolver("tpm")),
+     'needs control.resolver = "smooth", got "tpm"'),
     (lambda: simulate(SHORT, progress=3), "simulate: progress: expected a function, got int 3"),
     (lambda: simulate("elipse"), "unknown scenario 'elipse'; did you mean 'ellipse'?"),
     (lambda: compare(3), "compare: expected names, files, or what `load` returns, got int 3"),
