@@ -11,7 +11,7 @@ from scipy.stats import rankdata, wilcoxon
 from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.measure.causes import Tick, causes
-from scenarios.measure.goals import goals
+from scenarios.measure.goals import goals, percent
 from scenarios.measure.happenings import given_up, jumps
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import EXACT, best, paired, wilson
@@ -79,6 +79,7 @@ def test_the_table_has_a_row_for_each_goal_and_a_cell_for_each_run():
                                "HierarchyError: no.")
     assert found[0].as_plain_data()["goals"][0]["flag"] == "left"
     assert Verdict("a", 4.0, 4.0, None, False, ()).end == "ran the whole 4 s"
+    assert [*map(percent, (0.0123, 0.994, 0.996))] == ["1.2 %", "99 %", "100 %"]
 
 
 def test_a_run_lasts_as_long_as_its_whole_ticks():
