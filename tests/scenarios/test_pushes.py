@@ -134,7 +134,7 @@ def test_frames_placements_and_distances_are_those_recorded(runs):
 @pytest.mark.parametrize("name", NAMES)
 def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
     """A second run asks the loop's own hierarchy, tick by tick, what its command violates."""
-    scenario = load(name, ["control.duration=0.2"])
+    scenario = load(name, ["control.duration=0.2", "start.v=[0.1, -0.1, 0, 0.2, 0, 0.1, 0]"])
     controller = Controller(scenario)
     plant, seen = controller.cell.plant, []
     for k in range(200):
