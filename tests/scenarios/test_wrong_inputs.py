@@ -108,8 +108,8 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: solve_ik(ROBOT, Q, [replace(HAND, gain=201.0)], dt=0.01),
      "task 'position': gain = 201 1/s times the period of 0.01 s is 2.01"),
     (lambda: solve_ik(ROBOT, Q, [SelfSeparation(ROBOT.capsules, Barrier(0.02, 101.0))], dt=0.01),
-     "'self-separation': rate = 101 1/s times the period of 0.01 s is 1.01; above 1 a tick may take "
-     "more than the distance left, so give at most 100 1/s"),
+     "'self-separation': rate = 101 1/s times the period of 0.01 s is 1.01; above 1 a tick may "
+     "take more than the distance left, so give at most 100 1/s"),
     (lambda: solve_ik(ROBOT, Q, [HAND], dt=0.02, limits=SLOW, v=np.zeros(7)),
      "'joint limits': its period is 0.01 s, that of the "),
     (lambda: solve_ik(ROBOT, Q, [HAND], limits=SLOW), "give v, the velocity of the tick before"),
