@@ -10,9 +10,10 @@ the checkout is not touched, so kernels come from the cache. The tests are those
 changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
 once, and again when tests have changed), or --tests. Processes that tests start count as theirs. A
 line that runs as its module is imported has the tests of its module. Of many tests those of SEEN
-and MOST others are taken: a case of each function first, those first that run few lines. A mutant
-that survives meets the WHOLE files with the most of such tests: what a shared fixture runs counts
-only for the test that asked for it first. Prints every survivor with its line, and the share of
+and MOST others are taken: a case of each function first, those first that run few lines, FEW of
+which are asked before all others: four of five mutants end there. A mutant that survives meets the
+WHOLE files with the most of such tests: what a shared fixture runs counts only for the test that
+asked for it first. Prints every survivor with its line, and the share of
 survivors. A mutant whose tests take more CPU time than --limit at once counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
@@ -51,7 +52,7 @@ sys.path[0] = str(ROOT)  # beside this file are folders of tests with the names 
 SAMPLED = ("hierarchy", "solvers", "scenarios")
 FILES = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.py"))
 MAP = ROOT / "build" / "tests-of-lines"
-MOST, WHOLE = 40, 6  # tests of a mutant, beside those of SEEN, and then files of tests
+FEW, MOST, WHOLE = 8, 40, 6  # tests of a mutant, beside those of SEEN, and then files of tests
 SEEN = "tests/scenarios/test_seen.py"
 COMPILED = ("compiled", "unlocked", "internal", "inlined", "measured")
 # The folder of kernels, the integer codes that kernels read, and the LLVM code that they contain.
@@ -283,8 +284,10 @@ def tests_of(mutant: Mutant) -> list[tuple[str, ...]]:
     first = [test for test in order if test.startswith(SEEN)]  # much in little time
     others = sorted(order.keys() - {*first}, key=order.__getitem__)[:MOST]
     files = Counter(test.partition("::")[0] for test in order.keys() - {*first})
-    return [("field(" in line) * records + default * keys + (*first, *others),
-            *((file,) for file, _ in files.most_common(WHOLE))]
+    groups = (tuple(others[:FEW]),
+              ("field(" in line) * records + default * keys + (*first, *others[FEW:]),
+              *((file,) for file, _ in files.most_common(WHOLE)))
+    return [group for group in groups if group]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from scenarios.results.plan import Outcome
 
 def dies_of_one(job):
     """Stands for a run; one of resolver "deadly" ends the process that it is in."""
+    print("noise, which is no answer", flush=True)
     if job.resolver == "deadly":
         os._exit(1)
     return Outcome(job.key, 1, None, 0.0)

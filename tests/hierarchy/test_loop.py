@@ -131,6 +131,7 @@ def test_a_priority_that_is_not_given_is_said_and_one_that_is_is_given_back():
 def test_a_watchdog_stops_once_when_it_was_not_fed_for_its_time():
     clock, robot = Clock(), Robot()
     dog = Watchdog(1.0, robot.stop, clock)
+    assert dog._thread.daemon, "a stop that hangs keeps no program from ending"
     clock.now += 1.0
     assert not dog.check()
     dog.feed()

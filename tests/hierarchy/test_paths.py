@@ -4,26 +4,17 @@ from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
+from computed import PATHS, POINTS, TIMES
 from refusals import refused
 
 from hierarchy import paths
 
-TIMES = (0.5, 1.2, 2.0, 3.5)
-POINTS = ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2), (0.3, 0.5, 0.0), (0.1, 0.2, 0.4))
-PATHS = {
-    "line": paths.line(POINTS[0], POINTS[1], 1.5, begin=0.4),
-    "circle": paths.circle((0.1, 0.2, 0.3), 0.2, (0.2, -0.4, 1.0), rate=1.7, phase=0.4),
-    "circle about x": paths.circle((0.1, 0.2, 0.3), 0.2, (1.0, 0.0, 0.0)),
-    "waypoints": paths.Waypoints(TIMES, POINTS), "recorded": paths.Recorded(TIMES, POINTS),
-    "blended": paths.Blended(TIMES, POINTS, blend=0.3),
-    "ellipse": paths.Ellipse((0.0, 0.6, 0.0), (0.2, 0.0, 0.2), (0.0, 0.1, 0.0), rate=1.3),
-    "shifted": paths.Shifted(paths.Blended(TIMES, POINTS, blend=0.7), (0.1, 0.0, 0.0)),
-    "jittered": paths.Jittered(paths.line(POINTS[0], POINTS[1], 2.0), 0.01, 1.0, 3)}
+CIRCLE, BLENDED = PATHS[0], paths.Blended(TIMES, POINTS, blend=0.3)
 
 
-@pytest.mark.parametrize("name", PATHS)
-def test_velocity_and_acceleration_are_the_derivatives(name):
-    path, h = PATHS[name], 1e-6
+@pytest.mark.parametrize("path", [*PATHS, BLENDED], ids=lambda path: type(path).__name__)
+def test_velocity_and_acceleration_are_the_derivatives(path):
+    h = 1e-6
     for t in np.linspace(-0.2, 5.0, 401) + 1e-4:  # not where a piece begins
         before, now, later = path(t - h), path(t), path(t + h)
         rates = (later[:2] - before[:2]) / (2 * h)
@@ -31,14 +22,15 @@ def test_velocity_and_acceleration_are_the_derivatives(name):
 
 
 def test_a_circle_about_an_oblique_axis_has_its_radius():
-    from_centre = [PATHS["circle"](t)[0] - (0.1, 0.2, 0.3) for t in TIMES]
+    from_centre = [CIRCLE(t)[0] - (0.1, 0.2, 0.3) for t in TIMES]
     np.testing.assert_allclose(np.linalg.norm(from_centre, axis=1), 0.2)
     np.testing.assert_allclose(from_centre @ np.array([0.2, -0.4, 1.0]), 0.0, atol=1e-15)
-    np.testing.assert_allclose(PATHS["circle about x"](0.0)[0], (0.1, 0.4, 0.3))  # from y
+    about_x = paths.circle((0.1, 0.2, 0.3), 0.2, (1.0, 0.0, 0.0))
+    np.testing.assert_allclose(about_x(0.0)[0], (0.1, 0.4, 0.3))  # from y
 
 
 def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
-    path = PATHS["blended"]
+    path = BLENDED
     for i in (1, 2):
         at = path(TIMES[i] + 0.15)
         before = np.subtract(POINTS[i], POINTS[i - 1]) / (TIMES[i] - TIMES[i - 1])

@@ -152,6 +152,8 @@ def limits(**settings):
     (lambda: tasks.CentreOfPressure(Contacts(HUMANOID, [Contact(FOOT)])),
      "no contact is a surface"),
     (lambda: Contact.rectangle(FOOT, 0.1, (0.0, 0.1)), "sole: x [m]: expected 2 finite numbers"),
+    (lambda: Contact(FOOT, np.eye(3), slides=True), "3 points that slide; only a contact of one"),
+    (lambda: tasks.Along(HAND, ((1, 0, 0), (1, 1, 0))), "'along': directions ((1, 0, 0), (1, 1"),
     (lambda: Contact(FOOT, slides="no"), "contact: slides: expected a bool, got str 'no'"),
     (lambda: State.at(ROBOT, [1j] * 7), "'kuka_lwr': q is not an array of real numbers: it is co"),
     (lambda: tasks.model_rows("kuka_lwr"), "model_rows: robot: expected a Robot, got str"),

@@ -134,12 +134,6 @@ def test_a_name_of_a_larger_size_says_the_line_that_installs_it(name, size, with
     assert f"pip install 'task-hierarchy[{size}]'" in done.stderr.splitlines()[-1]
 
 
-def test_every_test_in_the_list_of_slow_ones_exists():
-    for line in (ROOT / "tests" / "slow.txt").read_text(encoding="utf-8").split():
-        file, _, name = line.partition("::")
-        assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8"), line
-
-
 @pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])
 def test_the_map_names_every_part_of_a_package_in_the_order_of_the_layers(package):
     told = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")

@@ -142,6 +142,7 @@ def test_what_cannot_be_is_refused_by_name(make, said):
     refused(said, make)
 
 
-def test_a_camera_faces_what_it_looks_at():
+def test_a_camera_faces_what_it_looks_at_with_the_middle_of_its_pixels():
+    assert (Pinhole(**SMALL).cx, Pinhole(**SMALL).cy) == (39.5, 29.5)  # of 0 to 79, of 0 to 59
     R = looking_at([0.0, 0.0, 1.0], [0.0, 1.0, 1.0])
     np.testing.assert_allclose(R, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], atol=1e-15)

@@ -52,11 +52,6 @@ def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
         "damping": 0.01, "threshold": 0.1}
 
 
-def test_a_change_of_several_lines_is_refused():
-    refused("expected one value", load, "ellipse", ["control.duration=2\nx = 3"],
-            error=ScenarioError)
-
-
 def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     path = tmp_path / "idle.toml"
     path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'

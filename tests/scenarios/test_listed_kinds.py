@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import tomli_w
 
-from hierarchy import plugins
 from hierarchy.tasks import Separation
 from scenarios import load, simulate
 from scenarios.cell.build import build
@@ -43,13 +42,6 @@ def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path)
     assert measure(run)[metric].value < (0.1 if "look" in metric else 1e-3)  # deg, or m and rad
 
 
-@pytest.mark.parametrize("task", [
-    COUPLING, FRAME, LOOK, RELATIVE, {"kind": "manipulability", "frame": "end_effector",
-                                      "least": 0.05}], ids=lambda task: task["kind"])
-def test_a_task_is_made_of_its_keys(task, tmp_path):
-    assert build(scenario_of(tmp_path, {**task, "damping": 3.0})).stack[task["kind"]].damping == 3.0
-
-
 def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     avoidance = {"kind": "separation", "distance": 0.05, "obstacles": [[0.1, 0.5, 0.1]]}
     first = build(scenario_of(tmp_path, HAND, avoidance=avoidance))
@@ -72,12 +64,3 @@ def test_a_path_is_followed(path, tmp_path):
     assert run.fault is None
     # What is left is what integrating velocities over a period leaves: v T / 2 and less.
     assert np.linalg.norm(run["position_error"][-30:], axis=1).max() < 2e-3
-
-
-def test_every_kind_has_a_test_here(request):
-    text = request.path.read_text(encoding="utf-8")
-    tested = {"pose", "com", "pointing", "posture",  # in scenarios that are run elsewhere
-              "self-collision",  # in tests/data/seen
-              "momentum", "contact-force", "least-force"}  # in shipped scenarios of torques
-    assert [kind for kind in plugins.registered("tasks")
-            if f'"{kind}"' not in text and kind not in tested] == []

@@ -28,6 +28,7 @@ def test_a_table_escapes_every_value_marks_the_best_and_says_how_much_is_left_ou
         assert shown in text
     assert "<b>" not in html_table("t", ("n",), [(1,)])
     assert "... and 70 more" in html_table("t", ("n",), [(i,) for i in range(100)])
+    assert "more" not in html_table("t", ("n",), [(i,) for i in range(30)])
 
 
 def test_a_recording_shows_its_signals_and_a_comparison_a_column_for_each_run(run):

@@ -67,7 +67,11 @@ def test_an_arrow_goes_to_the_middle_of_a_pushed_body_while_it_is_pushed():
         "joint": "trunk_pitch", "force": 100.0, "direction": 90.0, "at": 0.2, "duration": 0.1}})
     t = np.array([0.199, 0.2, 0.299, 0.3])
     rest = FACTS.robot.placements(np.array(FACTS.robot.rest))
-    found = pushes(FACTS, scenario, t, np.tile(rest, (4, 1, 1)), np.zeros((4, 8, 3)))
+    bare = replace(FACTS, robot=replace(FACTS.robot, capsules=()))  # to the joint, without bodies
+    found, to_joint = (pushes(facts, scenario, t, np.tile(rest, (4, 1, 1)), np.zeros((4, 8, 3)))
+                       for facts in (FACTS, bare))
+    trunk = FACTS.robot.joint_names.index("trunk_pitch") + 1
+    np.testing.assert_array_equal(to_joint.at(1).push[0, 1], rest[trunk, 9:])
     assert [len(found.at(f).push) for f in range(4)] == [0, 5, 5, 0]
     shaft, *head = found.at(1).push
     np.testing.assert_allclose(shaft[1] - shaft[0], [0.0, 0.2, 0.0], atol=1e-12)
@@ -130,7 +134,7 @@ def test_frames_placements_and_distances_are_those_recorded(runs):
 @pytest.mark.parametrize("name", NAMES)
 def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
     """A second run asks the loop's own hierarchy, tick by tick, what its command violates."""
-    scenario = load(name, ["control.duration=0.2"])
+    scenario = load(name, ["control.duration=0.2", "start.v=[0.1, -0.1, 0, 0.2, 0, 0.1, 0]"])
     controller = Controller(scenario)
     plant, seen = controller.cell.plant, []
     for k in range(200):

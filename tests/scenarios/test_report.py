@@ -17,7 +17,6 @@ from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
 from scenarios.results.page import comparison_page as page
 from scenarios.results.page import run_command
-from scenarios.results.sections import side_by_side
 
 LETTER = "tpm-published"
 
@@ -78,7 +77,7 @@ def test_a_page_is_whole_and_needs_nothing_outside_itself(runs, request):
     assert not re.search(r"<(?:link|img|(?:iframe|script)[^>]* src)\b|@import|url\((?!#)", text)
 
 
-def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best():
+def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best(undrawn):
     runs = [dataclasses.replace(made(LETTER, scenario=asked(name=name), v=speed * np.eye(5, 7)),
                                 label=name) for name, speed in (("slow", 0.1), ("jumpy", 2.0))]
     text = page(comparison(*runs))
@@ -131,10 +130,6 @@ def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(tmp_path):
         assert tab.complaints == []
 
 
-def beside(panel, recordings):
-    return side_by_side(panel, recordings, palette.looks(recordings))
-
-
 def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
     looks = palette.looks(["tpm-published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"])
     assert list(looks) == ["tpm-published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"]
@@ -154,7 +149,7 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, 
     assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
 
 
-def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
+def test_the_letters_pairs_are_made_of_its_runs_in_its_order(tmp_path):
     names = ("ellipse-35deg-equality", "ellipse", "ellipse-velocity", "ellipse-35deg", "ellipse-3d")
     runs = [recording(load(name), v=np.full((5, 7), float(i))) for i, name in enumerate(names)]
     drawn = dict(letter.figures(runs))
@@ -164,3 +159,4 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order():
     assert headings == ["(a) ", "(b) ", "Body"]
     speeds = [ax.lines[0].get_ydata()[0] for ax in drawn["figure-4-joint-velocities"].axes]
     assert speeds == [2.0, 1.0]  # the velocity level is (a)
+    letter.write_all([recording(t=[0.0])], tmp_path)  # a run of one tick has no figure

@@ -82,11 +82,6 @@ def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
         np.testing.assert_array_equal(controller.resolution.x, alone)
 
 
-def test_the_smooth_stack_refuses_a_resolver_without_activations():
-    scenario = load("ellipse-smooth").with_resolver("tpm")
-    refused('needs control.resolver = "smooth", got "tpm"', Controller, scenario)
-
-
 # The avoidance of the letter's references [5] and [10].
 def at_the_start(scenario):
     cell = build(scenario)

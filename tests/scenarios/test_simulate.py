@@ -48,18 +48,6 @@ def test_row_0_is_the_start_and_the_stack_is_recorded_as_the_measurements_ask(ru
     assert run["repulsion_active"].any()
 
 
-def test_a_scenario_may_have_any_of_its_tasks():
-    base = load("ellipse", SHORT)
-    run = simulate(base.model_copy(update={"avoidance": None, "pointing": None}))
-    assert run.orders == ("position",)
-    assert "ee_distance" not in run
-    assert np.abs(run["position_error"][2500:]).max() < 1e-4
-    cone = simulate(base.model_copy(update={"avoidance": None, "position": None}))
-    assert set(cone.orders) <= {"pointing", ""}
-    assert "position_error" not in cone
-    assert cone["pointing_error"][-1] < 0.01
-
-
 def test_progress_is_told_and_an_interrupted_run_keeps_what_was_run():
     def interrupt(done, total):
         if done == 1000:

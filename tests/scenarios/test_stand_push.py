@@ -67,8 +67,8 @@ class Failing:
         return res if self.left >= 0 else Resolution(res.x, self.status)
 
 
-@pytest.mark.parametrize(("action", "patience"), [("hold", 10), ("brake", 0)])
-def test_without_an_answer_the_last_torques_are_held_or_joints_slowed_down(action, patience):
+@pytest.mark.parametrize("action", ["hold", "brake"])
+def test_without_an_answer_the_last_torques_are_held_or_joints_slowed_down(action):
     scenario = SHORT.with_changes({"control.policy.backend_failure": action})
     controller = Controller(scenario, resolver=Failing(Status.BACKEND_FAILURE, 8))
     recorder = Recorder(controller, 10)

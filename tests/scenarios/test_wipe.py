@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from standing import drift_of
 
-from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy import Robot, Stack, State
 from hierarchy.contacts import Contact, Contacts
-from hierarchy.paths import Still
-from hierarchy.tasks import Along, ContactMotion, Friction, Position
+from hierarchy.tasks import ContactMotion, Friction
 from scenarios import load, simulate
 from scenarios.cell.plants.torque import inside
 from scenarios.measure.metrics import measure
@@ -50,13 +49,6 @@ def test_a_sliding_contact_is_held_along_its_normal_only():
     expected = -30.0 * normal @ J @ state.v - normal @ drift_of(contacts, state)
     np.testing.assert_allclose(h.lower, expected)
     assert motion.row_names == ("end_effector along its normal",)
-
-
-def test_what_cannot_slide_or_is_no_direction_is_refused():
-    with pytest.raises(HierarchyError, match="4 points that slide; only a contact of one point"):
-        Contact(TIP, [(x, y, 0.0) for x in (0.0, 1.0) for y in (0.0, 1.0)], slides=True)
-    with pytest.raises(HierarchyError, match=r"'along': directions .* orthogonal"):
-        Along(Position(TIP, Still((0.0, 0.0, 0.0))), ((1.0, 0.0, 0.0), (1.0, 1.0, 0.0)))
 
 
 @pytest.mark.parametrize("height", [0.111, 0.09])

@@ -22,7 +22,9 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
 @pytest.mark.parametrize(("name", "changes"), [
     ("ellipse", ["start.end_effector=[5, 5, 5]"]), ("ellipse", ["robot.model=ur5"]),
     ("stand-push", ["contacts.0.frame=left_fot"])])
-def test_what_does_not_fit_the_robot_is_said_by_check_and_run(name, changes, command, tmp_path):
+def test_what_does_not_fit_the_robot_is_said_by_check_and_run(
+        name, changes, command, tmp_path, monkeypatch):
+    monkeypatch.setattr("scenarios.cell.robot._REACH_STEPS", 20)
     sets = [part for change in changes for part in ("--set", change)]
     checked = command("check", name, *sets, code=2).err
     run = command("run --duration 0.01", name, "--out", tmp_path / "run", *sets, code=2)
@@ -87,6 +89,9 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
 @pytest.mark.parametrize(("call", "said"), [
     (lambda: load(""), "load: expected a path, got str ''"),
     (lambda: load("ellipse", "control.period=1"), "expected a list of \"key=value\", got str"),
+    (lambda: load("ellipse", ["control.duration=2\nx = 3"]), "expected one value"),
+    (lambda: simulate(load("ellipse-smooth").with_resolver("tpm")),
+     'needs control.resolver = "smooth", got "tpm"'),
     (lambda: simulate(SHORT, progress=3), "simulate: progress: expected a function, got int 3"),
     (lambda: simulate("elipse"), "unknown scenario 'elipse'; did you mean 'ellipse'?"),
     (lambda: compare(3), "compare: expected names, files, or what `load` returns, got int 3"),
@@ -103,7 +108,8 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: solve_ik(ROBOT, Q, [replace(HAND, gain=201.0)], dt=0.01),
      "task 'position': gain = 201 1/s times the period of 0.01 s is 2.01"),
     (lambda: solve_ik(ROBOT, Q, [SelfSeparation(ROBOT.capsules, Barrier(0.02, 101.0))], dt=0.01),
-     "'self-separation': rate = 101 1/s times the period of 0.01 s is 1.01; above 1 a tick may"),
+     "'self-separation': rate = 101 1/s times the period of 0.01 s is 1.01; above 1 a tick may "
+     "take more than the distance left, so give at most 100 1/s"),
     (lambda: solve_ik(ROBOT, Q, [HAND], dt=0.02, limits=SLOW, v=np.zeros(7)),
      "'joint limits': its period is 0.01 s, that of the "),
     (lambda: solve_ik(ROBOT, Q, [HAND], limits=SLOW), "give v, the velocity of the tick before"),

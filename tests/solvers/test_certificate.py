@@ -15,7 +15,7 @@ from solvers import certificate, certify, make, problems
 from solvers.proof import prove
 
 # Not DEGEN7: some of its rows are at an angle of 2e-9, whose answer is 1e8 away or not.
-FAMILIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10", "INEQ7", "HUM38")
+FAMILIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10", "INEQ7", "HUM38", "DYN60")
 TINY = problems.Recipe(
     joints=(2, 3), levels=(2, 4), rows=(1, 3), scales=(1.0, 1.0), spread=1.0, angles=(1e-2, 1e-1),
     ties=0.5, zero_rows=0.1, duplicates=0.3, near_parallel=0.1)

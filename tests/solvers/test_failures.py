@@ -28,11 +28,12 @@ UNKNOWN = ["hcod_nested_2004163_shift"]  # near-ties of 1e-9: any answer that sa
 # called solved and wrong, the certificate rejected a right one (CERTAIN), or steps cycled.
 # Or of the exact engine: levels missed by a fiftieth, 169 steps for 10 rows (certain but IN_DOUBT);
 # tick 390 of stand-talos, on a heel edge, was INACCURATE.
-STORED = sorted([*(FOLDER.parent / "stress").glob("*.npz"),
-                 *(FOLDER.parent / "exact").glob("*.npz")])
+STORED = sorted(path for folder in ("", "stress", "exact", "whole-body")
+                for path in (FOLDER.parent / folder).glob("*.npz"))
 # The nearly-* have rows that are dependent up to 1e-8 rad: x was far off on the way, and levels
 # below, or the reference, moved it back along directions of which a row had a little left.
-IN_DOUBT = ("hcod_169_steps_9", "hcod_SOLVED_third_level_34")
+IN_DOUBT = ("hcod_169_steps_9", "hcod_SOLVED_third_level_34",
+            "step-18", "step-895")  # by which rows are pivots first
 CERTAIN = ["contacts-50000500", "contacts-50067440", "contacts-50081046",
            "cycle-mixed_units-50103472", "cycle-tiny_rows-50015365", "cycle-tiny_rows-50031629",
            "mixed_units-262311872", "mixed_units-281029597", "mixed_units-50076333",
@@ -75,9 +76,9 @@ def test_what_hcod_calls_solved_is_right_and_found_soon_with_its_memory_too(path
         assert res.status in (Status.SOLVED, Status.INACCURATE)
         assert res.iterations <= 8 * h.m
         assert res.status is not Status.SOLVED or is_right(h, res.x)
-        if path.parent.name == "exact":
+        if path.parent.name in ("exact", "whole-body"):
             assert res.status is Status.SOLVED or path.stem in IN_DOUBT
-    certain = path.stem in CERTAIN or path.stem.startswith("nearly-")
+    certain = path.stem in CERTAIN or path.stem.startswith(("nearly-", "hcod-", "step-"))
     assert not certain or certify(h, cold.x).certified
 
 

@@ -1,6 +1,7 @@
 """Every kind of task, constraint and limit that mink has, on a floating robot with two arms."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -93,3 +94,8 @@ def test_a_joint_that_cannot_come_back_in_time_is_no_solution_and_named(configur
     with pytest.raises(mink.NoSolutionFound, match=r"joint left_a must move by at least .* "
                        r"\(VelocityLimit\) and at most .* \(ConfigurationLimit\)"):
         solve_ik(outside, tasks_of(outside), DT, damping=1e-9, limits=limits)
+    up = SimpleNamespace(G=-np.eye(1, model.nv, 2), h=np.array([-0.1]), inactive=False)
+    limits = [mink.FreeJointVelocityLimit(model, 0.5, 0.9),
+              SimpleNamespace(compute_qp_inequalities=lambda *_: up)]
+    with pytest.raises(mink.NoSolutionFound, match=r"joint base 3 must move by at least 10 "):
+        solve_ik(configuration, tasks_of(configuration), DT, damping=1e-9, limits=limits)

@@ -37,15 +37,12 @@ def test_the_contributions_in_a_metric_give_the_answer():
     tpm = task_priority_matrix(h)
     close(tpm.contributions.sum(axis=0) + tpm.null_space_term, STAIRCASE.solve(h).x)
     refused("the hierarchy has a metric", task_priority_matrix, h, form="published")
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [1.0])])
+    refused("level 1, row 0: an inequality", task_priority_matrix, h)
 
 
 def close(x, y):
     np.testing.assert_allclose(x, y, rtol=0, atol=1e-8 * (1.0 + np.abs(y).max(initial=0.0)))
-
-
-def test_the_matrix_of_an_inequality_is_refused():
-    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [1.0])])
-    refused("level 1, row 0: an inequality", task_priority_matrix, h)
 
 
 # -- the published form, as printed: not to be mended ---------------------------------------------
