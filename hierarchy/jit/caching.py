@@ -313,9 +313,9 @@ def find(kernel: Any, kinds: tuple[Any, ...]) -> Any:
 
 @cache
 def parts() -> tuple[Part, ...]:
-    """Return the object files of this kind of machine."""
+    """Return the object files, from whose LLVM code this kind of machine can make its own."""
     triple = llvm.get_process_triple()
-    runs = triple.startswith("x86_64") and "linux" in triple
+    runs = triple.startswith(("x86_64", "aarch64")) and "linux" in triple
     return tuple(filter(None, map(Part.read, sorted(FOLDER.glob("*.o"))))) if runs else ()
 
 

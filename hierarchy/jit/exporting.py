@@ -19,7 +19,16 @@ from numba.np import arrayobj
 
 from hierarchy.jit.caching import PROCESSOR, Code, Part, read_code
 from hierarchy.jit.compiling import Cached
-from hierarchy.jit.inside import cgutils, compiler, global_compiler_lock, llvm, registry, types
+from hierarchy.jit.inside import (
+    cgutils,
+    compile_nrt_functions,
+    compiler,
+    global_compiler_lock,
+    llvm,
+    registry,
+    rtsys,
+    types,
+)
 from hierarchy.jit.linking import (
     Library,
     found,
@@ -152,6 +161,8 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
         for `stored`.
     """
     Library.running = Cached.kept = False
+    # Machine code was made of that of this process, which wrote instructions of x86-64 into it.
+    rtsys._library = compile_nrt_functions(registry.cpu_target.target_context)
     entries, libraries = _compiled(calls, say)
     if functions:
         libraries.append(_library(functions))
