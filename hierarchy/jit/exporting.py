@@ -6,6 +6,7 @@ compiled as it would be when called, for a processor that numba is told by its e
 process starts; only the machine code is made once, of all of them together.
 """
 
+import platform
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -147,8 +148,9 @@ def _view(dtype: Any) -> Any:
 numbers_at, integers_at = _view(types.float64), _view(types.int64)
 
 
-ENVIRONMENT = {"NUMBA_CPU_NAME": PROCESSOR, "NUMBA_CPU_FEATURES": "",
-               "NUMBA_DISABLE_INTEL_SVML": "1"}  # of a process that builds
+ENVIRONMENT = {  # of a process that builds
+    "NUMBA_CPU_NAME": PROCESSOR if platform.machine() in ("x86_64", "AMD64") else "generic",
+    "NUMBA_CPU_FEATURES": "", "NUMBA_DISABLE_INTEL_SVML": "1"}
 
 
 @global_compiler_lock  # type: ignore[untyped-decorator]
