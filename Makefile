@@ -63,17 +63,18 @@ docs: $(INSTALLED)
 	@$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs
 	@echo "Documentation: build/docs/index.html"
 
-# A wheel for any machine, and one with the kernels for x86-64-v3: their object files refer to no
-# system library but libm.
-PLATFORM := --config-setting=--build-option=--plat-name=manylinux_2_17_x86_64
+# A wheel for any machine, and those with kernels: machine code for x86-64-v3, which refers to no
+# system library but libm, and LLVM code of which other processors make theirs.
+PLATFORM := --config-setting=--build-option=--plat-name=manylinux_2_17_
 
 # The time in all archives, so that the same sources make the same files.
 dist: export SOURCE_DATE_EPOCH ?= $(shell git log -1 --format=%ct 2>/dev/null || echo 1577836800)
 dist: set-up
 	@rm -rf dist build
 	@$(BIN)/python -m build --no-isolation --outdir dist
-	@if [ -e hierarchy/jit/objects/solvers.o ]; then \
-	  $(BIN)/python -m build --no-isolation --wheel --outdir dist $(PLATFORM); fi
+	@if [ -e hierarchy/jit/objects/solvers.o ] && [ "$$(uname -sm)" = "Linux x86_64" ]; then \
+	  for machine in x86_64 aarch64; do \
+	    $(BIN)/python -m build --no-isolation --wheel --outdir dist $(PLATFORM)$$machine; done; fi
 	@cd dist && tar xzf *.tar.gz && rm *.tar.gz && for archive in */; do \
 	  tar --sort=name --mtime=@$$SOURCE_DATE_EPOCH --owner=0 --group=0 --numeric-owner -c $$archive \
 	  | gzip -n9 > $${archive%/}.tar.gz && rm -r $$archive; done

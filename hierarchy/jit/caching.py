@@ -1,9 +1,9 @@
 """Compiled kernels on disk: made when the package was built, or here when they were first needed.
 
 Ahead: object files, each with an index that has, for each kernel, the digest of the sources that it
-was made of and the types of arguments that there is code for. Another processor makes its own once,
-of the LLVM code beside. Any other call, and a kernel whose sources have changed since, is compiled
-when it is needed.
+was made of and the types of arguments that there is code for. Another processor with Linux makes
+its own once, of the LLVM code beside. Any other call, and a kernel whose sources have changed
+since, is compiled when it is needed.
 
 Then: one file for a kernel, the types of its arguments, and a machine. numba's own cache does not
 notice when a helper in another file has changed. Here the name of a file carries a digest of
@@ -313,9 +313,9 @@ def find(kernel: Any, kinds: tuple[Any, ...]) -> Any:
 
 @cache
 def parts() -> tuple[Part, ...]:
-    """Return the object files of this kind of machine."""
+    """Return the object files, from whose LLVM code this kind of machine can make its own."""
     triple = llvm.get_process_triple()
-    runs = triple.startswith("x86_64") and "linux" in triple
+    runs = triple.startswith(("x86_64", "aarch64")) and "linux" in triple
     return tuple(filter(None, map(Part.read, sorted(FOLDER.glob("*.o"))))) if runs else ()
 
 

@@ -6,6 +6,7 @@ compiled as it would be when called, for a processor that numba is told by its e
 process starts; only the machine code is made once, of all of them together.
 """
 
+import platform
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -19,7 +20,16 @@ from numba.np import arrayobj
 
 from hierarchy.jit.caching import PROCESSOR, Code, Part, read_code
 from hierarchy.jit.compiling import Cached
-from hierarchy.jit.inside import cgutils, compiler, global_compiler_lock, llvm, registry, types
+from hierarchy.jit.inside import (
+    cgutils,
+    compile_nrt_functions,
+    compiler,
+    global_compiler_lock,
+    llvm,
+    registry,
+    rtsys,
+    types,
+)
 from hierarchy.jit.linking import (
     Library,
     found,
@@ -138,8 +148,9 @@ def _view(dtype: Any) -> Any:
 numbers_at, integers_at = _view(types.float64), _view(types.int64)
 
 
-ENVIRONMENT = {"NUMBA_CPU_NAME": PROCESSOR, "NUMBA_CPU_FEATURES": "",
-               "NUMBA_DISABLE_INTEL_SVML": "1"}  # of a process that builds
+ENVIRONMENT = {  # of a process that builds
+    "NUMBA_CPU_NAME": PROCESSOR if platform.machine() in ("x86_64", "AMD64") else "generic",
+    "NUMBA_CPU_FEATURES": "", "NUMBA_DISABLE_INTEL_SVML": "1"}
 
 
 @global_compiler_lock  # type: ignore[untyped-decorator]
@@ -152,6 +163,8 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
         for `stored`.
     """
     Library.running = Cached.kept = False
+    # Machine code was made of that of this process, which wrote instructions of x86-64 into it.
+    rtsys._library = compile_nrt_functions(registry.cpu_target.target_context)
     entries, libraries = _compiled(calls, say)
     if functions:
         libraries.append(_library(functions))

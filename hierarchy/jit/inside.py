@@ -17,7 +17,9 @@ try:
     from numba.core.environment import Environment
     from numba.core.errors import NumbaError
     from numba.core.registry import CPUDispatcher
+    from numba.core.runtime import rtsys
     from numba.core.runtime._nrt_python import c_helpers as nrt_helpers
+    from numba.core.runtime.nrtdynmod import compile_nrt_functions
     from numba.core.serialize import dumps
     from numba.core.targetconfig import ConfigStack
     from numba.core.types.containers import BaseTuple
@@ -34,5 +36,6 @@ except (ImportError, AttributeError) as error:
 
 __all__ = ["BaseFunction", "BaseTuple", "CPUContext", "CPUDispatcher", "CodeLibrary", "Codegen",
            "CompileResult", "ConfigStack", "Environment", "NullCache", "NumbaError", "cgutils",
-           "compiler", "dumps", "event", "global_compiler_lock", "intrinsic", "llvm",
-           "load_helpers", "make_function", "nrt_helpers", "registry", "types"]
+           "compile_nrt_functions", "compiler", "dumps", "event", "global_compiler_lock",
+           "intrinsic", "llvm", "load_helpers", "make_function", "nrt_helpers", "registry", "rtsys",
+           "types"]

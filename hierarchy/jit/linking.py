@@ -53,7 +53,7 @@ class Library(CodeLibrary):  # type: ignore[misc]
         super().__init__(*about)
         self.kernel: Call | None = None
         self.calls: dict[Any, None] = {}
-        self.runs = True
+        self.runs = Library.running
 
     def add_linking_library(self, library: Any) -> None:
         """Link a library when this one is finished, or note that its names are needed."""

@@ -5,6 +5,7 @@ with the kernels of Python when the package was built; if not, numba makes it no
 gets the same code through its own back end, which splits vectors that are too wide for it.
 """
 
+import platform
 import re
 import shutil
 import struct
@@ -233,11 +234,10 @@ def _filled(name: str, made: Emitted, resolvers: Sequence[str]) -> str:
 
 def _link(folder: Path, target: str) -> str:
     """Make a shared library of the static one; return why not, empty if it was made."""
-    if target == "aarch64":
-        return "only the linker of this machine is used, and the code is for aarch64"
-    compiler = next(filter(None, map(shutil.which, _COMPILERS)), None)
+    names = _COMPILERS if target in ("native", platform.machine()) else (f"{target}-linux-gnu-gcc",)
+    compiler = next(filter(None, map(shutil.which, names)), None)
     if compiler is None:
-        return f"no linker: none of {', '.join(_COMPILERS)} is found"
+        return f"no linker: none of {', '.join(names)} is found"
     done = subprocess.run(
         [compiler, "-shared", "-o", folder / _SHARED, "-Wl,-soname,libtask_hierarchy.so",
          "-Wl,--whole-archive", folder / _ARCHIVE, "-Wl,--no-whole-archive", "-lm"],

@@ -178,9 +178,9 @@ def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and
         x, left = make("recursive").solve(h).x, library.solve("recursive", h)[1]
         assert np.abs(left.answer - x).max() <= 1e-9 * (1.0 + np.abs(x).max())
     (tmp_path / "arm").mkdir()
-    write(tmp_path / "arm", ("recursive",), "aarch64")
+    arm = write(tmp_path / "arm", ("recursive",), "aarch64")
     content = (tmp_path / "arm" / "lib" / "libtask_hierarchy.a").read_bytes()
     elf = content[content.index(b"\x7fELF"):]
     assert int.from_bytes(elf[18:20], "little") == 183  # EM_AARCH64
-    assert not (tmp_path / "arm" / "lib" / "libtask_hierarchy.so").exists()
+    assert arm.shared in ("", "no linker: none of aarch64-linux-gnu-gcc is found")
     assert "th_solve_sns" not in (tmp_path / "arm/include/task_hierarchy.h").read_text()
