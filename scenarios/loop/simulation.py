@@ -14,7 +14,7 @@ from scenarios.loop.faults import Faults, with_room
 from scenarios.loop.recorder import FASTEST, Recorder
 from scenarios.measure.judging import Fates, completed
 from scenarios.recording.blame import blamed, blaming
-from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording, was_interrupted
 
 _REPORT_EVERY = 500  # ticks between two calls of `progress`
 
@@ -63,7 +63,7 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
 def uninterrupted(scenario: Scenario, audits: Sequence[Audit] = ()) -> Recording:
     """Return the recording of a run; KeyboardInterrupt where `simulate` keeps a part of it."""
     recording = simulate(scenario, audits=audits)
-    if str(recording.fault).startswith("interrupted"):
+    if was_interrupted(recording.fault):
         raise KeyboardInterrupt
     return recording
 

@@ -13,7 +13,7 @@ from scenarios.measure.happenings import Happening, happened
 from scenarios.measure.metric import NOTHING
 from scenarios.measure.metrics import Metric
 from scenarios.recording.facts import ResolverFacts, resolver_facts
-from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording, was_interrupted
 
 _TIE = 0.01  # relative: values that near are as good, as those within NOTHING
 # How a resolver that is not strict departs from strict priorities, by its name.
@@ -50,7 +50,7 @@ class Run:
     @property
     def interrupted(self) -> bool:
         """Whether Ctrl-C or a signal ended it."""
-        return str(self.fault).startswith("interrupted")
+        return was_interrupted(self.fault)
 
     @property
     def title(self) -> str:

@@ -233,6 +233,11 @@ class Recording:
         return found
 
 
+def was_interrupted(fault: str | None) -> bool:
+    """Whether Ctrl-C or a signal ended a run, by its fault."""
+    return str(fault).startswith("interrupted")
+
+
 def _entries(signal: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:
     """Yield each number of a signal (T, ...) over time, with its indices as text."""
     for place in np.ndindex(signal.shape[1:]):
