@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 _NEAR = 0.6   # similarity of two names, 0 to 1, from which one is suggested
 _LARGEST = 2**31 - 1  # whole number, where no other is said
+SEEDS = 2**63 - 1     # largest seed of random numbers
 _LISTED = 15  # known names that a message lists; of more it has the nearest
 
 
@@ -124,11 +125,11 @@ def real(what: str, value: object) -> float:
 
 def whole(what: str, value: object, least: int = 0, largest: int = _LARGEST) -> int:
     """Return a whole number from `least` to `largest`; raise a HierarchyError for anything else."""
-    if isinstance(value, Integral) and not isinstance(value, bool):
-        found = int(value)
-        if least <= found <= largest:
-            return found
-    raise HierarchyError(f"{what} = {value!r}: expected a whole number{_between(least, largest)}")
+    given = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
+    if given is not None and least <= given <= largest:
+        return given
+    bound = inf if largest == _LARGEST and (given is None or given < least) else largest
+    raise HierarchyError(f"{what} = {value!r}: expected a whole number{_between(least, bound)}")
 
 
 def check_choice(what: str, value: object, known: Collection[str | int]) -> None:
@@ -148,7 +149,7 @@ def as_float(value: object) -> float:
 
 
 def _between(least: float, largest: float) -> str:
-    return (f" from {least:g} to {largest:g}" if isfinite(largest) and largest != _LARGEST else
+    return (f" from {least:g} to {largest:.12g}" if isfinite(largest) else
             f" from {least:g} on" if isfinite(least) else "")
 
 

@@ -13,6 +13,7 @@ from pathlib import Path as File
 import numpy as np
 
 from hierarchy.errors import (
+    SEEDS,
     brief,
     expect,
     file_path,
@@ -157,7 +158,7 @@ class Jittered(Path):
         number("jitter: amplitude", self.amplitude, 0.0)
         positive("jitter: rate [Hz]", self.rate)
         expect("jitter: path", self.path, Path, "see hierarchy.paths")
-        whole("jitter: seed", self.seed)
+        whole("jitter: seed", self.seed, largest=SEEDS)
         random = np.random.default_rng(self.seed)
         speeds = 2.0 * np.pi * self.rate * random.uniform(0.5, 1.0, (3, 5))  # rad/s
         set_frozen(self, _sines=np.stack([speeds, random.uniform(0.0, 2.0 * np.pi, (3, 5))]))

@@ -24,6 +24,7 @@ from numpy.linalg import norm
 
 from hierarchy.archives import read_arrays
 from hierarchy.errors import (
+    SEEDS,
     HierarchyError,
     expect,
     file_path,
@@ -96,7 +97,7 @@ _MORE = ("metric", "give")  # what a file has of the hierarchies that have it
 def generate(seed: int, recipe: Recipe = ANY) -> Hierarchy:
     """Return the hierarchy of a seed, reproducibly."""
     expect("generate: recipe", recipe, Recipe, "give Recipe()")
-    rng = np.random.default_rng(whole("generate: seed", seed))
+    rng = np.random.default_rng(whole("generate: seed", seed, largest=SEEDS))
     n = _whole(rng, recipe.joints)
     count = _whole(rng, recipe.levels)
     rows = (max(recipe.rows[0], min(1, recipe.rows[1])), recipe.rows[1])

@@ -33,7 +33,7 @@ def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, command,
 @pytest.mark.parametrize("name", ["EQ7", "INEQ7", "DEGEN7", *problems.KINDS, "recipe"])
 def test_halves_are_reproducible_and_never_the_same(name):
     one = family(name)
-    assert one.half(3, 2).digest == one.half(3, 2).digest
+    assert one.half(26112907, 2).digest == one.half(26112907, 2).digest
     assert len({one.half(seed, 2).digest for seed in (0, 1, 2)}) == 3
 
 
