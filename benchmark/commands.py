@@ -225,15 +225,19 @@ def stress(count: Annotated[int, typer.Option(
 
     What is not certified is proved right or wrong. Exit code 1 if an answer fails.
     """
-    from benchmark.stress import ALL, KINDS, report, run
+    from benchmark.stress import ALL, KINDS, Tally, report, run
     from hierarchy.errors import check_name
     from solvers import make
 
     make(resolver)
     check_name("kind", kind, (ALL, *KINDS))
-    found = report(resolver, run(count, resolver, first, processes, kind), out)
-    found.say()
-    return int(found.failed)
+    found: dict[str, Tally] = {}
+    try:
+        run(count, resolver, found, first, processes, kind)
+    finally:  # what was judged before an interruption is said too
+        said = report(resolver, found, out)
+        said.say()
+    return int(said.failed)
 
 
 def reproduce(names: Annotated[list[str] | None, typer.Argument(

@@ -120,23 +120,24 @@ def tally(job: tuple[str, range, str]) -> Tally:
     return found
 
 
-def run(count: int, name: str, first: int = 0, processes: int | None = None, kind: str = RECIPE
-        ) -> dict[str, Tally]:
-    """Judge a resolver on `count` problems starting at seed `first`; return the counts by kind.
+def run(count: int, name: str, found: dict[str, Tally], first: int = 0,
+        processes: int | None = None, kind: str = RECIPE) -> None:
+    """Judge a resolver on `count` problems starting at seed `first`.
 
+    found : the counts by kind, filled as they come: a run that is interrupted leaves them.
     processes : number of processes; None for one per core.
     kind : one of KINDS, or "all" to distribute the problems evenly over them.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by the processes when they start
     kinds = KINDS if kind == ALL else (kind,)
-    each, found = -(-count // len(kinds)), {one: Tally() for one in kinds}
+    each = -(-count // len(kinds))
+    found.update({one: Tally() for one in kinds})
     jobs = [(name, range(i, min(i + _CHUNK, first + each)), one) for one in kinds
             for i in range(first, first + each, _CHUNK)]
     with bar("problems") as told:
         for (_, seeds, one), part in ended(tally, jobs, processes):
             found[one].add(part or Tally(Counter({CRASHED: len(seeds)}), lost=[seeds]))
             told(name, sum(some.counts.total() for some in found.values()), each * len(kinds))
-    return found
 
 
 def report(name: str, found: Mapping[str, Tally], out: Path) -> Report:

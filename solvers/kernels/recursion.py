@@ -20,6 +20,8 @@ from solvers.kernels.linalg.block import (
 )
 from solvers.kernels.linalg.rows import (
     finish,
+    finish_unless_missed,
+    has_outlier,
     largest_row,
     length_of,
     load_rows,
@@ -27,6 +29,7 @@ from solvers.kernels.linalg.rows import (
     swap_rows,
 )
 from solvers.kernels.linalg.space import Block, View, assign, fill, matrix, shared, vector
+from solvers.kernels.tolerances import NEGLIGIBLE
 from solvers.status import SOLVED, TOO_SMALL
 
 LEVEL, NAKAMURA, CHIAVERINI, SELECTIVE = 0.0, 1.0, 2.0, 3.0  # methods of `Recursive`, in order
@@ -73,7 +76,8 @@ def _carve(work, at, m, n):
 def recursion(A, lower, upper, sizes, x, settings, work):
     """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
-    settings: those of `Recursive`. Other arguments and the codes are those of `solve_by_staircase`.
+    settings: those of `Recursive`. Other arguments and the codes are those of `solve_by_staircase`,
+    but INACCURATE if a level is missed whose rows are rounding beside others.
     """
     m, n = A.shape
     rows, at = _carve(work, 0, m, n)
@@ -105,7 +109,8 @@ def recursion(A, lower, upper, sizes, x, settings, work):
     for i in range(n):
         add_multiple(q, x[i], rows.P[i])  # (14): I - J^# J = P_l
     assign(x, q)
-    return finish(x, SOLVED)
+    light = has_outlier(rows.zero, NEGLIGIBLE * NEGLIGIBLE) and inverse.method == LEVEL
+    return finish_unless_missed(light, A, lower, sizes, x, settings.damping)
 
 
 @inlined

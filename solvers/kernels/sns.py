@@ -17,6 +17,8 @@ from solvers.kernels.linalg.rows import (
     all_finite,
     factor_level,
     finish,
+    finish_unless_missed,
+    has_outlier,
     load_rows,
     make_reflector,
     only_entry,
@@ -37,7 +39,7 @@ from solvers.kernels.linalg.space import (
     vector,
 )
 from solvers.kernels.staircase import carve_staircase, climb
-from solvers.kernels.tolerances import BOUND_KEPT, TERMS
+from solvers.kernels.tolerances import BOUND_KEPT, NEGLIGIBLE, TERMS
 from solvers.status import CONTRADICTION, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 NO_JOINT = -1
@@ -149,14 +151,16 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
         return finish(x, code)
     assign(space.reference, x)
     if bounds == 0:
-        code, _ = climb(A, lower, upper, sizes, x, settings, work[3 * n:])
+        code, least = climb(A, lower, upper, sizes, x, settings, work[3 * n:])
+        light = least == 0.0
     else:
         code = _saturate(A[bounds:], lower[bounds:], upper[bounds:], sizes[below:], x, space,
                          record[n + below:])
+        light = has_outlier(space.zero, NEGLIGIBLE * NEGLIGIBLE)
     if code != SOLVED:
         return code - bounds if code < 0 else finish(x, code)
     _record_bounds(x, space, record)
-    return finish(x, SOLVED)
+    return finish_unless_missed(light, A[bounds:], lower[bounds:], sizes[below:], x, settings[0])
 
 
 @inlined

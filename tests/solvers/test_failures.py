@@ -90,6 +90,17 @@ def test_a_small_row_that_could_be_met_is_not_hidden_by_a_large_one(name, wrong)
     assert certify(read(name), wrong).level == 1
 
 
+@pytest.mark.parametrize("name", ["augmented", "hcod", "recursive", "sns", "tpm"])
+def test_a_row_that_is_rounding_makes_no_answer_large(name):
+    """A row of the Jacobian of a straight arm: x was 1e17, SOLVED."""
+    one, dust = ([[1.0, 0.0]], [1.0]), ([[0.0, 1e-17]], [1.0])
+    beside = make(name).solve(Hierarchy.from_levels([([[1.0, 0.0], [0.0, 1e-17]], [1.0, 1.0])]))
+    below = make(name).solve(Hierarchy.from_levels([one, dust]))
+    assert beside.status is Status.SOLVED
+    assert [*beside.x, *below.x] == pytest.approx([1.0, 0.0, 1.0, 0.0], abs=1e-9)
+    assert below.status is (Status.SOLVED if name == "augmented" else Status.INACCURATE)
+
+
 @pytest.mark.parametrize("backend", [name for name in BACKENDS if installed(name)])
 def test_numbers_that_overflow_when_squared_do_not_end_the_process(backend):
     h = read("hqp_segfault")

@@ -9,7 +9,7 @@ import numpy as np
 
 from hierarchy.jit import add_multiple, inlined, inner_product, internal
 from solvers.kernels.linalg.space import fill
-from solvers.kernels.tolerances import LEAST_SQUARE
+from solvers.kernels.tolerances import LEAST_SQUARE, LEVEL_MET, NEGLIGIBLE
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED
 
 LANES = 8  # numbers that the inner loops take at a time
@@ -19,11 +19,12 @@ LANES = 8  # numbers that the inner loops take at a time
 def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
     """Copy A into the first rows of W, check all data, and write when a row counts as zero.
 
-    zero (m,) receives the squared norm at or below which the remainder of a row counts as zero.
-    Returns SOLVED, NUMERICAL_FAILURE for an entry that is not finite, -(i + 1) if row i is an
-    inequality, or INACCURATE if the square of a row underflows.
+    zero (m,) receives the squared norm at or below which the remainder of a row counts as zero,
+    infinite for a row that is rounding beside the largest. Returns SOLVED, NUMERICAL_FAILURE for an
+    entry that is not finite, -(i + 1) if row i is an inequality, or INACCURATE if the square of a
+    row underflows.
     """
-    m, n = A.shape
+    (m, n), most = A.shape, 0.0
     code = SOLVED if all_finite(x) else NUMERICAL_FAILURE
     for i in range(m):
         if lower[i] != upper[i]:
@@ -32,11 +33,14 @@ def load_rows(W, zero, A, lower, upper, x, rank_tolerance):
         for c in range(n):
             W[i, c] = A[i, c]
             square += A[i, c] * A[i, c]
-        zero[i] = rank_tolerance * rank_tolerance * square
+        zero[i], most = rank_tolerance * rank_tolerance * square, max(most, square)
         if square <= LEAST_SQUARE and code == SOLVED and A[i].any():
             code = INACCURATE
         if not (np.isfinite(square) and np.isfinite(lower[i])):
             return NUMERICAL_FAILURE
+    most *= (rank_tolerance * NEGLIGIBLE) ** 2
+    for i in range(m):
+        zero[i] = np.inf if 0.0 < zero[i] < most else zero[i]
     return code
 
 
@@ -190,4 +194,29 @@ def finish(x, code):
         code = NUMERICAL_FAILURE
     if code != SOLVED:
         fill(x, 0.0)
+    return code
+
+
+@internal
+def finish_unless_missed(light, A, b, sizes, x, damping):
+    """Return the code of `finish`, or INACCURATE if a level of rows that are rounding is missed.
+
+    light : whether `load_rows` may have found such rows. Beside a heavier row of its level one is
+    no more than a small change of that row, and any is missed with damping.
+    """
+    code, most, first = finish(x, SOLVED), 0.0, 0
+    if code != SOLVED or not light or damping > 0.0:
+        return code
+    for i in range(b.size):
+        most = max(most, length_of(A[i]))
+    for k in range(sizes.size):
+        last, largest, over = first + sizes[k], 0.0, 0.0
+        for i in range(first, last):
+            norm = length_of(A[i])
+            largest = max(largest, norm)
+            off = abs(b[i] - inner_product(A[i], x))
+            over = max(over, off / norm if norm > 0.0 else 0.0)
+        if 0.0 < largest < NEGLIGIBLE * most and over > LEVEL_MET * (1.0 + length_of(x)):
+            code = INACCURATE
+        first = last
     return code
