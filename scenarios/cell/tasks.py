@@ -54,8 +54,9 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
     # The separation from obstacles stands where the task "collision" is listed.
     collision = any(task.kind == "collision" for task in scenario.tasks)
     moved = [task for task in avoiding if collision and isinstance(task, kinds.Separation)]
-    listed = [task for i, section in enumerate(scenario.tasks) for task in (
-        moved if section.kind == "collision" else [_made(section, at, f"tasks.{i}")])]
+    of_section = [(section, moved if section.kind == "collision" else [
+        _made(section, at, f"tasks.{i}")]) for i, section in enumerate(scenario.tasks)]
+    listed = [task for _, made in of_section for task in made]
     last = posture if scenario.posture and scenario.posture.role == "task" else None
     tasks = [*first, *(task for task in avoiding if task not in moved),
              *(task for task in (position, pointing, *listed, last) if task)]
@@ -66,7 +67,8 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
             check_period(task, scenario.control.period, scenario.control.level)
     return Tasks(tasks, first if areas else [*first, *avoiding], position, pointing, limits,
                  tuple(task for task in listed if task not in moved), areas,
-                 reference, {task.title: task.give for task in scenario.tasks if task.give})
+                 reference, {task.name: section.give for section, made in of_section
+                             for task in made if section.give})
 
 
 def _first(scenario: Scenario, at: References) -> tuple[kinds.JointLimits | None, list[Task]]:
