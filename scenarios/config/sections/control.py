@@ -8,14 +8,14 @@ from pydantic import Field
 from scenarios.config import sections as keys
 from scenarios.config.sections.avoidance import AvoidanceSection, SeparationSection
 from scenarios.config.sections.robot import ControlPointSection
-from scenarios.config.sections.tasks import LimitsSection, PointingTask
+from scenarios.config.sections.tasks import LimitsSection, Made, PointingTask
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
 BlindPolicy = Literal["brake", "hold", "stop"]
 MOST_TICKS = 10_000_000  # some kB each in memory
 StackKind = Literal["switched", "hierarchical", "set-based", "smooth"]
 RIVALS = ("set-based", "smooth")  # kinds of `control.stack` that are defined at velocity level
-_PUSHES = ("rate", "influence", "recovery", "limit")  # keys that say how fast a row is left
+_PUSHES = {"rate", "influence", "recovery", "limit", "gain"}  # keys of how fast a row is left
 
 
 class PolicySection(keys.Section):
@@ -114,19 +114,20 @@ class ControlSection(keys.Section):
 
 def unfit(control: ControlSection, limits: LimitsSection | None,
           avoidance: AvoidanceSection | SeparationSection | None,
-          pointing: Mapping[str, PointingTask]) -> Iterator[str]:
+          tasks: Mapping[str, Made]) -> Iterator[str]:
     """Yield what a scenario asks for that its kind of stack does not have.
 
-    `pointing` has the pointing tasks by their dotted keys.
+    `tasks` has the sections of tasks by their dotted keys.
     """
     section = avoidance if isinstance(avoidance, SeparationSection) else None
+    pointing = {key: task for key, task in tasks.items() if isinstance(task, PointingTask)}
     if control.stack in RIVALS:
         yield from _unfit_control(control, limits)
     if control.stack == "smooth":
         yield from _unfit_buffers(section, pointing)
         return
     if control.stack == "set-based":
-        yield from _unused(section, pointing)
+        yield from _unused(section, tasks)
     buffered: dict[str, PointingTask | SeparationSection] = {**pointing}
     if section:
         buffered["avoidance"] = section
@@ -149,16 +150,14 @@ def _unfit_control(control: ControlSection, limits: LimitsSection | None) -> Ite
         yield f"control.strictness = true does not go with {kind}"
 
 
-def _unused(section: SeparationSection | None,
-            pointing: Mapping[str, PointingTask]) -> Iterator[str]:
+def _unused(section: SeparationSection | None, tasks: Mapping[str, Made]) -> Iterator[str]:
     """Yield the keys of pushing back that are set: a set-based task is frozen."""
-    why = 'does not go with control.stack = "set-based": a task is frozen, not pushed'
-    for key in _PUSHES if section else ():
-        if (value := getattr(section, key)) != SeparationSection.model_fields[key].default:
-            yield f"avoidance.{key} = {value:g} {why}"
-    for where, task in pointing.items():
-        if task.rows == "inequality" and task.gain != PointingTask.model_fields["gain"].default:
-            yield f"{where}.gain = {task.gain:g} {why}"
+    frozen = {key: task for key, task in tasks.items() if task.one_sided}
+    for where, one in {**({"avoidance": section} if section else {}), **frozen}.items():
+        for key in _PUSHES & type(one).model_fields.keys():
+            if (value := getattr(one, key)) != type(one).model_fields[key].default:
+                yield (f'{where}.{key} = {value:g} does not go with control.stack = "set-based": a '
+                       "task is frozen, not pushed")
 
 
 def _unfit_buffers(section: SeparationSection | None,
