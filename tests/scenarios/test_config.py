@@ -52,9 +52,9 @@ def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a
     monkeypatch.chdir(tmp_path / "base")
     for name in ("base.toml", "../mine.toml"):
         found = load(name, ["position.path={kind='recorded', file='path.csv'}"])
-        files = (found.robot.model, found.avoidance.obstacles[0].path.file, found.position.path.file)
-        assert files == tuple(f"{tmp_path}/base/{file}" for file in (
-            "arm.urdf", "motion.csv", "path.csv"))
+        assert [found.robot.model, found.avoidance.obstacles[0].path.file,
+                found.position.path.file] == [f"{tmp_path}/base/{file}" for file in (
+                    "arm.urdf", "motion.csv", "path.csv")]
 
 
 def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
