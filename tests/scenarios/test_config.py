@@ -72,6 +72,8 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'
                     '[control]\nresolver = "tpm"\nduration = 1.0\n')
     refused("scenario 'idle': the stack is empty", lambda: build(load(path)), error=ScenarioError)
+    posture = load(path, ["control.stack=hierarchical", "posture.role=task"])
+    assert build(posture).stack.names == ("posture",)
 
 
 def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():
