@@ -80,18 +80,18 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     return validated(Scenario, data, what)
 
 
-def _make_files_absolute(data: dict[str, Any], here: Path) -> None:
-    """Put the folder `here` in front of the files that a scenario names."""
+def files_in(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield the table and the key of each file or folder that the data of a scenario name."""
     robot = data.get("robot")
     if isinstance(robot, dict) and not in_package(model := str(robot.get("model", ""))) and (
             is_file_name(model)):
-        robot["model"] = str(here / robot["model"])
+        yield robot, "model"
     sensor = data.get("sensor")
     folder = sensor.get("folder") if isinstance(sensor, dict) else None
     if isinstance(folder, str) and not (LIBRARY / "frames" / folder).is_dir():
-        data["sensor"]["folder"] = str(here / folder)
+        yield data["sensor"], "folder"
     for path in _recorded(data):
-        path["file"] = str(here / path["file"])
+        yield path, "file"
 
 
 def _recorded(data: Any) -> Iterator[dict[str, Any]]:
@@ -102,6 +102,12 @@ def _recorded(data: Any) -> Iterator[dict[str, Any]]:
     if isinstance(data, dict) and data.get("kind") == "recorded" and (
             isinstance(data.get("file"), str)):
         yield data
+
+
+def _make_files_absolute(data: dict[str, Any], here: Path) -> None:
+    """Put the folder `here` in front of the files that a scenario names."""
+    for table, key in files_in(data):
+        table[key] = str(here / table[key])
 
 
 def _require_plugins(data: dict[str, Any], what: str) -> None:
