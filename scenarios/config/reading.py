@@ -75,7 +75,7 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
         changes = parse_changes(changes, what="--set")
     _list_points_as_tables(data)
     change_all(data, changes, Scenario)
-    _make_files_absolute(data, Path.cwd())
+    _make_files_absolute(data, Path())
     _require_plugins(data, what)
     return validated(Scenario, data, what)
 
@@ -107,7 +107,7 @@ def _recorded(data: Any) -> Iterator[dict[str, Any]]:
 def _make_files_absolute(data: dict[str, Any], here: Path) -> None:
     """Put the folder `here` in front of the files that a scenario names."""
     for table, key in files_in(data):
-        table[key] = str(here / table[key])
+        table[key] = str((here / table[key]).absolute())
 
 
 def _require_plugins(data: dict[str, Any], what: str) -> None:
