@@ -38,7 +38,9 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
 
     Raises ScenarioError if it asks for nothing, or for what its robot cannot do.
     """
-    asked = scenario.position or scenario.pointing or scenario.avoidance or scenario.tasks
+    last = scenario.posture is not None and scenario.posture.role == "task"
+    asked = (scenario.position or scenario.pointing or scenario.avoidance or scenario.tasks
+             or last)
     if not (asked or at.robot.coupled or at.robot.loops):
         raise ScenarioError(f"scenario {scenario.name!r}: the stack is empty: give at least one of "
                             "[position], [pointing], [avoidance], [[tasks]]")
@@ -54,11 +56,11 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
     # The separation from obstacles stands where the task "collision" is listed.
     collision = any(task.kind == "collision" for task in scenario.tasks)
     moved = [task for task in avoiding if collision and isinstance(task, kinds.Separation)]
-    listed = [task for i, section in enumerate(scenario.tasks) for task in (
-        moved if section.kind == "collision" else [_made(section, at, f"tasks.{i}")])]
-    last = posture if scenario.posture and scenario.posture.role == "task" else None
+    of_section = [(section, moved if section.kind == "collision" else [
+        _made(section, at, f"tasks.{i}")]) for i, section in enumerate(scenario.tasks)]
+    listed = [task for _, made in of_section for task in made]
     tasks = [*first, *(task for task in avoiding if task not in moved),
-             *(task for task in (position, pointing, *listed, last) if task)]
+             *(task for task in (position, pointing, *listed, posture if last else None) if task)]
     reference = _reference(scenario, at, None if last else posture)
     frozen = scenario.control.stack == "set-based"  # inequalities, which then use no gain or rate
     for task in (*tasks, *((reference,) if reference else ())):
@@ -66,7 +68,8 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
             check_period(task, scenario.control.period, scenario.control.level)
     return Tasks(tasks, first if areas else [*first, *avoiding], position, pointing, limits,
                  tuple(task for task in listed if task not in moved), areas,
-                 reference, {task.title: task.give for task in scenario.tasks if task.give})
+                 reference, {task.name: section.give for section, made in of_section
+                             for task in made if section.give})
 
 
 def _first(scenario: Scenario, at: References) -> tuple[kinds.JointLimits | None, list[Task]]:

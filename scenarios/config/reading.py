@@ -1,6 +1,6 @@
 """Read a scenario by name or file, with what it extends and with changes; groups of scenarios."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -75,26 +75,39 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
         changes = parse_changes(changes, what="--set")
     _list_points_as_tables(data)
     change_all(data, changes, Scenario)
-    _make_files_absolute(data, path.parent.resolve())
+    _make_files_absolute(data, Path())
     _require_plugins(data, what)
     return validated(Scenario, data, what)
 
 
-def _make_files_absolute(data: dict[str, Any], here: Path) -> None:
-    """Put the folder `here` in front of the files that a scenario names."""
+def files_in(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield the table and the key of each file or folder that the data of a scenario name."""
     robot = data.get("robot")
     if isinstance(robot, dict) and not in_package(model := str(robot.get("model", ""))) and (
             is_file_name(model)):
-        robot["model"] = str(here / robot["model"])
+        yield robot, "model"
     sensor = data.get("sensor")
     folder = sensor.get("folder") if isinstance(sensor, dict) else None
     if isinstance(folder, str) and not (LIBRARY / "frames" / folder).is_dir():
-        data["sensor"]["folder"] = str(here / folder)
-    listed = data.get("tasks")
-    for task in (data.get("position"), *(listed if isinstance(listed, list) else ())):
-        along = task.get("path") if isinstance(task, dict) else None
-        if isinstance(along, dict) and isinstance(along.get("file"), str):
-            along["file"] = str(here / along["file"])
+        yield data["sensor"], "folder"
+    for path in _recorded(data):
+        yield path, "file"
+
+
+def _recorded(data: Any) -> Iterator[dict[str, Any]]:
+    """Yield the paths of recorded motions, wherever a scenario has them."""
+    inside = data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
+    for one in inside:
+        yield from _recorded(one)
+    if isinstance(data, dict) and data.get("kind") == "recorded" and (
+            isinstance(data.get("file"), str)):
+        yield data
+
+
+def _make_files_absolute(data: dict[str, Any], here: Path) -> None:
+    """Put the folder `here` in front of the files that a scenario names."""
+    for table, key in files_in(data):
+        table[key] = str((here / table[key]).absolute())
 
 
 def _require_plugins(data: dict[str, Any], what: str) -> None:
@@ -127,12 +140,13 @@ def _read(source: Source) -> dict[str, Any]:
     variants = data.pop("variants", {})
     if not isinstance(variants, dict) or not all(isinstance(v, dict) for v in variants.values()):
         raise ScenarioError(f"{source.path}: variants: expected a table of tables")
-    if not source.variant:
-        return data
-    with naming(str(source.path)):
-        check_name("variant", source.variant, variants)
-    return {"name": f"{source.path.stem}-{source.variant}", "extends": Source(source.path),
-            **variants[source.variant]}
+    if source.variant:
+        with naming(str(source.path)):
+            check_name("variant", source.variant, variants)
+        data = {"name": f"{source.path.stem}-{source.variant}", "extends": Source(source.path),
+                **variants[source.variant]}
+    _make_files_absolute(data, source.path.parent.resolve())
+    return data
 
 
 def _read_extended(source: Source, below: tuple[Source, ...] = ()) -> dict[str, Any]:

@@ -32,7 +32,6 @@ from scenarios.config.sections.tasks import (
     LimitsSection,
     ListedTask,
     PointingSection,
-    PointingTask,
     PositionSection,
     PostureSection,
 )
@@ -92,9 +91,10 @@ class Scenario(Section):
     def _has_the_level_of_its_forces(self) -> Iterator[str]:
         torque = self.control.level == "torque"
         forces = next((task.title for task in self.tasks if task.of_forces), None)
-        if not torque and (self.contacts or forces):
-            what = "[[contacts]]" if self.contacts else f"task {forces!r}"
-            yield f'{what} needs control.level = "torque"'
+        for what, given in (("[[contacts]]", self.contacts), (f"task {forces!r}", forces),
+                            ("[forces]", self.forces != ForcesSection())):
+            if given and not torque:
+                yield f'{what} needs control.level = "torque"'
         if self.start.on_floor and not torque:
             yield 'start.on_floor needs control.level = "torque"'
         if torque and self.control.stack != "hierarchical":
@@ -130,8 +130,7 @@ class Scenario(Section):
 
     def _fits_its_stack(self) -> Iterator[str]:
         pointing = {"pointing": self.pointing} if self.pointing else {}
-        listed = {f"tasks.{i}": task for i, task in enumerate(self.tasks)
-                  if isinstance(task, PointingTask)}
+        listed = {f"tasks.{i}": task for i, task in enumerate(self.tasks)}
         return unfit(self.control, self.limits, self.avoidance, {**pointing, **listed})
 
     def _lists_tasks_apart(self) -> Iterator[str]:

@@ -72,6 +72,8 @@ def _after_one(scenario: Scenario) -> Controller:
         check(scenario.faults, controller.cell.robot)
         plant = controller.cell.plant
         controller.command(0.0, plant.q, plant.v)
+        if not controller.answered:  # before a first image, where a run resolves its rows too
+            controller.rehearse()
     return controller
 
 

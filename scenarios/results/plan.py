@@ -18,6 +18,7 @@ from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, is_shipped, load
 from scenarios.config import sections as keys
 from scenarios.config.distributions import Parameters
+from scenarios.config.reading import files_in
 from scenarios.config.resolvers import check_names, usable
 from scenarios.config.sampling import changed, drawn
 from scenarios.config.scenario import OWN
@@ -176,6 +177,14 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
         for name in sweep.scenarios)})
 
 
+def _content(path: str) -> str:
+    """Return a digest of a file, or of all in a folder: what a run depends on beside its text."""
+    here = Path(path)
+    files = sorted(here.iterdir()) if here.is_dir() else [here] if here.is_file() else []
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files if file.is_file())
+                          ).hexdigest()[:16]
+
+
 @dataclass(frozen=True)
 class Plan:
     """All runs of a sweep, without duplicates.
@@ -201,7 +210,7 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
     asked = [load(name, lasting) for name in sweep.scenarios] if scenarios is None else scenarios
     columns, refused = side_by_side(asked, sweep.resolvers or None, f"sweep {sweep.name!r}: ")
     alone = len({run.spec for run in columns}) == 1 and len(asked) > 1
-    code = digest()
+    code, content = digest(), cache(_content)
     runs: dict[str, Job] = {}
     for index in range(sweep.samples):
         for scenario in asked:
@@ -215,10 +224,12 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
             refuse("control.resolver" in values and {run.spec for run in columns} != {OWN},
                    f"{what}: control.resolver is drawn, but the resolvers of the sweep replace it; "
                    f"give it the one resolver {OWN!r}")
-            text = changed(scenario, values, what).to_toml()
+            sample = changed(scenario, values, what)
+            text = sample.to_toml()
+            files = [table[key] for table, key in files_in(sample.model_dump(mode="json"))]
             for run in columns:
                 if run.scenario.name == scenario.name:
-                    key = key_of(text, run.spec, code)
+                    key = key_of(text, run.spec, "".join((code, *map(content, files))))
                     runs.setdefault(key, Job(
                         key, text, run.spec, scenario.name, index, values, plugins.loaded(),
                         run.spec if alone else scenario.name, run.label))

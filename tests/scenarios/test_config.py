@@ -42,6 +42,21 @@ def test_a_variant_has_two_names_and_those_of_a_file_extend_it(tmp_path):
     refused("wide", load, f"{tmp_path}/mine.toml:wid")
 
 
+def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a_change(
+        tmp_path, monkeypatch):
+    (tmp_path / "base").mkdir()
+    (tmp_path / "base" / "base.toml").write_text(
+        'extends = "ellipse"\nname = "base"\nrobot.model = "arm.urdf"\n[avoidance]\nobstacles = '
+        '[{shape = "sphere", radius = 0.1, path = {kind = "recorded", file = "motion.csv"}}]\n')
+    (tmp_path / "mine.toml").write_text('extends = "base/base.toml"\nname = "mine"\n')
+    monkeypatch.chdir(tmp_path / "base")
+    for name in ("base.toml", "../mine.toml"):
+        found = load(name, ["position.path={kind='recorded', file='path.csv'}"])
+        assert [found.robot.model, found.avoidance.obstacles[0].path.file,
+                found.position.path.file] == [f"{tmp_path}/base/{file}" for file in (
+                    "arm.urdf", "motion.csv", "path.csv")]
+
+
 def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
     s = load("ellipse").with_resolver("recursive")
     assert s.control.resolver == "recursive"
@@ -57,6 +72,8 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'
                     '[control]\nresolver = "tpm"\nduration = 1.0\n')
     refused("scenario 'idle': the stack is empty", lambda: build(load(path)), error=ScenarioError)
+    posture = load(path, ["control.stack=hierarchical", "posture.role=task"])
+    assert build(posture).stack.names == ("posture",)
 
 
 def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import tomli_w
+from refusals import refused
 
 from hierarchy.tasks import Separation
 from scenarios import load, simulate
@@ -46,9 +47,13 @@ def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     avoidance = {"kind": "separation", "distance": 0.05, "obstacles": [[0.1, 0.5, 0.1]]}
     first = build(scenario_of(tmp_path, HAND, avoidance=avoidance))
     assert first.stack.names == ("separation", "position")
-    later = build(scenario_of(tmp_path, HAND, {"kind": "collision"}, COUPLING, avoidance=avoidance))
+    listed = {"kind": "collision", "give": 0.01}
+    later = build(scenario_of(tmp_path, HAND, listed, COUPLING, avoidance=avoidance))
     assert later.stack.names == ("position", "separation", "coupling")
     assert isinstance(later.stack["separation"], Separation)
+    assert later.tasks.give == {"separation": 0.01}
+    refused("tasks.0: name = 'hands'", scenario_of, tmp_path, {**listed, "name": "hands"},
+            avoidance=avoidance)
 
 
 @pytest.mark.parametrize("path", [

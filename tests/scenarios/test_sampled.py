@@ -121,6 +121,17 @@ def test_all_resolvers_see_the_same_samples_and_no_run_is_planned_twice(tmp_path
     assert (len(planned.runs), len(planned.refused)) == (2, 2)  # all samples are the same
 
 
+def test_runs_are_made_again_after_a_file_that_their_scenario_names_has_changed(tmp_path):
+    motion, keys = tmp_path / "motion.csv", []
+    path = f"position.path={{kind='recorded', file='{motion}'}}"
+    for height in (0.1, 0.1, 0.2):
+        motion.write_text(f"t,x,y,z\n0,0,0.6,0.1\n1,0,0.6,{height}\n")
+        planned = plan(load_sweep(write(tmp_path, "")), [load("ellipse", [path])])
+        keys.append({one.key for one in planned.runs})
+    assert keys[0] == keys[1]
+    assert not keys[0] & keys[2]
+
+
 @pytest.mark.parametrize(("variation", "says"), [
     ({}, r"'ellipse' has no \[variation\]"),
     ({"start.p": {"around": 1.0}}, r"variation\.start\.p")])

@@ -21,7 +21,8 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
 
 @pytest.mark.parametrize(("name", "changes"), [
     ("ellipse", ["start.end_effector=[5, 5, 5]"]), ("ellipse", ["robot.model=ur5"]),
-    ("stand-push", ["contacts.0.frame=left_fot"])])
+    ("stand-push", ["contacts.0.frame=left_fot"]),
+    ("human", ["plant.kind=kinematic", "control.metric=mass", "sensor.latency=0.01"])])
 def test_what_does_not_fit_the_robot_is_said_by_check_and_run(
         name, changes, command, tmp_path, monkeypatch):
     monkeypatch.setattr("scenarios.cell.robot._REACH_STEPS", 20)
@@ -90,6 +91,13 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: load(""), "load: expected a path, got str ''"),
     (lambda: load("ellipse", "control.period=1"), "expected a list of \"key=value\", got str"),
     (lambda: load("ellipse", ["control.duration=2\nx = 3"]), "expected one value"),
+    (lambda: load("ellipse", ["forces.least=1.0"]), '[forces] needs control.level = "torque"'),
+    (lambda: load("ellipse-set-based", ["tasks=[{kind='self-collision', rate=3.0}]"]),
+     'tasks.0.rate = 3 does not go with control.stack = "set-based"'),
+    (lambda: load("ellipse-set-based", ["tasks=[{kind='com', give=0.1}]"]),
+     'tasks.0.give = 0.1 does not go with control.stack = "set-based"'),
+    (lambda: load("ellipse-smooth", ["tasks=[{kind='self-collision', distance=0.28}]"]),
+     "reaches from 0.28 m beyond tasks.0.influence = 0.3 m"),
     (lambda: simulate(load("ellipse-smooth").with_resolver("tpm")),
      'needs control.resolver = "smooth", got "tpm"'),
     (lambda: simulate(SHORT, progress=3), "simulate: progress: expected a function, got int 3"),

@@ -6,16 +6,20 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from scenarios.config import sections as keys
-from scenarios.config.sections.avoidance import AvoidanceSection, SeparationSection
+from scenarios.config.sections.avoidance import (
+    AvoidanceSection,
+    BarrierSection,
+    SeparationSection,
+)
 from scenarios.config.sections.robot import ControlPointSection
-from scenarios.config.sections.tasks import LimitsSection, PointingTask
+from scenarios.config.sections.tasks import LimitsSection, Made, PointingTask
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
 BlindPolicy = Literal["brake", "hold", "stop"]
 MOST_TICKS = 10_000_000  # some kB each in memory
 StackKind = Literal["switched", "hierarchical", "set-based", "smooth"]
 RIVALS = ("set-based", "smooth")  # kinds of `control.stack` that are defined at velocity level
-_PUSHES = ("rate", "influence", "recovery", "limit")  # keys that say how fast a row is left
+_PUSHES = ("rate", "influence", "recovery", "limit", "gain")  # keys of how fast a row is left
 
 
 class PolicySection(keys.Section):
@@ -114,19 +118,21 @@ class ControlSection(keys.Section):
 
 def unfit(control: ControlSection, limits: LimitsSection | None,
           avoidance: AvoidanceSection | SeparationSection | None,
-          pointing: Mapping[str, PointingTask]) -> Iterator[str]:
+          tasks: Mapping[str, Made]) -> Iterator[str]:
     """Yield what a scenario asks for that its kind of stack does not have.
 
-    `pointing` has the pointing tasks by their dotted keys.
+    `tasks` has the sections of tasks by their dotted keys.
     """
     section = avoidance if isinstance(avoidance, SeparationSection) else None
+    pointing = {key: task for key, task in tasks.items() if isinstance(task, PointingTask)}
     if control.stack in RIVALS:
         yield from _unfit_control(control, limits)
     if control.stack == "smooth":
-        yield from _unfit_buffers(section, pointing)
+        yield from _unfit_buffers(section, pointing, {
+            key: task for key, task in tasks.items() if isinstance(task, BarrierSection)})
         return
     if control.stack == "set-based":
-        yield from _unused(section, pointing)
+        yield from _unused(section, tasks)
     buffered: dict[str, PointingTask | SeparationSection] = {**pointing}
     if section:
         buffered["avoidance"] = section
@@ -149,21 +155,24 @@ def _unfit_control(control: ControlSection, limits: LimitsSection | None) -> Ite
         yield f"control.strictness = true does not go with {kind}"
 
 
-def _unused(section: SeparationSection | None,
-            pointing: Mapping[str, PointingTask]) -> Iterator[str]:
-    """Yield the keys of pushing back that are set: a set-based task is frozen."""
-    why = 'does not go with control.stack = "set-based": a task is frozen, not pushed'
-    for key in _PUSHES if section else ():
-        if (value := getattr(section, key)) != SeparationSection.model_fields[key].default:
-            yield f"avoidance.{key} = {value:g} {why}"
-    for where, task in pointing.items():
-        if task.rows == "inequality" and task.gain != PointingTask.model_fields["gain"].default:
-            yield f"{where}.gain = {task.gain:g} {why}"
+def _unused(section: SeparationSection | None, tasks: Mapping[str, Made]) -> Iterator[str]:
+    """Yield the keys of pushing back that are set: a set-based task is frozen; or what gives."""
+    for where, task in tasks.items():
+        if not task.one_sided and (give := getattr(task, "give", 0.0)):
+            yield (f'{where}.give = {give:g} does not go with control.stack = "set-based": an '
+                   "equality that gives has two sides")
+    frozen = {key: task for key, task in tasks.items() if task.one_sided}
+    for where, one in {**({"avoidance": section} if section else {}), **frozen}.items():
+        for key in _PUSHES:
+            field = type(one).model_fields.get(key)
+            if field is not None and (value := getattr(one, key)) != field.default:
+                yield (f'{where}.{key} = {value:g} does not go with control.stack = "set-based": a '
+                       "task is frozen, not pushed")
 
 
-def _unfit_buffers(section: SeparationSection | None,
-                   pointing: Mapping[str, PointingTask]) -> Iterator[str]:
-    """Yield the buffers that are missing, not used, or too wide."""
+def _unfit_buffers(section: SeparationSection | None, pointing: Mapping[str, PointingTask],
+                   apart: Mapping[str, BarrierSection]) -> Iterator[str]:
+    """Yield the buffers that are missing, not used, or too wide; `apart` has that of `section`."""
     lacks = 'control.stack = "smooth" needs {}.buffer, in which an inequality comes into effect'
     for where, task in pointing.items():
         if task.rows == "equality" and task.buffer is not None:
@@ -173,13 +182,14 @@ def _unfit_buffers(section: SeparationSection | None,
         if task.rows == "inequality" and (task.buffer or 0.0) > task.alpha_d:
             yield (f"{where}.buffer = {task.buffer:g} deg is wider than {where}.alpha_d = "
                    f"{task.alpha_d:g} deg")
-    if section and section.buffer is None:
-        yield lacks.format("avoidance")
-    elif section and section.buffer is not None:
-        widest = max(section.distance, section.self_collision or 0.0)
-        if widest + section.buffer >= section.influence:
-            yield (f"avoidance.buffer = {section.buffer:g} m reaches from {widest:g} m beyond "
-                   f"avoidance.influence = {section.influence:g} m")
+    buffer = section.buffer if section else None
+    for where, one in {**({"avoidance": section} if section else {}), **apart}.items():
+        widest = max(one.distance, getattr(one, "self_collision", None) or 0.0)
+        if buffer is None:
+            yield lacks.format("avoidance")
+        elif widest + buffer >= one.influence:
+            yield (f"avoidance.buffer = {buffer:g} m reaches from {widest:g} m beyond "
+                   f"{where}.influence = {one.influence:g} m")
 
 
 class FaultSection(keys.Section):

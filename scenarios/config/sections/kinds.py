@@ -227,3 +227,7 @@ class ListedCollision(base.Listed):
     """Where the rows of [avoidance] `separation` stand; by default above all tasks."""
 
     rows: ClassVar[base.Rows] = "inequality"
+
+    def _wrong(self) -> Iterator[str]:
+        if self.name is not None:
+            yield f'name = {self.name!r}: the level of the rows is named "separation"'
