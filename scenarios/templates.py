@@ -12,7 +12,7 @@ from hierarchy.words import listed
 from scenarios.files import slug
 
 _CODE = re.compile(r"`([^`]+)`")
-_NUMBER = re.compile(r"[0-9.]+e-[0-9]+")
+_NUMBER = re.compile(r"[0-9.]+(?:e[-+][0-9]+)?(?: (?:%|[µm]?m|s|N|N m|rad|rad/s)(?![\w/]))?")
 
 
 def render(template: str, **values: Any) -> Markup:
@@ -31,7 +31,7 @@ def resource(name: str) -> Markup:
 
 
 def unbroken(text: str) -> Markup:
-    """Return text in which no line ends inside a number such as 4e-08."""
+    """Return text in which no line ends inside a number such as 4e-08, or before its unit."""
     return Markup(_NUMBER.sub(r'<span class="number">\g<0></span>', str(escape(text))))
 
 
