@@ -12,7 +12,8 @@ from hierarchy.words import listed
 from scenarios.files import slug
 
 _CODE = re.compile(r"`([^`]+)`")
-_NUMBER = re.compile(r"[0-9.]+(?:e[-+][0-9]+)?(?: (?:%|[µm]?m|s|N|N m|rad|rad/s)(?![\w/]))?")
+_UNIT = r"(?: (?:%|[µm]?m|s|N m|N|rad/s|rad)(?![\w/]))"
+_NUMBER = re.compile(rf"\d[\d.]*(?:e[-+]\d+{_UNIT}?|{_UNIT})")
 
 
 def render(template: str, **values: Any) -> Markup:

@@ -229,7 +229,8 @@ def scenario_data(scenario: Scenario, found: FirstTick) -> dict[str, Any]:
 
 def scenario_in_words(scenario: Scenario, found: FirstTick) -> str:
     """Return the summary of a scenario and its first tick as text."""
-    lines = [f"{scenario.name}: {scenario.title}", *_sections(scenario), *_first(found)]
+    named = ": ".join(filter(None, (scenario.name, scenario.title)))
+    lines = [named, *_sections(scenario), *_first(found)]
     lines += [fill(f"Warning: {text}.", _WIDTH, subsequent_indent="  ") for text in found.warnings]
     return "\n".join([*lines, "Valid."])
 

@@ -108,7 +108,8 @@ def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: 
         console.print("", laid_out)
     if any(cell.kind == "best" for row in rows for cell in row.cells):
         console.print("", f"* {best}", sep="\n")
-    console.print(*map(_filled, below), sep="\n", end="\n" if below else "")
+    for line in below:
+        console.print(_filled(line))
 
 
 def _filled(line: str) -> str:

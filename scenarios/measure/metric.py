@@ -58,9 +58,11 @@ class Metric:
             return "–"
         scale, _, decimals = _display(self.unit)
         value = self.value * scale
+        if not decimals and 0.01 <= abs(value) < 10.0:  # the median of counts
+            return f"{value:.2g}"
         if value != 0.0 and (abs(value) < 0.5 * 10.0**-decimals or abs(value) >= 1e5):
             return f"{value:.1e}"
-        if decimals and value != 0.0 and abs(value) < 10.0 ** (1 - decimals):
+        if value != 0.0 and abs(value) < 10.0 ** (1 - decimals):
             return f"{value:.{decimals + 1}f}"
         return f"{value:.{0 if abs(value) >= 1e3 else decimals}f}"
 

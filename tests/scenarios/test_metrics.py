@@ -78,6 +78,8 @@ def test_each_unit_has_its_decimals(unit, shown):
 def test_a_small_number_has_a_digit_more():
     shown = [Metric("some", "Some", value, "rad").shown() for value in (0.0123, 0.00649, 0.0004)]
     assert shown == ["0.012", "0.0065", "4.0e-04"]
+    counts = [Metric("some", "Some", value, "").shown() for value in (0.0, 0.25, 1.5, 3.0, 12.5)]
+    assert counts == ["0", "0.25", "1.5", "3", "12"]
 
 
 def test_times_are_given_by_median_and_tails_for_each_part():

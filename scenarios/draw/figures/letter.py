@@ -149,7 +149,8 @@ def _others(recording: Recording) -> Iterator[tuple[str, Figure]]:
 
 
 def _fitting(names: Sequence[str], recording: Recording) -> list[Panel]:
-    return [panel for panel in map(PANEL.__getitem__, names) if panel.fits(recording)]
+    return [panel for panel in map(PANEL.__getitem__, names)
+            if panel.fits(recording) and panel.shows(recording)]
 
 
 def _named(wanted: LetterFigure, recordings: Sequence[Recording]) -> tuple[str, str]:
