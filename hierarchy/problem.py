@@ -101,8 +101,8 @@ class Hierarchy:
                 **others: Any) -> Hierarchy:
         """Return a hierarchy made of arguments of `Hierarchy`, whose values are not checked.
 
-        And of `named`. For what a program works out, which may overflow: `solve` has a status for
-        that. Shapes and sizes are checked as ever.
+        For what a program works out, which may overflow: `solve` has a status for that. Shapes and
+        sizes are checked as ever. `named` returns the names of the rows.
         """
         made = object.__new__(cls)
         made._keep(*parts, **others)
