@@ -104,8 +104,8 @@ def robot_in_words(section: RobotSection, robot: Robot, found: dict[str, Any]) -
     listed = "from its table" if of_table else "proposed"
     end = "as given" if section.end_effector else listed
     points = "as listed" if section.control_points is not None else listed
-    links = "as listed" if section.capsules is not None or of_table else (
-        "proposed from the collision geometry")
+    links = "as listed" if section.capsules is not None else (
+        listed if of_table else "proposed from the collision geometry")
     source = (f"{section.model} ({file_of(section.model)})" if in_package(section.model) else
               "a table of this package" if section.model in TABLES else section.model)
     moving, joint = 0, robot.frame(robot.end_effector).joint
