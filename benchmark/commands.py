@@ -48,7 +48,7 @@ def _run(out: Path | None, *names: str, **options: Any) -> int:
         report.say()
         report.write(folder / (function or module).split(".")[-1] if len(names) > 1 else folder)
         failed = failed or report.failed
-    print(f"\nNumbers: {shown(folder)}")
+    print(f"Numbers: {shown(folder)}")
     return int(failed)
 
 

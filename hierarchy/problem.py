@@ -52,9 +52,10 @@ class Hierarchy:
     Level k minimises the Euclidean norm of its violation without giving up any of the norms above
     it; among all such x the answer is the one nearest to `reference`. Arguments: see `from_levels`.
 
-    A (m, n) : the rows of all levels, stacked. lower, upper (m,) : their bounds.
+    A (m, n) : the rows of all levels, stacked.
+    lower, upper (m,) : their bounds.
     sizes (L,), offsets (L + 1,) : rows of each level, zero is allowed; first row of each, and m.
-    reference (n,), metric (n, n) or None, give (m,) or None.
+    reference (n,), metric (n, n), give (m,) : see `from_levels`; metric and give may be None.
     names, named : of the L levels; a function that returns those of the m rows, or None.
     plain : whether there is neither metric nor give.
     rows, start() : A, lower, upper, sizes; a copy of the reference. For kernels only.
@@ -100,8 +101,8 @@ class Hierarchy:
                 **others: Any) -> Hierarchy:
         """Return a hierarchy made of arguments of `Hierarchy`, whose values are not checked.
 
-        And of `named`. For what a program works out, which may overflow: `solve` has a status for
-        that. Shapes and sizes are checked as ever.
+        For what a program works out, which may overflow: `solve` has a status for that. Shapes and
+        sizes are checked as ever. `named` returns the names of the rows.
         """
         made = object.__new__(cls)
         made._keep(*parts, **others)

@@ -12,7 +12,8 @@ from hierarchy.words import listed
 from scenarios.files import slug
 
 _CODE = re.compile(r"`([^`]+)`")
-_NUMBER = re.compile(r"[0-9.]+e-[0-9]+")
+_UNIT = r"(?: (?:%|[µm]?m|s|N m|N|rad/s|rad)(?![\w/]))"
+_NUMBER = re.compile(rf"\d[\d.]*(?:e[-+]\d+{_UNIT}?|{_UNIT})")
 
 
 def render(template: str, **values: Any) -> Markup:
@@ -31,7 +32,7 @@ def resource(name: str) -> Markup:
 
 
 def unbroken(text: str) -> Markup:
-    """Return text in which no line ends inside a number such as 4e-08."""
+    """Return text in which no line ends inside a number such as 4e-08, or before its unit."""
     return Markup(_NUMBER.sub(r'<span class="number">\g<0></span>', str(escape(text))))
 
 

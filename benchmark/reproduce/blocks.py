@@ -54,7 +54,7 @@ def block(name: str, stored: Stored, output: Callable[[str], str]) -> str:
     """
     rows = stored.rows
     known: dict[str, Callable[[], list[str]]] = {
-        "asked-letter": _asked, "untested": _untested,
+        "asked-letter": partial(_asked, rows), "untested": _untested,
         **{one: partial(_items, given, rows, output) for one, given in ITEMS.items()},
         **{f"front-{one}": partial(fronts.table, stored.points, one) for one in fronts.FRONTS}}
     of_rows: dict[str, Callable[[Rows], list[str]]] = {
@@ -107,13 +107,15 @@ def cell(output: str, asked: Mapping[str, str]) -> str:
     return min(found, key=len)[int(asked["place"]) - 1]
 
 
-def _asked() -> list[str]:
+def _asked(rows: Rows | None) -> list[str]:
     """Return the quotations, and below each what decides it."""
     decided: dict[str, list[str]] = {}
     for one in PROTOCOL.claims:
         if one.family == "letter":
+            unit = rows.metrics[one.metric]["unit"] if rows and one.metric else ""
+            unit = unit.replace("share", "of the time")
             decided.setdefault(f"{one.section}: “{one.quotation}”: ", []).append(
-                f"{_decider(one)}, {_least(one)}")
+                f"{_decider(one, unit)}, {_least(one, unit)}")
     return [_item(said + "; ".join(decides)) for said, decides in decided.items()]
 
 
@@ -157,17 +159,17 @@ def _faults(rows: Rows) -> list[str]:
     return [f"{_progress(rows)} Faults in {total} runs: {', '.join(said) or 'none'}."]
 
 
-def _decider(claim: Claim) -> str:
+def _decider(claim: Claim, unit: str) -> str:
     if not claim.metric:
         return f"share of runs of `{claim.of}` that reach their end"
     if claim.rival:
         word = "below" if claim.below else "above"
         return f"`{claim.metric}` of `{claim.of}` {word} that of `{claim.rival}`"
     bound = f"at least {claim.least:g}" if claim.most == float("inf") else f"at most {claim.most:g}"
-    return f"`{claim.metric}` of `{claim.of}` {bound}"
+    return f"`{claim.metric}` of `{claim.of}` {bound} {unit}"
 
 
-def _least(claim: Claim) -> str:
+def _least(claim: Claim, unit: str) -> str:
     if not claim.rival:
         return f"{100 * PROTOCOL.share:g} % of starts"
-    return f"{claim.matters:g}{' %' if claim.percent else ' (SI)' if claim.matters < 1 else ''}"
+    return f"{claim.matters:g} {'%' if claim.percent else unit}".strip()

@@ -10,8 +10,12 @@ from sphinx.util import logging
 _log = logging.getLogger(__name__)
 # docutils puts the index of an accented letter below it, as if it were a sum; and what is marked as
 # an accent lies on its letter where there is no font for mathematics.
-_ACCENTED = re.compile(r'<munderover>(\s*<mi>[^<]*</mi>)(.*?)(<mo stretchy="false">[¨˙ˆˉ]</mo>\s*)'
-                       r"</munderover>", re.DOTALL)
+_ACCENTED = re.compile(r"<munderover>(\s*(?:<mi>[^<]*</mi>|<mover.*?</mover>))(.*?)"
+                       r'(<mo stretchy="false">[¨˙ˆˉ]</mo>\s*)</munderover>', re.DOTALL)
+# Browsers leave the room of a binary operator around these.
+_TIGHT = re.compile(r'<mo(?: stretchy="false")?>([|‖/])</mo>')
+_SIGN = re.compile(r"(<mo[^>]*>[=≤≥,(→∈]</mo>\s*)<mo>([−±])</mo>")
+_FUNCTION = re.compile(r"<mo>(min|max)</mo>")
 
 
 def setup(app):
@@ -37,4 +41,7 @@ def _drawn(node, as_block):
         _log.warning("equation %r: %s", node.astext(), error, location=node)
         return f"<code>{node.astext()}</code>"
     drawn = _ACCENTED.sub(r"<msub><mover>\1\3</mover>\2</msub>", drawn)
+    drawn = _TIGHT.sub(r'<mo stretchy="false" lspace="0" rspace="0">\1</mo>', drawn)
+    drawn = _SIGN.sub(r'\1<mo form="prefix">\2</mo>', drawn)
+    drawn = _FUNCTION.sub(r"<mi>\1</mi>", drawn)
     return drawn.replace('<mover accent="true">', "<mover>")

@@ -7,8 +7,21 @@ have is on a page of its own.
 """
 
 import re
+from typing import Any
 
-_ENTRY = re.compile(r"([A-Za-z_*][\w*.\[\]/^ ]*(?:, [A-Za-z_*][\w*.\[\]/^ ]*)*) : ?(.*)")
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sphinx.util.typing import stringify_annotation
+
+from hierarchy.problem import Array
+
+_NAMED = r"[A-Za-z_*][\w*.\[\]/^ ]*(?:\([^()]*\))?"  # a name, maybe with a shape
+_ENTRY = re.compile(rf"({_NAMED}(?:, {_NAMED})*) : ?(.*)")
+# Sphinx writes aliases out, or the way in which it refers to them.
+_ALIASES = {f"TypeAliasForwardRef('{name}')": name for name in ("Array", "ArrayLike")} | {
+    stringify_annotation(alias, "smart"): name for alias, name in (
+        (ArrayLike, "ArrayLike"), (Array, "Array"), (NDArray[np.int64], "NDArray[int64]"),
+        (NDArray[np.bool_], "NDArray[bool]"), (NDArray[Any], "NDArray[Any]"))}
 _TICKS = re.compile(r"`([^`]+)`")
 _NAME = re.compile(r"[A-Za-z_][\w.]*")
 _SPECIAL = re.compile(r"([\\*|`]|_(?=\W|$))")
@@ -18,9 +31,16 @@ def setup(app):
     """Convert every docstring that autodoc hands over."""
     app.connect("autodoc-process-docstring", lambda app, what, name, obj, options, lines:
                 lines.__setitem__(slice(None), converted(lines)))
-    app.connect("autodoc-process-signature", lambda app, what, name, obj, *rest:
-                ("", None) if hasattr(obj, "model_fields") else None)
+    app.connect("autodoc-process-signature", lambda app, what, name, obj, options, taken, returned:
+                ("", None) if hasattr(obj, "model_fields") else (_short(taken), _short(returned)))
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _short(signature):
+    """Return a signature, or None, with the names of aliases."""
+    for written, alias in _ALIASES.items() if signature else ():
+        signature = signature.replace(written, alias)
+    return signature
 
 
 def converted(lines):

@@ -104,8 +104,8 @@ def robot_in_words(section: RobotSection, robot: Robot, found: dict[str, Any]) -
     listed = "from its table" if of_table else "proposed"
     end = "as given" if section.end_effector else listed
     points = "as listed" if section.control_points is not None else listed
-    links = "as listed" if section.capsules is not None or of_table else (
-        "proposed from the collision geometry")
+    links = "as listed" if section.capsules is not None else (
+        listed if of_table else "proposed from the collision geometry")
     source = (f"{section.model} ({file_of(section.model)})" if in_package(section.model) else
               "a table of this package" if section.model in TABLES else section.model)
     moving, joint = 0, robot.frame(robot.end_effector).joint
@@ -229,7 +229,8 @@ def scenario_data(scenario: Scenario, found: FirstTick) -> dict[str, Any]:
 
 def scenario_in_words(scenario: Scenario, found: FirstTick) -> str:
     """Return the summary of a scenario and its first tick as text."""
-    lines = [f"{scenario.name}: {scenario.title}", *_sections(scenario), *_first(found)]
+    named = ": ".join(filter(None, (scenario.name, scenario.title)))
+    lines = [named, *_sections(scenario), *_first(found)]
     lines += [fill(f"Warning: {text}.", _WIDTH, subsequent_indent="  ") for text in found.warnings]
     return "\n".join([*lines, "Valid."])
 

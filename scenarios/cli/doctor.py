@@ -161,7 +161,7 @@ def _short_run() -> tuple[str, bool]:
 
     run = simulate(load("ellipse", ["control.duration=0.2"]))
     median = float(np.median(run["time_tick"]) * 1e6)
-    return f"{run.ticks} ticks of ellipse, median {median:.0f} us", run.fault is None
+    return f"{run.ticks} ticks of ellipse, median {median:.0f} µs", run.fault is None
 
 
 def _required() -> Iterator[tuple[Requirement, str | None]]:

@@ -95,8 +95,7 @@ def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json
         terminal.print_table([made])
         if certify:
             print(f"\n{terminal.certified(recording, resolver.damping)}")
-        print(*terminal.troubles(recording), "", f"{recording.ticks} ticks in {shown(folder)}",
-              sep="\n")
+        print(*terminal.troubles(recording), "", terminal.kept_in(folder, recording), sep="\n")
     return exit_code(recording.fault)
 
 
@@ -164,8 +163,8 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
     else:
         for runs in comparison.groups().values():
             terminal.print_table(runs)
-        print("", *comparison.refused, sep="\n" if comparison.refused else "")
-        print(f"\nReport: {report}")
+        print(*(["", *comparison.refused] if comparison.refused else []), "", f"Report: {report}",
+              sep="\n")
     codes = [max(exit_code(f"{run.label}: {run.fault}"), opt.INTERRUPTED * run.interrupted)
              for run in comparison.faults]
     return max(codes, default=0)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scenarios.cli.options import PORT, AsJson, Browser, Plugins, Port, Run, Runs, app, output
-from scenarios.cli.terminal import print_files, print_json, shown
+from scenarios.cli.terminal import kept_in, print_files, print_json
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
@@ -105,7 +105,7 @@ def _keep(live: Live, folder: Path) -> None:
     used = folder.exists() and any(folder.iterdir())
     free = next_free(folder) if used else folder
     recording = live.save(free)
-    print(f"{recording.ticks} ticks in {shown(free)}", flush=True)
+    print(kept_in(free, recording), flush=True)
     if recording.fault:
         print(f"hierarchy: fault: {recording.fault}", file=sys.stderr)
 

@@ -28,7 +28,7 @@ def troubles(recording: Any) -> list[str]:
     faults = [f"{kind}: {action} in {len(ticks)} ticks, first in tick {ticks[0]} "
               f"(t = {recording['t'][ticks[0]]:.3f} s)"
               for (kind, action), ticks in recording.troubles().items()]
-    missed = [fill(str(one), _WIDTH, subsequent_indent="  ") for one in given_up(recording)]
+    missed = [_filled(str(one)) for one in given_up(recording)]
     return [line for lines in (faults, missed) if lines for line in ("", *lines)]
 
 
@@ -60,8 +60,7 @@ def print_table(runs: list[Run]) -> None:
     from scenarios.measure.verdict import lines, verdicts
 
     found = verdicts(runs)
-    goals = [fill(f"  {goal}", _WIDTH, subsequent_indent="    ") for goal in found[0].goals
-             ] if len(found) == 1 else []
+    goals = [f"  {goal}" for goal in found[0].goals] if len(found) == 1 else []
     _print_rows(dict.fromkeys(run.title for run in runs), "", [run.label for run in runs],
                 table(runs), "best of its row, or within 1 % of that",
                 ["", *map(str, partings(runs)), *flags(runs), *lines(found), *goals])
@@ -90,7 +89,7 @@ def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: 
     from rich.text import Text
 
     console = Console(markup=False, highlight=False)
-    console.print("", *above, sep="\n")
+    console.print("", *map(_filled, above), sep="\n")
     heads = [re.sub(r"(?<=[^ :-])[ :-]", lambda at: at[0].strip() + "\n", one) for one in labels]
     cells = [[Text(cell.text + ("*" if cell.kind == "best" else " "),
                    "bold" if cell.kind == "best" else "").append(
@@ -109,7 +108,15 @@ def _print_rows(above: Iterable[str], corner: str, labels: Sequence[str], rows: 
         console.print("", laid_out)
     if any(cell.kind == "best" for row in rows for cell in row.cells):
         console.print("", f"* {best}", sep="\n")
-    console.print(*below, sep="\n", end="\n" if below else "")
+    for line in below:
+        console.print(_filled(line))
+
+
+def _filled(line: str) -> str:
+    """Return a line as lines of 80 columns, those after the first indented further."""
+    indent = " " * (len(line) - len(line.lstrip()) + 2)
+    return fill(line.replace(" %", "\N{NO-BREAK SPACE}%"), _WIDTH, subsequent_indent=indent,
+                break_on_hyphens=False).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def print_lists(lists: dict[str, dict[str, str]], as_json: bool = False) -> None:
@@ -160,6 +167,13 @@ def shown(path: Path) -> str:
         return str(path.resolve().relative_to(Path.cwd()))
     except (OSError, ValueError):  # the current folder has gone, or is elsewhere
         return str(path)
+
+
+def kept_in(folder: Path, recording: Any) -> str:
+    """Return how long a run was, and where it is."""
+    from hierarchy.words import counted
+
+    return f"{counted(recording.ticks, 'tick')} in {shown(folder)}"
 
 
 @contextmanager

@@ -73,7 +73,7 @@ def _said(root: type[Section], data: Any, error: Any) -> str:
     if isinstance(found, dict) or error["type"] in ("kind", "literal_error"):
         return f"{where}: {text}"
     unit = next((f" {unit.name}" for part in _annotations(root, keys)
-                 for unit in parts_of(part, Unit)), "")
+                 for unit in parts_of(part, Unit) if not isinstance(found, str)), "")
     return f"{where}: {text}, got {found!r}{unit}"
 
 

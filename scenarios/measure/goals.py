@@ -145,11 +145,12 @@ def _limits(recording: Recording) -> Iterator[_Asked]:
 def _of_units(name: str, units: Sequence[str], beyond: Array) -> Iterator[_Asked]:
     """Yield limits of joints, those in rad apart from those in m; joints without are left out."""
     has_limits = np.isfinite(beyond).any(axis=0)
-    for unit in dict.fromkeys(units):
+    known = dict.fromkeys(np.array(units)[has_limits].tolist())
+    for unit in known:
         chosen = has_limits & np.array([one == unit for one in units])
-        if chosen.any():  # each joint by itself: another's return forgives nothing
-            off = passed(np.maximum(beyond[:, chosen], 0.0), PROMISED.get(unit, 0.0))
-            yield name, "", unit, off.max(axis=1), True
+        # each joint by itself: another's return forgives nothing
+        off = passed(np.maximum(beyond[:, chosen], 0.0), PROMISED.get(unit, 0.0))
+        yield name, f"in {unit}" if len(known) > 1 else "", unit, off.max(axis=1), True
 
 
 def _goal(name: str, asked: str, unit: str, off: Array, promise: bool, t: Array) -> Goal:

@@ -14,6 +14,7 @@ from hierarchy.problem import Array, Hierarchy
 from scenarios.cell.build import Cell, build, stack_resolver
 from scenarios.measure.causes import Cause, Solve, Tick, causes
 from scenarios.measure.judging import Rows
+from scenarios.measure.metric import shown
 from scenarios.measure.safety import STEPS
 from scenarios.recording.fate import Fate
 from scenarios.recording.recording import Recording
@@ -43,7 +44,7 @@ class Jump:
     causes: tuple[Cause, ...]
 
     def __str__(self) -> str:
-        return f"{self.what} changed by {self.size:.3g} {self.unit}"
+        return f"{self.what} changed by {shown(self.size, self.unit)}"
 
 
 def jumps(recording: Recording, tick: int | None = None,

@@ -50,14 +50,21 @@ class Metric:
         return _display(self.unit)[0]
 
     def shown(self) -> str:
-        """Return the value for a table: in `shown_unit`, without the unit."""
+        """Return the value for a table: in `shown_unit`, without the unit.
+
+        A small value has a digit more; one from 1000 on has none behind the point.
+        """
         if self.value is None:
             return "–"
         scale, _, decimals = _display(self.unit)
         value = self.value * scale
+        if not decimals and 0.01 <= abs(value) < 10.0:  # the median of counts
+            return f"{value:.2g}"
         if value != 0.0 and (abs(value) < 0.5 * 10.0**-decimals or abs(value) >= 1e5):
             return f"{value:.1e}"
-        return f"{value:.{decimals}f}"
+        if value != 0.0 and abs(value) < 10.0 ** (1 - decimals):
+            return f"{value:.{decimals + 1}f}"
+        return f"{value:.{0 if abs(value) >= 1e3 else decimals}f}"
 
 
 class Criteria(NamedTuple):
@@ -92,12 +99,13 @@ def true(recording: Recording, signal: str) -> Array:
 
 
 def passed(off: Array, tolerance: float = 0.0) -> Array:
-    """Return the excess (T, ...), at least 0, of a run that is `off` beyond a limit.
+    """Return the excess (T, ...), at least 0, of a run that is `off` beyond a limit, not rounding.
 
     A run that begins beyond it and comes back has not passed it, unless it goes further.
     """
     came_back = (off <= tolerance).any(axis=0)
-    return np.asarray(np.where(came_back, off - np.fmin.accumulate(off), off))
+    excess = np.where(came_back, off - np.fmin.accumulate(off), off)
+    return np.where(excess < NOTHING, 0.0, excess)
 
 
 def largest(values: Array) -> float | None:

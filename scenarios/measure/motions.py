@@ -90,9 +90,10 @@ class Parting:
         if self.largest == 0.0:
             return f"{self.label} moves as {self.other} to the last bit"
         if self.tick is None:
-            return f"{self.label} keeps within {self.largest:.1e} rad of {self.other} to the end"
-        return (f"{self.label} parts from {self.other} by more than {self.bound:.0e} rad at tick "
-                f"{self.tick} ({self.time:.2f} s), by {self.largest:.1e} rad at most: {self.why}")
+            return f"{self.label} stays within {self.largest:.1e} rad of {self.other} to the end"
+        return (f"{self.label} diverges from {self.other} by more than {self.bound:.0e} rad at "
+                f"tick {self.tick} ({self.time:.2f} s), by {self.largest:.2g} rad at most: "
+                f"{self.why}")
 
 
 def partings(runs: Sequence[Run]) -> list[Parting]:
@@ -130,8 +131,9 @@ def _why(one: Labelled, other: Labelled, tick: int, accuracy: float) -> str:
     if mine.limits_in_stack != theirs.limits_in_stack:
         return "the limits are in the stack of one, and a guard outside it for the other"
     if mine.asks == "bounds" and "bounds" in (mine.resolver.handles, theirs.resolver.handles):
-        return ("while limits act they agree only undamped, and sns not then: it scales what it "
-                "cannot meet")
+        return ("while limits act, sns scales what it cannot meet"
+                if "sns" in (mine.resolver.name, theirs.resolver.name) else
+                "while limits act, they agree only without damping")
     stacks = [np.array([*run.orders, ""])[run["order"][:tick + 1]] for _, run in (one, other)]
     switched = np.flatnonzero(stacks[0] != stacks[1])
     if switched.size:

@@ -120,7 +120,7 @@ def table(runs: Sequence[Run]) -> list[Row]:
 
     Only runs of one scenario that reached their end compete: other scenarios ask for other things,
     and a shorter run's numbers cover less time. Values within one percent of the best are as good,
-    and where all are, none is marked.
+    and where all are, none is marked. Metrics that no run has are left out.
     """
     one_scenario = len({run.scenario.name for run in runs}) == 1
     competes = [one_scenario and run.fault is None for run in runs]
@@ -129,6 +129,8 @@ def table(runs: Sequence[Run]) -> list[Row]:
     rows = []
     for name, metric in known.items():
         found = [run.metrics.get(name) for run in runs]
+        if all(m is None or m.value is None for m in found):
+            continue
         best = _best({i: m.value for i, m in enumerate(found)
                       if m and m.value is not None and competes[i]}, metric.lower_is_better)
         rows.append(Row(metric.label, metric.shown_unit, metric.group, name, tuple(

@@ -138,8 +138,8 @@ def _about(name: str, runs: Sequence[Run]) -> dict[str, Any]:
     """Return the title, and each scenario's description by name ("" if there is only one)."""
     asked = {run.scenario.name: run.scenario for run in runs}
     if len(asked) > 1:
-        by = "each by its own resolver" if name == OWN else f"by {name}"
-        return {"title": f"{in_words(len(asked)).capitalize()} scenarios, resolved {by}",
+        by = "each resolved by its own resolver" if name == OWN else f"resolved by {name}"
+        return {"title": f"{in_words(len(asked)).capitalize()} scenarios, {by}",
                 "about": {run.scenario.name: run.title for run in runs}}
     by = "one resolver" if len(runs) == 1 else f"{in_words(len(runs))} resolvers"
     return {"title": f"{runs[0].scenario.title or name}: {by}",

@@ -147,7 +147,7 @@ def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
                      _departure(recordings, looks)))
     timings = {run.label: run.timing or recordings[run.label] for run in runs
                if run.label in recordings}
-    figs.append(("Time per tick: dot: resolve, median; whole tick | median, × 99.9 %",
+    figs.append(("Time per tick: ● resolve, median; | whole tick, median; × whole tick, 99.9 %",
                  _computing_time(timings, looks)))
     return render("results/overlays.html", looks={label: looks[label] for label in recordings},
                   drawn=[(title, svg(fig, f"{name}: {title}")) for title, fig in figs])
@@ -175,7 +175,7 @@ def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mappi
         margin = linear * (0.04 * (most - least) or 1.0)
         ax.set_ylim(least - margin, most + margin)
         ax.set_xlim(0.0, end)
-        ax.xaxis.set_major_locator(MaxNLocator(4))
+        ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         if high - low > 1.1 * (most - least + 2 * margin):
             ax.text(0.98, 0.96, f"cut: {low:.2g} to {high:.2g}", color=ALERT, fontsize=8,
                     ha="right", va="top", transform=ax.transAxes)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _ERRORS = {"m": ", positions", "deg": ", directions", "rad": ", joints", "": "",
            "N s": ", linear momentum", "N m s": ", angular momentum"}
+_SHOWN = {"m": (1e3, "mm"), "deg": (1.0, "°")}
 _SYMBOLS = {r"$\epsilon_1$": "ε₁", r"$\epsilon_2$": "ε₂", r"$\epsilon_{ee}$": "ε_ee",
             r"$d_{min}$": "d_min"}
 
@@ -54,7 +55,7 @@ def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
         yield _sampled("Distance from the path", "mm", ("end effector",), error, ticks,
                        logarithmic=True)
     if "pointing_error" in recording and scenario.pointing is not None:
-        yield _sampled("Angle to the cone's axis", "deg", ("end effector",),
+        yield _sampled("Angle to the cone's axis", "°", ("end effector",),
                        scenario.pointing.angle(recording["pointing_error"]), ticks,
                        (("α_d", scenario.pointing.alpha_d),))
     for name, signal in (("Body to the nearest obstacle", "minimal_distance"),
@@ -76,8 +77,9 @@ def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Ser
     for section, unit, error in listed.errors(recording):
         found.setdefault(unit, {})[section.title] = error
     for unit, errors in found.items():
-        yield _sampled(f"Errors of tasks{_ERRORS[unit]}", unit, tuple(errors),
-                       np.column_stack(list(errors.values())), ticks)
+        scale, shown = _SHOWN.get(unit, (1.0, unit))
+        yield _sampled(f"Errors of tasks{_ERRORS[unit]}", shown, tuple(errors),
+                       scale * np.column_stack(list(errors.values())), ticks)
 
 
 def _forces(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:

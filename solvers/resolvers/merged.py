@@ -45,7 +45,7 @@ class OneLevel(Resolver):
 
     handles: ClassVar[Handles] = "inequalities"
     strict: ClassVar[bool] = False
-    damps: ClassVar[str] = "the merged level as a whole, about the reference"
+    damps: ClassVar[str] = "the weighted level as a whole, about the reference"
     damps_with_bounds: ClassVar[str] = damps
     tolerance: float = number(Hcod.tolerance, high=1e-3, open_below=True)
     max_iterations: int = whole_number(Hcod.max_iterations, 1)

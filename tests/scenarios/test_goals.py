@@ -82,6 +82,14 @@ def test_the_table_has_a_row_for_each_goal_and_a_cell_for_each_run():
     assert [*map(percent, (0.0123, 0.994, 0.996))] == ["1.2 %", "99 %", "100 %"]
 
 
+def test_limits_of_joints_that_turn_and_of_those_that_slide_are_two_goals():
+    run = recording(**joint([0.0, 2.5, 0.0, 0.0, 0.0]))
+    robot = replace(run.facts.robot, position_units=("rad",) * 6 + ("m",))
+    mixed = replace(run, facts=replace(run.facts, robot=robot))
+    found = {one.title: one.flag for one in goals(mixed) if one.name == "joint limits"}
+    assert found == {"joint limits, in rad": "broken", "joint limits, in m": "kept"}
+
+
 def test_a_run_lasts_as_long_as_its_whole_ticks():
     scenario = load("ellipse", {"control.period": 0.3, "control.duration": 1.0})
     (found,) = verdicts([Run(scenario, "a", "a", recording(scenario, t=[0.0, 0.3, 0.6]))])

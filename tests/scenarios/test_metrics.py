@@ -68,11 +68,18 @@ def test_a_signal_has_its_largest_value_step_or_count(name, signals, value):
 
 
 @pytest.mark.parametrize(("unit", "shown"), [
-    ("m", "12345.679"), ("s", "1.2e+07"), ("deg", "12.346"), ("share", "1234.57"),
+    ("m", "12346"), ("s", "1.2e+07"), ("deg", "12.346"), ("share", "1235"),
     ("rad", "12.346"), ("rad/s", "12.346"), ("rad/s^2", "12.35"), ("rad/s^3", "12"),
     ("N", "12.3"), ("", "12")])
 def test_each_unit_has_its_decimals(unit, shown):
     assert Metric("some", "Some", 12.3456789, unit).shown() == shown
+
+
+def test_a_small_number_has_a_digit_more():
+    shown = [Metric("some", "Some", value, "rad").shown() for value in (0.0123, 0.00649, 0.0004)]
+    assert shown == ["0.012", "0.0065", "4.0e-04"]
+    counts = [Metric("some", "Some", value, "").shown() for value in (0.0, 0.25, 1.5, 3.0, 12.5)]
+    assert counts == ["0", "0.25", "1.5", "3", "12"]
 
 
 def test_times_are_given_by_median_and_tails_for_each_part():

@@ -67,6 +67,7 @@ def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_mo
 
         until("player.runs[0].frames > 3 && !player.stage.flat")
         before = browser.screenshot()
+        browser.run("window.curves = player.curves, window.card = player.stacks[0].card, 0")
         browser.run("player.choice.value = 'hcod'")
         browser.run("player.choice.dispatchEvent(new Event('change'))")
         until("document.querySelector('.card h2').textContent.startsWith('hcod')")
@@ -87,7 +88,9 @@ def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_mo
         browser.run("player.ask('avoidance.near', 0.3)")
         until("player.warning.textContent.includes('beyond far')")
         browser.run("player.ask('restart', null)")
-        until("player.begun === 1 && player.runs[0].frames > 1")
+        until("player.begun === 1 && player.runs[0].frames > 3")
+        assert browser.run("player.curves === window.curves && player.stacks[0].card !== card")
+        assert browser.run("document.querySelectorAll('#curves .line').length") > 4
         assert browser.complaints == []
 
 

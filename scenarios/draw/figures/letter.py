@@ -51,6 +51,7 @@ class LetterFigure(NamedTuple):
 _ELLIPSE, _HUMAN = ("ellipse", "ellipse-published"), ("human",)
 _VELOCITIES, _ACCELERATIONS = ("joint-velocities",), ("joint-accelerations",)
 _BODY, _TIP, _CONE = ("active-point", "body-distance"), ("ee-distance",), ("pointing-error",)
+_TASKS = LetterFigure("task-errors", ((("task-errors", "task-angles"), ()),))
 SIMULATION = (
     LetterFigure("joint-velocities", (
         (_VELOCITIES, ("ellipse-velocity",)), (_VELOCITIES, _ELLIPSE)), 4),
@@ -60,13 +61,14 @@ SIMULATION = (
     LetterFigure("pointing-error", (
         (_CONE, ("ellipse-35deg",)), (_CONE, ("ellipse-35deg-equality",))), 7),
     LetterFigure("position-error", ((("position-error",), ()),)),
-    LetterFigure("task-errors", ((("task-errors", "task-angles"), ()),)),
+    _TASKS,
 )
 EXPERIMENT = (
     LetterFigure("velocities-and-accelerations", (
         (_VELOCITIES, _HUMAN), (_ACCELERATIONS, _HUMAN)), 9),
     LetterFigure("errors-and-distances", (
         (("position-components",), _HUMAN), (_CONE, _HUMAN), (_TIP, _HUMAN), (_BODY, _HUMAN)), 10),
+    _TASKS,
 )
 _SHORT = 10  # letters of a label, of which seven fit in a line
 _SINGLE = ("velocities-and-distance",)  # of two runs, its panels are in other figures
@@ -147,7 +149,8 @@ def _others(recording: Recording) -> Iterator[tuple[str, Figure]]:
 
 
 def _fitting(names: Sequence[str], recording: Recording) -> list[Panel]:
-    return [panel for panel in map(PANEL.__getitem__, names) if panel.fits(recording)]
+    return [panel for panel in map(PANEL.__getitem__, names)
+            if panel.fits(recording) and panel.shows(recording)]
 
 
 def _named(wanted: LetterFigure, recordings: Sequence[Recording]) -> tuple[str, str]:
@@ -216,8 +219,8 @@ def tick_times(recording: Recording) -> Figure:
     ax.set_xlabel(f"{', '.join(filter(None, ('whole tick', recording.beside_computing)))} [µs]")
     ax.set_ylabel("ticks")
     run = f"{_run_of(recording)}: " if drawing.present().titled else ""
-    ax.set_title(f"{run}{np.mean(times <= period):.2%} of {recording.ticks} ticks within the "
-                 "period", loc="left")
+    ax.set_title(f"{run}{100.0 * np.mean(times <= period):.2f} % of {recording.ticks} ticks within "
+                 "the period", loc="left")
     return fig
 
 

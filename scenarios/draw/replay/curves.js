@@ -255,6 +255,6 @@ function short(value) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   if (size < 1e-9) return "0";
-  if (size < 1e-3 || size >= 1e5) return value.toExponential(0);
+  if (size < 1e-3 || size >= 1e5) return (+value.toPrecision(2)).toExponential();
   return `${+value.toPrecision(3)}`;
 }

@@ -11,7 +11,8 @@ class Player {
     const get = id => document.getElementById(id);
     this.parts = Object.fromEntries(["space", "scrub", "time", "play", "speed", "legend", "modes",
       "names", "notice", "drawn", "stacks", "curves", "marks"].map(id => [id, get(id)]));
-    this.make_lists(data);
+    this.make_stacks(data);
+    this.curves = new Curves(this.parts.curves, this.runs, data, t => this.seek(t));
     this.make_stage();
     this.make_controls(data);
     this.make_legend();
@@ -22,11 +23,11 @@ class Player {
 
   run(data) { return new Run(data); }
 
-  make_lists(data) {
+  make_stacks(data) {
     this.stacks = this.runs.map(run => new StackList(run, data, this.runs.length > 1,
       t => this.seek(t)));
+    for (const stack of this.stacks) stack.follow(this.t);  // else rows would move to their places
     this.parts.stacks.replaceChildren(...this.stacks.map(stack => stack.card));
-    this.curves = new Curves(this.parts.curves, this.runs, data, t => this.seek(t));
   }
 
   make_stage() {

@@ -46,7 +46,7 @@ class StackList {
     if (!this.run.limited || this.run.fate.values.includes(this.unknown)) return [];
     this.joints = this.run.joints.map(name => element("i", {title: name}));
     this.joints_say = element("span");
-    return [element("div", {class: "joints"}, element("span", {}, "limits"), ...this.joints,
+    return [element("div", {class: "joints"}, element("span", {}, "limits:"), ...this.joints,
                     this.joints_say)];
   }
 

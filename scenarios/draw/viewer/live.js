@@ -133,11 +133,12 @@ class LivePlayer extends Player {
       this.begun = data.begun;
       this.stage?.forget(run);
       this.runs.splice(0, 1, next);
-      this.make_lists(data);
+      this.curves.rolls = false;
+      this.make_stacks(data);
     } else if (next.end > run.end) run.append(next);
     else for (const name of ["goals", "missed", "fault", "handles"]) run[name] = next[name];
     this.handles = data.handles;
-    if (lists !== [run.label, run.fault, run.goals].join() && this.runs[0] === run) this.make_lists(data);
+    if (lists !== [run.label, run.fault, run.goals].join() && this.runs[0] === run) this.make_stacks(data);
     this.roll();
     this.renew();
     this.seek();
