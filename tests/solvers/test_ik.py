@@ -156,6 +156,14 @@ def test_two_hands_on_an_object_take_it_as_near_to_a_target_out_of_reach_as_they
     assert found.errors["object"] < 0.08
 
 
+def test_joints_that_do_not_help_stay_though_a_target_is_out_of_reach():
+    """The best of the random starts was the answer, by less than rounding."""
+    far = RelativePose(FRAME, ROBOT.frame("joint_3"), (0.0, 0.0, 5.0))
+    found = solve_ik(ROBOT, Q, [far], until=1e-6)
+    assert not found.met
+    np.testing.assert_allclose(found.q[:3], Q[:3], atol=1e-9)
+
+
 def test_what_holds_a_target_out_of_reach_back_is_said():
     found = solve_ik(ROBOT, Q, [Position(FRAME, Still([0.0, 0.0, 3.0]))], until=1e-6)
     assert not found.met
