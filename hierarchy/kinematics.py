@@ -241,7 +241,7 @@ class Spot(NamedTuple):
     @classmethod
     def of(cls, frame: Any) -> Spot:
         """Return the spot of a frame."""
-        return cls(frame.joint, frame.offset, np.ascontiguousarray(frame.rotation))
+        return cls(frame.joint, frame.offset, frame.rotation)
 
 
 @inlined

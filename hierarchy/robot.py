@@ -23,8 +23,11 @@ from hierarchy.errors import (
     finite_numbers,
     is_one_of,
     naming,
+    whole,
 )
+from hierarchy.gate import array_of, check_rotation
 from hierarchy.problem import Array
+from hierarchy.records import set_frozen
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
 from hierarchy.robots.found import (
@@ -47,12 +50,22 @@ BASE_SPEED = (2.0, 3.0)  # [m/s], [rad/s] of a floating base in inverse kinemati
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame fixed to the body that `joint` moves; offset (3,) [m] and rotation (3, 3) in it."""
+    """A frame fixed to the body that `joint` moves; offset (3,) [m] and rotation (3, 3) in it.
+
+    Raises HierarchyError for numbers that are none of these.
+    """
 
     name: str
     joint: int
     offset: Array
     rotation: Array
+
+    def __post_init__(self) -> None:
+        what = f"frame {self.name!r}"
+        check_rotation(f"{what}: rotation", self.rotation)
+        set_frozen(self, joint=whole(f"{what}: joint", self.joint),
+                   offset=finite_numbers(f"{what}: offset", self.offset, 3),
+                   rotation=array_of(f"{what}: rotation", self.rotation))
 
 
 @dataclass(frozen=True)
@@ -294,8 +307,8 @@ class Robot:
             raise RobotError(f"robot {self.name!r}: {len(found)} frames are called {name!r}, "
                              f"{in_words(self.model, found)}; give one another name in the file")
         frame = found[0]
-        return Frame(name, int(frame.parentJoint), frame.placement.translation.copy(),
-                     np.ascontiguousarray(frame.placement.rotation))
+        return Frame(name, int(frame.parentJoint), frame.placement.translation,
+                     frame.placement.rotation)
 
     def control_point(self, joint: str, offset: ArrayLike,
                       name: str | None = None) -> ControlPoint:

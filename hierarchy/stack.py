@@ -90,7 +90,8 @@ class Stack:
     def insert(self, task: Task, index: int | None = None) -> None:
         """Insert a task at `index` of the order, 0 being the most important; None for the end."""
         expect("a stack", task, Task, "a task says itself what it moves; see hierarchy.tasks")
-        refuse(task.name in self._tasks, f"the stack already has a task {task.name!r}")
+        refuse(task.name in self._tasks, f"the stack already has a task {task.name!r}; "
+               "give each its own name")
         _check_forces(task, self.level, self.contacts)
         position = len(self._order) if index is None else index
         expect(f"task {task.name!r}: index", position, int, "0 is the most important")

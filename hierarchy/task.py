@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from ast import literal_eval
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import Field, fields, is_dataclass
 from functools import cache, wraps
 from inspect import formatannotation
@@ -238,6 +238,20 @@ def check_period(task: Task, period: float, level: Level = "velocity") -> None:
         refuse(rate * period > 1.0 + _ROUNDING, f"task {part.name!r}: rate = {rate:g} 1/s times "
                f"the period of {period:g} s is {rate * period:g}; above 1 a tick may take more "
                f"than the distance left, so give at most {1.0 / period:g} 1/s")
+
+
+def curved(tasks: Iterable[Task], joints: int) -> frozenset[str]:
+    """Return the names of tasks whose rows, or what tasks above leave of them, bend.
+
+    Those are all, most important first, but straight ones that are at the top or have a row for
+    each of the `joints`.
+    """
+    names, bent = set[str](), False
+    for task in tasks:
+        if not task.straight or (bent and task.dimension < joints):
+            names.add(task.name)
+        bent |= not task.straight
+    return frozenset(names)
 
 
 def parts(task: Task) -> Iterator[Task]:

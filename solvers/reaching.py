@@ -12,7 +12,7 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Robot
 from hierarchy.stack import Stack
 from hierarchy.state import State
-from hierarchy.task import Task, parts
+from hierarchy.task import Task, curved, parts
 from hierarchy.tasks.joints.joint_limits import StepLimits
 from hierarchy.tasks.joints.mechanism import Mechanism, above, model_rows
 from hierarchy.words import listed
@@ -59,9 +59,10 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
     Gauss-Newton steps of the same problem as `solve_ik`, each at most 0.3 rad or m, for the whole
     error of each task whatever its gain. Where the errors stop falling, they start again from a
     random configuration within the limits, the same ones in each call. These steps are undamped,
-    which finds more; from the best of all starts damped ones go on to the nearest. Joint tasks such
-    as a posture are preferences: they do not decide whether the others are met, but where; their
-    gains count relative to the largest of all.
+    which finds more; from the end of the first start, and of the best, damped ones go on to the
+    nearest, and the latter is the answer where it is nearer by `until`. Joint tasks such as a
+    posture are preferences: they do not decide whether the others are met, but where; their gains
+    count relative to the largest of all.
 
     until : largest norm of the error of each task that decides, in its unit.
 
@@ -69,16 +70,18 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
     """
     positive("solve_ik: until", until)
     search = _Search(State.at(robot, q, t=t), tasks, until, limits, resolver, damping)
-    rng, start = np.random.default_rng(0), search.state.q.copy()
-    best = search.descend(start, resolver)
+    rng, start = np.random.default_rng(0), search.within_limits(search.state.q.copy())
+    first = best = search.descend(start, resolver)
     iterations, count = best[2], 1
     while max(best[0]) > until and count < _STARTS:
         found = search.descend(_drawn(robot, start, rng), resolver)
         iterations, count = iterations + found[2], count + 1
         best = min(best, found, key=lambda one: one[0])
     if max(best[0]) > until:
-        best = search.descend(best[1], search.settled, _AT_REST, min(until, 1.0) ** (0.5 / _MOST))
-        iterations += best[2]
+        ends = [search.descend(q, search.settled, _AT_REST, min(until, 1.0) ** (0.5 / _MOST))
+                for q in (first[1], best[1])]
+        best = min(ends, key=lambda one: [error // until for error in one[0]])
+        iterations += sum(end[2] for end in ends)
     return search.answer(best[1], iterations, count)
 
 
@@ -89,9 +92,10 @@ def stacked(robot: Robot, tasks: Sequence[Task], period: float, limits: Sequence
     period [s], for which a velocity will be held; damping as in `solve_ik`.
     """
     first = above(model_rows(robot, period), limits, resolver.can_resolve("inequalities"))
-    stack = Stack([*first, *tasks], "velocity")
-    return stack, Settled(inner=resolver, period=period, softness=damping, curved=frozenset(
-        task.name for task in tasks if not task.straight))
+    tasks = [task.on(robot) for task in tasks]
+    return Stack([*first, *tasks], "velocity"), Settled(
+        inner=resolver, period=period, softness=damping,
+        curved=curved(tasks, robot.n - robot.actuated))
 
 
 class _Search:
@@ -114,6 +118,14 @@ class _Search:
         self.changed = [(task, factor) for task, factor in zip(tasks, factors, strict=True)
                         if factor != 1.0 or np.any(task.desired_velocity(state))]
         self.state, self.status = state, Status.SOLVED
+
+    def within_limits(self, q: Array) -> Array:
+        """Return q with the joints that are beyond a limit on it, from which steps do not leave."""
+        here = q[self.robot.coordinates]
+        step = np.clip(here, *self.robot.position_limits()) - here
+        if not self.limits or not step.any():
+            return q
+        return self.mechanism.closed(self.robot.integrate(q, step))
 
     def descend(self, q: Array, resolver: Resolver, still: float = _STILL, shrink: float = 1.0
                 ) -> tuple[list[float], Array, int]:

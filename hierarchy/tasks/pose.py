@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import finite_numbers
-from hierarchy.gate import check_rotation
+from hierarchy.gate import array_of, check_rotation
 from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import (
     Kinematics,
@@ -76,7 +76,7 @@ class Pose(Measured):
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
-        return _pose, (Spot.of(self.frame), np.array(self.rotation, dtype=float))
+        return _pose, (Spot.of(self.frame), array_of(self.name, self.rotation))
 
 
 _SERIES = 0.01   # [rad^2] squared angle below which coefficients are taken from their series
@@ -199,7 +199,7 @@ class RelativePose(NamedRows, Measured):
         """See `Measured.measure`."""
         rotation = np.eye(3) if self.rotation is None else self.rotation
         return _relative, (Spot.of(self.frame), Spot.of(self.to),
-                           np.array(self.position, dtype=float), np.array(rotation, dtype=float))
+                           array_of(self.name, self.position), array_of(self.name, rotation))
 
 
 @compiled

@@ -15,6 +15,7 @@ from hierarchy.avoidance import Measurement, Obstacles
 from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
+from hierarchy.task import curved
 from hierarchy.tasks import Pointing, Separation
 from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.tasks.together import TangentCone
@@ -155,12 +156,13 @@ def _rows(scenario: Scenario, tasks: Sequence[Task],
     return found, Activation(state, found, buffers)
 
 
-def stack_resolver(scenario: Scenario, stack: Stack, activation: Activation | None) -> Resolver:
-    """Return the scenario's resolver, as its stack uses it; stack, activation as in a Cell.
+def stack_resolver(scenario: Scenario, cell: Cell) -> Resolver:
+    """Return the scenario's resolver, as the stack of its cell uses it.
 
     Raises ScenarioError if the stack has activations and the resolver does not take them.
     """
     resolver, control = scenario.make_resolver(), scenario.control
+    robot, stack, activation = cell.robot, cell.stack, cell.activation
     if isinstance(resolver, Merged):
         scales = {name: stack[name].scale for name in stack.names}
         resolver = replace(resolver, scales=scales | dict(resolver.scales))
@@ -169,9 +171,9 @@ def stack_resolver(scenario: Scenario, stack: Stack, activation: Activation | No
     if activation is None and (control.level != "velocity" or control.damping == 0.0):
         return resolver
     if activation is None:  # where x is a velocity, tasks out of reach come to rest
-        curved = frozenset(name for name in stack.names if not stack[name].straight)
+        tasks = [stack[name].on(robot) for name in stack.names]
         return Settled(inner=resolver, period=control.period, softness=control.damping,
-                       curved=curved)
+                       curved=curved(tasks, robot.n - robot.actuated))
     if not isinstance(resolver, Smooth):
         raise ScenarioError('control.stack = "smooth" needs control.resolver = "smooth", got '
                             f'"{resolver.name}"')

@@ -38,7 +38,7 @@ class Controller:
                  resolver: Resolver | None = None, faults: Faults | None = None) -> None:
         cell = build(scenario) if cell is None else cell
         if resolver is None:
-            resolver = stack_resolver(scenario, cell.stack, cell.activation)
+            resolver = stack_resolver(scenario, cell)
         self.clock = perf_counter
         if faults is not None:
             cell, resolver, self.clock = faults.around(cell, resolver)

@@ -77,7 +77,7 @@ def jumps(recording: Recording, tick: int | None = None,
 def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
             ) -> dict[int, Solve]:
     """Return what answers as in each of these ticks; what `merged` carries comes from a replay."""
-    resolver = stack_resolver(recording.scenario, cell.stack, cell.activation)
+    resolver = stack_resolver(recording.scenario, cell)
     carried: dict[int, Any] = {}
     memory = None
 

@@ -43,7 +43,8 @@ class Settled(Around):
 
     period : T [s] for which x, a velocity, will be held.
     softness : factor of the estimate of the curvature; 0 leaves every level as it is.
-    curved : names of levels of equalities whose Jacobians change with the configuration.
+    curved : names of levels of equalities whose rows, or what levels above leave of them, change
+        with the configuration.
 
     Theory: the module's docstring.
     """
@@ -82,11 +83,12 @@ class Settled(Around):
 
 
 class _Reached(NamedTuple):
-    """The x for one mu, and its residual |b - A x|."""
+    """The x for one mu, its residual |b - A x|, and how the solve ended."""
 
     mu: float
     x: Array
     missed: float
+    status: Status
 
 
 class _Above:
@@ -131,11 +133,15 @@ class _Above:
         if not 0.0 < _LEAST * size * size < alpha * out < np.inf:
             return A, b, b
         probe = self._damped(A, b)
-        first = probe(_LEAST * size * size)
-        if alpha * first.missed <= first.mu:
+        found = first = probe(_LEAST * size * size)
+        met = alpha * first.missed <= first.mu
+        if not met:
+            found = _search(probe, first, alpha, alpha * out)
+        if found.status is not Status.SOLVED:
+            self.status = found.status
+        if met:
             self.x = first.x
             return A, b, b
-        found = _search(probe, first, alpha, alpha * out)
         step = float(np.linalg.norm(found.x - self.x))
         free = A - (A @ self.held().T) @ self.held()
         self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
@@ -172,9 +178,7 @@ class _Above:
             weights[:] = np.sqrt(mu)
             lower[-n:] = upper[-n:] = weights * x0
             found = self.inner.solve(h)
-            if found.status is not Status.SOLVED:
-                self.status = found.status
-            return _Reached(mu, found.x, float(np.linalg.norm(b - A @ found.x)))
+            return _Reached(mu, found.x, float(np.linalg.norm(b - A @ found.x)), found.status)
 
         return probe
 

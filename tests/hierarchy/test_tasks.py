@@ -13,6 +13,7 @@ from hierarchy import Stack, State, tasks
 from hierarchy.avoidance import Barrier
 from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
+from hierarchy.robot import Frame
 from hierarchy.robots import TABLES as ROBOT_TABLES
 from hierarchy.robots import link_capsules
 from hierarchy.task import Rows
@@ -77,6 +78,17 @@ def test_compiled_rows_equal_those_of_the_plain_methods(name, level, differences
         state = state_at(q, v, differences=differences)
         state.move(0.8, q + 1e-3 * v, v)
         compiled_rows(task, state, level)
+
+
+@pytest.mark.parametrize("name", ["pose", "relative pose"])
+def test_kernels_get_rotations_row_by_row(name):
+    """Pinocchio's are column by column: kernels were compiled for them, for 13 s, within a loop."""
+    here = pin.SE3(np.eye(3)[[1, 2, 0]], np.array([0.1, 0.5, 0.1]))
+    tool = Frame("tool", FRAME.joint, here.translation, here.rotation)
+    read = replace(TASKS[name], frame=tool, rotation=here.rotation).measure(State(ROBOT))[1]
+    arrays = [part for part in (*read, *read[0]) if isinstance(part, np.ndarray)]
+    assert not here.rotation.flags.c_contiguous
+    assert all(array.flags.c_contiguous for array in arrays)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.5, 3.0, np.pi - 1e-9, np.pi])
@@ -214,7 +226,7 @@ def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
 @pytest.mark.parametrize(("edit", "said"), [
     (lambda s: s.remove("pose"), "unknown task 'pose'"),
     (lambda s: s.swap("position", "pointin"), "did you mean 'pointing'"),
-    (lambda s: s.insert(TASKS["position"]), "already has a task 'position'"),
+    (lambda s: s.insert(TASKS["position"]), "already has a task 'position'; give each its own"),
     (lambda s: s.insert(TASKS["pose"], 9), "index 9"),
     (lambda s: s.reorder(["position"]), "each of"),
     (lambda s: Stack().hierarchy(State.at(ROBOT, Q)), "stack is empty"),

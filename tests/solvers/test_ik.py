@@ -18,6 +18,7 @@ from hierarchy.tasks import (
     Position,
     Posture,
     RelativePose,
+    Together,
 )
 from solvers import Status, certify, explain, make, solve_ik
 
@@ -54,6 +55,16 @@ def test_an_arm_that_cannot_reach_its_target_comes_to_rest_stretched(goal, below
     missed = np.linalg.norm(goal - State.at(ROBOT, q).position(FRAME))
     for near in q + np.random.default_rng(0).normal(scale=0.03, size=(50, 7)):
         assert np.linalg.norm(goal - State.at(ROBOT, near).position(FRAME)) > missed - 1e-6
+
+
+@pytest.mark.parametrize("goal", [[0.3, 0.5, 0.1], [0.5, 0.3, 0.3]])
+def test_joints_that_are_held_below_the_hand_come_to_rest_where_they_must_move(goal):
+    """What the hand leaves of their rows is singular where the arm beyond them is stretched: every
+    joint reversed its full speed in each tick, with status SOLVED, and the hand stayed away."""
+    held = [JointCoupling(ROBOT, {f"joint_{i}": 1.0}, Q[i - 1]) for i in (1, 2, 3)]
+    q, v = follow([Position(FRAME, Still(goal)), Together(held)], 300)
+    assert np.abs(np.diff(v[-100:], axis=0)).max() < 1e-3
+    np.testing.assert_allclose(State.at(ROBOT, q).position(FRAME), goal, atol=1e-6)
 
 
 def test_the_answer_near_a_singularity_is_continuous():
@@ -101,6 +112,17 @@ def test_poses_of_random_configurations_are_found_within_the_limits():
         np.testing.assert_allclose(here.rotation(FRAME), goal.rotation(FRAME), atol=2e-6)
 
 
+def test_a_configuration_is_within_the_limits_though_the_start_is_not():
+    """A target that is met at a start beyond a limit was reached there, as encoders may read it."""
+    beyond = np.where(np.arange(7) == 3, ROBOT.upper + 0.05, Q)
+    there = Position(FRAME, Still(State.at(ROBOT, beyond).position(FRAME)))
+    found = solve_ik(ROBOT, beyond, [there], until=1e-6)
+    assert found.met
+    assert (found.q <= ROBOT.upper).all()
+    np.testing.assert_array_equal(solve_ik(ROBOT, beyond, [there], until=1e-6, limits=False).q,
+                                  beyond)
+
+
 def test_a_configuration_does_not_depend_on_the_gains_of_its_tasks():
     goal, elbow = State.at(ROBOT, Q + 0.4), ROBOT.frame("joint_4")
     found = [solve_ik(ROBOT, Q, [
@@ -132,6 +154,14 @@ def test_two_hands_on_an_object_take_it_as_near_to_a_target_out_of_reach_as_they
     assert not found.met
     assert found.errors["relative"] <= until
     assert found.errors["object"] < 0.08
+
+
+def test_joints_that_do_not_help_stay_though_a_target_is_out_of_reach():
+    """The best of the random starts was the answer, by less than rounding."""
+    far = RelativePose(FRAME, ROBOT.frame("joint_3"), (0.0, 0.0, 5.0))
+    found = solve_ik(ROBOT, Q, [far], until=1e-6)
+    assert not found.met
+    np.testing.assert_allclose(found.q[:3], Q[:3], atol=1e-9)
 
 
 def test_what_holds_a_target_out_of_reach_back_is_said():
