@@ -121,6 +121,8 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
     ({"more": '<x:gripper xmlns:y="" side="left"/>', "root": ' xmlns:x="http://wiki.ros.org/xacro"'},
      "the macros <x:gripper> stand for"),
     ({"limit": '<limit lower="-1" upper="1" velocity="2" effort="0"/>'}, "effort limits of only:"),
+    ({"limit": '<limit lower="-1" upper="1" velocity="2"/>'}, "effort limits of only:"),
+    ({"limit": LIMIT + '<safety_controller soft_upper_limit="0.5"/>'}, "soft limits of only:"),
     ({"kind": "planar"}, "limits of only: a floating or planar joint has none"),
     ({"kind": "continuous"}, "position limits of only: a continuous joint has none"),
     ({"kind": "planar", "axis": ""}, "planar joints only: their planes are normal to x"),
@@ -132,6 +134,19 @@ def test_what_a_robot_is_without_is_said(load, changed, said):
                  joint("only", given["kind"], "base", "arm", given["limit"], given["axis"]),
                  given["more"], root=f'<robot name="r"{given["root"]}>')
     assert [sentence for sentence in robot.missing if said in sentence], robot.missing
+
+
+def test_what_the_parser_refuses_and_can_only_mean_one_thing_is_read(load):
+    given = INERTIAL.replace('iyy="0.4"', 'iyy="0.4\n"').replace(' ixy="0.01"', "")
+    robot = load(link("base", '<visual><geometry><blob/></geometry></visual>'), link("arm", given),
+                 joint("only", "revolute", "base", "arm",
+                       '<limit upper="1"/><dynamics friction="0"/>'),
+                 2 * '<material name="grey"><color rgba="1 1 1 1"/></material>')
+    np.testing.assert_allclose(robot.bodies()[0].inertia,
+                               INERTIA - [[0.0, 0.01, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    assert (robot.lower, robot.upper) == (0.0, 1.0)
+    assert np.isinf([*robot.velocity_limit, *robot.effort_limit]).all()
+    assert not [sentence for sentence in robot.missing if "cannot be read" in sentence]
 
 
 def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
@@ -158,6 +173,8 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
     ("a.urdf", "<robot/>", "its <robot> has no name"),
     ("a.urdf", urdf(link("a", shape('<box size="1 -1 1"/>'))),
      "link 'a': its box has size = '1 -1 1'"),
+    ("a.urdf", urdf(link("a"), link("b"), joint("j", "prismatic", "a", "b", "")),
+     "prismatic and has no <limit>$"),
     ("a.urdf", "<robot name='r'><link name='table'/></robot>", "with base = 'floating'")])
 def test_another_file_is_refused_with_what_to_give(tmp_path, name, text, said):
     (tmp_path / name).write_text(text)
