@@ -8,6 +8,7 @@ from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape, urdf
 
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
+from hierarchy.tasks import Mechanism
 
 CENTRE = np.array([0.1, 0.2, 0.3])
 INERTIA = np.array([[0.3, 0.01, 0.02], [0.01, 0.4, 0.03], [0.02, 0.03, 0.5]])
@@ -147,6 +148,15 @@ def test_what_the_parser_refuses_and_can_only_mean_one_thing_is_read(load):
     assert (robot.lower, robot.upper) == (0.0, 1.0)
     assert np.isinf([*robot.velocity_limit, *robot.effort_limit]).all()
     assert not [sentence for sentence in robot.missing if "cannot be read" in sentence]
+
+
+def test_what_follows_a_joint_does_so_at_rest(load):
+    at = "<limit lower='{}' upper='2' velocity='1' effort='1'/><mimic joint='{}' offset='0.7'/>"
+    robot = load(*map(link, "abcd"), joint("third", "revolute", "a", "b", at.format(0, "second")),
+                 joint("second", "revolute", "b", "c", at.format(0, "first")),
+                 joint("first", "revolute", "c", "d", LIMIT.replace("-1", "0")))
+    assert robot.values(robot.rest) == pytest.approx({"first": 0.0, "second": 0.7, "third": 1.4})
+    np.testing.assert_allclose(Mechanism(robot).closed(robot.rest), robot.rest)
 
 
 def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
