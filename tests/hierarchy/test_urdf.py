@@ -139,13 +139,14 @@ def test_what_a_robot_is_without_is_said(load, changed, said):
 
 def test_what_the_parser_refuses_and_can_only_mean_one_thing_is_read(load):
     given = INERTIAL.replace('iyy="0.4"', 'iyy="0.4\n"').replace(' ixy="0.01"', "")
-    robot = load(link("base", '<visual><geometry><blob/></geometry></visual>'), link("arm", given),
+    seen = "<visual><geometry><blob/></geometry></visual>"
+    robot = load(link("base"), link("arm", given + seen + BALL),
                  joint("only", "revolute", "base", "arm",
                        '<limit upper="1"/><dynamics friction="0"/>'),
                  2 * '<material name="grey"><color rgba="1 1 1 1"/></material>')
     np.testing.assert_allclose(robot.bodies()[0].inertia,
                                INERTIA - [[0.0, 0.01, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    assert (robot.lower, robot.upper) == (0.0, 1.0)
+    assert (robot.lower, robot.upper, len(robot.capsules)) == (0.0, 1.0, 1)
     assert np.isinf([*robot.velocity_limit, *robot.effort_limit]).all()
     assert not [sentence for sentence in robot.missing if "cannot be read" in sentence]
 
