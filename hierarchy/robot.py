@@ -138,8 +138,12 @@ class Robot:
         self.frame(self.end_effector, "end_effector frame")
         self.control_points = (points_along_chain(model, self.end_effector)
                                if found.control_points is None else found.control_points)
-        self.rest = np.array(pin.neutral(model)) if found.rest is None else found.rest
         self.capsules, self.missing, self.coupled = found.capsules, found.missing, found.coupled
+        self.rest = np.array(pin.neutral(model)) if found.rest is None else found.rest
+        leaders = {one.other for one in self.coupled} - {"", *(one.joint for one in self.coupled)}
+        if leaders:
+            values = self.values(self.rest)
+            self.rest = self.configuration({name: values[name] for name in leaders}, self.rest)
         self.loops, self.starts, self.apart = found.loops, found.starts, found.apart
         self.table = found.table
 

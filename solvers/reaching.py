@@ -165,10 +165,16 @@ class _Search:
     def _errors(self, q: Array) -> list[float]:
         """Move to q and return the norm of the error of each deciding task, `until` if it is met.
 
-        What is left below that, rounding, must not outweigh the tasks below.
+        What is left below that, rounding, must not outweigh the tasks below. What comes first is
+        how far q is open or beyond limits, where it starts or the two contradict each other.
         """
         self.state.move(self.t, q, np.zeros(self.robot.n))
-        return [max(self._missed(task), self.until) for task in self.deciding]
+        return [self._broken(q), *(max(self._missed(task), self.until) for task in self.deciding)]
+
+    def _broken(self, q: Array) -> float:
+        beyond = np.maximum(self.robot.lower - q, q - self.robot.upper) if self.limits else 0.0
+        broken = max(float(np.max(beyond)), self.mechanism.gap(q)[0])
+        return broken if broken > _AT else 0.0
 
     def _missed(self, task: Task) -> float:
         error = task.error(self.state)
@@ -177,11 +183,12 @@ class _Search:
 
     def answer(self, q: Array, iterations: int, starts: int) -> Reached:
         """Return what is to be said of a configuration."""
-        self._errors(q)
+        broken = self._errors(q)[0]
         errors = {task.name: self._missed(task) for task in self.tasks}
         met = all(errors[task.name] <= self.until for task in self.deciding)
-        return Reached(q, met, errors, "reached" if met else self._verdict(errors), iterations,
-                       starts, self.status)
+        said = ("unreachable: nearest found is beyond limits, or its mechanism open, by "
+                f"{broken:.3g}") if met and broken else "reached" if met else self._verdict(errors)
+        return Reached(q, met and not broken, errors, said, iterations, starts, self.status)
 
     def _verdict(self, errors: dict[str, float]) -> str:
         """Say what holds back the first task that is not met."""

@@ -46,6 +46,7 @@ def read_file(path: str | Path, base: Base | None = None, shapes: bool = True,
     if root:
         raise RobotError(f"robot file {str(path)!r}: root is for an MJCF; a URDF is one robot")
     urdf.check(element, path)
+    urdf.complete(element)
     return _read_urdf(path, element, base, shapes, locked)
 
 

@@ -103,6 +103,27 @@ def left_over(root: Element) -> list[str]:
     return list(dict.fromkeys([*elements, *values]))
 
 
+_LEFT_OUT = {"limit": ("effort", "velocity"), "inertia": ("ixy", "ixz", "iyz"),
+             "dynamics": ("damping",), "safety_controller": ("k_velocity",)}
+
+
+def complete(root: Element) -> None:
+    """Make a URDF, in place, one that the parser reads: it refuses more than says what a robot is.
+
+    Numbers lose the space around them, those of which only 0 can be meant where they are left out
+    are 0, and what is only seen goes.
+    """
+    for element in root.iter():
+        for key, value in element.items():
+            if numbers_in(value, 1) is not None:
+                element.set(key, value.strip())
+        for key in _LEFT_OUT.get(element.tag, ()):
+            element.attrib.setdefault(key, "0")
+    for parent, tag in ((root, "material"), *((link, "visual") for link in root.findall("link"))):
+        for seen in parent.findall(tag):
+            parent.remove(seen)
+
+
 def coupled(root: Element) -> tuple[Coupled, ...]:
     """Return the joints that follow another one (`mimic`); one that is fixed leaves a constant."""
     fixed = {name_of(joint) for joint in root.findall("joint") if joint.get("type") == "fixed"}
@@ -162,7 +183,8 @@ def _of_limit(joint: Element, kind: str | None) -> Iterator[str]:
     limit = joint.find("limit")
     if limit is None:
         if kind in _WITH_LIMIT:
-            yield f"it is {kind} and has no <limit>; without limits it is of type continuous"
+            yield f"it is {kind} and has no <limit>" + (
+                "; without limits it is of type continuous" if kind == "revolute" else "")
         return
     lower, upper, velocity, effort = ((numbers_in(limit.get(key, "0"), 1) or (0.0,))[0]
                                       for key in ("lower", "upper", "velocity", "effort"))
@@ -272,6 +294,10 @@ def remarks(root: Element) -> Iterator[str]:
                       for side in ("lower", "upper"))]
     if endless:
         yield f"position limits of {some(endless)}: a continuous joint has none"
+    soft = [name_of(joint) for joint in root.findall("joint")
+            if joint.find("safety_controller") is not None]
+    if soft:
+        yield f"soft limits of {some(soft)}: those of <limit> count"
     plain = [name_of(joint) for joint in root.findall("joint")
              if joint.get("type") == "planar" and joint.find("axis") is None]
     if plain:

@@ -98,6 +98,11 @@ def test_robots_of_public_packages_are_what_mujoco_and_pinocchio_have(package):
     assert "equal" in {verdict for _, verdict, _ in judged}
 
 
+def test_the_root_element_says_what_a_file_is_and_not_its_suffix(written):
+    path = written(world(WALKER))
+    assert Robot.load(path.rename(path.with_suffix(".mjcf"))).n == 7
+
+
 def test_without_mujoco_the_extra_is_named(written, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     path = written(world(link("a")))

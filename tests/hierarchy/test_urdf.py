@@ -8,6 +8,7 @@ from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape, urdf
 
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
+from hierarchy.tasks import Mechanism
 
 CENTRE = np.array([0.1, 0.2, 0.3])
 INERTIA = np.array([[0.3, 0.01, 0.02], [0.01, 0.4, 0.03], [0.02, 0.03, 0.5]])
@@ -121,6 +122,8 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
     ({"more": '<x:gripper xmlns:y="" side="left"/>', "root": ' xmlns:x="http://wiki.ros.org/xacro"'},
      "the macros <x:gripper> stand for"),
     ({"limit": '<limit lower="-1" upper="1" velocity="2" effort="0"/>'}, "effort limits of only:"),
+    ({"limit": '<limit lower="-1" upper="1" velocity="2"/>'}, "effort limits of only:"),
+    ({"limit": LIMIT + '<safety_controller soft_upper_limit="0.5"/>'}, "soft limits of only:"),
     ({"kind": "planar"}, "limits of only: a floating or planar joint has none"),
     ({"kind": "continuous"}, "position limits of only: a continuous joint has none"),
     ({"kind": "planar", "axis": ""}, "planar joints only: their planes are normal to x"),
@@ -132,6 +135,29 @@ def test_what_a_robot_is_without_is_said(load, changed, said):
                  joint("only", given["kind"], "base", "arm", given["limit"], given["axis"]),
                  given["more"], root=f'<robot name="r"{given["root"]}>')
     assert [sentence for sentence in robot.missing if said in sentence], robot.missing
+
+
+def test_what_the_parser_refuses_and_can_only_mean_one_thing_is_read(load):
+    given = INERTIAL.replace('iyy="0.4"', 'iyy="0.4\n"').replace(' ixy="0.01"', "")
+    seen = "<visual><geometry><blob/></geometry></visual>"
+    robot = load(link("base"), link("arm", given + seen + BALL),
+                 joint("only", "revolute", "base", "arm",
+                       '<limit upper="1"/><dynamics friction="0"/>'),
+                 2 * '<material name="grey"><color rgba="1 1 1 1"/></material>')
+    np.testing.assert_allclose(robot.bodies()[0].inertia,
+                               INERTIA - [[0.0, 0.01, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    assert (robot.lower, robot.upper, len(robot.capsules)) == (0.0, 1.0, 1)
+    assert np.isinf([*robot.velocity_limit, *robot.effort_limit]).all()
+    assert not [sentence for sentence in robot.missing if "cannot be read" in sentence]
+
+
+def test_what_follows_a_joint_does_so_at_rest(load):
+    at = "<limit lower='{}' upper='2' velocity='1' effort='1'/><mimic joint='{}' offset='0.7'/>"
+    robot = load(*map(link, "abcd"), joint("third", "revolute", "a", "b", at.format(0, "second")),
+                 joint("second", "revolute", "b", "c", at.format(0, "first")),
+                 joint("first", "revolute", "c", "d", LIMIT.replace("-1", "0")))
+    assert robot.values(robot.rest) == pytest.approx({"first": 0.0, "second": 0.7, "third": 1.4})
+    np.testing.assert_allclose(Mechanism(robot).closed(robot.rest), robot.rest)
 
 
 def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
@@ -158,6 +184,8 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
     ("a.urdf", "<robot/>", "its <robot> has no name"),
     ("a.urdf", urdf(link("a", shape('<box size="1 -1 1"/>'))),
      "link 'a': its box has size = '1 -1 1'"),
+    ("a.urdf", urdf(link("a"), link("b"), joint("j", "prismatic", "a", "b", "")),
+     "prismatic and has no <limit>$"),
     ("a.urdf", "<robot name='r'><link name='table'/></robot>", "with base = 'floating'")])
 def test_another_file_is_refused_with_what_to_give(tmp_path, name, text, said):
     (tmp_path / name).write_text(text)

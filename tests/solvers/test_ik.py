@@ -6,6 +6,7 @@ import pytest
 from scene import FRAME, ROBOT
 from standing import ROBOT as HUMANOID
 from standing import WEIGHT, feet, standing_stack
+from urdf_text import LIMIT, joint, link, placed, urdf
 
 from hierarchy import Robot, State
 from hierarchy.paths import Still, circle
@@ -227,3 +228,20 @@ def test_torques_that_cannot_hold_the_weight_stay_within_limits_and_the_knees_ar
     said = explain(h, res, rows=stack.row_names()).splitlines()[2]
     assert said.startswith("centre of mass is missed by")
     assert "torque limits left_knee at its" in said
+
+
+@pytest.mark.parametrize(("multiplier", "offset", "most"), [(1.0, 0.5, 0.5), (-1.0, 0.0, 0.0)])
+def test_what_is_unreachable_is_missed_within_limits_and_couplings(tmp_path, multiplier, offset,
+                                                                   most):
+    limit, along = LIMIT.replace("-1", "0"), placed("0.5 0 0")
+    mimic = f'<mimic joint="first" multiplier="{multiplier}" offset="{offset}"/>'
+    path = tmp_path / "r.urdf"
+    path.write_text(urdf(*map(link, "abcd"), joint("first", "revolute", "a", "b", limit),
+                         joint("second", "revolute", "b", "c", limit + mimic, origin=along),
+                         joint("end", "fixed", "c", "d", "", "", along)))
+    robot = Robot.load(path)
+    tip = robot.frame("d")
+    beyond = State.at(robot, [0.8, 0.8 * multiplier + offset]).position(tip)
+    found = solve_ik(robot, robot.rest, [Position(tip, Still(beyond.tolist()))], until=1e-6)
+    assert not found.met
+    np.testing.assert_allclose(found.q, [most, multiplier * most + offset], atol=1e-6)

@@ -57,7 +57,8 @@ def compiled(path: Path) -> Compiled:
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         try:
-            model = _compiled(mujoco.MjSpec.from_file(file))
+            model = (_compiled(mujoco.MjSpec.from_file(file)) if path.suffix == ".xml" else
+                     mujoco.MjModel.from_xml_path(file))  # MjSpec reads no other suffix
         except (ValueError, RuntimeError) as error:
             said = _in_one_line(str(error))
             raise RobotError(f"robot file {file!r} cannot be read: {said}") from error
