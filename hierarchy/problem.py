@@ -52,8 +52,7 @@ class Hierarchy:
     Level k minimises the Euclidean norm of its violation without giving up any of the norms above
     it; among all such x the answer is the one nearest to `reference`. Arguments: see `from_levels`.
 
-    A (m, n) : the rows of all levels, stacked.
-    lower, upper (m,) : their bounds.
+    A (m, n), lower, upper (m,) : the rows of all levels, stacked, and their bounds.
     sizes (L,), offsets (L + 1,) : rows of each level, zero is allowed; first row of each, and m.
     reference (n,), metric (n, n), give (m,) : see `from_levels`; metric and give may be None.
     names, named : of the L levels; a function that returns those of the m rows, or None.
