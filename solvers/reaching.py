@@ -121,11 +121,14 @@ class _Search:
 
     def within_limits(self, q: Array) -> Array:
         """Return q with the joints that are beyond a limit on it, from which steps do not leave."""
+        step = self._inward(q)
+        return self.mechanism.closed(self.robot.integrate(q, step)) if step.any() else q
+
+    def _inward(self, q: Array) -> Array:
+        """Return the step (n,) of each joint to its range, zero inside it or without limits."""
         here = q[self.robot.coordinates]
-        step = np.clip(here, *self.robot.position_limits()) - here
-        if not self.limits or not step.any():
-            return q
-        return self.mechanism.closed(self.robot.integrate(q, step))
+        return (np.asarray(np.clip(here, *self.robot.position_limits()) - here) if self.limits else
+                np.zeros(self.robot.n))
 
     def descend(self, q: Array, resolver: Resolver, still: float = _STILL, shrink: float = 1.0
                 ) -> tuple[list[float], Array, int]:
@@ -172,8 +175,8 @@ class _Search:
         return [self._broken(q), *(max(self._missed(task), self.until) for task in self.deciding)]
 
     def _broken(self, q: Array) -> float:
-        beyond = np.maximum(self.robot.lower - q, q - self.robot.upper) if self.limits else 0.0
-        broken = max(float(np.max(beyond)), self.mechanism.gap(q)[0])
+        """Return by how much q is beyond limits or its mechanism open [rad or m], 0 if rounding."""
+        broken = max(float(np.abs(self._inward(q)).max()), self.mechanism.gap(q)[0])
         return broken if broken > _AT else 0.0
 
     def _missed(self, task: Task) -> float:
@@ -186,8 +189,13 @@ class _Search:
         broken = self._errors(q)[0]
         errors = {task.name: self._missed(task) for task in self.tasks}
         met = all(errors[task.name] <= self.until for task in self.deciding)
-        said = ("unreachable: nearest found is beyond limits, or its mechanism open, by "
-                f"{broken:.3g}") if met and broken else "reached" if met else self._verdict(errors)
+        if not met:
+            said = self._verdict(errors)
+        elif broken:
+            said = ("unreachable: nearest found is beyond limits, or its mechanism open, by "
+                    f"{broken:.3g}")
+        else:
+            said = "reached"
         return Reached(q, met and not broken, errors, said, iterations, starts, self.status)
 
     def _verdict(self, errors: dict[str, float]) -> str:
