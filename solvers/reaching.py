@@ -106,6 +106,8 @@ class _Search:
         robot, fastest = state.robot, max([1e-3, *map(_fastest, tasks)])
         self.robot, self.until, self.t, self.tasks = robot, until, state.t, list(tasks)
         self.limits = [StepLimits(robot, _PERIOD, 1.0 / _PERIOD)] if limits else []
+        free = np.full(robot.n, np.inf)
+        self.lower, self.upper = robot.position_limits() if limits else (-free, free)
         self.stack, self.settled = stacked(robot, tasks, _PERIOD, self.limits, resolver, damping)
         self.mechanism = Mechanism(robot)
         self.deciding = [task for task in tasks if not task.straight]
@@ -127,8 +129,7 @@ class _Search:
     def _inward(self, q: Array) -> Array:
         """Return the step (n,) of each joint to its range, zero inside it or without limits."""
         here = q[self.robot.coordinates]
-        return (np.asarray(np.clip(here, *self.robot.position_limits()) - here) if self.limits else
-                np.zeros(self.robot.n))
+        return np.minimum(np.maximum(here, self.lower), self.upper) - here
 
     def descend(self, q: Array, resolver: Resolver, still: float = _STILL, shrink: float = 1.0
                 ) -> tuple[list[float], Array, int]:
@@ -214,13 +215,10 @@ class _Search:
 
     def _limits_at(self, wanted: Array) -> list[str]:
         """Name the position limits against which a task pulls, `wanted` (n,) being its pull."""
-        if not self.limits:
-            return []
-        lower, upper = self.robot.position_limits()
         q = self.state.q[self.robot.coordinates]
         return [f"{name} at its {'upper' if pull > 0.0 else 'lower'} limit"
-                for name, low, up, here, pull in zip(self.robot.velocity_names, lower, upper, q,
-                                                     wanted, strict=True)
+                for name, low, up, here, pull in zip(self.robot.velocity_names, self.lower,
+                                                     self.upper, q, wanted, strict=True)
                 if (pull > 0.0 and here > up - _AT) or (pull < 0.0 and here < low + _AT)]
 
 
