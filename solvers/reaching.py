@@ -106,7 +106,7 @@ class _Search:
         robot, fastest = state.robot, max([1e-3, *map(_fastest, tasks)])
         self.robot, self.until, self.t, self.tasks = robot, until, state.t, list(tasks)
         self.limits = [StepLimits(robot, _PERIOD, 1.0 / _PERIOD)] if limits else []
-        free = np.full(robot.n, np.inf)
+        free: Array = np.full(robot.n, np.inf)
         self.lower, self.upper = robot.position_limits() if limits else (-free, free)
         self.stack, self.settled = stacked(robot, tasks, _PERIOD, self.limits, resolver, damping)
         self.mechanism = Mechanism(robot)
@@ -129,7 +129,7 @@ class _Search:
     def _inward(self, q: Array) -> Array:
         """Return the step (n,) of each joint to its range, zero inside it or without limits."""
         here = q[self.robot.coordinates]
-        return np.minimum(np.maximum(here, self.lower), self.upper) - here
+        return np.asarray(np.minimum(np.maximum(here, self.lower), self.upper) - here)
 
     def descend(self, q: Array, resolver: Resolver, still: float = _STILL, shrink: float = 1.0
                 ) -> tuple[list[float], Array, int]:
