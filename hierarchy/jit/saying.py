@@ -20,15 +20,14 @@ class _Compilations(event.Listener):  # type: ignore[misc]
     def on_start(self, event: Any) -> None:
         if self._begun == 0.0 and _is_own(event):
             self._begun = self._said = monotonic()
-            say("compiling kernels for this machine, once; a scenario needs some 80, in 20 to "
-                 "40 s ...")
+            say("compiling kernels for this machine, once ...")
 
     def on_end(self, event: Any) -> None:
         self._count += _is_own(event)
         now = monotonic()
         if self._begun > 0.0 and now - self._said > _EVERY:
             self._said = now
-            say(f"{self._count} kernels in {now - self._begun:.0f} s ...")
+            say(f"{self._count} kernels in {now - self._begun:.0f} s, of at most some 80 ...")
 
 
 def _is_own(event: Any) -> bool:

@@ -28,8 +28,34 @@ CALLS = Path(__file__).with_name("calls.txt")
 PARTS = {"solvers": ("solvers",), "robots": ("hierarchy", "scenarios")}
 # Together they have every kind of task, sensor and plant of the shipped scenarios.
 _SCENARIOS = ("crawl", "dual-arm", "ellipse", "ellipse-3d", "ellipse-danger-bounds", "ellipse-hqp",
-              "ellipse-mass", "ellipse-nullspace", "ellipse-published", "ellipse-set-based",
-              "human", "humanoid", "reach-torque", "wipe")
+              "ellipse-inertia", "ellipse-mass", "ellipse-nullspace", "ellipse-published",
+              "ellipse-set-based", "human", "humanoid", "reach-torque", "wipe")
+_KUKA = [0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3]  # a configuration [rad]
+# Kinds of tasks that only users' scenarios have.
+_OTHERS = f"""
+name = "others"
+robot.model = "kuka_lwr"
+start.q = {_KUKA}
+damping.value = 1.0
+control = {{ stack = "hierarchical", resolver = "hcod" }}
+[[tasks]]
+kind = "coupling"
+joints = {{ joint_2 = 1.0, joint_5 = -0.5 }}
+[[tasks]]
+kind = "frame"
+frame = "end_effector"
+[[tasks]]
+kind = "relative"
+frame = "end_effector"
+to = "joint_3"
+[[tasks]]
+kind = "relative"
+name = "reach"
+frame = "end_effector"
+to = "joint_2"
+position = [0.4, 0.0, 0.5]
+orientation = false
+"""
 
 
 def main() -> None:
@@ -131,7 +157,8 @@ def _arrays(_: Path) -> None:
         explain(h, result)
         certify(h, result.x)
         result.verified(h)
-        make("hcod").solve(h.changed(give=np.append(np.ones(h.m - 1), 0.0)))
+        for name in ("hcod", "hqp"):
+            make(name).solve(h.changed(give=np.append(np.ones(h.m - 1), 0.0)))
 
 
 def _hierarchies() -> Iterator[tuple[Any, tuple[str, ...]]]:
@@ -159,8 +186,32 @@ def _robot(_: Path) -> None:
 
     robot = Robot.load("kuka_lwr")
     hand = Position(robot.frame("end_effector"), Still([0.3, 0.5, 0.1]))
-    solve_ik(robot, [0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3], [hand, Posture((0.5,) * 7)],
-             limits=True, dt=0.01)
+    solve_ik(robot, _KUKA, [hand, Posture((0.5,) * 7)], limits=True, dt=0.01)
+
+
+def _others(folder: Path) -> None:
+    """Run the tasks of no shipped scenario, at both levels."""
+    file = folder / "others.toml"
+    file.write_text(_OTHERS)
+    for level in ("velocity", "acceleration"):
+        _run(f"{file} --set control.level={level}", folder / level)
+
+
+def _tasks_of_pink(_: Path) -> None:
+    """Resolve tasks of another package, with its limits and its damping."""
+    import pink
+    from pink.tasks import FrameTask, PostureTask
+
+    from hierarchy import Robot
+    from solvers.adapters.for_pink import solve_ik
+
+    robot = Robot.load("kuka_lwr")
+    now = pink.Configuration(robot.model, robot.model.createData(), np.array(_KUKA))
+    tasks: list[Any] = [FrameTask("end_effector", 1.0, 0.5), PostureTask(cost=1.0)]
+    for task in tasks:
+        task.set_target_from_configuration(now)
+    for damping in (0.0, 0.1):
+        solve_ik(now, tasks, 0.01, damping=damping)
 
 
 def _batches(_: Path) -> None:
@@ -191,4 +242,5 @@ def _kept_factorised(_: Path) -> None:
 
 JOBS: dict[str, Callable[[Path], None]] = {
     **{name: partial(_run, name) for name in _SCENARIOS},
-    "arrays": _arrays, "robot": _robot, "batches": _batches, "kept": _kept_factorised}
+    "others": _others, "arrays": _arrays, "robot": _robot, "pink": _tasks_of_pink,
+    "batches": _batches, "kept": _kept_factorised}

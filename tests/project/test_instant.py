@@ -58,6 +58,14 @@ def test_commands_compile_nothing(tmp_path):
     assert compiled(code, tmp_path) == []
 
 
+def test_no_kind_of_task_compiles_anything(tmp_path):
+    code = ("from hierarchy import Stack\nfrom scene import TASKS, state_at, states\n"
+            "for task in TASKS.values():\n"
+            "    for level in 'velocity', 'acceleration':\n"
+            "        Stack([task], level).hierarchy(state_at(*states(1)[0]))")
+    assert compiled(code, tmp_path, PYTHONPATH=f"{ROOT}:{ROOT / 'tests' / 'helpers'}") == []
+
+
 def test_another_processor_makes_code_once_and_compiles_nothing(tmp_path):
     code = ("import numpy as np\nfrom hierarchy import Hierarchy\nfrom solvers import make\n"
             "box = np.eye(2), [-1.0] * 2, [1.0] * 2\n"
