@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import brief
+from hierarchy.errors import HierarchyError, brief
 from hierarchy.jit import bind, compiled, inlined
 from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import Kinematics
@@ -148,8 +148,9 @@ class Measured(Task):
         found = task.measure(state)
         function = found[0] if isinstance(found, tuple) and len(found) == 2 else None
         code = getattr(getattr(function, "py_func", function), "__code__", None)
-        task.refuse(code is not _rows.__code__, f"measure returned {brief(found)}; expected a "
-                    "function under @measured or @plain, and a tuple of what it reads")
+        if code is not _rows.__code__:
+            raise HierarchyError(f"task {task.name!r}: measure returned {brief(found)}; expected a "
+                                 "function under @measured or @plain, and a tuple of what it reads")
         return task, *found
 
     def _asked(self, state: State, level: Level, motion: Array) -> _Asked:
@@ -164,10 +165,15 @@ class Measured(Task):
     def _measured(self, state: State, kinematics: Kinematics | None = None
                   ) -> tuple[Array, Motion, Array]:
         """The Jacobian (m, n), the rest of what is measured, and the goal of each row (3, m)."""
-        return self._reader(state)(kinematics or state.kinematics)
+        J, motion, goal = self._reader(state)(kinematics or state.kinematics)
+        columns = cast("Measured", self.on(state.robot)).columns
+        return J, motion, np.asarray(np.hstack([goal, np.zeros((3, 1))])[:, columns])
 
     def _reader(self, state: State) -> Callable[[Kinematics], tuple[Array, Motion, Array]]:
-        """Return what `_measured` calls, for a state that moves; each call overwrites the last."""
+        """Return what `_measured` calls, for a state that moves; each call overwrites the last.
+
+        It gives the goal as kernels read it.
+        """
         task, function, reads = self._function(state)
         m = task.dimension
         J, sides, motion = np.zeros((m, state.n)), np.zeros((2, m)), np.zeros((8, m))
@@ -179,8 +185,7 @@ class Measured(Task):
                 move_goal(state.t)
             # Called, not bound: to bind takes 0.5 ms.
             function(kinematics, reads, asked, J, *sides)
-            return J, Motion(*motion[:4]), np.hstack([asked.goal, np.zeros((3, 1))])[
-                :, task.columns]
+            return J, Motion(*motion[:4]), asked.goal
 
         return read
 

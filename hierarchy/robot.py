@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hierarchy import plugins
 from hierarchy.avoidance.body import ControlPoint
@@ -338,6 +338,16 @@ class Robot:
                 zip(self.joint_names, list(self.model.jointPlacements)[1:],
                     list(self.model.inertias)[1:], strict=True), 1))
 
+    @cached_property
+    def supports(self) -> NDArray[np.bool_]:
+        """Whether a velocity moves a body (joints + 1, n); the first body is the world."""
+        supports = np.zeros((self.model.njoints, self.n), dtype=np.bool_)
+        for body in range(1, self.model.njoints):
+            for joint in self.model.supports[body].tolist()[1:]:  # the world is the first
+                first = self.model.joints[joint].idx_v
+                supports[body, first:first + self.model.joints[joint].nv] = True
+        return supports
+
     def position_limits(self) -> tuple[Array, Array]:
         """Return lower and upper (n,), (n,) [rad or m], one per velocity.
 
@@ -345,17 +355,22 @@ class Robot:
         RobotError if another joint with more coordinates than velocities has a limit.
         """
         lower, upper = self.lower[self.coordinates], self.upper[self.coordinates]
-        for name, joint in zip(self.joint_names, self.model.joints[1:], strict=True):
-            if joint.nq != joint.nv:
-                of = slice(joint.idx_q, joint.idx_q + joint.nq)
-                limits = np.abs([self.lower[of], self.upper[of]])
-                if (np.isfinite(limits) & (limits != _UNIT)).any():
-                    raise RobotError(f"robot {self.name!r}: joint {name!r} has {joint.nq} "
-                                     f"coordinates for {joint.nv} velocities; limits of its "
-                                     "positions are not supported")
-                lower[joint.idx_v:joint.idx_v + joint.nv] = -np.inf
-                upper[joint.idx_v:joint.idx_v + joint.nv] = np.inf
+        for name, of, moved in self._unbounded:
+            limits = np.abs([self.lower[of], self.upper[of]])
+            if (np.isfinite(limits) & (limits != _UNIT)).any():
+                raise RobotError(f"robot {self.name!r}: joint {name!r} has {of.stop - of.start} "
+                                 f"coordinates for {moved.stop - moved.start} velocities; limits "
+                                 "of its positions are not supported")
+            lower[moved], upper[moved] = -np.inf, np.inf
         return lower, upper
+
+    @cached_property
+    def _unbounded(self) -> list[tuple[str, slice, slice]]:
+        """The joints with more coordinates than velocities, with their spans in q and v."""
+        return [(name, slice(joint.idx_q, joint.idx_q + joint.nq),
+                 slice(joint.idx_v, joint.idx_v + joint.nv))
+                for name, joint in zip(self.joint_names, self.model.joints[1:], strict=True)
+                if joint.nq != joint.nv]
 
     def configuration(self, values: ArrayLike | Mapping[str, ArrayLike],
                       q: ArrayLike | None = None) -> Array:

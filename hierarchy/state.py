@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 from numba.core.errors import NumbaError
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.errors import RobotError, brief, expect, naming, number, refuse
@@ -84,7 +84,7 @@ class State:
         self._compute()
         self.J, self.dJ = _columns(self._data.J, 6), _columns(self._data.dJ, 6)
         self.placements = _placements_view(self._data, robot.model.njoints)
-        self.supports = _supports(robot.model)
+        self.supports = robot.supports.copy()
         self.period = differences or 0.0
         self.previous_J = self.J.copy(order="F")
         self.previous_placements = self.placements.copy()
@@ -102,12 +102,20 @@ class State:
         another length than one, see `Robot.normalised`.
         """
         expect("State.at: robot", robot, Robot, "make one with Robot.load(name or file)")
-        number("State.at: t", t)
         state = cls(robot, differences)
-        state.move(t, robot.normalised(_checked(robot, "q", q, robot.coordinate_names)),
-                   _checked(robot, "v", np.zeros(robot.n) if v is None else v,
-                            robot.velocity_names))
+        state.go(q, v, t)
         return state
+
+    def go(self, q: ArrayLike, v: ArrayLike | None = None, t: float = 0.0) -> None:
+        """Go where `at` makes a state, and raise what it raises; `move` is for a loop."""
+        robot = self.robot
+        number("State: t", t)
+        v = np.zeros(robot.n) if v is None else v
+        if robot.nq == robot.n and _like(q, self.q) and _like(v, self.v) and self.move(t, q, v):
+            return
+        q = _checked(robot, "q", q, robot.coordinate_names)
+        v = _checked(robot, "v", v, robot.velocity_names)
+        self.move(t, robot.normalised(q), v)
 
     def __repr__(self) -> str:
         return f"State({self.robot!r}, t={self.t:g}, q={numbers(self.q)})"
@@ -263,11 +271,10 @@ def _placements_view(data: Any, joints: int) -> Array:
     """One (joints, 12) view over pinocchio's contiguous vector of placements."""
     first = data.oMi[0].rotation
     view = np.lib.stride_tricks.as_strided(first.T.reshape(-1), (joints, 12), (96, 8))
-    for i in range(joints):
-        here = data.oMi[i]
-        if not (np.shares_memory(view, here.translation)
-                and (view[i] == np.r_[here.rotation.T.ravel(), here.translation]).all()):
-            raise RobotError("this version of pinocchio has an unknown layout of placements")
+    last = data.oMi[joints - 1]
+    if not (np.shares_memory(view, last.translation)
+            and (view[-1] == np.r_[last.rotation.T.ravel(), last.translation]).all()):
+        raise RobotError("this version of pinocchio has an unknown layout of placements")
     return view
 
 
@@ -276,14 +283,10 @@ def _columns(matrix: Array, rows: int) -> Array:
     return matrix.reshape((rows, -1), order="F")
 
 
-def _supports(model: Any) -> NDArray[np.bool_]:
-    supports = np.zeros((model.njoints, model.nv), dtype=np.bool_)
-    for body in range(1, model.njoints):
-        for joint in model.supports[body].tolist():
-            if joint > 0:
-                first = model.joints[joint].idx_v
-                supports[body, first:first + model.joints[joint].nv] = True
-    return supports
+def _like(value: ArrayLike, array: Array) -> TypeGuard[Array]:
+    """Whether a value is an array of the same kind."""
+    return (type(value) is np.ndarray and value.dtype == array.dtype
+            and value.shape == array.shape and value.flags.c_contiguous)
 
 
 def _checked(robot: Robot, what: str, value: ArrayLike, names: Sequence[str]) -> Array:
@@ -294,6 +297,7 @@ def _checked(robot: Robot, what: str, value: ArrayLike, names: Sequence[str]) ->
                 if what == "q" and robot.nq != robot.n else "")
         raise RobotError(f"robot {robot.name!r}: {what} has shape {vector.shape}, "
                          f"expected ({len(names)},){more}")
-    for (i,) in np.argwhere(~np.isfinite(vector))[:1]:
+    if not np.isfinite(vector).all():
+        i = int(np.flatnonzero(~np.isfinite(vector))[0])
         raise RobotError(f"robot {robot.name!r}: {what}[{i}] ({names[i]}) is {vector[i]}")
     return vector

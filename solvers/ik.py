@@ -4,9 +4,13 @@ It is here, above the resolvers and below scenarios, because it joins a stack of
 resolver and needs nothing else. Like the adapters it meets pinocchio only through `hierarchy`.
 """
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Sequence
-from typing import NamedTuple, overload
+from operator import is_
+from threading import Lock
+from typing import NamedTuple, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,10 +35,17 @@ _warned: set[tuple[str, ...]] = set()  # joints without velocity limits that wer
 
 
 class Memory(NamedTuple):
-    """What the next call of `solve_ik` starts from: the resolver's memory, and the last v (n,)."""
+    """What the next call of `solve_ik` starts from.
+
+    The resolver's memory, the last v (n,), and, for the same objects, what the call has set up.
+    """
 
     resolver: Array | None
     v: Array
+    set_up: _SetUp | None = None
+
+    def __repr__(self) -> str:
+        return f"Memory(v={numbers(self.v)})"
 
 
 class Step(NamedTuple):
@@ -68,8 +79,9 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
              damping: float = 1.0, until: float | None = None) -> Step | Reached:
     """Return the joint velocity that serves `tasks` at q, most important first.
 
-    Move on with `q = robot.integrate(q, step.v * dt)`. A loop at a fixed rate saves the set-up of
-    each call with a `Stack` and a `State` of its own, see docs/loop.md.
+    Move on with `q = robot.integrate(q, step.v * dt)`. With the `memory` of the last call and the
+    same objects, tasks among them, what that call has set up serves again, which saves most of the
+    time; for loops of a fixed rate see docs/loop.md.
 
     q : (nq,) joint positions [rad or m].
     tasks : tasks of `hierarchy.tasks`, plugins or your own, at velocity level.
@@ -91,6 +103,14 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     period of a task, a gain times dt is above 2 or a rate times dt above 1, or the resolver cannot
     handle a row. A numerical failure is a status, with a finite v.
     """
+    resolver_memory, before = _before(memory, v, limits)
+    made = None if memory is None else memory.set_up
+    asked = robot, tasks, limits, resolver, dt, damping
+    if made is not None and until is None and made.serves(*asked) and made.lock.acquire(False):
+        try:
+            return made.step(q, before, t, resolver_memory)
+        finally:
+            made.lock.release()
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
     expect_each("solve_ik: tasks", tasks, Task, "give a list of tasks")
     positive("solve_ik: dt [s]", dt)
@@ -100,38 +120,34 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     if not isinstance(resolver, str):
         expect("solve_ik: resolver", resolver, Resolver, "give a name of solvers.names()")
     number("solve_ik: damping", damping, 0.0)
-    inner = make(resolver) if isinstance(resolver, str) else resolver
     if until is not None:
         if isinstance(limits, Task):
             raise HierarchyError(f"solve_ik: with until, limits are True or False, not the task "
                                  f"{limits.name!r}: a configuration has no speed")
-        return reach(robot, q, tasks, until, limits=limits, resolver=inner, t=t, damping=damping)
-    begun, before = _before(memory, v, limits)
-    state = State.at(robot, q, before, t)
-    state.commanded = state.v.copy()
+        return reach(robot, q, tasks, until, limits=limits, resolver=_resolver(resolver), t=t,
+                     damping=damping)
+    step = _SetUp(*asked).step(q, before, t, resolver_memory)
     if limits is True:
         _warn_of_speeds(robot)
-    box = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
-    stack, settled = stacked(robot, tasks, dt, box, inner, damping)
-    for task in (*box, *tasks):
-        check_period(task, dt)
-    found = _solved(robot, state.q, stack.hierarchy(state), settled, begun)
-    return Step(found.x, found.status, Memory(found.memory, found.x.copy()))
+    return step
 
 
-def _solved(robot: Robot, q: Array, h: Hierarchy, resolver: Settled,
-            memory: Array | None) -> Resolution:
+def _resolver(asked: str | Resolver) -> Resolver:
+    return make(asked) if isinstance(asked, str) else asked
+
+
+def _solved(state: State, h: Hierarchy, resolver: Settled, memory: Array | None) -> Resolution:
     """Solve, and where the mechanism bends within the period again with that on its sides.
 
     Beside a singular configuration that may diverge: the first answer then counts.
     """
     plain = found = resolver.solve(h, memory)
-    if not bends(robot):
+    if not bends(state.robot):
         return found
-    mechanism, first = Mechanism(robot), h.offsets[h.names.index(MECHANISM)]
+    mechanism, first = Mechanism(state.robot), h.offsets[h.names.index(MECHANISM)]
     before, change = np.zeros(1), np.inf
     for _ in range(_MOST_BENDS):
-        bend = mechanism.bend(q, found.x, resolver.period)
+        bend = mechanism.bend(state.q, found.x, resolver.period)
         last, change = change, np.abs(bend - before).max(initial=0.0)
         if change < _STRAIGHT:
             break
@@ -165,3 +181,40 @@ def _warn_of_speeds(robot: Robot) -> None:
         _warned.add((robot.name, *free))
         warnings.warn(f"robot {robot.name!r} has no velocity limit for {listed(free)}: limits=True "
                       "does not limit their speed; set robot.velocity_limit", stacklevel=3)
+
+
+@final
+class _SetUp:
+    """What calls with the same objects share: a state, and the stack of the tasks over it.
+
+    A copy, also one in another process, is None.
+    """
+
+    def __init__(self, robot: Robot, tasks: Sequence[Task], limits: bool | Task,
+                 resolver: str | Resolver, dt: float, damping: float) -> None:
+        self._objects, self._numbers = (robot, limits, resolver, *tasks), (dt, damping)
+        self.state, self.lock = State(robot), Lock()
+        box = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
+        self.stack, self.resolver = stacked(robot, tasks, dt, box, _resolver(resolver), damping)
+        for task in (*box, *tasks):
+            check_period(task, dt)
+
+    def serves(self, robot: Robot, tasks: Sequence[Task], limits: bool | Task,
+               resolver: str | Resolver, dt: float, damping: float) -> bool:
+        """Whether it is made of these."""
+        objects = robot, limits, resolver, *(tasks if isinstance(tasks, list | tuple) else ())
+        return (len(objects) == len(self._objects) and all(map(is_, objects, self._objects))
+                and isinstance(dt, int | float) and isinstance(damping, int | float)
+                and (dt, damping) == self._numbers)
+
+    def step(self, q: ArrayLike, v: ArrayLike | None, t: float, memory: Array | None) -> Step:
+        """Return the answer at q and v; the memory is the resolver's."""
+        state = self.state
+        state.go(q, v, t)
+        state.commanded = state.v.copy()
+        found = _solved(state, self.stack.hierarchy(state), self.resolver, memory)
+        return Step(found.x, found.status, Memory(found.memory, found.x.copy(), self))
+
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """Copy as None."""
+        return type(None), ()

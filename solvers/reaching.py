@@ -120,6 +120,7 @@ class _Search:
         self.changed = [(task, factor) for task, factor in zip(tasks, factors, strict=True)
                         if factor != 1.0 or np.any(task.desired_velocity(state))]
         self.state, self.status = state, Status.SOLVED
+        self._read = {task.name: task.error_reader(state) for task in tasks}
 
     def within_limits(self, q: Array) -> Array:
         """Return q with the joints that are beyond a limit on it, from which steps do not leave."""
@@ -181,7 +182,7 @@ class _Search:
         return broken if broken > _AT else 0.0
 
     def _missed(self, task: Task) -> float:
-        error = task.error(self.state)
+        error = self._read[task.name]()
         return float(np.linalg.norm(np.maximum(error, 0.0) if task.kind == "inequality"
                                     else error))
 

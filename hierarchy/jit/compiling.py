@@ -58,7 +58,7 @@ def _compiled(function: Kernel, kind: type[Cached] | None = None, nogil: bool = 
                              _nrt=allocates, no_cpython_wrapper=kind is not None,
                              no_cfunc_wrapper=True)(function)
     kernel.__class__ = kind or Cached
-    kernel.allocates, kernel.ready = allocates, {}
+    kernel.allocates, kernel.ready, kernel.bound = allocates, {}, {}
     return kernel  # type: ignore[no-any-return]
 
 
@@ -88,6 +88,7 @@ class Cached(CPUDispatcher):  # type: ignore[misc]
     kept = True  # on disk
     is_named = True  # in code that calls it, not linked into it
     ready: dict[Any, Any]  # entries for Python by types of arguments, compiled ahead
+    bound: dict[Any, Any]  # entries by what types depend on, as `bind` has asked for them
     _cache: Any
 
     def entry(self, kinds: tuple[Any, ...]) -> Any:
@@ -159,19 +160,18 @@ def bind(kernel: Kernel, *arguments: Any, then: tuple[Any, ...] = ()) -> Callabl
     dispatcher: Any = kernel
     if not hasattr(dispatcher, "overloads"):  # NUMBA_DISABLE_JIT
         return partial(kernel, *arguments)
-    types = tuple(_type_of(value) for value in (*arguments, *then))
-    entry = dispatcher.entry(types)
+    given = *arguments, *then
+    types = tuple(map(_type_of, given))
+    entry = dispatcher.bound.get(types)
+    if entry is None:
+        entry = dispatcher.bound[types] = dispatcher.entry(tuple(map(numba.typeof, given)))
     return partial(entry, *arguments) if arguments else entry
 
 
-_TYPES: dict[tuple[Any, ...], Any] = {}
-
-
 def _type_of(value: Any) -> Any:
-    """Return numba's type of a value; types of arrays are cached, since finding one takes 4 us."""
-    if not isinstance(value, np.ndarray):
-        return numba.typeof(value)
-    kind = value.dtype, value.ndim, value.flags.num
-    if kind not in _TYPES:
-        _TYPES[kind] = numba.typeof(value)
-    return _TYPES[kind]
+    """Return what numba's type of a value depends on, since making the type takes 4 us an array."""
+    if isinstance(value, np.ndarray):
+        return value.dtype, value.ndim, value.flags.num
+    if isinstance(value, tuple):
+        return type(value), *map(_type_of, value)
+    return numba.typeof(value)

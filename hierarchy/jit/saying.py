@@ -27,7 +27,7 @@ class _Compilations(event.Listener):  # type: ignore[misc]
         now = monotonic()
         if self._begun > 0.0 and now - self._said > _EVERY:
             self._said = now
-            say(f"{self._count} kernels in {now - self._begun:.0f} s, of at most some 80 ...")
+            say(f"{self._count} kernels in {now - self._begun:.0f} s ...")
 
 
 def _is_own(event: Any) -> bool:

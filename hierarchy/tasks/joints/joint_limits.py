@@ -194,7 +194,7 @@ class StepLimits(JointRows):
     def box(self, state: State) -> tuple[Array, Array]:
         """Least and largest velocity of each joint (n,), (n,) [rad/s or m/s]."""
         q, fastest = state.q[self.robot.coordinates], self.robot.velocity_limit
-        lower, upper = (np.clip(self.gain * (side - q), -fastest, fastest)
+        lower, upper = (np.minimum(np.maximum(self.gain * (side - q), -fastest), fastest)
                         for side in self.robot.position_limits())
         return lower, upper
 
@@ -205,9 +205,10 @@ class StepLimits(JointRows):
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; for velocity level."""
         self.refuse(level != "velocity", "for velocity level; see JointLimits")
+        unit = np.eye(state.n)
 
         def write() -> None:
-            rows.A[:] = np.eye(state.n)
+            rows.A[:] = unit
             rows.lower[:], rows.upper[:] = self.box(state)
 
         return write
