@@ -30,6 +30,7 @@ TASKS = {
     "frame": tasks.FrameLog(FRAME, Still((0.1, 0.5, 0.1)), np.eye(3)[[1, 2, 0]]),
     "centre of mass": tasks.CentreOfMass(ROBOT, PATH),
     "centre of mass, x and z": tasks.CentreOfMass(ROBOT, PATH, (0, 2)),
+    "momentum": tasks.Momentum(),
     "posture": tasks.Posture((0.1,) * 7), "damping": tasks.JointDamping(7),
     "relative pose": tasks.RelativePose(FRAME, ROBOT.frame("joint_3"), (0.1, 0.2, 0.3),
                                   np.eye(3)[[1, 2, 0]]),

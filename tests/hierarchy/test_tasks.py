@@ -69,6 +69,16 @@ def test_jacobian_derivative_agrees_with_central_differences(name):
         np.testing.assert_allclose(task.jacobian_derivative(state), difference, rtol, atol)
 
 
+@pytest.mark.parametrize("name", ["posture", "coupling", "frame", "momentum"])
+def test_exact_derivatives_take_no_difference_of_ticks(name):
+    (q, v), (_, other) = STATES[:2]
+    states = [state_at(q, v, differences=differences) for differences in (None, 1e-3)]
+    for state in states:
+        state.move(0.7, q + 0.01 * other, other)
+    exact, ticked = (TASKS[name].jacobian_derivative(state) for state in states)
+    np.testing.assert_array_equal(ticked, exact)
+
+
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("differences", [None, 1e-3])
 @pytest.mark.parametrize("name", TASKS)

@@ -31,7 +31,8 @@ def ticks(live, count):
         live.tick()
 
 
-def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_its_settings():
+def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_its_settings(
+        tmp_path):
     live, recording = Live(LIMITED), simulate(LIMITED)
     ticks(live, 700)
     assert live.over
@@ -45,6 +46,9 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_
     live.drag(0, (0.0, 0.0, 0.1))
     live.change({"pointing.alpha_d": 15.0})
     ticks(live, 50)
+    live.save(tmp_path / "run")
+    kept = json.loads((tmp_path / "run" / "changes.json").read_text())
+    assert [(one["t"], one["key"]) for one in kept][-1] == (0.01, "pointing.alpha_d")
     live.restart()
     assert (live.t, live.changes, live.over) == (0.0, [], False)
     assert live.scenario.pointing.alpha_d == 15.0
