@@ -10,7 +10,8 @@ limit is damped as one that is singular. Then level by level
 
 and last the distance to the reference. c_k is the x of the staircase without what level k adds to
 it. So each level alone has that x for its minimum, and keeps it where inequalities allow. No lambda
-depends on which of them act, and what a level hands down is unique: x is continuous in the sides.
+depends on which of them act, and what a level hands down is unique: x is continuous in the sides,
+except where those of a row meet, which makes an equality of it.
 """
 
 from typing import NamedTuple

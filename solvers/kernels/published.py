@@ -1,8 +1,8 @@
 """The task priority matrix as published: plain QR (8), Gauss-Jordan with pivot blocks (9)-(10).
 
-It gives the answer of the recursion only while no level above the last loses rank, or freedom
-remains: a level occupies as many columns of Q as it has rows, whether it can use them or not. For
-m > n, zero columns extend J to a square matrix.
+A level occupies as many columns of Q as it has rows, whether it can use them or not. So where one
+above the last loses rank it gives the answer of the recursion only if no lower level needs the
+columns that are wasted. For m > n, zero columns extend J to a square matrix.
 """
 
 from typing import NamedTuple

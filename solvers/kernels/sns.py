@@ -471,13 +471,14 @@ def _hold_again(space, seen, x, above, count, least):
 def _to_reference(space, x, rank):
     """Move x inside the box, in the columns of Q that no task has; return the number of steps.
 
-    Without release: to x plus the reference as far as the bounds allow, holding joints that reach
-    one. With release: to the x nearest to the reference.
+    Without release: by the reference minus x_0 as far as the bounds allow, holding joints that
+    reach one. With release: to the x nearest to the reference.
     """
     n, ways, release = x.size, space.line, space.release
     d, target, no_rows = ways[0], ways[1], ways[:0]
     for j in range(n):
-        space.side[j], target[j] = 0.0, space.reference[j] + (0.0 if release else x[j])
+        start = min(max(0.0, space.low[j]), space.up[j])  # x_0
+        space.side[j], target[j] = 0.0, space.reference[j] + (0.0 if release else x[j] - start)
     count, steps = 0, 0
     while steps < 4 * n + 2:
         steps += 1

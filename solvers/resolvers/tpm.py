@@ -43,9 +43,9 @@ class Tpm(Resolver):
         keeps the bounds to rounding; its `scaling` is max(0, 1 - |A_k x - b_k| / |b_k|), exactly 1
         for a level that is met.
     form = "published", also `make("tpm-published")`: plain QR and Gauss-Jordan elimination as
-        printed. It departs from the strict answer where a level above the last loses rank and no
-        freedom remains. Equalities only; its rank_tolerance is absolute for singular values, times
-        the largest row norm of J.
+        printed. It departs from the strict answer where a level above the last loses rank and a
+        lower one needs the column of Q that this wastes. Equalities only; its rank_tolerance is
+        absolute for the singular values of pivots, times the largest row norm of J.
 
     See docs/theory/tpm.md, and docs/theory/strict.md for damping.
     """

@@ -169,6 +169,13 @@ def test_the_optimal_form_ends_nearest_to_the_reference():
             assert np.linalg.norm(x - h.reference) <= distance + 1e-8 * (1.0 + distance)
 
 
+def test_where_no_bound_acts_x_is_that_of_the_recursion_also_in_a_box_without_zero():
+    """The basic form added the reference to the x that it starts from: 1.5 instead of 1."""
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0])], [1.0, 1.0])
+    for resolver in (BASIC, OPTIMAL):
+        np.testing.assert_allclose(resolver.solve(boxed(h, 0.5, 2.0)).x, [1.0, 1.0], atol=1e-12)
+
+
 def test_a_level_without_any_scaling_adds_nothing_and_scaling_what_is_missed_helps():
     """Level 1 already moves joint 1 by -1, and 0.5 is all that the box leaves level 2."""
     h = Hierarchy.from_levels([([[1.0, 0.0]], [-1.0]), ([[1.0, 1.0]], [1.0])])

@@ -121,6 +121,20 @@ def test_a_joint_that_a_light_row_fixes_among_bounds_is_not_damped(name):
     np.testing.assert_allclose(x, [0.5, 0.3], rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("name", ["tpm", "hcod"])
+@pytest.mark.parametrize("damping", [0.0, 0.2])
+def test_a_joint_at_its_bound_is_said_to_be_there(name, damping):
+    """With damping levels below found the bound without force: half of the joints were not."""
+    for seed in range(40):
+        r = np.random.default_rng([seed, 4102])
+        up = r.uniform(0.1, 1.0, 5)
+        tasks = [(r.normal(size=(2, 5)), 2.0 * r.normal(size=2)) for _ in range(2)]
+        h = Hierarchy.from_levels([(np.eye(5), -up, up), *tasks])
+        res = make(name, damping=damping, threshold=1.0).solve(h)
+        said = getattr(res, "saturated", res.active[:5] if name == "hcod" else np.zeros(5))
+        np.testing.assert_array_equal(said, np.sign(res.x) * (np.abs(res.x) >= up - 1e-12))
+
+
 @pytest.mark.parametrize("damping", [0.0, 0.1])
 @pytest.mark.parametrize("lower", [-np.inf, -0.5])
 def test_a_bound_beyond_the_largest_number_is_a_failure_with_a_finite_x(damping, lower):

@@ -9,7 +9,7 @@ the claims are verified, and nothing is SOLVED otherwise.
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, internal
+from hierarchy.jit import compiled, inlined, inner_product, internal
 from solvers.kernels.active_set.levels import pass_through_levels
 from solvers.kernels.active_set.multipliers import write_multipliers
 from solvers.kernels.active_set.search import pivot_in_blocks, pivot_one_by_one, save
@@ -53,6 +53,7 @@ from solvers.kernels.tolerances import (
     DEARER,
     INDEPENDENT,
     LARGER,
+    LEVEL_MET,
     MET,
     PASS_STEPS,
     PATIENCE,
@@ -147,7 +148,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
                                inner[:3 * rows + 3], limits, work[at:])
         if k <= last:
             d.sizes[k] -= n
-        _add_record(record, inner, lower, upper, d, rows, end, k)
+        _add_record(record, inner, lower, upper, d, x, end, k)
         limits[MOST] -= inner[3 * rows] + inner[3 * rows + 1]
         if limits[MOST] < 1.0 and k <= last and code == SOLVED:
             code = ITERATION_LIMIT
@@ -165,16 +166,27 @@ def solve(A, lower, upper, sizes, x, record, settings, work):
 
 
 @inlined
-def _add_record(record, inner, lower, upper, d, rows, end, k):
-    """Add the result of a level: states of rows, and which rows hold it back."""
-    m = lower.size
+def _add_record(record, inner, lower, upper, d, x, end, k):
+    """Add the result of a level: states of rows, and which rows hold it back.
+
+    A row that a level above has brought to its side stays active while x is there.
+    """
+    m, rows = lower.size, end + (x.size if k < d.factor.size else 0)
     for i in range(end):
         missed = d.lower[i] < lower[i] or d.upper[i] > upper[i]  # by a level before
-        record[i] = record[i] if missed else inner[i]
+        stays = inner[i] == FREE and _stays(d.A[i], lower[i], upper[i], record[i], x)
+        record[i] = record[i] if missed or stays else inner[i]
         if record[m + i] < 0.0 and 0.0 <= inner[rows + i] <= k:
             record[m + i], record[2 * m + i] = inner[rows + i], inner[2 * rows + i]
     record[3 * m] += inner[3 * rows]
     record[3 * m + 1] += inner[3 * rows + 1]
+
+
+@inlined
+def _stays(a, low, up, state, x):
+    """Whether x is at the side of a row that is active there by its state."""
+    side = up if state > 0.0 else low
+    return abs(state) == 1.0 and abs(inner_product(a, x) - side) <= LEVEL_MET * (1.0 + abs(side))
 
 
 @inlined
