@@ -52,6 +52,15 @@ def test_a_setting_that_makes_no_sense_is_named_with_its_value(name, settings):
         make("hqp", form="slak")
 
 
+def test_both_forms_of_hqp_damp_alike():
+    r = np.random.default_rng(0)
+    h = Hierarchy.from_levels([(r.normal(size=(m, 5)), r.normal(size=m)) for m in (2, 1, 2)])
+    forms = [make("hqp", form=form, damping=0.3, threshold=1.0).solve(h).x
+             for form in ("null-space", "slack")]
+    np.testing.assert_allclose(*forms, atol=1e-7)
+    assert np.abs(make("hqp").solve(h).x - forms[0]).max() > 1e-3
+
+
 def test_settings_of_parts_are_named():
     for scales, said in (({"hand": 0.0}, ": 'hand'"), (("hand",), " = ('hand',), expected")):
         refused(f"merged: scales{said}", make, "merged", scales=scales)
