@@ -146,7 +146,8 @@ def doubtful_units(section: Section, above: str = "") -> Iterator[str]:
     """Yield what stands in a section in another unit than its own, by its size."""
     for name, field in type(section).model_fields.items():
         key, value = f"{above}{field.alias or name}", getattr(section, name)
-        units = {unit.name for unit in parts_of((field.annotation, *field.metadata), Unit)}
+        units = {unit.name for unit in parts_of((field.annotation, *field.metadata), Unit)
+                 if unit.doubted}
         unit = units.pop() if len(units) == 1 else ""
         least, largest, remark = _USUAL.get(unit, (0.0, inf, ""))
         for where, one in _leaves(value, key):

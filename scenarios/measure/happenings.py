@@ -27,7 +27,8 @@ _LARGEST = 3       # jumps
 _LOOKED_AT = 20   # ticks of a level, spread over those in which it was missed
 _LEAST = 0.01     # share of a level's ticks: what is given up for less is not said
 _OFTEN = 0.25     # share of the ticks looked at: what holds back less often is not said
-_UNITS = {"torque": "N m", "acceleration": "rad/s^2", "velocity": "rad/s"}
+_TORQUE = {"rad": "N m", "m": "N"}
+_PER = {"acceleration": "/s^2", "velocity": "/s"}
 
 Shares = tuple[tuple[str, float], ...]
 
@@ -51,13 +52,13 @@ def jumps(recording: Recording, tick: int | None = None,
           least: Mapping[str, float] | None = None) -> list[Jump]:
     """Return the three largest changes of a run's command, or that into one tick, with causes.
 
-    `least` has, by its unit, the change from which on they are meant. Raises HierarchyError for a
+    `least` has, by level, the change from which on they are meant. Raises HierarchyError for a
     tick that the run does not have, or the first.
     """
     refuse(tick is not None and not 0 < whole("tick", tick) < recording.ticks, f"tick {tick}: the "
            f"run has ticks 0 to {recording.ticks - 1}, and a change needs the one before")
     step = np.nan_to_num(np.abs(np.diff(recording["command"], axis=0))).max(axis=1, initial=0.0)
-    above = (least or {}).get(_UNITS[recording.scenario.control.level], 0.0)
+    above = (least or {}).get(recording.scenario.control.level, 0.0)
     ticks = [k + 1 for k in np.argsort(-step, kind="stable")[:_LARGEST] if step[k] > above]
     if not ticks and tick is None:
         return []
@@ -68,9 +69,11 @@ def jumps(recording: Recording, tick: int | None = None,
     for k, solve in solves.items():
         change = np.nan_to_num(np.abs(recording["command"][k] - recording["command"][k - 1]))
         i = int(change.argmax())
-        joint = cell.robot.velocity_names[cell.robot.n - len(change) + i]
-        found.append(Jump(k, float(recording["t"][k]), f"{level} of {joint}", float(change[i]),
-                          _UNITS[level], tuple(_causes(recording, cell, rows, k, solve))))
+        joint, of = cell.robot.n - len(change) + i, cell.robot
+        unit = of.velocity_units[joint]
+        unit = _TORQUE[unit] if level == "torque" else unit + _PER[level]
+        found.append(Jump(k, float(recording["t"][k]), f"{level} of {of.velocity_names[joint]}",
+                          float(change[i]), unit, tuple(_causes(recording, cell, rows, k, solve))))
     return found
 
 

@@ -105,6 +105,14 @@ def test_a_file_alone_loads_no_code(what, command, folder):
     assert "plugin 'doors_of_mine' cannot be imported: ZeroDivisionError" in text
 
 
+def test_the_kinds_of_a_plugin_are_explained_and_a_wrong_key_meets_only_its_own(command):
+    said = command("help elbow --plugin doors_of_mine").out
+    assert said.startswith('[[tasks]] with kind = "elbow"')
+    assert "  joint: string, required" in said
+    said = command("check own.toml --plugin doors_of_mine --set tasks.0.joynt=1", code=2).err
+    assert "unknown key 'tasks.0.joynt'; did you mean 'tasks.0.joint'? Known: angle," in said
+
+
 def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():
     plugins.allow("doors_of_mine")
     scenario = load("own.toml")

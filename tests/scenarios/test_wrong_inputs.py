@@ -13,6 +13,7 @@ from hierarchy.tasks import JointLimits, Position, SelfSeparation
 from scenarios import compare, load, save, simulate
 from scenarios.cli.terminal import lines
 from scenarios.config import ScenarioError
+from scenarios.config.validation import doubtful_units
 from scenarios.toml_text import read_toml
 from solvers import Resolution, Resolver, Status, certify, explain, make, solve_ik
 
@@ -45,6 +46,14 @@ def test_sections_of_another_kind_are_replaced_by_a_file_that_extends_and_by_key
     for changes in (["position.path.kind=waypoints", *WAYPOINTS],
                     [*WAYPOINTS, "position.path.kind=waypoints"]):
         assert load("ellipse", changes).position.path.times == (0.0, 1.0)
+
+
+def test_a_point_far_away_that_stands_for_a_direction_is_not_taken_for_millimetres():
+    given = {"kind": "look-at", "frame": "end_effector", "target": [0.0, 0.0, -1000.0]}
+    assert not list(doubtful_units(load("dual-arm", {"tasks": [given]})))
+    given |= {"kind": "position", "offset": given.pop("target")}
+    assert [*doubtful_units(load("dual-arm", {"tasks": [given]}))] == [
+        "tasks.0.offset.2 = -1000 m: lengths are in metres, not in millimetres"]
 
 
 def test_obstacles_are_reached_by_number_or_all_at_once():

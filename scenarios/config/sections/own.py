@@ -72,7 +72,8 @@ class OwnSection(PartSection):
             for name, parameter in _parameters(maker).items()
             if name not in (*GIVEN[cls.group], *cls.model_fields)
             for kind in (_in_a_file(parameter.annotation),)}
-        made = create_model(cls.__name__, __base__=cls, __doc__=cls.__doc__, **fields)
+        made = create_model(cls.__name__, __base__=cls, __doc__=maker.__doc__ or cls.__doc__,
+                            **fields)
         made.maker = maker
         return made
 
