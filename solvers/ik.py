@@ -109,6 +109,7 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     begun, before = _before(memory, v, limits)
     state = State.at(robot, q, before, t)
     state.commanded = state.v.copy()
+    _warn_of_degrees(robot, state.q)
     if limits is True:
         _warn_of_speeds(robot)
     box = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
@@ -155,6 +156,15 @@ def _before(memory: Memory | None, v: ArrayLike | None,
                              "velocity of the tick before (zeros at rest), or the memory of the "
                              "last step, which has it")
     return None, v
+
+
+def _warn_of_degrees(robot: Robot, q: Array) -> None:
+    """Warn of a joint that is more than a turn beyond its limits, as no angle in radians is."""
+    beyond = np.maximum(robot.lower - q, q - robot.upper)
+    for i in np.flatnonzero(beyond > 2.0 * np.pi)[:1]:
+        warnings.warn(f"solve_ik: {robot.coordinate_names[i]} at {q[i]:g} is far beyond its "
+                      f"limits, {robot.lower[i]:.4g} to {robot.upper[i]:.4g}. Are these degrees?",
+                      stacklevel=3)
 
 
 def _warn_of_speeds(robot: Robot) -> None:
