@@ -11,7 +11,7 @@ from scenarios.measure.metric import Criteria, Metric, known, largest, least, pa
 from scenarios.recording.recording import Recording
 
 _ON_IT = 1e-4  # [m] below a distance that still counts as keeping it
-STEPS = {"velocity": 0.1, "acceleration": 50.0, "torque": 5.0}
+_STEPS = {"velocity": 0.1, "acceleration": 50.0, "torque": 5.0}
 """[rad/s, rad/s^2, N m] or the same with m and N, from one tick to the next: larger ones count."""
 _ROUNDING = 1e-9   # of such a step that still counts as not larger, as at a limit of acceleration
 _LOAD = 1.0        # [N] from which a contact counts as loaded
@@ -87,13 +87,18 @@ def units_of(recording: Recording, per: str = "") -> str:
     return " or ".join(f"{unit}{per}" for unit in sorted({*joints}, reverse=True)) or f"rad{per}"
 
 
+def counted_from(level: str) -> float:
+    """Return the step of a command of a level, in its unit, above which one is counted."""
+    return _STEPS[level] * (1.0 + _ROUNDING)
+
+
 def steps(key: str, label: str, values: Array, unit: str, note: str = "", group: str = "Safety"
           ) -> Iterator[Metric]:
     """Yield the largest step of values (T, n) between two ticks, and the ticks with large ones."""
-    step, bound = np.abs(np.diff(values, axis=0)), STEPS[key]
+    step, bound = np.abs(np.diff(values, axis=0)), _STEPS[key]
     yield Metric(f"{key}_step_max", f"{label} step, max", largest(known(step)), unit, group=group,
                  note=note)
-    large = float(np.count_nonzero((step > bound * (1.0 + _ROUNDING)).any(axis=1)))
+    large = float(np.count_nonzero((step > counted_from(key)).any(axis=1)))
     yield Metric(f"{key}_step_ticks", f"{label} steps above {bound:g} {unit.replace('^2', '²')}",
                  large, "", group=group, note="ticks")
 
