@@ -21,6 +21,7 @@ from scenarios.scene import Stage, ends, frames_at, moved_by_tasks, stage
 _VERTICES = 800
 _OTHER_POSES = 5
 _AREA_ALPHAS = (0.08, 0.18)  # of the outer and the inner area
+_HAIR = 1e-6  # [m] radius of an edge: a board without one has no area as seen along it
 _NEAR = 1.0  # [m] from the end effector: moving obstacles farther away are left out
 _DESIRED = (0, (3, 3))  # dashes
 
@@ -108,7 +109,7 @@ def hull(obstacle: Obstacle) -> tuple[Array, float]:
 def _hull(ax: Axes, flat: Array, radius: float, alpha: float) -> None:
     """Draw the hull of discs about points (K, 2)."""
     if radius > 0.0 or len(flat) > 1:
-        rims = (flat[:, None] + radius * _ROUND).reshape(-1, 2)
+        rims = (flat[:, None] + max(radius, _HAIR) * _ROUND).reshape(-1, 2)
         ax.add_patch(Polygon(rims[ConvexHull(rims).vertices], color=ALERT, alpha=alpha,
                              linewidth=0))
 
