@@ -81,6 +81,8 @@ def _worded(error: Any) -> str:
     """Return what pydantic says of a value, and of a choice the nearest one."""
     if error["type"] == "literal_error" and (names := _QUOTED.findall(error["ctx"]["expected"])):
         return str(UnknownNameError("value", error["input"], names))
+    if error["type"] == "too_long" and error["ctx"]["field_type"] == "Tuple":
+        return f"expected {error['ctx']['max_length']} entries, not {error['ctx']['actual_length']}"
     return str(error["msg"]).removeprefix("Value error, ")
 
 

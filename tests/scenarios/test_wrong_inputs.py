@@ -49,6 +49,12 @@ def test_sections_of_another_kind_are_replaced_by_a_file_that_extends_and_by_key
         assert load("ellipse", changes).position.path.times == (0.0, 1.0)
 
 
+def test_a_quaternion_in_place_of_a_matrix_has_an_entry_too_many():
+    task = {"kind": "pose", "frame": "right_hand", "rotation": [0.0, 0.0, 0.0, 1.0]}
+    refused("tasks.0.rotation: expected 3 entries, not 4, got [0.0,", load, "dual-arm",
+            {"tasks": [task]})
+
+
 def test_rounding_of_a_robot_at_rest_at_its_targets_is_not_said_to_be_missed():
     """A posture was missed by 1.42e-14, held back by grip and tray."""
     hand, grip = {"frame": "right_hand"}, {"frame": "left_hand", "to": "right_hand"}
