@@ -148,16 +148,17 @@ class Measured(Task):
         found = task.measure(state)
         function = found[0] if isinstance(found, tuple) and len(found) == 2 else None
         code = getattr(getattr(function, "py_func", function), "__code__", None)
-        if code is not _rows.__code__:
+        if code is not _rows.__code__:  # the text takes longer than the rest
             raise HierarchyError(f"task {task.name!r}: measure returned {brief(found)}; expected a "
                                  "function under @measured or @plain, and a tuple of what it reads")
         return task, *found
 
     def _asked(self, state: State, level: Level, motion: Array) -> _Asked:
         m = self.dimension
-        settings = np.array([np.broadcast_to(value, m) for value in (
-            self.stiffness, self.damping, self.gain,
-            np.inf if self.kind == "inequality" else 0.0, self.columns)], dtype=float)
+        settings, width = np.empty((5, m)), np.inf if self.kind == "inequality" else 0.0
+        for row, value in zip(settings, (self.stiffness, self.damping, self.gain, width,
+                                         self.columns), strict=True):
+            row[:] = np.asarray(value)
         derivative = (_NONE if level == "velocity" else
                       _EXACT if self.exact or state.period == 0.0 else _DIFFERENCE)
         return _Asked(self.goal(state), settings, derivative, motion, np.zeros((m, state.n)))

@@ -126,7 +126,9 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
                                  f"{limits.name!r}: a configuration has no speed")
         return reach(robot, q, tasks, until, limits=limits, resolver=_resolver(resolver), t=t,
                      damping=damping)
-    step = _SetUp(*asked).step(q, before, t, resolver_memory)
+    made = _SetUp(*asked)
+    step = made.step(q, before, t, resolver_memory)
+    _warn_of_degrees(robot, made.state.q)
     if limits is True:
         _warn_of_speeds(robot)
     return step
@@ -171,6 +173,15 @@ def _before(memory: Memory | None, v: ArrayLike | None,
                              "velocity of the tick before (zeros at rest), or the memory of the "
                              "last step, which has it")
     return None, v
+
+
+def _warn_of_degrees(robot: Robot, q: Array) -> None:
+    """Warn of a joint that is more than a turn beyond its limits, as no angle in radians is."""
+    beyond = np.maximum(robot.lower - q, q - robot.upper)
+    for i in np.flatnonzero(beyond > 2.0 * np.pi)[:1]:
+        warnings.warn(f"solve_ik: {robot.coordinate_names[i]} at {q[i]:g} is far beyond its "
+                      f"limits, {robot.lower[i]:.4g} to {robot.upper[i]:.4g}. Are these degrees?",
+                      stacklevel=3)
 
 
 def _warn_of_speeds(robot: Robot) -> None:

@@ -52,7 +52,7 @@ class Path(ABC):
 
 @dataclass(frozen=True)
 class Still(Path):
-    """A point at rest, `position` (3,) [m]."""
+    """A point at rest, `position` (3,) [m]; what is written into an array moves it."""
 
     position: Vector
 

@@ -7,6 +7,7 @@ from math import cos
 import numpy as np
 
 from hierarchy.errors import finite_numbers, number
+from hierarchy.gate import readable
 from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import (
     Spot,
@@ -114,7 +115,8 @@ class LookAt(Measured):
     With the unit vector u to the target in the frame's axes, the rows are 2 u_x / (1 + u_z) and
     2 u_y / (1 + u_z), of length 2 tan(angle / 2): the stereographic projection, which is regular on
     the axis, where the cosine of `Pointing` has no gradient, and everywhere but straight behind. At
-    velocity level the angle falls by gain sin(angle).
+    velocity level the angle falls by gain sin(angle). What is written into the
+    array moves the target, without feedforward.
     """
 
     frame: Frame
@@ -132,7 +134,7 @@ class LookAt(Measured):
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`: the error is -2 (u_x, u_y) / (1 + u_z)."""
-        return _look_at, (Spot.of(self.frame), np.array(self.target, dtype=float))
+        return _look_at, (Spot.of(self.frame), readable(self.name, self.target))
 
 
 @inlined

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import finite_numbers
-from hierarchy.gate import array_of, check_rotation
+from hierarchy.gate import check_rotation, readable
 from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import (
     Kinematics,
@@ -57,7 +57,8 @@ class Pose(Measured):
     """Move `frame` along `path` with the constant orientation `rotation` (3, 3) (m = 6) [m, rad].
 
     The orientation error is the rotation vector from the actual to the desired orientation, in
-    world axes; the last three rows are those of the angular velocity.
+    world axes; the last three rows are those of the angular velocity. What is written into the
+    array `rotation` turns the target, without feedforward.
     """
 
     frame: Frame
@@ -76,7 +77,7 @@ class Pose(Measured):
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
-        return _pose, (Spot.of(self.frame), array_of(self.name, self.rotation))
+        return _pose, (Spot.of(self.frame), readable(self.name, self.rotation))
 
 
 _SERIES = 0.01   # [rad^2] squared angle below which coefficients are taken from their series
@@ -199,7 +200,7 @@ class RelativePose(NamedRows, Measured):
         """See `Measured.measure`."""
         rotation = np.eye(3) if self.rotation is None else self.rotation
         return _relative, (Spot.of(self.frame), Spot.of(self.to),
-                           array_of(self.name, self.position), array_of(self.name, rotation))
+                           readable(self.name, self.position), readable(self.name, rotation))
 
 
 @compiled

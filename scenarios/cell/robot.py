@@ -14,7 +14,7 @@ from hierarchy.avoidance import Capsule, ControlPoint
 from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.paths import Still
 from hierarchy.problem import Array
-from hierarchy.tasks import Position
+from hierarchy.tasks import CentreOfMass, Position
 from hierarchy.tasks.joints.mechanism import Mechanism, model_rows
 from scenarios.cell.plants.mjcf import BALL
 from scenarios.config import Scenario, ScenarioError
@@ -170,8 +170,9 @@ def on_contacts(scenario: Scenario, start: State) -> tuple[State, Contacts | Non
     """Return the start on its contacts, and those; see `contacts_of`.
 
     With start.on_floor the base is raised or lowered so that the lowest contact touches the floor.
-    Raises a ScenarioError for a fixed base then, or for a contact that does not stand on the
-    plant's floor. One that is open at the start may be anywhere, one that slides above the floor.
+    Raises a ScenarioError for a fixed base then, for a contact that does not stand on the plant's
+    floor, or for a floating base with its centre of mass below it. A contact that is open at the
+    start may be anywhere, one that slides above the floor.
     """
     contacts = contacts_of(scenario, start.robot)
     if contacts is None:
@@ -180,8 +181,10 @@ def on_contacts(scenario: Scenario, start: State) -> tuple[State, Contacts | Non
     floor = plant.height if isinstance(plant, TorqueSection) else 0.0
     if scenario.start.on_floor:
         start = _lowered(contacts, start, floor)
-    if isinstance(plant, TorqueSection) and (found := list(_astray(contacts, start, floor))):
-        raise ScenarioError(min(found)[1])
+    if isinstance(plant, TorqueSection):
+        if found := list(_astray(contacts, start, floor)):
+            raise ScenarioError(min(found)[1])
+        _refuse_buried(start, floor)
     return start, contacts
 
 
@@ -200,6 +203,16 @@ def _astray(contacts: Contacts, start: State, floor: float) -> Iterator[tuple[fl
         waits = contact.load(0.0) == 0.0 or (contact.slides and above[0] > 0.0)
         if not waits and (wrong := _wrong(contact, above, start.rotation(contact.frame))):
             yield -np.abs(above).max(), f"contacts.{i}: at the start {wrong}"
+
+
+def _refuse_buried(start: State, floor: float) -> None:
+    """Raise a ScenarioError for a floating base that hangs from its contacts below the floor."""
+    if start.robot.base != "floating":
+        return
+    above = float(CentreOfMass(start.robot, Still((0.0, 0.0, 0.0))).position(start)[2]) - floor
+    if above < 0.0:
+        raise ScenarioError(f"start: the centre of mass is {-1e3 * above:.3g} mm below the floor. "
+                            "Is the base upside down? Its quaternion in start.q is x, y, z, w")
 
 
 def doubts(scenario: Scenario, contacts: Contacts) -> Iterator[str]:

@@ -155,13 +155,20 @@ def check(file: Annotated[str, typer.Argument(help="A scenario or a robot: file 
 
 @app.command("help")
 def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
-        metavar="KEY", help="A key of a scenario file, such as avoidance.obstacles.path, or a "
-                            "command. Default: all sections and commands.")] = None,
+        metavar="KEY", help="A key of a scenario file, such as avoidance.obstacles.path, a kind "
+                            "such as look-at, or a command. Default: all sections and "
+                            "commands.")] = None,
           plugin: opt.Plugins = None) -> None:
     """Say what a key of a scenario file means."""
     from hierarchy.errors import UnknownNameError
     from scenarios.config import Scenario
-    from scenarios.config.reference import explained, keys_of, places_of, sections
+    from scenarios.config.reference import (
+        explained,
+        explained_kind,
+        keys_of,
+        places_of,
+        sections,
+    )
 
     above = context.parent
     assert above is not None, "help is a command of the application"
@@ -178,6 +185,8 @@ def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
         print(commands[what].get_help(typer.Context(commands[what], above, what)))
     elif places := places_of(what):
         print(f"{what} is a key of several sections:", *places, sep="\n  ")
+    elif lines := explained_kind(what):
+        print(*lines, sep="\n")
     else:
         known = {f"{place.strip('[]')}.{key.name}".lstrip(".")
                  for place, section in sections() for key in keys_of(section)}

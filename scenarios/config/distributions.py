@@ -52,6 +52,8 @@ class Distribution(Section):
         return value
 
     def _around(self, chance: np.random.Generator, own: Value | None) -> Any:
+        if own is None:
+            raise ValueError(f"around = {self.around} needs a value in the scenario; give it one")
         try:
             centre = np.array(own, dtype=float)
             offset = np.broadcast_to(np.array(self.around), centre.shape)

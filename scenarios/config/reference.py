@@ -35,7 +35,6 @@ class Key(NamedTuple):
     below: tuple[type[Section], ...]
 
 
-@cache
 def keys_of(section: type[Section]) -> tuple[Key, ...]:
     """Return the keys of a section, but not what says its kind if there is one choice."""
     schema, meanings, found = section.model_json_schema(), _meanings(section), []
@@ -77,12 +76,25 @@ def explained(dotted: str) -> list[str]:
                     title_of(owner, _bracketed(path[:-1])))
     lines = [line for text, owners in said.items() for line in (*owners, *text)]
     for section in found:
-        lines += ["", title_of(section, _bracketed(path)), *(
-            fill(text, 88, initial_indent="  ", subsequent_indent="  ")
-            for text in about(section).split("\n\n"))]
-        for key in keys_of(section):
-            lines += _lines(key)
+        lines += ["", *_whole(section, _bracketed(path))]
     return lines
+
+
+def explained_kind(dotted: str) -> list[str]:
+    """Return what a kind means, such as `look-at` or `path.circle`, as lines for a terminal."""
+    above, _, kind = f".{dotted}".rpartition(".")
+    return [line for place, section in sections()
+            if kind in kinds_of(section) and f".{place.strip('[]')}".endswith(above)
+            for line in _whole(section, place)]
+
+
+def _whole(section: type[Section], place: str) -> Iterator[str]:
+    """Yield what a section is, and its keys."""
+    yield title_of(section, place)
+    for text in about(section).split("\n\n"):
+        yield fill(text, 88, initial_indent="  ", subsequent_indent="  ")
+    for key in keys_of(section):
+        yield from _lines(key)
 
 
 def _bracketed(path: list[str]) -> str:

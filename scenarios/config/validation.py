@@ -81,6 +81,8 @@ def _worded(error: Any) -> str:
     """Return what pydantic says of a value, and of a choice the nearest one."""
     if error["type"] == "literal_error" and (names := _QUOTED.findall(error["ctx"]["expected"])):
         return str(UnknownNameError("value", error["input"], names))
+    if error["type"] == "too_long" and error["ctx"]["field_type"] == "Tuple":
+        return f"expected {error['ctx']['max_length']} entries, not {error['ctx']['actual_length']}"
     return str(error["msg"]).removeprefix("Value error, ")
 
 
@@ -146,7 +148,8 @@ def doubtful_units(section: Section, above: str = "") -> Iterator[str]:
     """Yield what stands in a section in another unit than its own, by its size."""
     for name, field in type(section).model_fields.items():
         key, value = f"{above}{field.alias or name}", getattr(section, name)
-        units = {unit.name for unit in parts_of((field.annotation, *field.metadata), Unit)}
+        units = {unit.name for unit in parts_of((field.annotation, *field.metadata), Unit)
+                 if unit.doubted}
         unit = units.pop() if len(units) == 1 else ""
         least, largest, remark = _USUAL.get(unit, (0.0, inf, ""))
         for where, one in _leaves(value, key):

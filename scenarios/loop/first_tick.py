@@ -22,6 +22,7 @@ from solvers.explain import is_missed
 _NAMED = 3        # pairs of capsules named at most
 _ROUNDING = 1e-6  # [m] below a distance that is not said
 _FAR_BEYOND = 2.0  # times its limit: an acceleration that is said
+_NOTHING = 1e-12  # violation that rounding leaves of a robot at rest at its targets
 _MET = 1e-6       # violation of a level relative to its terms, below which it is met
 
 
@@ -100,10 +101,11 @@ def _unmet(controller: Controller) -> Iterator[str]:
     """Yield what `explain` says of each level that the exact resolver cannot meet."""
     h = controller.hierarchy
     exact = make("hcod").solve(h)
+    missed = h.violations(exact.x)
     lines = explain(h, exact, _MET, controller.cell.stack.row_names(h.names)).splitlines()
     crossed = len(lines) < len(h.sizes)  # sides of rows, which is all that is said
     yield from (line for k, line in enumerate(lines[:len(h.sizes)])
-                if crossed or is_missed(h, exact.x, k, _MET))
+                if crossed or (missed[k] > _NOTHING and is_missed(h, exact.x, k, _MET)))
 
 
 def _distances(controller: Controller) -> dict[str, float]:

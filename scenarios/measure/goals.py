@@ -111,6 +111,8 @@ def _in_words(section: Any) -> str:
         return f"{lowest:g}" + (" or more" if section.one_sided else "")
     if (apart := getattr(section, "distance", None)) is not None:
         return f"{shown(apart, 'm')} or more"
+    if section.one_sided:
+        return "in its bounds"
     return "at its target" if getattr(section, "path", None) is None else "on its path"
 
 

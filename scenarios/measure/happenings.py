@@ -1,7 +1,7 @@
 """What happened in a run, and why: trouble, contacts, large changes of command, missed levels."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from scenarios.cell.build import Cell, build, stack_resolver
 from scenarios.measure.causes import Cause, Solve, Tick, causes
 from scenarios.measure.judging import Rows
 from scenarios.measure.metric import shown
-from scenarios.measure.safety import STEPS
+from scenarios.measure.safety import counted_from
 from scenarios.recording.fate import Fate
 from scenarios.recording.recording import Recording
 from solvers import Status
@@ -27,7 +27,8 @@ _LARGEST = 3       # jumps
 _LOOKED_AT = 20   # ticks of a level, spread over those in which it was missed
 _LEAST = 0.01     # share of a level's ticks: what is given up for less is not said
 _OFTEN = 0.25     # share of the ticks looked at: what holds back less often is not said
-_UNITS = {"torque": "N m", "acceleration": "rad/s^2", "velocity": "rad/s"}
+_TORQUE = {"rad": "N m", "m": "N"}
+_PER = {"acceleration": "/s^2", "velocity": "/s"}
 
 Shares = tuple[tuple[str, float], ...]
 
@@ -47,18 +48,16 @@ class Jump:
         return f"{self.what} changed by {shown(self.size, self.unit)}"
 
 
-def jumps(recording: Recording, tick: int | None = None,
-          least: Mapping[str, float] | None = None) -> list[Jump]:
+def jumps(recording: Recording, tick: int | None = None, least: float = 0.0) -> list[Jump]:
     """Return the three largest changes of a run's command, or that into one tick, with causes.
 
-    `least` has, by its unit, the change from which on they are meant. Raises HierarchyError for a
+    Changes up to `least`, in the unit of the command, are left out. Raises HierarchyError for a
     tick that the run does not have, or the first.
     """
     refuse(tick is not None and not 0 < whole("tick", tick) < recording.ticks, f"tick {tick}: the "
            f"run has ticks 0 to {recording.ticks - 1}, and a change needs the one before")
     step = np.nan_to_num(np.abs(np.diff(recording["command"], axis=0))).max(axis=1, initial=0.0)
-    above = (least or {}).get(_UNITS[recording.scenario.control.level], 0.0)
-    ticks = [k + 1 for k in np.argsort(-step, kind="stable")[:_LARGEST] if step[k] > above]
+    ticks = [k + 1 for k in np.argsort(-step, kind="stable")[:_LARGEST] if step[k] > least]
     if not ticks and tick is None:
         return []
     cell = build(recording.scenario)
@@ -68,9 +67,11 @@ def jumps(recording: Recording, tick: int | None = None,
     for k, solve in solves.items():
         change = np.nan_to_num(np.abs(recording["command"][k] - recording["command"][k - 1]))
         i = int(change.argmax())
-        joint = cell.robot.velocity_names[cell.robot.n - len(change) + i]
-        found.append(Jump(k, float(recording["t"][k]), f"{level} of {joint}", float(change[i]),
-                          _UNITS[level], tuple(_causes(recording, cell, rows, k, solve))))
+        joint, of = cell.robot.n - len(change) + i, cell.robot
+        unit = of.velocity_units[joint]
+        unit = _TORQUE[unit] if level == "torque" else unit + _PER[level]
+        found.append(Jump(k, float(recording["t"][k]), f"{level} of {of.velocity_names[joint]}",
+                          float(change[i]), unit, tuple(_causes(recording, cell, rows, k, solve))))
     return found
 
 
@@ -142,7 +143,7 @@ def happened(recording: Recording) -> Iterator[Happening]:
     if touched.size:
         yield Happening("contact", "–", int(touched.size), float(t[touched[0]]))
     try:
-        found = jumps(recording, least=STEPS)
+        found = jumps(recording, least=counted_from(recording.scenario.control.level))
     except HierarchyError:
         return
     for one in found:

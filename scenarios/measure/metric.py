@@ -90,7 +90,7 @@ def shown(value: float, unit: str) -> str:
 
 
 def _display(unit: str) -> tuple[float, str, int]:
-    return _SHOWN.get(unit, (1.0, unit, 3))
+    return _SHOWN.get(unit, (1.0, unit.replace("^2", "²"), 3))
 
 
 def true(recording: Recording, signal: str) -> Array:

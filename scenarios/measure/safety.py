@@ -11,7 +11,8 @@ from scenarios.measure.metric import Criteria, Metric, known, largest, least, pa
 from scenarios.recording.recording import Recording
 
 _ON_IT = 1e-4  # [m] below a distance that still counts as keeping it
-STEPS = {"rad/s": 0.1, "rad/s^2": 50.0, "N m": 5.0}  # from one tick to the next: larger ones count
+_STEPS = {"velocity": 0.1, "acceleration": 50.0, "torque": 5.0}
+"""[rad/s, rad/s^2, N m] or the same with m and N, from one tick to the next: larger ones count."""
 _ROUNDING = 1e-9   # of such a step that still counts as not larger, as at a limit of acceleration
 _LOAD = 1.0        # [N] from which a contact counts as loaded
 _ZERO = 1e-12      # of a share: rounding
@@ -58,12 +59,13 @@ def _contacts(recording: Recording, by: Criteria) -> Iterator[Metric]:
 @register("motion")
 def _motion(recording: Recording, by: Criteria) -> Iterator[Metric]:
     v = true(recording, "v")
+    speed, rate = units_of(recording, "/s"), units_of(recording, "/s^2")
     yield _joint_limit_excess(recording)
-    yield _metric("speed_max", "Joint speed, max", largest(v), "rad/s")
-    yield from steps("velocity", "Joint speed", v, "rad/s", "of the joints, not of the command")
+    yield _metric("speed_max", "Joint speed, max", largest(v), speed)
+    yield from steps("velocity", "Joint speed", v, speed, "of the joints, not of the command")
     if "true_v" in recording:
         yield _metric("velocity_step_max_measured", "Joint speed step measured, max",
-                      largest(np.diff(recording["v"], axis=0)), "rad/s", None, detail=True,
+                      largest(np.diff(recording["v"], axis=0)), speed, None, detail=True,
                       note="with the errors of the sensor")
     control, command = recording.scenario.control, recording["command"]
     commanded = "of the command, not of the joints"
@@ -71,20 +73,32 @@ def _motion(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if control.level != "torque":
         yield _metric("command_step_max", "Commanded speed step, max",
                       largest(np.diff(command, axis=0) if control.level == "velocity" else
-                              command * control.period), "rad/s",
+                              command * control.period), speed,
                       note=commanded)
     yield _metric("acceleration_max", "Joint acceleration, max", largest(recording["a"]),
-                  "rad/s^2", note=meant)
-    yield from steps("acceleration", "Joint acceleration", recording["a"], "rad/s^2", meant)
+                  rate, note=meant)
+    yield from steps("acceleration", "Joint acceleration", recording["a"], rate, meant)
+
+
+def units_of(recording: Recording, per: str = "") -> str:
+    """Return the units of the joints, "rad", "m" or "rad or m", each `per` something."""
+    robot = recording.facts.robot
+    joints = robot.velocity_units[6 if robot.base == "floating" else 0:]
+    return " or ".join(f"{unit}{per}" for unit in sorted({*joints}, reverse=True)) or f"rad{per}"
+
+
+def counted_from(level: str) -> float:
+    """Return the step of a command of a level, in its unit, above which one is counted."""
+    return _STEPS[level] * (1.0 + _ROUNDING)
 
 
 def steps(key: str, label: str, values: Array, unit: str, note: str = "", group: str = "Safety"
           ) -> Iterator[Metric]:
     """Yield the largest step of values (T, n) between two ticks, and the ticks with large ones."""
-    step, bound = np.abs(np.diff(values, axis=0)), STEPS[unit]
+    step, bound = np.abs(np.diff(values, axis=0)), _STEPS[key]
     yield Metric(f"{key}_step_max", f"{label} step, max", largest(known(step)), unit, group=group,
                  note=note)
-    large = float(np.count_nonzero((step > bound * (1.0 + _ROUNDING)).any(axis=1)))
+    large = float(np.count_nonzero((step > counted_from(key)).any(axis=1)))
     yield Metric(f"{key}_step_ticks", f"{label} steps above {bound:g} {unit.replace('^2', '²')}",
                  large, "", group=group, note="ticks")
 
@@ -97,7 +111,8 @@ def _joint_limit_excess(recording: Recording) -> Metric:
         joint = int(np.argmax(excess))
         value = largest(excess)
         note = recording.facts.robot.coordinate_names[joint] if excess[joint] > 0.0 else ""
-    return _metric("joint_limit_excess", "Beyond a joint limit, max", value, "rad", note=note)
+    return _metric("joint_limit_excess", "Beyond a joint limit, max", value, units_of(recording),
+                   note=note)
 
 
 @register("forces")
@@ -172,7 +187,7 @@ def _torques(recording: Recording) -> Iterator[Metric]:
         yield metric("torque_limit_share", "Time with a torque at its limit", float(at.mean()),
                      "share")
     yield from steps("torque", "Torque", torque, "N m", group="Torques")
-    if "com" in recording:
+    if "com" in recording and recording.facts.robot.base == "floating":
         height = recording["com"][:, 2]
         yield metric("com_drop_max", "Centre of mass below its start, max",
                      float(height[0] - height.min()), "m")

@@ -2,7 +2,16 @@
 
 from scenarios.recording.facts import capsules, ends, placed_points
 from scenarios.scene.curves import Series, series
-from scenarios.scene.drawn import SEPARATION, Moved, Scene, Stage, scene, stage
+from scenarios.scene.drawn import (
+    SEPARATION,
+    Moved,
+    Scene,
+    Stage,
+    frames_at,
+    moved_by_tasks,
+    scene,
+    stage,
+)
 
-__all__ = ["SEPARATION", "Moved", "Scene", "Series", "Stage", "capsules", "ends", "placed_points",
-           "scene", "series", "stage"]
+__all__ = ["SEPARATION", "Moved", "Scene", "Series", "Stage", "capsules", "ends", "frames_at",
+           "moved_by_tasks", "placed_points", "scene", "series", "stage"]

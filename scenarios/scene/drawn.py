@@ -130,14 +130,14 @@ def scene(recording: Recording, rate: float = 30.0) -> Scene:
     ticks = _frames(recording, rate)
     fixed, t = stage(recording.facts.robot, recording.scenario), recording["t"][ticks]
     order = recording["order"].astype(np.int64)
-    moved = _moved(fixed, recording, ticks)
+    moved = frames_at(fixed, recording, ticks)
     levels = levels_at(recording, ticks)
     return Scene(fixed, t, ticks, **moved,
                  active=_active(recording, ticks, levels, moved["distance"]),
                  desired=recording["desired_position"][ticks]
                  if "desired_position" in recording else None,
                  order=order[ticks], orders=recording.order_names,
-                 paths=tuple(_paths(recording, ticks)), levels=levels,
+                 paths=tuple(moved_by_tasks(recording, ticks)), levels=levels,
                  series=tuple(series(recording, ticks)),
                  switches=recording["t"][recording.switches()],
                  pushes=_pushes(recording, ticks, moved["placements"]))
@@ -167,8 +167,8 @@ def _joints(recording: Recording) -> Array:
     return np.asarray(recording["true_q" if "true_q" in recording else "q"])
 
 
-def _moved(fixed: Stage, recording: Recording, ticks: NDArray[np.int64]) -> dict[str, Array]:
-    """Return what follows from the joints at each tick."""
+def frames_at(fixed: Stage, recording: Recording, ticks: NDArray[np.int64]) -> dict[str, Array]:
+    """Return what follows from the joints at each tick, as in `Scene` and by its names."""
     placements = fixed.robot.placements(_joints(recording)[ticks])
     tip = fixed.robot.points[-1].joint
     z = placements[:, tip, :9].reshape(-1, 3, 3).swapaxes(1, 2) @ np.array(fixed.robot.tool)[:, 2]
@@ -209,7 +209,9 @@ def _active(recording: Recording, ticks: NDArray[np.int64], levels: Levels,
     return np.maximum(recording["active_control_point"][ticks].astype(np.int64) - 1, -1)
 
 
-def _paths(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Moved]:
+def moved_by_tasks(recording: Recording, ticks: NDArray[np.int64] | slice = slice(None)
+                   ) -> Iterator[Moved]:
+    """Yield where listed tasks move a point, and want it, at some ticks."""
     for section in recording.scenario.tasks:
         if listed.position_of(section.title) not in recording:
             continue

@@ -138,6 +138,19 @@ def test_rates_of_a_frame_that_follows_a_path_are_the_derivatives_of_its_error(a
                                rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.parametrize(("kind", "given", "other"), [
+    (tasks.LookAt, {"target": np.array([0.3, 0.5, 0.1])}, [0.1, -0.4, 0.2]),
+    (tasks.Pose, {"path": PATH, "rotation": np.eye(3)}, np.diag([1.0, -1.0, -1.0])),
+    (tasks.FrameLog, {"path": PATH, "rotation": np.eye(3)}, np.diag([-1.0, 1.0, -1.0]))])
+def test_what_is_written_into_the_array_of_a_target_moves_it_in_a_stack_too(kind, given, other):
+    state, key = State.at(ROBOT, *STATES[0]), [*given][-1]
+    stack = Stack([kind(FRAME, **given)], "velocity")
+    stack.hierarchy(state)
+    given[key][:] = other
+    fresh = Stack([kind(FRAME, **{**given, key: np.array(other)})], "velocity")
+    np.testing.assert_array_equal(stack.hierarchy(state).lower, fresh.hierarchy(state).lower)
+
+
 @pytest.mark.parametrize(("method", "value", "said"), [
     ("jacobian", np.eye(7), "task 'elbow': jacobian has shape (7, 7), expected (1, 7)"),
     ("jacobian", np.full((1, 7), np.nan), "task 'elbow', row 0: A[0, 0] is nan"),

@@ -279,6 +279,12 @@ def test_a_wrong_value_is_refused_and_named(make, said):
     refused(said, make)
 
 
+def test_what_would_be_said_of_a_wrong_measure_is_not_written_for_a_right_one(monkeypatch):
+    """It took most of the time of a task of one's own that asks another for its Jacobian."""
+    monkeypatch.setattr("hierarchy.measured.brief", lambda value: pytest.fail("written"))
+    assert HAND.jacobian(STATE).shape == (3, 7)
+
+
 @pytest.mark.parametrize("given", ["state", None, 3, ROBOT])
 @pytest.mark.parametrize("task", [HAND, tasks.Posture((0.0,) * 7), Elbow()],
                          ids=lambda task: task.name)

@@ -12,7 +12,8 @@ from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.measure.causes import Tick, causes
 from scenarios.measure.goals import goals, percent
-from scenarios.measure.happenings import given_up, jumps
+from scenarios.measure.happenings import given_up, happened, jumps
+from scenarios.measure.metrics import measure
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import EXACT, best, paired, wilson
 from scenarios.measure.verdict import Verdict, goal_table, lines, verdicts
@@ -246,3 +247,11 @@ def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
     run = simulate(load("reach-torque-smooth").with_changes({"control.duration": 0.05}))
     assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
     assert [jump.tick for jump in jumps(run, 1)] == [1]  # the first that has one before it
+
+
+@pytest.mark.parametrize(("step", "shown"), [(50.0 * (1.0 + 1e-14), 0), (50.1, 1)])
+def test_changes_that_the_metrics_do_not_count_are_not_explained(step, shown):
+    """A robot at its limit of acceleration changed by 0.1 rad/s in each tick, but for rounding."""
+    command = np.outer(np.arange(5) > 2, step * np.eye(7)[3])
+    run = recording(command=command, a=command)
+    assert len([*happened(run)]) == measure(run)["acceleration_step_ticks"].value == shown

@@ -1,5 +1,6 @@
 """Numbers of a run, by signals made by hand; jitter."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -73,6 +74,14 @@ def test_a_signal_has_its_largest_value_step_or_count(name, signals, value):
     ("N", "12.3"), ("", "12")])
 def test_each_unit_has_its_decimals(unit, shown):
     assert Metric("some", "Some", 12.3456789, unit).shown() == shown
+
+
+def test_joints_that_slide_are_not_measured_in_radians():
+    run = recording()
+    robot = replace(run.facts.robot, velocity_units=("m",) * 2 + ("rad",) * 5)
+    found = measure(replace(run, facts=replace(run.facts, robot=robot)))
+    assert [found[name].shown_unit for name in ("speed_max", "acceleration_max")] == [
+        "rad/s or m/s", "rad/s² or m/s²"]
 
 
 def test_a_small_number_has_a_digit_more():

@@ -12,6 +12,7 @@ from refusals import refused
 
 from hierarchy import Robot, plugins
 from scenarios import Scenario, load, load_run, simulate
+from scenarios.measure.goals import goals
 from solvers import make
 
 MODULE = '''
@@ -103,6 +104,25 @@ def test_a_file_alone_loads_no_code(what, command, folder):
     (folder / "doors_of_mine.py").write_text("1 / 0")
     text = "".join(command(what, "own.toml", "--plugin", "doors_of_mine", code=2))
     assert "plugin 'doors_of_mine' cannot be imported: ZeroDivisionError" in text
+
+
+def test_the_kinds_of_a_plugin_are_explained_and_a_wrong_key_meets_only_its_own(command):
+    said = command("help elbow --plugin doors_of_mine").out
+    assert said.startswith('[[tasks]] with kind = "elbow"')
+    assert "  joint: string, required" in said
+    said = command("check own.toml --plugin doors_of_mine --set tasks.0.joynt=1", code=2).err
+    assert "unknown key 'tasks.0.joynt'; did you mean 'tasks.0.joint'? Known: angle," in said
+
+
+def test_the_error_of_a_task_of_a_plugin_has_the_unit_that_its_class_says(folder):
+    file, scenario = folder / "doors_of_mine.py", folder / "own.toml"
+    file.write_text(MODULE + BRITTLE.replace("dimension = 1", 'dimension = 1\n    unit = "m"\n'
+                                             '    kind = "inequality"'))
+    scenario.write_text(scenario.read_text().replace('"halved"', '"hcod"')
+                        + '[[tasks]]\nkind = "brittle"\nsince = 9.0\n')
+    plugins.allow("doors_of_mine")
+    found = next(one for one in goals(simulate(load("own.toml"))) if one.name == "brittle")
+    assert (found.unit, found.asked, found.promise) == ("m", "in its bounds", True)
 
 
 def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():

@@ -10,15 +10,20 @@ import pytest
 from hand_made import asked, recording
 from headless import Balanced, chromium
 
+from hierarchy.avoidance import Measurement, Obstacle
+from hierarchy.avoidance.measurement import measure_exactly
 from scenarios import load, save, simulate
-from scenarios.draw.figures import letter, palette
+from scenarios.cell.sensors.sensor import packed_laws
+from scenarios.draw.figures import drawing, letter, palette, picture
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
 from scenarios.results.page import comparison_page as page
 from scenarios.results.page import run_command
+from scenarios.scene import scene
 
 LETTER = "tpm-published"
+TURNED = [[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]]
 
 
 def made(spec="tpm-published", fault=None, error=None, scenario=None, **signals):
@@ -152,7 +157,8 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, 
 
 def test_the_letters_pairs_are_made_of_its_runs_in_its_order(tmp_path):
     names = ("ellipse-35deg-equality", "ellipse", "ellipse-velocity", "ellipse-35deg", "ellipse-3d")
-    runs = [recording(load(name), v=np.full((5, 7), float(i))) for i, name in enumerate(names)]
+    runs = [recording(load(name), v=np.full((5, 7), float(i)),
+                      active_control_point=np.full(5, 2)) for i, name in enumerate(names)]
     drawn = dict(letter.figures(runs))
     assert list(drawn) == ["figure-4-joint-velocities", "figure-5-distances",
                            "figure-6-velocities-and-distance", "figure-7-pointing-error"]
@@ -161,3 +167,35 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order(tmp_path):
     speeds = [ax.lines[0].get_ydata()[0] for ax in drawn["figure-4-joint-velocities"].axes]
     assert speeds == [2.0, 1.0]  # the velocity level is (a)
     letter.write_all([recording(t=[0.0])], tmp_path)  # a run of one tick has no figure
+
+
+@pytest.mark.parametrize("obstacle", [
+    Obstacle("point", (0.3, 0.0, 0.2)), Obstacle("sphere", (0.3, 0.0, 0.2), (0.1,)),
+    Obstacle("capsule", (0.3, 0.0, 0.2), (0.1, 0.4), TURNED),
+    Obstacle("box", (0.3, 0.0, 0.2), (0.1, 0.2, 0.3), TURNED)], ids=lambda one: one.shape)
+def test_an_obstacle_is_drawn_as_far_as_distances_say_that_it_reaches(obstacle):
+    balls, radius = picture.hull(obstacle)
+    for direction in np.random.default_rng(1).normal(size=(20, 3)):
+        u, far = direction / np.linalg.norm(direction), 1e5
+        seen, there = Measurement(0), np.r_[np.eye(3).ravel(), obstacle.centre + far * u][None]
+        measure_exactly(there, np.zeros(1, int), np.zeros((1, 3)), obstacle.packed()[None],
+                        packed_laws(), np.zeros(2), seen.arrays)
+        assert (balls @ u).max() + radius == pytest.approx(far - seen.distance[0], abs=1e-5)
+
+
+def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_are_to_go(
+        tmp_path):
+    scenario = load("wipe", {"control.duration": 0.02, "avoidance": {
+        "kind": "separation", "obstacles": [
+            {"shape": "box", "centre": [0.0, 0.9, 0.5], "half_lengths": [0.3, 0.1, 0.3]}]}})
+    run = simulate(scenario)
+    lines = picture.picture({"hcod": run}).axes[0].lines
+    link = next(line for line in lines if line.get_color() == drawing.ALERT
+                and len(line.get_xdata()) == 2)
+    seen = scene(run)
+    frame = int(np.argmin(seen.distance[:, :-1].min(axis=1)))
+    k = int(np.argmin(seen.distance[frame, :-1]))
+    ends = drawing.project(np.array([seen.points[frame, k], seen.nearest[frame, k]]))
+    np.testing.assert_allclose(link.get_xydata(), ends, atol=1e-3)
+    assert [line.get_linestyle() for line in lines].count("--") == 1  # the path of `wipe`
+    assert not letter.PANEL["active-point"].shows(run)  # rows push all points at once

@@ -134,7 +134,8 @@ def test_runs_are_made_again_after_a_file_that_their_scenario_names_has_changed(
 
 @pytest.mark.parametrize(("variation", "says"), [
     ({}, r"'ellipse' has no \[variation\]"),
-    ({"start.p": {"around": 1.0}}, r"variation\.start\.p")])
+    ({"start.p": {"around": 1.0}}, r"variation\.start\.p"),
+    ({"start.v": {"around": 1.0}}, "around = 1.0 needs a value in the scenario; give it one")])
 def test_a_variation_that_cannot_be_drawn_is_refused(variation, says, tmp_path):
     with pytest.raises(HierarchyError, match=says):
         compare_starts([load("ellipse", {**SHORT, "variation": variation})], ["hcod"], 2, 0,

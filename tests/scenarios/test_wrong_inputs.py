@@ -13,6 +13,8 @@ from hierarchy.tasks import JointLimits, Position, SelfSeparation
 from scenarios import compare, load, save, simulate
 from scenarios.cli.terminal import lines
 from scenarios.config import ScenarioError
+from scenarios.config.validation import doubtful_units
+from scenarios.loop.first_tick import first_tick
 from scenarios.toml_text import read_toml
 from solvers import Resolution, Resolver, Status, certify, explain, make, solve_ik
 
@@ -45,6 +47,27 @@ def test_sections_of_another_kind_are_replaced_by_a_file_that_extends_and_by_key
     for changes in (["position.path.kind=waypoints", *WAYPOINTS],
                     [*WAYPOINTS, "position.path.kind=waypoints"]):
         assert load("ellipse", changes).position.path.times == (0.0, 1.0)
+
+
+def test_a_quaternion_in_place_of_a_matrix_has_an_entry_too_many():
+    task = {"kind": "pose", "frame": "right_hand", "rotation": [0.0, 0.0, 0.0, 1.0]}
+    refused("tasks.0.rotation: expected 3 entries, not 4, got [0.0,", load, "dual-arm",
+            {"tasks": [task]})
+
+
+def test_rounding_of_a_robot_at_rest_at_its_targets_is_not_said_to_be_missed():
+    """A posture was missed by 1.42e-14, held back by grip and tray."""
+    hand, grip = {"frame": "right_hand"}, {"frame": "left_hand", "to": "right_hand"}
+    tasks = [{"kind": "relative", **grip}, {"kind": "pose", **hand}, {"kind": "posture"}]
+    assert first_tick(load("dual-arm", {"tasks": tasks, "control.resolver": "hcod"})).unmet == ()
+
+
+def test_a_point_far_away_that_stands_for_a_direction_is_not_taken_for_millimetres():
+    given = {"kind": "look-at", "frame": "end_effector", "target": [0.0, 0.0, -1000.0]}
+    assert not list(doubtful_units(load("dual-arm", {"tasks": [given]})))
+    given |= {"kind": "position", "offset": given.pop("target")}
+    assert [*doubtful_units(load("dual-arm", {"tasks": [given]}))] == [
+        "tasks.0.offset.2 = -1000 m: lengths are in metres, not in millimetres"]
 
 
 def test_obstacles_are_reached_by_number_or_all_at_once():

@@ -121,6 +121,12 @@ def test_joints_without_a_velocity_limit_are_named_once(tmp_path):
     solve_ik(robot, robot.rest, task)
 
 
+def test_degrees_are_asked_about():
+    task = [Position(FRAME, Still([0.3, 0.5, 0.1]))]
+    with pytest.warns(UserWarning, match="joint_1 at 51.56.* its limits, -2.967 to 2.967. Are"):
+        solve_ik(ROBOT, np.degrees(Q), task)
+
+
 def test_poses_of_random_configurations_are_found_within_the_limits():
     rng = np.random.default_rng(3)
     for _ in range(10):

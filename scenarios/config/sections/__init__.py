@@ -23,9 +23,13 @@ naming = partial(errors.naming, error=ScenarioError)  # of a key or a file
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit of a key, for messages and for the page of keys."""
+    """The unit of a key, for messages and for the page of keys.
+
+    `doubted` says whether `check` asks if a value of an unusual size is in another unit.
+    """
 
     name: str
+    doubted: bool = True
 
 
 # Strict: true is not 1.0, and "5" is not 5. A whole number may be given for a float.
@@ -171,4 +175,4 @@ def kinds_of(section: type[Section]) -> tuple[str, ...]:
     field = section.model_fields.get("kind")
     return get_args(field.annotation if field else None) or tuple(
         kind for group in plugins.GROUPS for kind, one in plugins.registered(group).items()
-        if one is section)
+        if one in (section, getattr(section, "maker", None)))

@@ -100,7 +100,8 @@ class ListedLookAt(base.Listed, base.TaskSection):
 
     made_by: ClassVar[str] = "hierarchy.tasks:LookAt"
     frame: str  #: Frame of the robot.
-    target: keys.Point  #: The point.
+    target: Annotated[keys.Vector3, keys.Unit("m", doubted=False)]
+    """The point, a far one for a direction."""
     stiffness: keys.Stiffness = 20.0
     damping: keys.Gain = 10.0
     gain: keys.Gain = 5.0
@@ -193,6 +194,10 @@ class ListedCentreOfMass(base.Listed, base.AlongSection):
         anywhere = CentreOfMass(at.robot, Still((0.0, 0.0, 0.0)))
         return {"path": self.along(anywhere.position(at.start)),
                 "axes": tuple("xyz".index(axis) for axis in self.axes)}
+
+    def wanted(self, position: Array, error: Array) -> Array | None:
+        """Return where the task wants the centre of mass."""
+        return base.wanted_along(self.axes, position, error)
 
 
 @register("tasks", "momentum", shipped=True)

@@ -51,11 +51,15 @@ class PartSection(Section):
 
 
 class OwnSection(PartSection):
-    """A section whose kind and keys are those of a plugin; `of` adds the keys."""
+    """A section whose kind and keys are those of a plugin; `of` adds the keys.
+
+    `unit` is that of a task's error, as the plugin's class says.
+    """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
     group: ClassVar[Group]
     maker: ClassVar[Maker]
+    unit: ClassVar[str] = ""
     kind: str  #: Which kind it is.
 
     @classmethod
@@ -72,8 +76,9 @@ class OwnSection(PartSection):
             for name, parameter in _parameters(maker).items()
             if name not in (*GIVEN[cls.group], *cls.model_fields)
             for kind in (_in_a_file(parameter.annotation),)}
-        made = create_model(cls.__name__, __base__=cls, __doc__=cls.__doc__, **fields)
-        made.maker = maker
+        made = create_model(cls.__name__, __base__=cls, __doc__=maker.__doc__ or cls.__doc__,
+                            **fields)
+        made.maker, made.unit = maker, str(getattr(maker, "unit", ""))
         return made
 
     def __reduce__(self) -> Any:  # a class that was made has no module to be unpickled from

@@ -98,6 +98,13 @@ class AlongSection(TaskSection):
         return Shifted(path, shift.tolist()) if shift.any() else path
 
 
+def wanted_along(axes: str, position: Array, error: Array) -> Array:
+    """Return where a task wants a point (..., 3) [m] from its errors (..., k) along k axes."""
+    goal = position.copy()
+    goal[..., ["xyz".index(axis) for axis in axes]] += error
+    return goal
+
+
 def of_pose(error: Array) -> Iterator[tuple[str, Array]]:
     """Yield the sizes (T,) of errors (T, 6), of position [m] and of rotation [deg]."""
     yield "m", np.linalg.norm(error[:, :3], axis=1)
@@ -127,9 +134,7 @@ class PositionTask(AlongSection):
 
     def wanted(self, position: Array, error: Array) -> Array | None:
         """Return where the task wants the point."""
-        axes, goal = ["xyz".index(axis) for axis in self.axes], position.copy()
-        goal[..., axes] += error
-        return goal
+        return wanted_along(self.axes, position, error)
 
 
 class PointingTask(TaskSection):

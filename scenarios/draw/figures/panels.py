@@ -157,7 +157,7 @@ PANELS = (
           "kept."),
     Panel("active-point", "Control point being pushed away", "number", "active_control_point",
           active_point, "The control point nearest to an obstacle, while within ε₂.",
-          shows=lambda recording: bool(recording["active_control_point"].any())),
+          shows=lambda recording: bool((recording["active_control_point"] > 0).any())),
     Panel("ee-distance", "End effector to the nearest obstacle", "m", "ee_distance",
           partial(distance, signal="ee_distance"),
           "Dashed: below ε_ee, in red, the position task is pushed off its path; d_min is kept."),

@@ -1,26 +1,27 @@
 """The scene of a run in space: the robot, its desired and actual paths, the obstacles."""
 
 from collections.abc import Mapping
+from itertools import product
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon
+from matplotlib.patches import Polygon
+from scipy.spatial import ConvexHull
 
-from hierarchy.avoidance import Obstacles
+from hierarchy.avoidance import Obstacle
 from hierarchy.problem import Array
-from scenarios.cell.sensors.sensor import make_obstacles
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK
 from scenarios.recording.facts import RobotFacts
 from scenarios.recording.recording import Recording
-from scenarios.scene import ends, placed_points
+from scenarios.scene import Stage, ends, frames_at, moved_by_tasks, stage
 
 _VERTICES = 800
 _OTHER_POSES = 5
 _AREA_ALPHAS = (0.08, 0.18)  # of the outer and the inner area
-_BALLS = 24  # that a capsule is drawn with
+_HAIR = 1e-6  # [m] radius of an edge: a board without one has no area as seen along it
 _NEAR = 1.0  # [m] from the end effector: moving obstacles farther away are left out
 _DESIRED = (0, (3, 3))  # dashes
 
@@ -30,6 +31,7 @@ _APART = 1.1    # distance between bodies, in widths of the widest
 _WIDTH, _HEADROOM = 6.4, 0.5  # of the figure [in]
 _AZIMUTH, _ELEVATION = 40.0, 12.0  # [deg] of the camera: in front of a robot that looks along x
 _AROUND = np.linspace(0.0, np.pi, 13)  # of half a rim
+_ROUND = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 96)) for f in (np.cos, np.sin)])  # a rim
 _LIGHT, _DARK = (0.835, 0.851, 0.871), (0.553, 0.588, 0.631)  # of links far away and near
 
 
@@ -46,13 +48,18 @@ def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str] | No
     if not first.facts.robot.is_chain:
         return _bodies(recordings, chosen)
     fig, (ax,) = drawing.figure(width=4.9, height=3.9)
-    _obstacles(ax, first)
-    _arms(ax, first.facts.robot, first)
+    fixed, tick = stage(first.facts.robot, first.scenario), _nearest(first)
+    seen = {name: part[0] for name, part in frames_at(fixed, first, np.array([tick])).items()}
+    _obstacles(ax, first, fixed, seen["centres"], seen["points"][-1])
+    _arms(ax, first, tick)
+    _points(ax, seen, linked=_exact(first))
     for label, colour in reversed(list(chosen.items())):
-        _line(ax, drawing.project(recordings[label]["ee_position"]), color=colour, linewidth=1.8)
-    if "desired_position" in first:
-        _line(ax, drawing.project(once(first["desired_position"])), color=INK, linewidth=0.9,
-              linestyle=_DESIRED)
+        run = recordings[label]
+        for actual in (run["ee_position"], *(moved.actual for moved in moved_by_tasks(run))):
+            _line(ax, drawing.project(actual), color=colour, linewidth=1.8)
+    wanted = [first["desired_position"]] if "desired_position" in first else []
+    for path in (*wanted, *(m.wanted for m in moved_by_tasks(first) if m.wanted is not None)):
+        _line(ax, drawing.project(once(path)), color=INK, linewidth=0.9, linestyle=_DESIRED)
     ax.set_aspect("equal")
     ax.set_axis_off()
     return fig
@@ -72,38 +79,39 @@ def _line(ax: Axes, path: Array, **style: object) -> None:
     ax.plot(*path[:: max(1, len(path) // _VERTICES)].T, **style)  # type: ignore[arg-type]
 
 
-def _obstacles(ax: Axes, recording: Recording) -> None:
-    """Draw static obstacles with their areas, and moving ones that are near."""
+def _obstacles(ax: Axes, recording: Recording, fixed: Stage, centres: Array, tip: Array) -> None:
+    """Draw the obstacles, static ones with their areas, and moving ones that are near the tip."""
     avoidance = recording.scenario.avoidance
-    if avoidance is None:
-        return
-    areas = sorted(avoidance.thresholds.values(), reverse=True)
-    tick = _nearest(recording)
-    there, tip = _obstacles_at(recording, tick), recording["ee_position"][tick]
-    for obstacle, centre in zip(there.obstacles, there.centres, strict=True):
-        if obstacle.path is not None and np.linalg.norm(centre - tip) > _NEAR:
+    areas = sorted(avoidance.thresholds.values(), reverse=True) if avoidance else []
+    for obstacle, centre in zip(fixed.obstacles.obstacles, centres, strict=True):
+        balls, radius = hull(obstacle)
+        away = np.linalg.norm(centre - tip) - radius - np.linalg.norm(balls, axis=1).max()
+        if obstacle.path is not None and away > _NEAR:
             continue
-        radius = obstacle.size[0] if obstacle.size and obstacle.shape != "box" else 0.0
-        half = obstacle.size[1] if obstacle.shape == "capsule" else 0.0
-        axis = np.asarray(obstacle.rotation, dtype=float)[:, 2]
-        for at in np.linspace(-half, half, _BALLS if half else 1):
-            _ball(ax, centre + at * axis, radius, 1.0)
         ax.plot(*drawing.project(centre), "o", color=ALERT, markersize=5)
+        flat = drawing.project(centre + balls)
+        _hull(ax, flat, radius, 1.0)
         if obstacle.path is None:
             for area, alpha in zip(areas, _AREA_ALPHAS[-len(areas):], strict=True):
-                _ball(ax, centre, radius + area, alpha)
+                _hull(ax, flat, radius + area, alpha)
 
 
-def _ball(ax: Axes, centre: Array, radius: float, alpha: float) -> None:
-    x, y = drawing.project(centre)
-    ax.add_patch(Circle((x, y), radius, color=ALERT, alpha=alpha, linewidth=0))
+def hull(obstacle: Obstacle) -> tuple[Array, float]:
+    """Return an obstacle as the hull of balls: their centres (K, 3) from its own, and radius."""
+    size, axes = obstacle.size, np.asarray(obstacle.rotation, dtype=float)
+    corners = {"capsule": [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]],
+               "box": list(product((1.0, -1.0), repeat=3))}.get(obstacle.shape, [[0.0, 0.0, 0.0]])
+    half = size if obstacle.shape == "box" else size[1:]
+    return (np.array(corners) * (half or 0.0)) @ axes.T, 0.0 if obstacle.shape == "box" else (
+        size[0] if size else 0.0)
 
 
-def _obstacles_at(recording: Recording, tick: int) -> Obstacles:
-    avoidance = recording.scenario.avoidance
-    obstacles = make_obstacles(avoidance.placed if avoidance else ())
-    obstacles.at(float(recording["t"][tick]))
-    return obstacles
+def _hull(ax: Axes, flat: Array, radius: float, alpha: float) -> None:
+    """Draw the hull of discs about points (K, 2)."""
+    if radius > 0.0 or len(flat) > 1:
+        rims = (flat[:, None] + max(radius, _HAIR) * _ROUND).reshape(-1, 2)
+        ax.add_patch(Polygon(rims[ConvexHull(rims).vertices], color=ALERT, alpha=alpha,
+                             linewidth=0))
 
 
 def _nearest(recording: Recording) -> int:
@@ -121,26 +129,27 @@ def _exact(recording: Recording) -> bool:
     return recording.scenario.sensor.kind == "exact"
 
 
-def _arms(ax: Axes, robot: RobotFacts, recording: Recording) -> None:
-    nearest = _nearest(recording)
+def _arms(ax: Axes, recording: Recording, nearest: int) -> None:
     others = np.linspace(0, recording.ticks - 1, _OTHER_POSES).astype(int)
     for k, alpha in (*((int(k), 0.16) for k in others), (nearest, 0.9)):
-        placements = robot.placements(recording["q"][k])
+        placements = recording.facts.robot.placements(recording["q"][k])
         tip = recording["ee_position"][k]
         chain = drawing.project(np.vstack([np.zeros(3), placements[1:, 9:], tip]))
         ax.plot(*chain.T, color=INK, alpha=alpha, linewidth=5.0 if k == nearest else 2.5,
                 solid_capstyle="round", solid_joinstyle="round")
         if k == nearest:
             ax.plot(*chain.T, "o", color=INK, markersize=6)
-            points = robot.points[:-1]
-            body = placed_points(placements, [p.joint for p in points], [p.offset for p in points])
-            if len(body):
-                ax.plot(*drawing.project(body).T, "o", color=ALERT, markersize=3)
-            centres = _obstacles_at(recording, k).centres
-            if len(body) and centres.size and _exact(recording):  # the shortest, as in figure 3
-                point = body[int(np.argmin(recording["control_point_distance"][k]))]
-                end = centres[int(np.argmin(np.linalg.norm(centres - point, axis=1)))]
-                ax.plot(*drawing.project(np.array([point, end])).T, color=ALERT, linewidth=1.2)
+
+
+def _points(ax: Axes, seen: Mapping[str, Array], linked: bool) -> None:
+    """Draw the control points, and the shortest line to an obstacle, as in figure 3."""
+    body, distance = seen["points"][:-1], seen["distance"][:-1]
+    if len(body):
+        ax.plot(*drawing.project(body).T, "o", color=ALERT, markersize=3)
+    if linked and np.isfinite(distance).any():
+        k = int(np.argmin(distance))
+        ax.plot(*drawing.project(np.array([body[k], seen["nearest"][k]])).T, color=ALERT,
+                linewidth=1.2)
 
 
 def _bodies(recordings: Mapping[str, Recording], colours: Mapping[str, str]) -> Figure:
@@ -160,14 +169,11 @@ def _bodies(recordings: Mapping[str, Recording], colours: Mapping[str, str]) -> 
         _body(ax, robot, first["q"][k], aside)
         for label, colour in reversed(list(colours.items())):
             run = recordings[label]
-            for signal in (one for one in run.signals if one.startswith("task_position_")):
-                path, name = run[signal], signal.removeprefix("task_position_")
-                if "task_error_" + name in first and run is first:
-                    error = run[f"task_error_{name}"]
-                    if error.shape[1] >= 3:
-                        _line(ax, aside + _flat(path + error[:, :3]), color=INK, linewidth=0.7,
-                              linestyle=_DESIRED)
-                _line(ax, aside + _flat(path[:k + 1]), color=colour, linewidth=1.6)
+            for moved in moved_by_tasks(run):
+                if run is first and moved.wanted is not None:
+                    _line(ax, aside + _flat(moved.wanted), color=INK, linewidth=0.7,
+                          linestyle=_DESIRED)
+                _line(ax, aside + _flat(moved.actual[:k + 1]), color=colour, linewidth=1.6)
         ax.text(i * apart, lowest - 0.03, f"{first['t'][k]:.1f} s",
                 ha="center", va="top")
     ax.set_aspect("equal")
