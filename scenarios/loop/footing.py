@@ -4,9 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hierarchy.paths import Still
 from hierarchy.problem import Array
+from hierarchy.tasks import CentreOfMass
 from hierarchy.words import some
 from scenarios.cell.plants.mjcf import of_drives
+from scenarios.cell.plants.torque import inside
 from scenarios.cell.robot import doubts
 from scenarios.config.sections.plant import TorqueSection
 from scenarios.loop.controller import Controller
@@ -14,6 +17,7 @@ from scenarios.loop.controller import Controller
 _FAR_BEYOND = 2.0   # times its limit: an acceleration that is said
 _FREE = 0.1         # share of a unit motion that no task holds from which a joint is said
 _DEPENDENT = 1e-6   # singular value of rows of length one up to which they depend on each other
+_LEVEL = 0.999      # vertical part of the normal of a level surface
 _NEARBY = 0.01      # [rad or m] to the posture in which their rank is that of other postures
 
 
@@ -23,8 +27,10 @@ def footing(controller: Controller) -> Iterator[str]:
     if cell.contacts is None:
         return
     yield from doubts(cell.scenario, cell.contacts)
+    yield from _unlimited(controller)
     if isinstance(cell.scenario.plant, TorqueSection):
         yield from _balanced(controller)
+        yield from _unsupported(controller)
     if controller.answered:
         yield from _too_fast(controller)
         yield from _held_by_friction(controller)
@@ -41,6 +47,33 @@ def _balanced(controller: Controller) -> Iterator[str]:
     if names:
         yield (f"no body has the inertia that moves with {some(names)}: the largest principal "
                "moment is more than the sum of the others. The plant has their mean instead")
+
+
+def _unlimited(controller: Controller) -> Iterator[str]:
+    """Yield the joints whose torques are to be limited, by a limit that they lack."""
+    robot, limits = controller.cell.robot, controller.cell.scenario.limits
+    names = [robot.velocity_names[i] for i in range(robot.actuated, robot.n)
+             if not np.isfinite(robot.effort_limit[i])]
+    if names and limits is not None and limits.torque:
+        yield f"limits.torque does not limit {some(names)}, which have no effort limit"
+
+
+def _unsupported(controller: Controller) -> Iterator[str]:
+    """Yield that the centre of mass is at the start not above the contacts, all on the floor."""
+    cell = controller.cell
+    state, robot = cell.state, cell.robot
+    closed = [one for one in cell.contacts.contacts if one.load(0.0) > 0.0] if cell.contacts else []
+    if robot.base == "fixed" or any(_LEVEL > one.axes[2, 2] for one in closed):
+        return
+    points = [state.position(one.frame) + np.array(one.points) @ state.rotation(one.frame).T
+              for one in closed]
+    centre = CentreOfMass(robot, Still((0.0, 0.0, 0.0))).position(state)
+    margin = inside(np.concatenate([np.empty((0, 3)), *points])[:, :2], centre[:2])
+    if np.isnan(margin):
+        yield "the contacts span no area, so the robot cannot stand still"
+    elif margin < 0.0:
+        yield (f"the centre of mass is at the start {-1e3 * margin:.0f} mm outside the polygon of "
+               "the contacts, so the robot cannot stand still there")
 
 
 def _too_fast(controller: Controller) -> Iterator[str]:

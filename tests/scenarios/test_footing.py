@@ -31,7 +31,16 @@ def of_a_thin_shank(robot):
     robot.model.inertias[knee] = pin.Inertia(3.0, np.zeros(3), np.diag([0.03, 0.01, 0.01]))
 
 
+def of_a_motor_without_limit(robot):
+    robot.effort_limit[robot.velocity_names.index("left_knee")] = np.inf
+
+
+LEFT = {"frame": "left_foot", "x": [-0.05, 0.16], "y": [-0.04, 0.04]}
 CASES = {
+    "one foot beside": ({"contacts": [LEFT]}, None, "mm outside the polygon of the contacts"),
+    "on two points": ({"contacts": [{"frame": f"{side}_foot"} for side in ("left", "right")]}, None,
+                      "the contacts span no area"),
+    "no effort limit": ({}, of_a_motor_without_limit, "does not limit left_knee"),
     "no posture": ({"tasks": [{"kind": "com"}, {"kind": "least-force"}]}, None,
                    "no task holds left_hip_yaw"),
     "effort limits that say nothing": ({}, of_strong_drives, "it holds the robot, whatever"),
