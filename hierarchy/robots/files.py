@@ -122,7 +122,7 @@ def _in_one_line(error: Exception) -> str:
 
 def _urdf_shapes(path: Path, root: Element, model: Any, meshes: bool) -> tuple[Any, list[str]]:
     """Read a copy of the text with absolute mesh paths and without the missing meshes."""
-    missing = []
+    missing: dict[str, str] = {}
     for link in root.iter("link"):
         for collision in link.findall("collision"):
             mesh = collision.find("geometry/mesh")
@@ -136,10 +136,19 @@ def _urdf_shapes(path: Path, root: Element, model: Any, meshes: bool) -> tuple[A
                 continue
             link.remove(collision)
             if file is None:
-                missing.append(f"mesh {name!r} of link {link.get('name')!r} is not there")
+                missing.setdefault(urdf.name_of(link), name)
     text = ElementTree.tostring(root, encoding="unicode")
     geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
-    return geometry.geometryObjects, missing
+    return geometry.geometryObjects, list(_not_there(missing))
+
+
+def _not_there(meshes: Mapping[str, str]) -> Iterator[str]:
+    """Yield one sentence for all missing meshes, each by its link."""
+    if meshes:
+        name = next(iter(meshes.values()))
+        searched = ("; packages are searched for in the folders above the robot's file"
+                    if name.startswith("package://") else "")
+        yield f"meshes of {some(list(meshes))} are not there, such as {name!r}{searched}"
 
 
 def _in_metres(scale: str, file: Path) -> str:

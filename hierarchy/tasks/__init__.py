@@ -18,7 +18,7 @@ from hierarchy.tasks.joints.mechanism import Mechanism, model_rows
 from hierarchy.tasks.joints.posture import JointDamping, Posture
 from hierarchy.tasks.manipulability import Manipulability
 from hierarchy.tasks.pointing import LookAt, Pointing
-from hierarchy.tasks.pose import FrameLog, Pose, RelativePose
+from hierarchy.tasks.pose import FrameLog, Orientation, Pose, RelativePose
 from hierarchy.tasks.position import Along, Position
 from hierarchy.tasks.separation import SelfSeparation, Separation
 from hierarchy.tasks.together import Together
@@ -32,7 +32,8 @@ TASKS: dict[str, type[Task]] = {
     "danger bounds": DangerBounds, "frame": FrameLog, "friction": Friction,
     "joint limits": JointLimits,
     "least force": LeastForce, "look-at": LookAt, "manipulability": Manipulability,
-    "momentum": Momentum, "pointing": Pointing, "pose": Pose, "position": Position,
+    "momentum": Momentum, "orientation": Orientation, "pointing": Pointing, "pose": Pose,
+    "position": Position,
     "posture": Posture, "relative pose": RelativePose, "self-separation": SelfSeparation,
     "separation": Separation, "together": Together, "torque limits": TorqueLimits,
     "torque step": TorqueStep,
@@ -41,6 +42,6 @@ TASKS: dict[str, type[Task]] = {
 __all__ = ["TASKS", "Along", "Avoidance", "BaseDynamics", "CentreOfMass", "CentreOfPressure",
            "ContactForce", "ContactMotion", "CumulatedRepulsion", "DangerBounds", "FrameLog",
            "Friction", "JointCoupling", "JointDamping", "JointLimits", "LeastForce", "LookAt",
-           "Manipulability", "Mechanism", "Momentum", "Pointing", "Pose", "Position", "Posture",
-           "RelativePose", "SelfSeparation", "Separation", "Together", "TorqueLimits",
+           "Manipulability", "Mechanism", "Momentum", "Orientation", "Pointing", "Pose", "Position",
+           "Posture", "RelativePose", "SelfSeparation", "Separation", "Together", "TorqueLimits",
            "TorqueStep", "model_rows"]

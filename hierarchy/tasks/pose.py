@@ -80,6 +80,43 @@ class Pose(Measured):
         return _pose, (Spot.of(self.frame), readable(self.name, self.rotation))
 
 
+@measured
+def _orientation(kinematics, reads, goal, J, motion):
+    frame, desired = reads
+    write_rotation_jacobian(kinematics, frame.joint, J)
+    w, b = motion_of(kinematics, frame)[1::2]
+    motion.error[:] = rotation_vector(times_transposed(
+        desired, rotation_of(kinematics.placements, frame)))
+    for i in range(3):
+        motion.rate[i], motion.drift[i] = w[i], b[i]
+
+
+@dataclass(frozen=True)
+class Orientation(Measured):
+    """Turn `frame` to the constant orientation `rotation` (3, 3), wherever it is (m = 3) [rad].
+
+    Its rows are the last three of `Pose`, and `rotation` can be written into as there. Beside a
+    centre of mass it holds a trunk, whose position that already determines.
+    """
+
+    frame: Frame
+    rotation: ArrayLike
+    stiffness: float = 40.0
+    damping: float = 20.0
+    gain: float = 10.0
+    name: str = "orientation"
+    dimension = 3
+    row_names = Pose.row_names[3:]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_rotation(f"task {self.name!r}: rotation", self.rotation)
+
+    def measure(self, state: State) -> Measure:
+        """See `Measured.measure`."""
+        return _orientation, (Spot.of(self.frame), readable(self.name, self.rotation))
+
+
 _SERIES = 0.01   # [rad^2] squared angle below which coefficients are taken from their series
 _STEP = 1e-30    # of a complex step: no difference is formed, so it may be this small
 

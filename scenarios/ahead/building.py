@@ -181,12 +181,14 @@ def _robot(_: Path) -> None:
     """Move a robot of seven joints within its limits, in one call."""
     from hierarchy import Robot
     from hierarchy.paths import Still
-    from hierarchy.tasks import Position, Posture
+    from hierarchy.tasks import Orientation, Position, Posture
     from solvers import solve_ik
 
     robot = Robot.load("kuka_lwr")
-    hand = Position(robot.frame("end_effector"), Still([0.3, 0.5, 0.1]))
-    solve_ik(robot, _KUKA, [hand, Posture((0.5,) * 7)], limits=True, dt=0.01)
+    frame = robot.frame("end_effector")
+    tasks = [Position(frame, Still([0.3, 0.5, 0.1])), Orientation(frame, np.eye(3)),
+             Posture((0.5,) * 7)]
+    solve_ik(robot, _KUKA, tasks, limits=True, dt=0.01)
 
 
 def _others(folder: Path) -> None:

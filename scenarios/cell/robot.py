@@ -34,6 +34,7 @@ _REACH_STEPS = 500   # damped Newton steps; a reachable point takes about ten
 _ON_LIMIT = 1e-9     # [rad or m] beyond a limit that is rounding
 _LONGEST_STEP = 0.3  # [rad] of any joint
 _CLOSED = 1e-3       # [m or rad] by which rounding in a file may leave a mechanism open
+_SINK = 2e-5         # [m] that on_floor presses a contact down: at 0 rounding decides if it carries
 _OFF = 0.002         # [m] of a point from the floor that is too far
 _TILTED = 1.0        # [deg] of a sole from the floor that is too much
 _ON_EDGE, _TURNED_OVER = 45.0, 135.0  # [deg] from which another plane of its frame must be meant
@@ -192,7 +193,7 @@ def _lowered(contacts: Contacts, start: State, floor: float) -> State:
     if contacts.robot.base != "floating" or not contacts.contacts:
         raise ScenarioError("start.on_floor needs a floating base and [[contacts]]")
     q = start.q.copy()
-    q[2] += floor - min(_heights(contact, start).min() for contact in contacts.contacts)
+    q[2] += floor - _SINK - min(_heights(contact, start).min() for contact in contacts.contacts)
     return State.at(contacts.robot, q, start.v)
 
 

@@ -4,7 +4,6 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from math import isfinite
-from operator import itemgetter
 from textwrap import fill
 from typing import Any
 
@@ -28,6 +27,7 @@ from solvers import Status
 
 _ROUND = 4     # decimals of proposed positions [m]
 _TURNS = 50.0  # [rad] between limits of a joint beyond which they are taken for degrees
+_ALIKE = 3     # decimals of heights [m] that are alike
 _LEVEL = 0.02  # [m] between frames that are at the same height
 _WIDTH, _UNDER = 100, " " * 12  # of a summary of a scenario
 _UNITS = {"rad": "rad, rad/s, N m", "m": "m, m/s, N"}
@@ -194,20 +194,27 @@ def _missing(robot: Robot) -> list[str]:
 
 
 def _lowest(robot: Robot) -> list[str]:
-    """Return where a floating robot may stand: the lowest frames, at most one of each body.
+    """Return where a floating robot may stand: a frame of each body at the end of a chain.
 
-    In its own posture, and within 2 cm of the lowest of all.
+    They are within 2 cm of the lowest in the robot's own posture, or that of the base if it is
+    lowest. A frame at the joint of its body, such as a knee, is not its end if there is another.
     """
     if robot.base == "fixed":
         return []
-    state, lowest = State.at(robot, robot.rest), dict[int, tuple[float, str]]()
-    for name in robot.frame_names:
+    state, lowest = State.at(robot, robot.rest), dict[int, tuple[bool, float, int, str]]()
+    fixed = {str(frame.name) for frame in robot.model.frames if frame.type.name == "FIXED_JOINT"}
+    links = [name for name in robot.frame_names if name not in {*robot.joint_names, *fixed}]
+    for name in links:
         frame = robot.frame(name)
-        if name not in robot.joint_names and frame.joint > 1:
-            here = float(state.position(frame)[2]), name
-            lowest[frame.joint] = min(here, lowest.get(frame.joint, here), key=itemgetter(0))
-    floor = min((height for height, _ in lowest.values()), default=0.0)
-    return [name for height, name in lowest.values() if height < floor + _LEVEL]
+        if frame.joint == 1 or (frame.joint > 1 and frame.joint not in robot.parents):
+            height = round(float(state.position(frame)[2]), _ALIKE)
+            here = frame.joint > 1 and not frame.offset.any(), height, len(name), name
+            lowest[frame.joint] = min(here, lowest.get(frame.joint, here))
+    base = lowest.pop(1, None)
+    floor = min((height for _, height, *_ in lowest.values()), default=np.inf)
+    if base is not None and base[1] < floor:
+        return [base[-1]]
+    return [name for _, height, _, name in lowest.values() if height < floor + _LEVEL]
 
 
 def _carrier(robot: Robot, joint: int) -> str | None:

@@ -4,24 +4,21 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite
 
-import numpy as np
-
 from hierarchy.tasks.pairs import inseparable_pairs
 from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.words import listed
 from scenarios.cell.build import Cell
-from scenarios.cell.robot import doubts
 from scenarios.config import Scenario
 from scenarios.config.validation import doubtful_units
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import check
+from scenarios.loop.footing import footing
 from scenarios.recording.blame import blaming
 from solvers import Status, explain, make
 from solvers.explain import is_missed
 
 _NAMED = 3        # pairs of capsules named at most
 _ROUNDING = 1e-6  # [m] below a distance that is not said
-_FAR_BEYOND = 2.0  # times its limit: an acceleration that is said
 _NOTHING = 1e-12  # violation that rounding leaves of a robot at rest at its targets
 _MET = 1e-6       # violation of a level relative to its terms, below which it is met
 
@@ -50,12 +47,12 @@ def first_tick(scenario: Scenario) -> FirstTick:
     """
     controller = _after_one(scenario)
     distances = _distances(controller)
-    warnings = (*_warnings(scenario, distances), *_itself(controller.cell),
-                *_of_contacts(controller))
+    unmet = tuple(_unmet(controller)) if controller.answered else ()
+    warnings = (*_warnings(scenario, distances), *_itself(controller.cell), *footing(controller))
     if not controller.answered:
         return FirstTick(None, (), (), distances, warnings)
-    return FirstTick(controller.resolution.status, controller.hierarchy.names,
-                     tuple(_unmet(controller)), distances, warnings)
+    return FirstTick(controller.resolution.status, controller.hierarchy.names, unmet, distances,
+                     warnings)
 
 
 def contact_warnings(scenario: Scenario) -> tuple[str, ...]:
@@ -63,7 +60,7 @@ def contact_warnings(scenario: Scenario) -> tuple[str, ...]:
 
     Nothing but at level "torque". Raises HierarchyError where a run would.
     """
-    return tuple(_of_contacts(_after_one(scenario))) if scenario.control.level == "torque" else ()
+    return tuple(footing(_after_one(scenario))) if scenario.control.level == "torque" else ()
 
 
 def _after_one(scenario: Scenario) -> Controller:
@@ -76,25 +73,6 @@ def _after_one(scenario: Scenario) -> Controller:
         if not controller.answered:  # before a first image, where a run resolves its rows too
             controller.rehearse()
     return controller
-
-
-def _of_contacts(controller: Controller) -> Iterator[str]:
-    """Yield what is wrong with the floor, and which joint accelerates too fast."""
-    cell = controller.cell
-    if cell.contacts is None:
-        return
-    yield from doubts(cell.scenario, cell.contacts)
-    if cell.tasks.limits is None or not controller.answered:
-        return
-    robot = cell.robot
-    asked = controller.resolution.x[robot.actuated:robot.n]
-    limit = cell.tasks.limits.limits.acceleration[-len(asked):]  # a base may have limits too
-    i = int((np.abs(asked) / limit).argmax())
-    if abs(asked[i]) > _FAR_BEYOND * limit[i]:
-        unit = robot.velocity_units[robot.actuated + i]
-        yield (f"the first tick asks joint {robot.velocity_names[robot.actuated + i]} for "
-               f"{asked[i]:.3g} {unit}/s^2, {abs(asked[i]) / limit[i]:.2g} times its limit of "
-               f"{limit[i]:g} (limits.acceleration)")
 
 
 def _unmet(controller: Controller) -> Iterator[str]:

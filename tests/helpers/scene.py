@@ -27,6 +27,7 @@ TASKS = {
     "cone": tasks.Pointing(FRAME, (1.0, 0.2, 0.0), 0.3, "inequality"),
     **{f"avoidance {rows}-D": tasks.Avoidance(ROBOT.control_points, rows) for rows in (1, 3)},
     "pose": tasks.Pose(FRAME, PATH, np.eye(3)), "look-at": tasks.LookAt(FRAME, (0.3, 0.9, 1.4)),
+    "orientation": tasks.Orientation(FRAME, np.eye(3)[[1, 2, 0]]),
     "frame": tasks.FrameLog(FRAME, Still((0.1, 0.5, 0.1)), np.eye(3)[[1, 2, 0]]),
     "centre of mass": tasks.CentreOfMass(ROBOT, PATH),
     "centre of mass, x and z": tasks.CentreOfMass(ROBOT, PATH, (0, 2)),

@@ -10,7 +10,7 @@ from mechanisms import four_bar
 from refusals import refused
 from scipy.spatial.transform import Rotation
 from standing import IDEAL, ROBOT, accelerations, feet, moving_state
-from urdf_text import INERTIAL, joint, link, urdf
+from urdf_text import INERTIAL, LIMIT, joint, link, urdf
 
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
@@ -54,13 +54,25 @@ def test_gravity_is_that_of_the_robots_file(tmp_path):
     np.testing.assert_allclose(plant.a, expected, rtol=1e-3)
 
 
-def test_a_robot_whose_inertia_no_body_has_is_named_and_a_joint_of_several_axes(tmp_path):
-    arm = link("arm", INERTIAL.replace("0.4", "1.4"))
-    (tmp_path / "flat.urdf").write_text(f'<robot name="flat">{link("base")}{arm}' + joint(
-        "only", "revolute", "base", "arm") + "</robot>")
-    robot = Robot.load(tmp_path / "flat.urdf")
-    refused("plant: MuJoCo refuses robot 'flat'", TorqueRobot, robot, Contacts(robot, ()),
-            np.zeros(1), section=plant_with(), error=ScenarioError)
+def one_joint(folder, inertial=INERTIAL, limit=LIMIT):
+    (folder / "one.urdf").write_text(urdf(link("base"), link("arm", inertial), joint(
+        "only", "revolute", "base", "arm", limit)))
+    robot = Robot.load(folder / "one.urdf")
+    return robot, TorqueRobot(robot, Contacts(robot, ()), np.zeros(1), section=plant_with())
+
+
+def test_an_inertia_that_no_body_has_becomes_its_mean(tmp_path):
+    robot, plant = one_joint(tmp_path, INERTIAL.replace("0.4", "1.4"))
+    moments = np.linalg.eigvalsh(robot.model.inertias[1].inertia)
+    np.testing.assert_allclose(plant.model.body_inertia[1], moments.mean())
+
+
+def test_a_joint_without_room_between_its_limits_stays_there(tmp_path):
+    _, plant = one_joint(tmp_path, limit=LIMIT.replace("-1", "0").replace('"1"', '"0"'))
+    assert abs(driven(plant, np.full(1, 1.0), 0.1).q[0]) < 1e-3
+
+
+def test_a_joint_of_several_axes_is_named():
     bar = four_bar(rocker=pin.JointModelSpherical())
     refused("joint 'rocker' does not turn", TorqueRobot, bar, Contacts(bar, ()), bar.rest,
             section=plant_with(), error=ScenarioError)

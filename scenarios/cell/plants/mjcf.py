@@ -43,7 +43,7 @@ def add(parent: Element, tag: str, **values: ArrayLike) -> Element:
 def begin(robot: Robot, timestep: float, **option: ArrayLike) -> tuple[Element, Element]:
     """Return the root of a scene and its world."""
     root = Element("mujoco", model=robot.name)
-    add(root, "compiler", angle="radian", inertiafromgeom="false")
+    add(root, "compiler", angle="radian", inertiafromgeom="false", balanceinertia="true")
     about = add(root, "option", timestep=timestep, gravity=robot.model.gravity.linear, **option)
     add(about, "flag", autoreset="disable")  # a diverged state is not reset
     return root, add(root, "worldbody")
@@ -95,7 +95,9 @@ def each(value: float | tuple[float, ...], n: int, name: str) -> Array:
 def _stops(robot: Robot, q: Array) -> list[dict[str, ArrayLike]]:
     """Return the limits of each velocity (n); where q (nq,) is beyond one, its stop is there."""
     (lower, upper), at = robot.position_limits(), robot.vector(q)
-    ranges = np.array([np.minimum(lower, at), np.maximum(upper, at)]).T
+    lower, upper = np.minimum(lower, at), np.maximum(upper, at)
+    # MuJoCo takes no range of one value, as of a joint whose file gives it no room.
+    ranges = np.array([lower, np.maximum(upper, np.nextafter(lower, np.inf))]).T
     return [{"limited": "true", "range": np.nan_to_num(range_, posinf=_FAR, neginf=-_FAR)}
             if np.isfinite(range_).any() else {} for range_ in ranges]
 
@@ -182,7 +184,7 @@ def _capsules(elements: list[Element], contact: Element, robot: Robot, q: Array)
 
 def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> list[Element]:
     of_joint, own, elements = _axes(robot), robot.model.armature, [world]
-    friction, damping, armature = (_of_drives(robot, key, getattr(floor, key)) for key in _DRIVE)
+    friction, damping, armature = (of_drives(robot, key, getattr(floor, key)) for key in _DRIVE)
     stops = _stops(robot, q) if floor.stops else [{}] * robot.n
     for i, body in enumerate(robot.bodies()):
         element = add_body(elements[body.parent], body, _LEAST)
@@ -196,7 +198,7 @@ def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> lis
     return elements
 
 
-def _of_drives(robot: Robot, key: str, value: float | None) -> Array:
+def of_drives(robot: Robot, key: str, value: float | None) -> Array:
     """Return a property (n,) of the drives: one value, or a share of their effort limits."""
     if value is not None:
         return np.full(robot.n, value)

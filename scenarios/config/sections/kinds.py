@@ -51,18 +51,36 @@ class ListedPosition(base.Listed, base.PositionTask):
     axes: base.Axes = "xyz"  # type: ignore[misc]  #: Axes of the world that count.
 
 
-class _AlongPose(base.Listed, base.AlongSection):
-    """The position and the rotation of a frame (6 rows)."""
+class _Turned(base.Listed):
+    """The axes of a frame."""
 
     frame: str  #: Frame of the robot.
     rotation: keys.Rows3 | None = None
     """Rows of the wanted matrix from frame to world, by default the initial one."""
 
     def asked(self, at: References) -> dict[str, Any]:
-        """Return the path of the frame, and its rotation, by default the initial one."""
-        frame = at.frame(self.frame)
-        rotation = at.start.rotation(frame) if self.rotation is None else self.rotation
-        return {"path": self.along(at.start.position(frame)), "rotation": np.asarray(rotation)}
+        """Return the rotation, by default the initial one."""
+        return {"rotation": np.asarray(at.start.rotation(at.frame(self.frame))
+                                       if self.rotation is None else self.rotation)}
+
+
+@register("tasks", "orientation", shipped=True)
+class ListedOrientation(_Turned, base.TaskSection):
+    """The axes of a frame, wherever it is (3 rows)."""
+
+    made_by: ClassVar[str] = "hierarchy.tasks:Orientation"
+
+    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
+        """Yield the angle [deg]."""
+        yield "deg", np.degrees(np.linalg.norm(error, axis=1))
+
+
+class _AlongPose(_Turned, base.AlongSection):
+    """The position and the rotation of a frame (6 rows)."""
+
+    def asked(self, at: References) -> dict[str, Any]:
+        """Return the path of the frame, and its rotation."""
+        return super().asked(at) | {"path": self.along(at.start.position(at.frame(self.frame)))}
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
         """Yield the error of the position and of the rotation."""
