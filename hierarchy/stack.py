@@ -69,8 +69,9 @@ class Stack:
             self.insert(task)
         give = {} if give is None else give
         expect("give of a stack", give, Mapping, "give a number by the name of a task")
-        self._give = {name: checked_give(f"task {name!r}", value, self[name].dimension)
-                      for name, value in give.items()}
+        self._give = dict(give)
+        for name in give:
+            self._room(name)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -158,9 +159,11 @@ class Stack:
         """Bind the tasks of an order to a state now rather than in the first tick that uses it."""
         expect("Stack.hierarchy: state", state, State, "make one with State.at(robot, q)")
         refuse(not self._tasks, "the stack is empty: there are no tasks")
-        self._tasks = {name: task.on(state.robot) for name, task in self._tasks.items()}
-        if self.reference is not None:
-            self.reference = self.reference.on(state.robot)
+        tasks = {name: task.on(state.robot) for name, task in self._tasks.items()}
+        reference = None if self.reference is None else self.reference.on(state.robot)
+        if any(known.state.robot is not state.robot for known in self._prepared.values()):
+            self._prepared.clear()  # another robot has other rows, and other names of them
+        self._tasks, self.reference = tasks, reference
         known = self._prepared.get(order)
         h = self._buffers(order, state.n) if known is None else known.hierarchy
         if self._metric is not None:  # M is symmetric, and its transpose is C-contiguous
@@ -203,12 +206,15 @@ class Stack:
 
         return check
 
+    def _room(self, name: str) -> Array:
+        """Return what each row of a task gives (m,); another task may have had its name before."""
+        return checked_give(f"task {name!r}", self._give.get(name, 0.0), self[name].dimension)
+
     def _buffers(self, order: tuple[str, ...], joints: int) -> Hierarchy:
         n = joints if self.contacts is None else self.contacts.unknowns
         sizes = [self[name].dimension for name in order]
         m = sum(sizes)
-        give = np.concatenate([np.empty(0), *(
-            self._give.get(name, np.zeros(self[name].dimension)) for name in order)])
+        give = np.concatenate([np.empty(0), *map(self._room, order)])
         return Hierarchy.trusted(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, names=order,
                                  give=give if give.any() else None,
                                  named=partial(self.row_names, order))

@@ -9,7 +9,7 @@ from refusals import refused
 from scene import FRAME, PATH, ROBOT, TASKS, Elbow, compiled_rows, place_of, state_at, states
 from scipy.linalg import expm
 
-from hierarchy import Stack, State, tasks
+from hierarchy import Robot, Stack, State, tasks
 from hierarchy.avoidance import Barrier
 from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
@@ -207,6 +207,15 @@ def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_bu
     state.move(0.0, Q + 0.1, V)
     assert s.hierarchy(state) is first
     assert not np.array_equal(first.A, A)
+
+
+def test_a_stack_serves_one_robot_after_another():
+    both = ROBOT, Robot.named("dual_arm")
+    s = Stack([tasks.Posture({})], "velocity")
+    for robot in (*both, *both):  # the target is by name, so each has a row for every joint
+        h = s.hierarchy(State.at(robot, robot.rest))
+        np.testing.assert_array_equal(h.A, np.eye(robot.n))
+        assert s.row_names() == tuple(robot.velocity_names)
 
 
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
