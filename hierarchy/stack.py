@@ -81,6 +81,10 @@ class Stack:
     def __len__(self) -> int:
         return len(self._order)
 
+    def __getstate__(self) -> dict[str, object]:
+        """Everything but the buffers, of which a copy makes its own."""
+        return vars(self) | {"_tasks": dict(self._tasks), "_prepared": {}}
+
     def __repr__(self) -> str:
         return f"Stack({' > '.join(self._order)}; {self.level} level)"
 

@@ -1,5 +1,7 @@
 """Tasks: rows, errors and their derivatives, by differences; stacks of them."""
 
+import copy
+import pickle
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -207,6 +209,20 @@ def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_bu
     state.move(0.0, Q + 0.1, V)
     assert s.hierarchy(state) is first
     assert not np.array_equal(first.A, A)
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy,
+                                    lambda one: pickle.loads(pickle.dumps(one))])
+def test_a_copy_of_a_stack_that_was_used_is_a_stack_of_its_own(copied):
+    s, state = stack(), state_at(Q, V)
+    h = s.hierarchy(state)
+    other = copied(s)
+    np.testing.assert_array_equal(other.hierarchy(state).A, h.A)
+    assert not np.shares_memory(other.hierarchy(state).A, h.A)
+    other.insert(TASKS["posture"])
+    other.remove("position")
+    s.insert(TASKS["posture"], 0)
+    assert s.hierarchy(state).names == ("posture", "position", "pointing", "avoidance")
 
 
 def test_a_stack_serves_one_robot_after_another():
