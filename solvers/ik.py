@@ -140,7 +140,7 @@ def _solved(robot: Robot, q: Array, h: Hierarchy, resolver: Settled,
         lower, upper, rows = h.lower.copy(), h.upper.copy(), slice(first, first + len(bend))
         lower[rows] += bend
         upper[rows] += bend
-        found, before = resolver.solve(h.changed(lower=lower, upper=upper), found.memory), bend
+        found, before = resolver.solve(h.changed(lower=lower, upper=upper), memory), bend
     return found
 
 
