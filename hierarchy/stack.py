@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, ReadingError, check_name, expect, is_one_of, refuse
-from hierarchy.gate import checked_give, checked_metric
+from hierarchy.gate import Sizes, checked_give, checked_metric
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.state import State
@@ -20,10 +20,13 @@ from hierarchy.task import Level, Rows, Task, writer_in_stack
 class _Prepared(NamedTuple):
     """The buffers of one order and the writers of its tasks, for one state and its measurement.
 
-    Tasks bind their kernels to these arrays once, so that a tick does no look-ups.
+    Tasks bind their kernels to these arrays once, so that a tick does no look-ups. `hierarchy` is
+    what callers get, who may set other arrays, and other `rows` then; `kept` has the buffers.
     """
 
     hierarchy: Hierarchy
+    rows: tuple[Array, Array, Array, Sizes]
+    kept: Hierarchy
     state: State
     seen: Measurement | None
     writers: tuple[Callable[[], object], ...]
@@ -143,7 +146,8 @@ class Stack:
         """Write the tasks' rows at a state and return them as a Hierarchy.
 
         `order` names some or all of the tasks, most important first; None takes the stack's own.
-        The arrays are buffers of this stack: the next call with the same order overwrites them.
+        The arrays are buffers of this stack: the next call with the same order overwrites them, and
+        does not return one in which another array was set.
         Raises ReadingError if the last `move` of the state was to positions that are not finite,
         and HierarchyError where the sides of a row cross.
         """
@@ -157,7 +161,11 @@ class Stack:
                                f"read after t = {state.t:g} s is not finite; stop the robot")
         for write in prepared.writers:
             write()
-        return prepared.hierarchy
+        h = prepared.hierarchy
+        if h.rows is not prepared.rows:
+            h = prepared.kept.changed()
+            self._prepared[order] = prepared._replace(hierarchy=h, rows=h.rows)
+        return h
 
     def prepare(self, state: State, order: tuple[str, ...]) -> _Prepared:
         """Bind the tasks of an order to a state now rather than in the first tick that uses it."""
@@ -169,7 +177,7 @@ class Stack:
             self._prepared.clear()  # another robot has other rows, and other names of them
         self._tasks, self.reference = tasks, reference
         known = self._prepared.get(order)
-        h = self._buffers(order, state.n) if known is None else known.hierarchy
+        h = self._buffers(order, state.n) if known is None else known.kept
         if self._metric is not None:  # M is symmetric, and its transpose is C-contiguous
             metric = state.dynamics.M.T if isinstance(self._metric, str) else self._metric
             h = h.changed(metric=metric)
@@ -179,7 +187,8 @@ class Stack:
         if self.reference is not None:
             writers.append(self._reference_writer(self.reference, h, state))
         writers.append(self._sides_checked(h, order))
-        prepared = _Prepared(h, state, state.measurement, tuple(writers))
+        given = h.changed()
+        prepared = _Prepared(given, given.rows, h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared
         return prepared
 

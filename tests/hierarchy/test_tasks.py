@@ -211,6 +211,19 @@ def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_bu
     assert not np.array_equal(first.A, A)
 
 
+@pytest.mark.parametrize(("array", "value"), [
+    ("A", np.ones((7, 7))), ("lower", np.full(7, -np.inf)), ("upper", np.full(7, np.inf)),
+    ("reference", np.ones(7)), ("metric", 2.0 * np.eye(7)), ("give", np.ones(7))])
+def test_an_array_that_is_set_in_the_hierarchy_of_a_stack_stays_in_that_one(array, value):
+    s, state = stack(), state_at(Q, V)
+    setattr(s.hierarchy(state), array, value)
+    state.move(0.0, Q + 0.1, V)
+    for _ in range(2):
+        h, fresh = s.hierarchy(state), stack().hierarchy(state)
+        for one in ("A", "lower", "upper", "reference", "metric", "give"):
+            np.testing.assert_array_equal(getattr(h, one), getattr(fresh, one))
+
+
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy,
                                     lambda one: pickle.loads(pickle.dumps(one))])
 def test_a_copy_of_a_stack_that_was_used_is_a_stack_of_its_own(copied):
