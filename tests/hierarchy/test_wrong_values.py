@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pytest
 from refusals import refused
-from scene import FRAME, ROBOT, Elbow
+from scene import FRAME, ROBOT, SENSOR, Elbow
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
@@ -159,6 +159,7 @@ def limits(**settings):
     (lambda: tasks.Along(HAND, ((1, 0, 0), (1, 1, 0))), "'along': directions ((1, 0, 0), (1, 1"),
     (lambda: Contact(FOOT, slides="no"), "contact: slides: expected a bool, got str 'no'"),
     (lambda: setattr(STATE, "q", np.zeros(7)), "State.q cannot be set; state.move(t, q, v)"),
+    (lambda: setattr(SENSOR, "obstacles", []), "ExactDistances: obstacles cannot be set, as tasks"),
     (lambda: setattr(STATE, "v", np.zeros(7)), "State.v cannot be set"),
     (lambda: State.at(ROBOT, [1j] * 7), "'kuka_lwr': q is not an array of real numbers: it is co"),
     (lambda: tasks.model_rows("kuka_lwr"), "model_rows: robot: expected a Robot, got str"),
