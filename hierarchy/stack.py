@@ -59,14 +59,13 @@ class Stack:
             raise HierarchyError(
                 "level 'torque' needs contacts, Contacts(robot) for none" if contacts is None else
                 f"contacts need the level 'torque', not {level!r}")
-        if reference is not None:
-            expect("reference of a stack", reference, Task, "give a task such as Posture")
         self.level: Level = level
-        self.reference, self.contacts = reference, contacts
+        self.contacts = contacts
         self._metric = _metric(metric, contacts)
         self._tasks: dict[str, Task] = {}
         self._order: tuple[str, ...] = ()
         self._prepared: dict[tuple[str, ...], _Prepared] = {}
+        self.reference = reference
         expect("tasks of a stack", tasks, Iterable, "give a list of tasks")
         for task in tasks:
             self.insert(task)
@@ -80,6 +79,18 @@ class Stack:
     def names(self) -> tuple[str, ...]:
         """Names of the tasks, most important first."""
         return self._order
+
+    @property
+    def reference(self) -> Task | None:
+        """The task whose value is the hierarchy's reference, which can be set."""
+        return self._reference
+
+    @reference.setter
+    def reference(self, task: Task | None) -> None:
+        if task is not None:
+            expect("reference of a stack", task, Task, "give a task such as Posture")
+        self._reference = task
+        self._prepared.clear()
 
     def __len__(self) -> int:
         return len(self._order)
@@ -175,7 +186,7 @@ class Stack:
         reference = None if self.reference is None else self.reference.on(state.robot)
         if any(known.state.robot is not state.robot for known in self._prepared.values()):
             self._prepared.clear()  # another robot has other rows, and other names of them
-        self._tasks, self.reference = tasks, reference
+        self._tasks, self._reference = tasks, reference
         known = self._prepared.get(order)
         h = self._buffers(order, state.n) if known is None else known.kept
         if self._metric is not None:  # M is symmetric, and its transpose is C-contiguous

@@ -261,6 +261,15 @@ def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
     assert not Stack([task], level).hierarchy(state).reference.any()
 
 
+def test_a_reference_that_is_set_counts_from_the_next_tick_on():
+    s, state, new = stack("velocity", reference=TASKS["posture"]), state_at(Q, V), np.full(7, 0.4)
+    for reference, value in ((TASKS["posture"], 0.1 - Q), (tasks.Posture(new), new - Q),
+                             (None, np.zeros(7))):
+        s.reference = reference
+        np.testing.assert_allclose(s.hierarchy(state).reference, value, atol=1e-15)
+    refused("reference of a stack", setattr, s, "reference", "posture")
+
+
 @pytest.mark.parametrize(("edit", "said"), [
     (lambda s: s.remove("pose"), "unknown task 'pose'"),
     (lambda s: s.swap("position", "pointin"), "did you mean 'pointing'"),
