@@ -70,17 +70,21 @@ class Watchdog:
 
 
 class Once:
-    """A function that runs only the first time it is called, from any thread."""
+    """A function that runs only the first time it is called, from any thread.
+
+    `ended` is whether it has come to its end.
+    """
 
     def __init__(self, function: Callable[[], object]) -> None:
-        self._function, self._lock, self._done = function, Lock(), False
+        self._function, self._lock, self._begun, self.ended = function, Lock(), False, False
 
     def __call__(self) -> None:
         """Call the function unless it has already been called."""
         with self._lock:
-            first, self._done = not self._done, True
+            first, self._begun = not self._begun, True
         if first:
             self._function()
+            self.ended = True
 
 
 PERCENTILES = {"median": 50.0, "p95": 95.0, "p99.9": 99.9, "max": 100.0}
@@ -210,11 +214,12 @@ class Loop:
         not SOLVED, a command that is None or not finite, a reading that is not finite (a stack's
         ReadingError).
 
-        `safe_stop` is called however the loop ends: once, and a second time if the watchdog called
-        it and a command may have been sent since. An exception in any of the functions, or Ctrl-C,
-        then propagates to the caller.
+        `safe_stop` is called however the loop ends: once, and a second time if Ctrl-C broke it off,
+        or if the watchdog called it and a command may have been sent since. An exception in any of
+        the functions, or Ctrl-C, then propagates to the caller.
         """
         positive("loop: duration [s]", duration)
+        whole("loop: record", record)
         for name, function in (("step", step), ("safe_stop", safe_stop), ("send", send)):
             refuse(not (callable(function) or (name == "send" and function is None)),
                    f"loop: {name}: expected a function, got {brief(function)}")
@@ -225,15 +230,20 @@ class Loop:
         watched = dog if self.watchdog else nullcontext()
         with _quiet(self.pause_gc, self.priority, log.notes), watched:
             try:
-                log.ended = self._run(step, safe_stop, send, ticks, dog)
-            except BaseException as error:
-                log.ended = f"{type(error).__name__} after {log.count} ticks: {error}"
-                _stop_again(dog, safe_stop)
+                try:
+                    log.ended = self._run(step, safe_stop, send, ticks, dog)
+                except BaseException as error:
+                    log.ended = f"{type(error).__name__} after {log.count} ticks: {error}"
+                    _stop_again(dog, safe_stop)
+                    raise
+                finally:
+                    stop()
+                    if dog.error is not None:
+                        log.notes.append(f"safe_stop failed in the watchdog: {dog.error!r}")
+            except KeyboardInterrupt:
+                if not stop.ended:  # the second of two, while the robot was being stopped
+                    safe_stop()
                 raise
-            finally:
-                stop()
-                if dog.error is not None:
-                    log.notes.append(f"safe_stop failed in the watchdog: {dog.error!r}")
         if dog.error is not None:
             raise dog.error
         return log
@@ -312,16 +322,14 @@ def _quiet(pause_gc: bool, priority: int | None, notes: list[str]) -> Iterator[N
     """Turn the garbage collector off and raise the priority, as far as permitted."""
     before = _raise_priority(priority, notes)
     collecting = pause_gc and gc.isenabled()
-    if collecting:
-        gc.collect()
-        gc.freeze()
-        gc.disable()
     try:
+        if collecting:
+            gc.collect()
+            gc.disable()
         yield
     finally:
         if collecting:
             gc.enable()
-            gc.unfreeze()
         if before is not None:
             os.sched_setscheduler(0, *before)
 

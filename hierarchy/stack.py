@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
 from hierarchy.errors import HierarchyError, ReadingError, check_name, expect, is_one_of, refuse
-from hierarchy.gate import checked_give, checked_metric
+from hierarchy.gate import Sizes, checked_give, checked_metric
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.state import State
@@ -20,10 +20,13 @@ from hierarchy.task import Level, Rows, Task, writer_in_stack
 class _Prepared(NamedTuple):
     """The buffers of one order and the writers of its tasks, for one state and its measurement.
 
-    Tasks bind their kernels to these arrays once, so that a tick does no look-ups.
+    Tasks bind their kernels to these arrays once, so that a tick does no look-ups. `hierarchy` is
+    what callers get, who may set other arrays, and other `rows` then; `kept` has the buffers.
     """
 
     hierarchy: Hierarchy
+    rows: tuple[Array, Array, Array, Sizes]
+    kept: Hierarchy
     state: State
     seen: Measurement | None
     writers: tuple[Callable[[], object], ...]
@@ -56,29 +59,45 @@ class Stack:
             raise HierarchyError(
                 "level 'torque' needs contacts, Contacts(robot) for none" if contacts is None else
                 f"contacts need the level 'torque', not {level!r}")
-        if reference is not None:
-            expect("reference of a stack", reference, Task, "give a task such as Posture")
         self.level: Level = level
-        self.reference, self.contacts = reference, contacts
+        self.contacts = contacts
         self._metric = _metric(metric, contacts)
         self._tasks: dict[str, Task] = {}
         self._order: tuple[str, ...] = ()
         self._prepared: dict[tuple[str, ...], _Prepared] = {}
+        self.reference = reference
         expect("tasks of a stack", tasks, Iterable, "give a list of tasks")
         for task in tasks:
             self.insert(task)
         give = {} if give is None else give
         expect("give of a stack", give, Mapping, "give a number by the name of a task")
-        self._give = {name: checked_give(f"task {name!r}", value, self[name].dimension)
-                      for name, value in give.items()}
+        self._give = dict(give)
+        for name in give:
+            self._room(name)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the tasks, most important first."""
         return self._order
 
+    @property
+    def reference(self) -> Task | None:
+        """The task whose value is the hierarchy's reference, which can be set."""
+        return self._reference
+
+    @reference.setter
+    def reference(self, task: Task | None) -> None:
+        if task is not None:
+            expect("reference of a stack", task, Task, "give a task such as Posture")
+        self._reference = task
+        self._prepared.clear()
+
     def __len__(self) -> int:
         return len(self._order)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Everything but the buffers, of which a copy makes its own."""
+        return vars(self) | {"_tasks": dict(self._tasks), "_prepared": {}}
 
     def __repr__(self) -> str:
         return f"Stack({' > '.join(self._order)}; {self.level} level)"
@@ -138,7 +157,8 @@ class Stack:
         """Write the tasks' rows at a state and return them as a Hierarchy.
 
         `order` names some or all of the tasks, most important first; None takes the stack's own.
-        The arrays are buffers of this stack: the next call with the same order overwrites them.
+        The arrays are buffers of this stack: the next call with the same order overwrites them, and
+        does not return one in which another array was set.
         Raises ReadingError if the last `move` of the state was to positions that are not finite,
         and HierarchyError where the sides of a row cross.
         """
@@ -152,17 +172,23 @@ class Stack:
                                f"read after t = {state.t:g} s is not finite; stop the robot")
         for write in prepared.writers:
             write()
-        return prepared.hierarchy
+        h = prepared.hierarchy
+        if h.rows is not prepared.rows:
+            h = prepared.kept.changed()
+            self._prepared[order] = prepared._replace(hierarchy=h, rows=h.rows)
+        return h
 
     def prepare(self, state: State, order: tuple[str, ...]) -> _Prepared:
         """Bind the tasks of an order to a state now rather than in the first tick that uses it."""
         expect("Stack.hierarchy: state", state, State, "make one with State.at(robot, q)")
         refuse(not self._tasks, "the stack is empty: there are no tasks")
-        self._tasks = {name: task.on(state.robot) for name, task in self._tasks.items()}
-        if self.reference is not None:
-            self.reference = self.reference.on(state.robot)
+        tasks = {name: task.on(state.robot) for name, task in self._tasks.items()}
+        reference = None if self.reference is None else self.reference.on(state.robot)
+        if any(known.state.robot is not state.robot for known in self._prepared.values()):
+            self._prepared.clear()  # another robot has other rows, and other names of them
+        self._tasks, self._reference = tasks, reference
         known = self._prepared.get(order)
-        h = self._buffers(order, state.n) if known is None else known.hierarchy
+        h = self._buffers(order, state.n) if known is None else known.kept
         if self._metric is not None:  # M is symmetric, and its transpose is C-contiguous
             metric = state.dynamics.M.T if isinstance(self._metric, str) else self._metric
             h = h.changed(metric=metric)
@@ -172,7 +198,8 @@ class Stack:
         if self.reference is not None:
             writers.append(self._reference_writer(self.reference, h, state))
         writers.append(self._sides_checked(h, order))
-        prepared = _Prepared(h, state, state.measurement, tuple(writers))
+        given = h.changed()
+        prepared = _Prepared(given, given.rows, h, state, state.measurement, tuple(writers))
         self._prepared[order] = prepared
         return prepared
 
@@ -203,12 +230,15 @@ class Stack:
 
         return check
 
+    def _room(self, name: str) -> Array:
+        """Return what each row of a task gives (m,); another task may have had its name before."""
+        return checked_give(f"task {name!r}", self._give.get(name, 0.0), self[name].dimension)
+
     def _buffers(self, order: tuple[str, ...], joints: int) -> Hierarchy:
         n = joints if self.contacts is None else self.contacts.unknowns
         sizes = [self[name].dimension for name in order]
         m = sum(sizes)
-        give = np.concatenate([np.empty(0), *(
-            self._give.get(name, np.zeros(self[name].dimension)) for name in order)])
+        give = np.concatenate([np.empty(0), *map(self._room, order)])
         return Hierarchy.trusted(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, names=order,
                                  give=give if give.any() else None,
                                  named=partial(self.row_names, order))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
+from operator import attrgetter
 from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
@@ -47,6 +48,15 @@ class Momentum(NamedTuple):
     dA: Array  # noqa: N815
 
 
+def _moved(name: str) -> Any:
+    """Return an array that only `move` writes: kernels and pinocchio are bound to its memory."""
+    def refuse_value(state: State, value: object) -> None:
+        raise RobotError(f"robot {state.robot.name!r}: State.{name} cannot be set; "
+                         "state.move(t, q, v) goes there")
+
+    return property(attrgetter(f"_{name}"), refuse_value)
+
+
 class State:
     """Time, joint state and kinematics of one tick: everything that a task may read.
 
@@ -65,13 +75,16 @@ class State:
     None.
     """
 
+    q: Array = _moved("q")
+    v: Array = _moved("v")
+
     def __init__(self, robot: Robot, differences: float | None = None) -> None:
         expect("State: robot", robot, Robot, "make one with Robot.load(name or file)")
         if differences is not None:
             number("State: differences [s]", differences, 0.0)
         self.robot = robot
         self.t = 0.0
-        self.q, self.v = pin.neutral(robot.model), np.zeros(robot.n)
+        self._q, self._v = pin.neutral(robot.model), np.zeros(robot.n)
         self.measurement: Measurement | None = None
         self.commanded: Array | None = None
         self.carried: Array | None = None

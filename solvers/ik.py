@@ -158,7 +158,7 @@ def _solved(state: State, h: Hierarchy, resolver: Settled, memory: Array | None)
         lower, upper, rows = h.lower.copy(), h.upper.copy(), slice(first, first + len(bend))
         lower[rows] += bend
         upper[rows] += bend
-        found, before = resolver.solve(h.changed(lower=lower, upper=upper), found.memory), bend
+        found, before = resolver.solve(h.changed(lower=lower, upper=upper), memory), bend
     return found
 
 

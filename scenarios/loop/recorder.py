@@ -53,7 +53,8 @@ class _Seen(NamedTuple):
 class Recorder:
     """Memory for a whole run, filled row by row.
 
-    `ticks` is the number of rows written so far; `facts` are those of the first controller.
+    `ticks` is the number of rows that are complete, which `look` makes them: a tick that was broken
+    off is not part of the run. `facts` are those of the first controller.
     `audits` examine every tick that the controller has answered; in others their signals are NaN,
     -1 if they are integers, or false.
     """
@@ -118,12 +119,11 @@ class Recorder:
             self._weights[k] = self._blend.weight
         if self._policy.events:
             self._events += [Event(k, *event) for event in self._policy.events]
-        self.ticks = k + 1
         return bool(finite)
 
     def stamp(self, clock: float) -> None:
         """Note the clock [s] at the end of the tick just written."""
-        times = self._log.times[self.ticks - 1]
+        times = self._log.times[self.ticks]
         times[3] = clock - times[3]
 
     def look(self) -> None:
@@ -131,12 +131,13 @@ class Recorder:
 
         That is not part of the tick's time: a controller does not wait for it.
         """
-        controller, cell, k = self._controller, self._cell, self.ticks - 1
+        controller, cell, k = self._controller, self._cell, self.ticks
         if cell.tasks.position is not None:
             cell.tasks.position.path.write(cell.state.t, self._desired[k])
         for audit in self._audits if controller.answered else self._always:
             for name, value in audit(k, controller).items():
                 self._rows_of(name, np.asarray(value))[k] = value
+        self.ticks = k + 1
 
     def _rows_of(self, name: str, value: NDArray[Any]) -> NDArray[Any]:
         """Return the rows of an audit's signal, which begin when it is first given."""
@@ -148,7 +149,7 @@ class Recorder:
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return the run as recorded so far."""
         recording = replace(self.part(slice(self.ticks), scenario), fault=fault,
-                            events=tuple(self._events))
+                            events=tuple(one for one in self._events if one.tick < self.ticks))
         recording.signals.update((name, rows[:self.ticks].copy())
                                  for name, rows in self._audited.items())
         return recording

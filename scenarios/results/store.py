@@ -4,11 +4,12 @@
 `read_csv("results.csv").pivot_table("value", ["scenario", "resolver", "sample"], "metric")`.
 """
 
+import codecs
 import csv
 import io
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,8 @@ class Store:
     def opened(self) -> Iterator[None]:
         """Lock this writer's file for this process; make the folder if it is new.
 
+        What a writer that was stopped left of its last run, as on a full disk, is cut off.
+
         Raises
         ------
         StoreError : the folder has other content.
@@ -66,6 +69,8 @@ class Store:
         with files.named(self.folder):
             files.lock(self.file.resolve())
         try:
+            with suppress(FileNotFoundError, ValueError, csv.Error):  # what is damaged stays
+                os.truncate(self.file, len(_ended(self.file.read_bytes()).encode()))
             yield
         finally:
             files.unlock(self.file.resolve())
@@ -77,8 +82,7 @@ class Store:
         new = not (self.file.exists() and self.file.stat().st_size)
         text = _as_text([COLUMNS] * new + rows(job, outcome))
         with writing(self.file), self.file.open("ab") as stream:
-            begun = b"\n" * bool(stream.tell())  # ends a row cut off, as by a full disk
-            stream.write(begun + text.encode())
+            stream.write(text.encode())
             stream.flush()
             os.fsync(stream.fileno())
 
@@ -131,22 +135,37 @@ def read(file: Path) -> dict[str, Outcome]:
     found: dict[str, Outcome] = {}
     metrics: dict[str, dict[str, Metric]] = {}
     try:
-        with file.open(encoding="utf-8", newline="") as stream:
-            for row in csv.DictReader(stream):
-                if None in row.values() or row["group"] == _SAMPLED:
-                    continue
-                key, name, value = row["key"], row["metric"], row["value"]
-                of = metrics.setdefault(key, {})
-                of[name] = Metric(name, row["label"], float(value) if value else None, row["unit"],
-                                  _LOWER[row["better"]], row["group"], row["note"])
-                if name == _END:
-                    measured = tuple(one for one in of.values() if one.group != _RUN)
-                    found[key] = Outcome(key, int(of["ticks"].value or 0), row["note"] or None,
-                                         of["wall_seconds"].value or 0.0, measured)
+        for row in csv.DictReader(io.StringIO(_ended(file.read_bytes()), newline="")):
+            if None in row.values() or row["group"] == _SAMPLED:
+                continue
+            key, name, value = row["key"], row["metric"], row["value"]
+            of = metrics.setdefault(key, {})
+            of[name] = Metric(name, row["label"], float(value) if value else None, row["unit"],
+                              _LOWER[row["better"]], row["group"], row["note"])
+            if name == _END:
+                measured = tuple(one for one in of.values() if one.group != _RUN)
+                found[key] = Outcome(key, int(of["ticks"].value or 0), row["note"] or None,
+                                     of["wall_seconds"].value or 0.0, measured)
     except (OSError, ValueError, KeyError, csv.Error) as error:
         raise StoreError(f"{file} cannot be read ({error}); remove it to repeat its "
                          "runs") from error
     return found
+
+
+def _ended(content: bytes) -> str:
+    """Return the text of the runs of a file that were written to their end.
+
+    What follows may end in the middle of a row, a text in quotes or a character. Raises ValueError
+    or csv.Error for what is damaged elsewhere.
+    """
+    text = codecs.getincrementaldecoder("utf-8")().decode(content)
+    lines, end = list(io.StringIO(text, newline="")), 0
+    cut = not text.endswith("\n") or text.count('"') % 2 == 1
+    reader = csv.reader(lines)
+    for row in reader:
+        whole = reader.line_num < len(lines) or not cut
+        end = reader.line_num if whole and _END in row[4:5] else end
+    return "".join(lines[:end])
 
 
 @contextmanager

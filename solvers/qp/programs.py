@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from threading import Lock
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     import qpsolvers
 
 _RANK, _SETTLED = 1e-8, 1e-7  # of `level_problem`: rank tolerance, and miss of a row that is kept
+_WARNINGS = Lock()  # their filters belong to the process: threads would restore each other's
 
 
 @final
@@ -39,7 +41,7 @@ class Program:
         """Return the backend's y, zeros if it gave none, and whether the backend vouches for it."""
         import qpsolvers
 
-        with warnings.catch_warnings():
+        with _WARNINGS, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the backend's status says the same
             try:
                 solution = qpsolvers.solve_problem(

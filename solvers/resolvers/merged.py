@@ -2,16 +2,25 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, final
+from typing import Any, ClassVar, Self, cast, final
 
 import numpy as np
 
 from hierarchy.errors import HierarchyError, positive
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
-from solvers.kernels.merged import BY_RULE, NOTHING, merged, record_size, write_levels
+from solvers.kernels.merged import (
+    BY_RULE,
+    EXACT,
+    NOTHING,
+    OWN,
+    count_strict,
+    merged,
+    record_size,
+    write_levels,
+)
 from solvers.resolver import Handles, Resolution, Resolver, number, register, whole_number
 from solvers.resolvers.hcod import Hcod, warm_record
 from solvers.status import SOLVED, Status
@@ -61,6 +70,39 @@ class OneLevel(Resolver):
         if code == NOTHING:
             refuse_safety_alone(self, h)
         return MergedResolution(x, _SOLVED if code == SOLVED else Status(code), record, m)
+
+    def strictly(self) -> Hcod:
+        """Return the resolver with these settings for which all levels are strict."""
+        return Hcod(damping=self.damping, threshold=self.threshold, tolerance=self.tolerance,
+                    rank_tolerance=self.rank_tolerance, max_iterations=self.max_iterations)
+
+    def below_one_more(self, h: Hierarchy) -> Self:
+        """Return the resolver for the levels of h below one more, which is strict too."""
+        strict = int(count_strict(*h.rows[1:], self._settings_of(h)[EXACT]))
+        made: Self = cast(Any, replace)(self, strict_levels=strict + 1)
+        return made
+
+    def aimed(self, h: Hierarchy, memory: Array | None) -> Hierarchy:
+        """Return h with the sides that its rows aim at after an earlier resolution."""
+        y, _ = self._moves(h, memory)
+        return h.changed(lower=h.lower + y, upper=h.upper + y)
+
+    def carried_on(self, h: Hierarchy, x: Array, memory: Array | None) -> Array:
+        """Return the memory after an answer x (n,) that was found in another way."""
+        (y, cap), record = self._moves(h, memory), warm_record(None, record_size(h.n, h.m))
+        value = h.A @ x
+        miss = np.clip(value - y, h.lower, h.upper) - value
+        step = self._settings_of(h)[EXACT + 2]
+        record[:h.m] = np.clip(y + step * np.clip(miss, -cap, cap), -cap, cap)
+        return record
+
+    def _moves(self, h: Hierarchy, memory: Array | None) -> tuple[Array, Array]:
+        """Return by how much a memory moves the sides of each row, and at most: (m,) both."""
+        settings, levels = self._settings_of(h), len(h.names)
+        caps = settings[OWN + levels:].copy()
+        caps[:count_strict(*h.rows[1:], settings[EXACT])] = caps[-1:] = 0.0
+        cap, y = np.repeat(caps, h.sizes), warm_record(memory, record_size(h.n, h.m))[:h.m]
+        return np.clip(np.where(np.isfinite(y), y, 0.0), -cap, cap), cap
 
     @abstractmethod
     def _settings_of(self, h: Hierarchy) -> Array:

@@ -26,6 +26,7 @@ from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.met import plainly_met
 from solvers.resolver import Around, Handles, Resolution, Resolver, number
 from solvers.resolvers.hcod import ActiveSetResolution
+from solvers.resolvers.merged import OneLevel
 from solvers.status import Status
 
 _LEAST = 1e-6     # of |A|^2: the least mu
@@ -57,8 +58,15 @@ class Settled(Around):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; where a curved level is not plainly met, some problems of the levels to it."""
-        above = self._calmed(h)
-        return self.inner.solve(h, memory) if above is None else above.resolve(h)
+        one = self.inner if isinstance(self.inner, OneLevel) else None
+        aimed = h if one is None else one.aimed(h, memory)
+        above = self._calmed(aimed)
+        if above is None:
+            return self.inner.solve(h, memory)
+        found = above.resolve(aimed)
+        if one is not None:
+            found.memory = one.carried_on(h, found.x, memory)
+        return found
 
     def asked(self, h: Hierarchy) -> Hierarchy:
         """Return what the answer to h, a plain one, solves: the levels that were calmed as such."""
@@ -92,11 +100,17 @@ class _Reached(NamedTuple):
 
 
 class _Above:
-    """The levels written so far, x down to them, and by how much levels below may change it."""
+    """The levels written so far, x down to them, and by how much levels below may change it.
+
+    `strict` resolves levels as strict ones, `inner` all of them, and the pace above them.
+    """
 
     def __init__(self, inner: Resolver, h: Hierarchy) -> None:
         n = h.n
-        self.inner, self.calmed, self.status, self.names = inner, False, Status.SOLVED, h.names
+        self.strict = self.inner = inner
+        if isinstance(inner, OneLevel):
+            self.strict, self.inner = inner.strictly(), inner.below_one_more(h)
+        self.calmed, self.status, self.names = False, Status.SOLVED, h.names
         self.levels: list[tuple[Array, Array, Array]] = []
         self.x, self._held, self._later = np.zeros(n), np.empty((0, n)), list[Array]()
         self.behind = False  # whether x misses a level
@@ -126,7 +140,7 @@ class _Above:
         half : alpha / |A| [s].
         """
         if self.behind:
-            self.x = self.inner.solve(self.stacked(self.levels, self.x)).x
+            self.x = self.strict.solve(self.stacked(self.levels, self.x)).x
             self.behind = False
         size, out = float(np.linalg.norm(A)), float(np.linalg.norm(b - A @ self.x))
         alpha = half * size
@@ -177,7 +191,7 @@ class _Above:
         def probe(mu: float) -> _Reached:
             weights[:] = np.sqrt(mu)
             lower[-n:] = upper[-n:] = weights * x0
-            found = self.inner.solve(h)
+            found = self.strict.solve(h)
             return _Reached(mu, found.x, float(np.linalg.norm(b - A @ found.x)), found.status)
 
         return probe

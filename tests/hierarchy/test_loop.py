@@ -17,12 +17,12 @@ from solvers import Resolution, Status
 PERIOD = 0.25  # with steps of eighths every time is exact
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture(autouse=True, scope="module")
 def _little_to_collect():
-    """A loop collects garbage before it runs, and unfreezes what was frozen: here, all modules."""
+    """A loop collects garbage before it runs: here, not in all modules."""
     gc.freeze()
     yield
-    gc.freeze()
+    gc.unfreeze()
 
 
 class Clock:
@@ -111,12 +111,33 @@ def test_an_exception_ends_in_a_safe_stop_and_goes_on_with_the_log_kept(error, w
 
 
 def test_the_collector_of_garbage_rests_while_the_loop_runs_and_only_then():
-    seen = []
+    seen, frozen = [], gc.get_freeze_count()
     assert gc.isenabled()
     Loop(PERIOD, clock=(clock := Clock()), sleep=clock.sleep).run(
         lambda t: seen.append(gc.isenabled()), lambda: seen.append(gc.isenabled()), 0.5)
     assert seen == [False, False, False]
     assert gc.isenabled()
+    assert gc.get_freeze_count() == frozen > 0
+
+
+@pytest.mark.parametrize("first", [False, True], ids=["after the last tick", "after Ctrl-C"])
+def test_ctrl_c_while_the_robot_is_being_stopped_stops_it_again(first):
+    robot, calls, clock = Robot(), [], Clock()
+
+    def step(t):
+        if first and t > 0.0:
+            raise KeyboardInterrupt
+        return robot.step(t)
+
+    def stop():
+        calls.append("begun")
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        calls.append("ended")
+
+    with pytest.raises(KeyboardInterrupt):
+        Loop(PERIOD, clock=clock, sleep=clock.sleep).run(step, stop, 0.5, robot.send)
+    assert calls == ["begun", "begun", "ended"]
 
 
 def test_a_priority_that_is_not_given_is_said_and_one_that_is_is_given_back():
@@ -156,7 +177,7 @@ def test_what_hangs_is_stopped_from_outside_and_again_where_a_command_may_have_l
         stopped.set()
 
     step, send = (hangs, robot.send) if hanging == "step" else (robot.step, hangs)
-    log = Loop(0.001, watchdog=0.01).run(step, stop, 1.0, send)
+    log = Loop(0.001, watchdog=0.1).run(step, stop, 1.0, send)  # long enough for a busy machine
     assert (log.ended, log.count) == ("the watchdog fired in tick 0", sent)
     assert (robot.stops, len(robot.sent)) == (stops, sent)
 

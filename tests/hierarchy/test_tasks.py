@@ -1,5 +1,7 @@
 """Tasks: rows, errors and their derivatives, by differences; stacks of them."""
 
+import copy
+import pickle
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -9,7 +11,7 @@ from refusals import refused
 from scene import FRAME, PATH, ROBOT, TASKS, Elbow, compiled_rows, place_of, state_at, states
 from scipy.linalg import expm
 
-from hierarchy import Stack, State, tasks
+from hierarchy import Robot, Stack, State, tasks
 from hierarchy.avoidance import Barrier
 from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
@@ -232,6 +234,42 @@ def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_bu
     assert not np.array_equal(first.A, A)
 
 
+@pytest.mark.parametrize(("array", "value"), [
+    ("A", np.ones((7, 7))), ("lower", np.full(7, -np.inf)), ("upper", np.full(7, np.inf)),
+    ("reference", np.ones(7)), ("metric", 2.0 * np.eye(7)), ("give", np.ones(7))])
+def test_an_array_that_is_set_in_the_hierarchy_of_a_stack_stays_in_that_one(array, value):
+    s, state = stack(), state_at(Q, V)
+    setattr(s.hierarchy(state), array, value)
+    state.move(0.0, Q + 0.1, V)
+    for _ in range(2):
+        h, fresh = s.hierarchy(state), stack().hierarchy(state)
+        for one in ("A", "lower", "upper", "reference", "metric", "give"):
+            np.testing.assert_array_equal(getattr(h, one), getattr(fresh, one))
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy,
+                                    lambda one: pickle.loads(pickle.dumps(one))])
+def test_a_copy_of_a_stack_that_was_used_is_a_stack_of_its_own(copied):
+    s, state = stack(), state_at(Q, V)
+    h = s.hierarchy(state)
+    other = copied(s)
+    np.testing.assert_array_equal(other.hierarchy(state).A, h.A)
+    assert not np.shares_memory(other.hierarchy(state).A, h.A)
+    other.insert(TASKS["posture"])
+    other.remove("position")
+    s.insert(TASKS["posture"], 0)
+    assert s.hierarchy(state).names == ("posture", "position", "pointing", "avoidance")
+
+
+def test_a_stack_serves_one_robot_after_another():
+    both = ROBOT, Robot.named("dual_arm")
+    s = Stack([tasks.Posture({})], "velocity")
+    for robot in (*both, *both):  # the target is by name, so each has a row for every joint
+        h = s.hierarchy(State.at(robot, robot.rest))
+        np.testing.assert_array_equal(h.A, np.eye(robot.n))
+        assert s.row_names() == tuple(robot.velocity_names)
+
+
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("task", [tasks.JointDamping(7, 5.0), tasks.JointDamping(7, 2.0, "mass"),
                                   TASKS["posture"]], ids=["identity", "mass", "posture"])
@@ -244,6 +282,15 @@ def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
     np.testing.assert_array_equal([h.lower, h.upper], [h.reference] * 2)
     np.testing.assert_array_equal(h.A, np.eye(7))
     assert not Stack([task], level).hierarchy(state).reference.any()
+
+
+def test_a_reference_that_is_set_counts_from_the_next_tick_on():
+    s, state, new = stack("velocity", reference=TASKS["posture"]), state_at(Q, V), np.full(7, 0.4)
+    for reference, value in ((TASKS["posture"], 0.1 - Q), (tasks.Posture(new), new - Q),
+                             (None, np.zeros(7))):
+        s.reference = reference
+        np.testing.assert_allclose(s.hierarchy(state).reference, value, atol=1e-15)
+    refused("reference of a stack", setattr, s, "reference", "posture")
 
 
 @pytest.mark.parametrize(("edit", "said"), [

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pytest
 from refusals import refused
-from scene import FRAME, ROBOT, Elbow
+from scene import FRAME, ROBOT, SENSOR, Elbow
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
@@ -158,6 +158,9 @@ def limits(**settings):
     (lambda: Contact(FOOT, np.eye(3), slides=True), "3 points that slide; only a contact of one"),
     (lambda: tasks.Along(HAND, ((1, 0, 0), (1, 1, 0))), "'along': directions ((1, 0, 0), (1, 1"),
     (lambda: Contact(FOOT, slides="no"), "contact: slides: expected a bool, got str 'no'"),
+    (lambda: setattr(STATE, "q", np.zeros(7)), "State.q cannot be set; state.move(t, q, v)"),
+    (lambda: setattr(SENSOR, "obstacles", []), "ExactDistances: obstacles cannot be set, as tasks"),
+    (lambda: setattr(STATE, "v", np.zeros(7)), "State.v cannot be set"),
     (lambda: State.at(ROBOT, [1j] * 7), "'kuka_lwr': q is not an array of real numbers: it is co"),
     (lambda: tasks.model_rows("kuka_lwr"), "model_rows: robot: expected a Robot, got str"),
     (lambda: tasks.JointDamping(10**30), "joints = 1000000000000000000000000000000: expected a"),
@@ -234,6 +237,7 @@ def limits(**settings):
     (lambda: Loop(0.1, overrun="skipp"), "did you mean 'skip'"),
     (lambda: Loop(0.25, watchdog=0.1), "watchdog 0.1 s must be longer than the period 0.25 s"),
     (lambda: Loop(0.1).run(print, None, 1.0), "safe_stop: expected a function, got NoneType None"),
+    (lambda: Loop(0.1).run(print, print, 1.0, record=-1), "loop: record = -1: expected a whole"),
     (lambda: Stack(metric="inertia"), "'mass' or None, got 'inertia'"),
     (lambda: ROBOT.limit_base(1.0, 1.0), "its base is fixed"),
     (lambda: HUMANOID.limit_base(0.0, 1.0), "linear speed of the base = 0"),

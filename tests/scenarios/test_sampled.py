@@ -221,16 +221,23 @@ def test_one_of_several_quantities_is_best_beyond_chance_only_if_it_would_be_alo
 
 def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path, monkeypatch):
     store, jobs = Store(tmp_path / "out"), [Job(key, "", "tpm") for key in "abc"]
-    speed = metrics.Metric("speed_max", "Joint speed, max", 1.5, "rad/s")
+    speed = metrics.Metric("speed_max", "Joint speed, max", 1.5, "rad/s", note='"v", é')
+    runs = {key: Outcome(key, 20, said, 0.1, (speed,))
+            for key, said in (("a", None), ("b", 'broke,\n"é" once'), ("c", None))}
     with store.opened():
-        for job in jobs[:2]:
-            store.add(job, Outcome(job.key, 20, None, 0.1, (speed,)))
-        os.truncate(store.file, len(store.file.read_bytes()) - 20)
-        assert store.outcomes() == {"a": Outcome("a", 20, None, 0.1, (speed,))}
-        store.add(jobs[2], Outcome("c", 20, None, 0.1, (speed,)))
-        store.add(jobs[1], Outcome("b", 0, "broke,\nfor once", 0.1))
-        assert {key: one.reason for key, one in store.outcomes().items()} == {
-            "a": None, "c": None, "b": "broke,\nfor once"}
+        store.add(jobs[0], runs["a"])
+        one = store.file.stat().st_size
+        store.add(jobs[1], runs["b"])
+        both = store.file.read_bytes()
+    # In the header, a row, a text in quotes, a character, before the end of the last row.
+    for size in (9, *range(80, len(both), 80), both.rindex("é".encode()) + 1, len(both) - 1):
+        store.file.write_bytes(both[:size])
+        kept = {"a": runs["a"]} if size >= one else {}
+        assert store.outcomes() == kept
+        with store.opened():
+            store.add(jobs[2], runs["c"])
+            assert store.outcomes() == {**kept, "c": runs["c"]}
+    with store.opened():
         failed = outcome(mock.Mock(key="b", load=mock.Mock(side_effect=ValueError("broke"))))
         assert (failed.key, failed.ticks, failed.reason) == ("b", 0, "ValueError: broke")
         monkeypatch.setattr(os, "fsync", mock.Mock(side_effect=OSError(28, os.strerror(28))))

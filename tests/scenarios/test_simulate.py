@@ -10,6 +10,7 @@ import pytest
 import scenarios.loop.simulation
 from benchmark.studies.reference_runs import EVERY, RIGHT, RUNS, differences, reference
 from scenarios import load, load_run, save, simulate
+from scenarios.loop.recorder import Recorder
 from scenarios.measure.judging import Rows
 from scenarios.recording.fate import Fate
 
@@ -59,6 +60,20 @@ def test_progress_is_told_and_an_interrupted_run_keeps_what_was_run():
     seen = []
     simulate(load("ellipse", ["control.duration=1.2"]), lambda *args: seen.append(args))
     assert seen == [(0, 1200), (500, 1200), (1000, 1200), (1200, 1200)]
+
+
+@pytest.mark.parametrize("within", ["stamp", "look"])
+def test_a_tick_in_which_a_run_is_interrupted_is_not_part_of_it(within, monkeypatch):
+    scenario = load("ellipse", ["control.duration=0.01",
+                                "faults=[{kind='nan_velocity', at=0.007, duration=0.001}]"])
+    whole, method = simulate(scenario), getattr(Recorder, within)
+    monkeypatch.setattr(Recorder, within, lambda self, *clock: method(self, *clock) if
+                        self.ticks < 7 else signal.raise_signal(signal.SIGINT))
+    run = simulate(scenario)
+    assert (run.fault, run.ticks, run.events) == ("interrupted at tick 7", 7, ())
+    assert whole.events
+    assert run["time_tick"].max() < 10.0, "no reading of a clock"
+    np.testing.assert_array_equal(run["desired_position"], whole["desired_position"][:7])
 
 
 def test_what_needs_a_whole_run_is_interrupted_with_it():

@@ -9,7 +9,7 @@ from refusals import refused
 
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
-from hierarchy.tasks import Position, Posture
+from hierarchy.tasks import LookAt, Position, Posture
 from solvers import Status, certify, explain, make, names
 from solvers.batch import Batch
 from solvers.give import giving
@@ -135,6 +135,10 @@ def test_a_stack_takes_it_by_the_name_of_a_task_in_any_order():
     without = stack.hierarchy(state, ("posture",))
     assert (without.give, without.giving) == (None, [])
     assert np.abs(h.slacks(make("hcod").solve(h).x)[:3]).max() == pytest.approx(0.1)
+    stack.remove("position")
+    stack.insert(LookAt(hand.frame, (0.3, 0.9, 1.4), name="position"))  # of two rows
+    refused("task 'position': give has shape (3,), expected one number or (2,)", stack.hierarchy,
+            state)
     for give, said in (({"position": [0.1, 0.2]}, "task 'position': give has shape"),
                        ({"positon": 0.1}, "positon")):
         refused(said, Stack, [hand], "velocity", give=give)

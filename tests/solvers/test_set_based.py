@@ -131,6 +131,23 @@ def test_levels_below_do_not_move_what_a_level_settled_on(inner):
     assert inner != "hcod" or (both.holds_back == -1).all()
 
 
+def test_a_merged_level_out_of_reach_keeps_its_memory_and_strict_levels_stay_strict():
+    rng = np.random.default_rng(6)
+    A, b, E = nearly_singular(rng, 1e-4), 3.0 * rng.normal(size=3), np.eye(6)
+    h = Hierarchy.from_levels([(E[:1], [0.3]), (E, np.full(6, 0.1), np.full(6, 0.4)), (A, b),
+                               (E, np.zeros(6))], names=["mechanism", "limits", "hand", "posture"])
+    merged, y = settled("hand", inner="merged"), np.zeros(3)
+    memory = None
+    for _ in range(4):
+        assert merged._calmed(h) is not None
+        found = merged.solve(h, memory)
+        assert h.violations(found.x)[:2].max() < 1e-9
+        y = np.clip(y + 0.1 * np.clip(b - A @ found.x, -1.0, 1.0), -1.0, 1.0)
+        np.testing.assert_allclose(found.memory[:h.m], [*np.zeros(7), *y, *np.zeros(6)])
+        memory = found.memory
+    assert make("merged").solve(h, memory).status is found.status is Status.SOLVED
+
+
 LAMBDA, THRESHOLD, ETA = 1e-4, 1e-2, 10.0
 SMOOTH = make("smooth")
 

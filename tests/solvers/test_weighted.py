@@ -1,6 +1,8 @@
 """Priorities as weights, and the cascade of quadratic programs."""
 
 import sys
+import warnings
+from threading import Event, Thread
 
 import numpy as np
 import pytest
@@ -99,6 +101,32 @@ def test_a_backend_that_raises_is_a_status_and_the_level_of_limits_is_kept(monke
     assert res.status is Status.BACKEND_FAILURE
     assert np.isfinite(res.x).all()
     assert h.violations(res.x)[0] < 1e-8
+
+
+def test_solves_in_two_threads_leave_the_filters_of_warnings_as_they_were(monkeypatch):
+    filters, calls, entered, left = list(warnings.filters), [], Event(), Event()
+
+    def call(*_, **__):  # the first waits for the second, which ends after it
+        calls.append(1)
+        if len(calls) == 2:
+            entered.set()
+        (left if entered.is_set() else entered).wait(0.2)
+        raise ValueError
+
+    monkeypatch.setattr("qpsolvers.solve_problem", call)
+    none = refinement.Rows.none(1)
+    program = programs.null_space_program(none, none, none, 1.0, None)
+
+    def solve():
+        program.solve(backends.backend_of("proxqp"))
+        left.set()
+
+    threads = [Thread(target=solve) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert warnings.filters == filters
 
 
 @pytest.mark.parametrize("rows", [

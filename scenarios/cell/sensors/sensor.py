@@ -61,7 +61,7 @@ class ExactDistances:
                  tip: Repulsion | None = None,
                  mean_within: tuple[float, float] = (0.0, 0.0), pairs: bool = False) -> None:
         self.points = sensed_points(robot)
-        self.obstacles, self._mean_within = obstacles, np.array(mean_within)
+        self._obstacles, self._mean_within = obstacles, np.array(mean_within)
         self._joints, self._offsets = pack_points(self.points)
         self._laws = packed_laws(body, tip)
         self.measurement = Measurement(len(robot.control_points))
@@ -70,17 +70,27 @@ class ExactDistances:
         if pairs:
             self.measurement.pairs = Pairs(len(self.points), len(obstacles))
 
+    @property
+    def obstacles(self) -> Obstacles:
+        """The obstacles, as they are now; setting others raises a HierarchyError."""
+        return self._obstacles
+
+    @obstacles.setter
+    def obstacles(self, _: object) -> None:
+        raise HierarchyError("ExactDistances: obstacles cannot be set, as tasks have rows for these"
+                             "; make another sensor, or move them by a path or obstacles.shift")
+
     def measure(self, state: State) -> Measurement:
         """Measure at a state and attach the measurement to it; valid until the next call."""
         if state is not self._followed:
             self._followed = state
             self._measure = bind(measure_exactly, state.placements, self._joints, self._offsets,
-                                 self.obstacles.table, self._laws, self._mean_within,
+                                 self._obstacles.table, self._laws, self._mean_within,
                                  self.measurement.arrays)
-        self.obstacles.at(state.t)
+        self._obstacles.at(state.t)
         self._measure()
         if self.measurement.pairs is not None:
-            measure_pairs(self.measurement.pairs, self.measurement.points, self.obstacles)
+            measure_pairs(self.measurement.pairs, self.measurement.points, self._obstacles)
         state.measurement = self.measurement
         return self.measurement
 
