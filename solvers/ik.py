@@ -103,12 +103,11 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     period of a task, a gain times dt is above 2 or a rate times dt above 1, or the resolver cannot
     handle a row. A numerical failure is a status, with a finite v.
     """
-    resolver_memory, before = _before(memory, v, limits)
-    made = None if memory is None else memory.set_up
     asked = robot, tasks, limits, resolver, dt, damping
-    if made is not None and until is None and made.serves(*asked) and made.lock.acquire(False):
+    made = memory.set_up if isinstance(memory, Memory) and until is None else None
+    if made is not None and made.serves(*asked) and made.lock.acquire(False):
         try:
-            return made.step(q, before, t, resolver_memory)
+            return made.step(q, t, *_before(memory, v, limits))
         finally:
             made.lock.release()
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
@@ -126,8 +125,9 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
                                  f"{limits.name!r}: a configuration has no speed")
         return reach(robot, q, tasks, until, limits=limits, resolver=_resolver(resolver), t=t,
                      damping=damping)
+    before = _before(memory, v, limits)
     made = _SetUp(*asked)
-    step = made.step(q, before, t, resolver_memory)
+    step = made.step(q, t, *before)
     _warn_of_degrees(robot, made.state.q)
     if limits is True:
         _warn_of_speeds(robot)
@@ -218,7 +218,7 @@ class _SetUp:
                 and isinstance(dt, int | float) and isinstance(damping, int | float)
                 and (dt, damping) == self._numbers)
 
-    def step(self, q: ArrayLike, v: ArrayLike | None, t: float, memory: Array | None) -> Step:
+    def step(self, q: ArrayLike, t: float, memory: Array | None, v: ArrayLike | None) -> Step:
         """Return the answer at q and v; the memory is the resolver's."""
         state = self.state
         state.go(q, v, t)
