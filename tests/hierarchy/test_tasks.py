@@ -143,7 +143,9 @@ def test_rates_of_a_frame_that_follows_a_path_are_the_derivatives_of_its_error(a
 @pytest.mark.parametrize(("kind", "given", "other"), [
     (tasks.LookAt, {"target": np.array([0.3, 0.5, 0.1])}, [0.1, -0.4, 0.2]),
     (tasks.Pose, {"path": PATH, "rotation": np.eye(3)}, np.diag([1.0, -1.0, -1.0])),
-    (tasks.FrameLog, {"path": PATH, "rotation": np.eye(3)}, np.diag([-1.0, 1.0, -1.0]))])
+    (tasks.FrameLog, {"path": PATH, "rotation": np.eye(3)}, np.diag([-1.0, 1.0, -1.0])),
+    (tasks.Orientation, {"rotation": np.eye(3)}, np.diag([-1.0, 1.0, -1.0])),
+    (lambda _, target: tasks.Posture(target), {"target": np.full(7, 0.3)}, STATES[1][0])])
 def test_what_is_written_into_the_array_of_a_target_moves_it_in_a_stack_too(kind, given, other):
     state, key = State.at(ROBOT, *STATES[0]), [*given][-1]
     stack = Stack([kind(FRAME, **given)], "velocity")

@@ -53,7 +53,8 @@ class Posture(Measured):
     the rows are those of the other joints, one for each velocity. The error is the shortest way
     there, `Robot.difference`, and the rows are the identity. For balls, planar and free joints that
     is the derivative of the error along that way, so that at velocity level they go straight to the
-    target; in other directions it is the derivative only near it.
+    target; in other directions it is the derivative only near it. What is written into an array
+    moves the target, where every joint has one position.
 
     `robot` is that of the stack unless given. Raises HierarchyError for a target that fits none of
     its forms.
@@ -115,14 +116,19 @@ class Posture(Measured):
 
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
         """See `Measured.follow`."""
-        robot, rest = state.robot, self.rest
-        if _plain(robot):
+        robot, rest, target, m = state.robot, self.rest, self.target, self.dimension
+        if not _plain(robot):
+            def move(t: float) -> None:
+                goal[0] = pin.difference(robot.model, state.q, rest)[robot.actuated:]  # both sound
+
+            return move
+        if not isinstance(target, np.ndarray):
             return None
 
-        def move(t: float) -> None:
-            goal[0] = pin.difference(robot.model, state.q, rest)[robot.actuated:]  # both sound
+        def read(t: float) -> None:
+            goal[0] = target[len(target) - m:]
 
-        return move
+        return read
 
 
 def _plain(robot: Robot) -> bool:
