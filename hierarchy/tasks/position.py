@@ -1,6 +1,6 @@
 """Position of a frame along a path, in all directions or some, with the repulsion of eq. (30)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,6 +88,11 @@ class Along(Written):
     def error(self, state: State) -> Array:
         """Distance to the path along the directions (m,) [m]."""
         return np.asarray(self.directions) @ self.task.error(state)
+
+    def error_reader(self, state: State) -> Callable[[], Array]:
+        """See `Task.error_reader`."""
+        directions, read = np.asarray(self.directions), self.task.error_reader(state)
+        return lambda: np.asarray(directions @ read())
 
     def desired_velocity(self, state: State) -> Array:
         """Velocity of the path along the directions (m,) [m/s]."""

@@ -1,6 +1,6 @@
 """Tasks that are made of others: several as one level, and the rows of a set-based one."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -71,6 +71,11 @@ class Together(NamedRows, Written):
     def error(self, state: State) -> Array:
         """The errors of the tasks (m,)."""
         return np.concatenate([task.error(state) for task in self.tasks])
+
+    def error_reader(self, state: State) -> Callable[[], Array]:
+        """See `Task.error_reader`."""
+        readers = [task.error_reader(state) for task in self.tasks]
+        return lambda: np.concatenate([read() for read in readers])
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
