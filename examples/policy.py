@@ -32,11 +32,13 @@ def chunk(t, random):
 def run(kind, duration):
     """Return the joint positions (T, 7) and the distance from the seam (T,) [mm]."""
     q, memory, qs, off, random = START, None, [], [], np.random.default_rng(1)
+    action = START.copy()
+    wish = Posture(action, gain=20.0)  # what is written into the array moves its target
+    tasks = [ON_SEAM, wish] if kind == "strict" else [wish]
     for i, t in enumerate(np.arange(0.0, duration, DT)):
         if i % CHUNK == 0:
             actions = chunk(t, random)
-        wish = Posture(actions[i % CHUNK], gain=20.0)
-        tasks = [ON_SEAM, wish] if kind == "strict" else [wish]
+        action[:] = actions[i % CHUNK]
         step = solve_ik(ROBOT, q, tasks, dt=DT, memory=memory)
         q, memory = ROBOT.integrate(q, DT * step.v), step.memory
         off.append(1e3 * np.linalg.norm(ON_SEAM.error(State.at(ROBOT, q))))

@@ -34,13 +34,13 @@ def stream(duration):
 def run(kind, duration):
     """Return the joint positions (T, 7) and the largest acceleration (T,) [rad/s^2]."""
     limits = JointLimits(ROBOT, MOST, DT) if kind == "limits" else True
-    messages, target = iter([*stream(duration), (np.inf, HOME)]), HOME
+    messages, target = iter([*stream(duration), (np.inf, HOME)]), np.array(HOME)
+    tasks = [Position(HAND, Still(target), gain=8.0), Posture(START)]
     message = next(messages)
     q, v, memory, qs, most = START, np.zeros(7), None, [], []
     for t in np.arange(0.0, duration, DT):
         while message[0] <= t:  # only the newest counts
-            target, message = message[1], next(messages)
-        tasks = [Position(HAND, Still(target), gain=8.0), Posture(START)]
+            target[:], message = message[1], next(messages)
         step = solve_ik(ROBOT, q, tasks, limits=limits, dt=DT, v=v, memory=memory)
         most.append(np.abs(step.v - v).max() / DT)
         q, v, memory = ROBOT.integrate(q, DT * step.v), step.v, step.memory
