@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, brief
+from hierarchy.errors import brief
 from hierarchy.jit import bind, compiled, inlined
 from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import Kinematics
@@ -149,8 +149,8 @@ class Measured(Task):
         function = found[0] if isinstance(found, tuple) and len(found) == 2 else None
         code = getattr(getattr(function, "py_func", function), "__code__", None)
         if code is not _rows.__code__:  # the text takes longer than the rest
-            raise HierarchyError(f"task {task.name!r}: measure returned {brief(found)}; expected a "
-                                 "function under @measured or @plain, and a tuple of what it reads")
+            task.refuse(True, f"measure returned {brief(found)}; expected a function under "
+                        "@measured or @plain, and a tuple of what it reads")
         return task, *found
 
     def _asked(self, state: State, level: Level, motion: Array) -> _Asked:
@@ -184,7 +184,7 @@ class Measured(Task):
         def read(kinematics: Kinematics) -> tuple[Array, Motion, Array]:
             if move_goal is not None:
                 move_goal(state.t)
-            # Called, not bound: to bind takes 0.5 ms.
+            # Called, not bound: to bind takes longer than a call, and most read once.
             function(kinematics, reads, asked, J, *sides)
             return J, Motion(*motion[:4]), asked.goal
 

@@ -97,7 +97,7 @@ class State:
         self._compute()
         self.J, self.dJ = _columns(self._data.J, 6), _columns(self._data.dJ, 6)
         self.placements = _placements_view(self._data, robot.model.njoints)
-        self.supports = robot.supports.copy()
+        self.supports = robot.supports
         self.period = differences or 0.0
         self.previous_J = self.J.copy(order="F")
         self.previous_placements = self.placements.copy()
@@ -310,7 +310,6 @@ def _checked(robot: Robot, what: str, value: ArrayLike, names: Sequence[str]) ->
                 if what == "q" and robot.nq != robot.n else "")
         raise RobotError(f"robot {robot.name!r}: {what} has shape {vector.shape}, "
                          f"expected ({len(names)},){more}")
-    if not np.isfinite(vector).all():
-        i = int(np.flatnonzero(~np.isfinite(vector))[0])
+    for (i,) in np.argwhere(~np.isfinite(vector))[:1]:
         raise RobotError(f"robot {robot.name!r}: {what}[{i}] ({names[i]}) is {vector[i]}")
     return vector

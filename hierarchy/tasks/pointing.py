@@ -115,8 +115,8 @@ class LookAt(Measured):
     With the unit vector u to the target in the frame's axes, the rows are 2 u_x / (1 + u_z) and
     2 u_y / (1 + u_z), of length 2 tan(angle / 2): the stereographic projection, which is regular on
     the axis, where the cosine of `Pointing` has no gradient, and everywhere but straight behind. At
-    velocity level the angle falls by gain sin(angle). What is written into the
-    array moves the target, without feedforward.
+    velocity level the angle falls by gain sin(angle). What is written into the array moves the
+    target, without feedforward.
     """
 
     frame: Frame

@@ -87,7 +87,7 @@ class Along(Written):
 
     def error(self, state: State) -> Array:
         """Distance to the path along the directions (m,) [m]."""
-        return np.asarray(self.directions) @ self.task.error(state)
+        return self.error_reader(state)()
 
     def error_reader(self, state: State) -> Callable[[], Array]:
         """See `Task.error_reader`."""

@@ -70,7 +70,7 @@ class Together(NamedRows, Written):
 
     def error(self, state: State) -> Array:
         """The errors of the tasks (m,)."""
-        return np.concatenate([task.error(state) for task in self.tasks])
+        return self.error_reader(state)()
 
     def error_reader(self, state: State) -> Callable[[], Array]:
         """See `Task.error_reader`."""
