@@ -147,7 +147,7 @@ class State:
         RobotError unless q and v are arrays of these shapes.
         """
         try:
-            copied = self._copy(q, v, self.q, self.v)
+            copied = self._copy(q, v, self._q, self._v)
         except (TypeError, AttributeError, NumbaError):  # no arrays of numbers
             copied = _MISFIT
         if copied == _MISFIT:
