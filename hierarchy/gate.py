@@ -20,8 +20,7 @@ def array_of(what: str, value: Any) -> Array:
     """Return numbers as a new array; raises a HierarchyError for anything else."""
     try:
         given = np.asarray(value)
-        masked = isinstance(value, np.ndarray) and np.any(getattr(value, "mask", False))
-        if given.dtype.kind in _NUMBERS and not masked:
+        if given.dtype.kind in _NUMBERS and not np.ma.is_masked(value):
             return np.array(given, dtype=np.float64, order="C")
     except (TypeError, ValueError, OverflowError) as error:
         raise HierarchyError(f"{what} is not an array of numbers: {brief(value)}") from error
@@ -79,9 +78,9 @@ def level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
         raise HierarchyError(f"names: expected a list of texts, got {brief(names)}")
     if len(names) != count:
         raise HierarchyError(f"{len(names)} names for {count} levels")
-    for name, times in Counter(names).items():
-        if times > 1:
-            raise HierarchyError(f"{times} levels are named {name!r}; give each its own name")
+    if len(set(names)) < count:
+        name, times = Counter(names).most_common(1)[0]
+        raise HierarchyError(f"{times} levels are named {name!r}; give each its own name")
     return names
 
 
@@ -114,7 +113,7 @@ def check_rows(name: str, A: Array, lower: Array, upper: Array) -> None:
     """
     for row, column in np.argwhere(~np.isfinite(A))[:1]:
         raise HierarchyError(f"{name}, row {row}: A[{row}, {column}] is {A[row, column]}")
-    for (row,) in np.argwhere(_empty(lower, upper))[:1]:
+    for (row,) in np.argwhere(~_met_by_some(lower, upper))[:1]:
         for side, value in (("lower", lower[row]), ("upper", upper[row])):
             refuse(np.isnan(value), f"{name}, row {row}: {side} is nan")
         raise HierarchyError(
@@ -123,17 +122,17 @@ def check_rows(name: str, A: Array, lower: Array, upper: Array) -> None:
 
 def sound_rows(A: Array, lower: Array, upper: Array) -> bool:
     """Whether A is finite and a value lies between the sides of every row."""
-    return bool(np.isfinite(A).all()) and not _empty(lower, upper).any()
+    return bool(np.isfinite(A).all() and _met_by_some(lower, upper).all())
 
 
-def _empty(lower: Array, upper: Array) -> NDArray[np.bool_]:
-    """Whether no value lies between the sides of a row (m,), of which one may be NaN."""
-    return ~((lower <= upper) & (lower < np.inf) & (upper > -np.inf))
+def _met_by_some(lower: Array, upper: Array) -> NDArray[np.bool_]:
+    """Whether a value lies between the sides of a row (m,); not if one is NaN."""
+    return (lower <= upper) & (lower < np.inf) & (upper > -np.inf)
 
 
 def check_finite(what: str, values: Array) -> None:
     """Raise a HierarchyError that names the first entry of (n,) that is not finite."""
-    for (i,) in np.argwhere(~np.isfinite(values))[:1]:
+    for i in np.flatnonzero(~np.isfinite(values))[:1]:
         raise HierarchyError(f"{what}, entry {i}: {values[i]} is not finite")
 
 
@@ -182,7 +181,7 @@ def checked_level(name: str, level: Sequence[ArrayLike]) -> tuple[Array, Array, 
     """
     if not isinstance(level, (tuple, list)) or len(level) not in (2, 3):
         raise HierarchyError(f"{name}: expected (A, b) or (A, lower, upper), got {brief(level)}")
-    A = array_of(f"{name}: A", level[0])
+    A = readable(f"{name}: A", level[0])
     if A.ndim != 2:
         raise HierarchyError(f"{name}: A has shape {A.shape}, expected (rows, n)")
     first = "lower" if len(level) == 3 else "b"

@@ -92,7 +92,6 @@ class Hierarchy:
                  metric: ArrayLike | None = None, give: ArrayLike | None = None) -> None:
         """Keep packed arrays, in the same memory if kernels can read it; else copies."""
         self._keep(A, lower, upper, sizes, reference, names, metric, give)
-        set_frozen(self, names=gate.level_names(names, len(self.names)))
         self._check_values()
 
     @classmethod
@@ -139,11 +138,10 @@ class Hierarchy:
         names = gate.level_names(names, len(levels))
         packed = list(map(gate.checked_level, names, levels))
         n, sizes = _columns(packed, names, reference), [len(lower) for _, lower, _ in packed]
-        return cls(np.vstack([np.empty((0, n)), *(A for A, _, _ in packed)]),
-                   np.concatenate([np.empty(0), *(low for _, low, _ in packed)]),
-                   np.concatenate([np.empty(0), *(up for _, _, up in packed)]), sizes,
-                   None if reference is None else gate.array_of("reference", reference), names,
-                   None if metric is None else gate.array_of("metric", metric),
+        none = np.empty((0, n)), np.empty(0), np.empty(0)
+        A, lower, upper = map(np.concatenate, zip(none, *packed, strict=True))
+        return cls(A, lower, upper, sizes, _copied("reference", reference), names,
+                   _copied("metric", metric),
                    None if give is None else _checked_give(give, names, sizes))
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -185,12 +183,10 @@ class Hierarchy:
         reference = (np.zeros(n).view() if reference is None
                      else gate.shaped("reference", reference, (n,)))
         sizes = gate.checked_sizes(sizes, m)
-        names = gate.level_names(None, len(sizes)) if names is None else tuple(names)
-        if len(names) != len(sizes):
-            raise HierarchyError(f"{len(names)} names for {len(sizes)} levels")
         set_frozen(
-            self, rows=(A, lower, upper, sizes), start=reference.copy, m=m, n=n, names=names,
-            named=None, plain=metric is None and give is None, _reference=reference,
+            self, rows=(A, lower, upper, sizes), start=reference.copy, m=m, n=n,
+            names=gate.level_names(names, len(sizes)), named=None,
+            plain=metric is None and give is None, _reference=reference,
             _metric=None if metric is None else gate.shaped("metric", metric, (n, n)),
             _give=None if give is None else gate.shaped("give", give, (m,)))
 
@@ -202,8 +198,8 @@ class Hierarchy:
         gate.check_finite("reference", self._reference)
         if self._metric is not None:
             gate.checked_metric(self._metric, self.n)
-        for name, (first, last) in zip(self.names, self._bounds(), strict=True):
-            if self._give is not None:
+        if self._give is not None:
+            for name, (first, last) in zip(self.names, self._bounds(), strict=True):
                 gate.checked_give(name, self._give[first:last], last - first)
 
     @property
@@ -297,6 +293,10 @@ class Hierarchy:
                 for name, (A, lower, upper) in zip(self.names, self.levels(), strict=True)]
         return html_table(f"Hierarchy: {self.n} unknowns, most important level first",
                           ("level", "rows", "equalities", "inequalities"), rows)
+
+
+def _copied(what: str, value: ArrayLike | None) -> Array | None:
+    return None if value is None else gate.array_of(what, value)
 
 
 def _checked_give(give: Sequence[ArrayLike], names: Sequence[str], sizes: list[int]) -> Array:
