@@ -31,8 +31,8 @@ from solvers.status import Status
 
 _LEAST = 1e-6     # of |A|^2: the least mu
 _FAINT = 1e-10    # of |A|: singular values up to it are rounding
-_CLOSE = 1e-3     # accuracy of alpha at which the search for mu ends
-_MOST = 12        # its steps
+_CLOSE = 1e-8     # accuracy of alpha at which the search for mu ends
+_MOST = 20        # its steps; 4 in the mean, at most 8 seen
 _NONE = 1e-9      # of the largest column of A: a joint that a level does not use
 _PACE = 1e-5      # [rad/s or m/s] by which levels below may always change the speed of a joint
 
@@ -221,7 +221,8 @@ def _search(probe: Callable[[float], _Reached], low: _Reached, alpha: float,
             most: float) -> _Reached:
     """Return what is reached for mu = alpha |b - A x|, between `low` and mu = `most`.
 
-    By the Illinois variant of regula falsi on mu / |b - A x|, which grows with mu, nearly linearly.
+    By regula falsi on mu / |b - A x|, which grows with mu, nearly linearly. The end that stays
+    counts less, as in Anderson and Bjorck, BIT 13, 1973.
     """
     def over(one: _Reached) -> float:
         return one.mu / one.missed - alpha if one.missed > 0.0 else np.inf
@@ -231,13 +232,19 @@ def _search(probe: Callable[[float], _Reached], low: _Reached, alpha: float,
     for _ in range(_MOST):
         if not _CLOSE * alpha < abs(over(best)) or not 0.0 < high_over < np.inf:
             break
-        mu = high.mu - high_over * (high.mu - low.mu) / (high_over - low_over)
-        best = probe(mu)
-        if over(best) > 0.0:
-            high, high_over, low_over = best, over(best), low_over / 2
+        last, best = best, probe(high.mu - high_over * (high.mu - low.mu) / (high_over - low_over))
+        new = over(best)
+        if new > 0.0:
+            low_over *= _less(new, high_over) if last is high else 1.0
+            high, high_over = best, new
         else:
-            low, low_over, high_over = best, over(best), high_over / 2
+            high_over *= _less(new, low_over) if last is low else 1.0
+            low, low_over = best, new
     return best
+
+
+def _less(new: float, old: float) -> float:
+    return 1.0 - new / old if 0.0 < new / old < 1.0 else 0.5
 
 
 def _without_pace(found: Resolution, n: int, level: bool) -> Resolution:
