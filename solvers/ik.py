@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from operator import is_
-from threading import Lock
+from threading import local
 from typing import NamedTuple, final, overload
 
 import numpy as np
@@ -31,18 +30,15 @@ from solvers.status import Status
 
 _MOST_BENDS = 10   # corrections of the rows of a mechanism
 _STRAIGHT = 1e-8   # [m/s, rad/s] change of a correction that ends them
+_MOST_KEPT = 4     # set-ups, of the last calls with different objects
 _warned: set[tuple[str, ...]] = set()  # joints without velocity limits that were named
 
 
 class Memory(NamedTuple):
-    """What the next call of `solve_ik` starts from.
-
-    The resolver's memory, the last v (n,), and, for the same objects, what the call has set up.
-    """
+    """What the next call of `solve_ik` starts from: the resolver's memory, and the last v (n,)."""
 
     resolver: Array | None
     v: Array
-    set_up: _SetUp | None = None
 
     def __repr__(self) -> str:
         return f"Memory(v={numbers(self.v)})"
@@ -79,9 +75,9 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
              damping: float = 1.0, until: float | None = None) -> Step | Reached:
     """Return the joint velocity that serves `tasks` at q, most important first.
 
-    Move on with `q = robot.integrate(q, step.v * dt)`. With the `memory` of the last call and the
-    same objects, tasks among them, what that call has set up serves again, which saves most of the
-    time; for loops of a fixed rate see docs/loop.md.
+    Move on with `q = robot.integrate(q, step.v * dt)`. With the same objects, tasks among them, as
+    one of the last calls of the thread, what that call has set up serves again, which saves most of
+    the time; for loops of a fixed rate see docs/loop.md.
 
     q : (nq,) joint positions [rad or m].
     tasks : tasks of `hierarchy.tasks`, plugins or your own, at velocity level.
@@ -103,22 +99,15 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     period of a task, a gain times dt is above 2 or a rate times dt above 1, or the resolver cannot
     handle a row. A numerical failure is a status, with a finite v.
     """
-    asked = robot, tasks, limits, resolver, dt, damping
-    made = memory.set_up if isinstance(memory, Memory) and until is None else None
-    if made is not None and made.serves(*asked) and made.lock.acquire(False):
-        try:
-            return made.step(q, t, *_before(memory, v, limits))
-        finally:
-            made.lock.release()
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
     expect_each("solve_ik: tasks", tasks, Task, "give a list of tasks")
-    positive("solve_ik: dt [s]", dt)
+    dt = positive("solve_ik: dt [s]", dt)
     if not isinstance(limits, bool | Task):
         raise HierarchyError("solve_ik: limits: expected True, False or a task, got "
                              f"{brief(limits)}")
     if not isinstance(resolver, str):
         expect("solve_ik: resolver", resolver, Resolver, "give a name of solvers.names()")
-    number("solve_ik: damping", damping, 0.0)
+    damping = number("solve_ik: damping", damping, 0.0)
     if until is not None:
         if isinstance(limits, Task):
             raise HierarchyError(f"solve_ik: with until, limits are True or False, not the task "
@@ -126,8 +115,15 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
         return reach(robot, q, tasks, until, limits=limits, resolver=_resolver(resolver), t=t,
                      damping=damping)
     before = _before(memory, v, limits)
-    made = _SetUp(*asked)
+    kept = _of_thread.kept
+    asked = id(robot), *map(id, tasks), id(limits), id(resolver), dt, damping
+    if asked in kept:
+        return kept[asked].step(q, t, *before)
+    made = _SetUp(robot, tasks, limits, resolver, dt, damping)
     step = made.step(q, t, *before)
+    for oldest in list(kept)[:1 - _MOST_KEPT]:
+        del kept[oldest]
+    kept[asked] = made
     _warn_of_degrees(robot, made.state.q)
     if limits is True:
         _warn_of_speeds(robot)
@@ -196,27 +192,16 @@ def _warn_of_speeds(robot: Robot) -> None:
 
 @final
 class _SetUp:
-    """What calls with the same objects share: a state, and the stack of the tasks over it.
-
-    A copy, also one in another process, is None.
-    """
+    """What calls with the same objects share: a state, and the stack of the tasks over it."""
 
     def __init__(self, robot: Robot, tasks: Sequence[Task], limits: bool | Task,
                  resolver: str | Resolver, dt: float, damping: float) -> None:
-        self._objects, self._numbers = (robot, limits, resolver, *tasks), (dt, damping)
-        self.state, self.lock = State(robot), Lock()
+        self.objects = robot, *tasks, limits, resolver  # kept, so that their `id` stays theirs
+        self.state = State(robot)
         box = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
         self.stack, self.resolver = stacked(robot, tasks, dt, box, _resolver(resolver), damping)
         for task in (*box, *tasks):
             check_period(task, dt)
-
-    def serves(self, robot: Robot, tasks: Sequence[Task], limits: bool | Task,
-               resolver: str | Resolver, dt: float, damping: float) -> bool:
-        """Whether it is made of these."""
-        objects = robot, limits, resolver, *(tasks if isinstance(tasks, list | tuple) else ())
-        return (len(objects) == len(self._objects) and all(map(is_, objects, self._objects))
-                and isinstance(dt, int | float) and isinstance(damping, int | float)
-                and (dt, damping) == self._numbers)
 
     def step(self, q: ArrayLike, t: float, memory: Array | None, v: ArrayLike | None) -> Step:
         """Return the answer at q and v; the memory is the resolver's."""
@@ -224,8 +209,14 @@ class _SetUp:
         state.go(q, v, t)
         state.commanded = state.v.copy()
         found = _solved(state, self.stack.hierarchy(state), self.resolver, memory)
-        return Step(found.x, found.status, Memory(found.memory, found.x.copy(), self))
+        return Step(found.x, found.status, Memory(found.memory, found.x.copy()))
 
-    def __reduce__(self) -> tuple[type[None], tuple[()]]:
-        """Copy as None."""
-        return type(None), ()
+
+class _Kept(local):
+    """What the last calls of a thread have set up, by the identity of the objects given."""
+
+    def __init__(self) -> None:
+        self.kept: dict[tuple[float, ...], _SetUp] = {}
+
+
+_of_thread = _Kept()
