@@ -22,7 +22,6 @@ from hierarchy.loop import Loop
 from hierarchy.measured import Measured
 from hierarchy.paths import Blended, Jittered, Still, circle, read_bvh
 from hierarchy.robot import Frame
-from hierarchy.robots import TABLES, link_capsules
 
 NAN, INF = float("nan"), float("inf")
 A, B = np.eye(2), np.ones(2)
@@ -32,7 +31,7 @@ BARE = State.at(Robot.load(Path(__file__).parents[2] / "examples/robots/so101.ur
 THERE = Still([0.3, 0.5, 0.1])
 HAND = tasks.Position(FRAME, THERE)
 LIMITS, POINTS = tasks.JointLimits(ROBOT, 10.0, 0.01), ROBOT.control_points
-ARM, KEPT = link_capsules(TABLES["kuka_lwr"], foot=0.3105), Barrier(0.02)
+ARM, KEPT = ROBOT.capsules, Barrier(0.02)
 TIMES, CORNERS = (0.5, 1.2), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2))
 
 
@@ -169,7 +168,6 @@ def limits(**settings):
     (lambda: Obstacle("point", (0, 0, 0), path=THERE.position), "obstacle: path: expected a Path"),
     (lambda: Capsule("x", "hip", (0, 0, 0), (0, 0, 1), 1.0), "capsule 'x': joint = 'hip': expect"),
     (lambda: Loop(0.1, priority="high"), "loop: priority = 'high': expected a whole number"),
-    (lambda: link_capsules(None), "link_capsules: expected a table, got NoneType None"),
     (lambda: tasks.ContactForce(CONTACTS, "left_foot", (1.0, 2.0)), "is not 1, 3 or 6"),
     (lambda: tasks.ContactMotion(CONTACTS, [np.eye(3)] * 3),
      "anchors are not (4, 3) for each of 3"),
