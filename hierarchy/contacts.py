@@ -30,7 +30,7 @@ from hierarchy.errors import (
     positive,
     refuse,
 )
-from hierarchy.gate import array_of
+from hierarchy.gate import array_of, axes_along
 from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
 from hierarchy.problem import Array
@@ -89,8 +89,8 @@ class Contact:
                f"contact {self.name!r}: {len(points)} points on one line; a contact has one "
                "point, or at least three of a surface")
         positive(f"contact {self.name!r}: friction", self.friction)
-        axes, sole = (_axes(direction, f"contact {self.name!r}: {key}")
-                      for key, direction in (("normal", self.normal), ("up", self.up)))
+        axes, sole = (axes_along(f"contact {self.name!r}: {key}", getattr(self, key))
+                      for key in ("normal", "up"))
         spans = array_of(f"contact {self.name!r}: open", self.open)
         refuse(spans.size and (spans.shape[1:] != (2,) or not (spans[:, 0] < spans[:, 1]).all()),
                f"contact {self.name!r}: open {self.open!r}, expected pairs of times [s], each from "
@@ -245,19 +245,7 @@ def corners(x: tuple[float, float], y: tuple[float, float], up: Vector = (0.0, 0
     """
     sides = finite_numbers("sole: x [m]", x, 2), finite_numbers("sole: y [m]", y, 2)
     around = np.array([sides[0][[0, 1, 1, 0]], sides[1][[0, 0, 1, 1]]])
-    return np.asarray(around.T @ _axes(up, "sole: up")[:2])
-
-
-def _axes(normal: Vector, what: str) -> Array:
-    """Return two tangents and the normal as rows (3, 3); x, y and z for normal z."""
-    given = array_of(what, normal)
-    refuse(given.shape != (3,) or not 0.0 < np.linalg.norm(given) < np.inf,
-           f"{what} {normal!r} is no direction")
-    n = np.array(normal, dtype=float) / np.linalg.norm(normal)
-    x = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]
-    tangent = x - (x @ n) * n
-    tangent /= np.linalg.norm(tangent)
-    return np.array([tangent, np.cross(n, tangent), n])
+    return np.asarray(around.T @ axes_along("sole: up", up)[:2])
 
 
 @internal

@@ -227,6 +227,11 @@ class Robot:
         return cls(model, name)
 
     @property
+    def shares(self) -> Array:
+        """The share of all `masses` (joints + 1,) that each body has."""
+        return self.masses / float(self.masses.sum())
+
+    @property
     def frame_names(self) -> list[str]:
         """Names of the frames that `frame` finds, including those of joints and links."""
         unclear = set(ambiguous(self.model))

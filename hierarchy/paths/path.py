@@ -24,6 +24,7 @@ from hierarchy.errors import (
     refuse,
     whole,
 )
+from hierarchy.gate import axes_along
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
@@ -100,13 +101,7 @@ def circle(centre: Vector, radius: float, normal: Vector = (0.0, 0.0, 1.0), rate
     finite_numbers("centre [m]", centre, 3)
     number("circle: radius [m]", radius, 0.0)
     number("circle: phase [rad]", phase)
-    z = finite_numbers("circle: normal", normal, 3)
-    length = float(np.linalg.norm(z))
-    refuse(length <= 1e-9, f"circle: normal {brief(normal)} is no direction")
-    z = z / length
-    toward = np.eye(3)[1 if abs(z[0]) > 0.9 else 0]
-    x = toward - (toward @ z) * z
-    x, y = x / np.linalg.norm(x), np.cross(z, x / np.linalg.norm(x))
+    x, y, _ = axes_along("circle: normal", normal)
     c, s = cos(phase), sin(phase)
     return Ellipse(centre, tuple((radius * (c * x + s * y)).tolist()),
                    tuple((radius * (c * y - s * x)).tolist()), rate)

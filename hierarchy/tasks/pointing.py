@@ -7,7 +7,7 @@ from math import cos
 import numpy as np
 
 from hierarchy.errors import finite_numbers, number
-from hierarchy.gate import readable
+from hierarchy.gate import direction, readable
 from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import (
     Spot,
@@ -80,12 +80,9 @@ class Pointing(Measured):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        axis = finite_numbers(f"task {self.name!r}: axis", self.axis)
-        length = float(np.linalg.norm(axis))
-        self.refuse(axis.shape != (3,) or not 1e-9 < length < np.inf, f"axis {axis.tolist()} "
-                    "has no direction")
         number(f"task {self.name!r}: half_angle [rad]", self.half_angle, 0.0, np.pi)
-        set_frozen(self, z_d=axis / length, cos_alpha_d=cos(self.half_angle),
+        set_frozen(self, z_d=direction(f"task {self.name!r}: axis", self.axis),
+                   cos_alpha_d=cos(self.half_angle),
                    z_e=np.ascontiguousarray(self.frame.rotation[:, 2]))
 
     def cone_error(self, state: State) -> float:

@@ -229,8 +229,8 @@ def limits(**settings):
        f"jitter: {next(iter(bad))}")
       for bad in ({"amplitude": -1.0}, {"rate": 0.0}, {"seed": -1})),
     (lambda: circle((0, 0, 0), -0.1), "circle: radius [m] = -0.1"),
-    (lambda: circle((0, 0, 0), 0.1, (0, 0, 0)), "normal tuple (0, 0, 0) is no direction"),
-    (lambda: corners((0, 1), (0, 1), (0, 0, 0)), "sole: up (0, 0, 0) is no direction"),
+    (lambda: circle((0, 0, 0), 0.1, (0, 0, 0)), "normal: tuple (0, 0, 0) is no direction"),
+    (lambda: corners((0, 1), (0, 1), (0, 0, 0)), "sole: up: tuple (0, 0, 0) is no direction"),
     (lambda: Loop(0.0), "loop: period [s] = 0: expected"), (lambda: Loop(0.1, behind=0), "behind"),
     (lambda: Loop(0.1, overrun="skipp"), "did you mean 'skip'"),
     (lambda: Loop(0.25, watchdog=0.1), "watchdog 0.1 s must be longer than the period 0.25 s"),
