@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +46,9 @@ def check_rotation(what: str, rotation: ArrayLike) -> None:
     if np.linalg.det(R) < 0.0:
         raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), but it is a "
                              f"reflection, of determinant -1; got {brief(R.tolist())}")
+
+
+Rotation = Annotated[ArrayLike, check_rotation]  # (3, 3), of a field; see `records`
 
 
 def direction(what: str, value: ArrayLike) -> Array:

@@ -3,17 +3,19 @@
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from hierarchy.contacts import Contacts, Points, write_dynamics, zero_while_open
-from hierarchy.errors import HierarchyError, finite_numbers, number, positive
+from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.gate import shaped
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import less, place
 from hierarchy.problem import Array
+from hierarchy.records import Positive
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level, NamedRows, Rows, Writer, Written
@@ -198,14 +200,13 @@ class TorqueLimits(TorqueRows):
     """
 
     robot: Robot
-    fraction: float = 1.0
+    fraction: Annotated[float, partial(number, least=0.0, largest=1.0)] = 1.0
     name: str = "torque limits"
     contacts: Contacts | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(number(f"task {self.name!r}: fraction", self.fraction, 0.0, 1.0) == 0.0,
-                    f"fraction {self.fraction} is not more than 0")
+        self.refuse(self.fraction == 0.0, f"fraction {self.fraction} is not more than 0")
 
     @property
     def limit(self) -> Array:
@@ -234,13 +235,9 @@ class TorqueStep(TorqueRows):
     """
 
     robot: Robot
-    step: float
+    step: Positive
     name: str = "torque step"
     contacts: Contacts | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        positive(f"task {self.name!r}: step", self.step)
 
     def bounds(self, state: State) -> tuple[Array, Array]:
         """The commanded torques less and plus the step."""

@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import expect, finite_numbers, naming, number
+from hierarchy.errors import finite_numbers, naming
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import row_times, write_identity
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
+from hierarchy.records import NotNegative, set_frozen
 from hierarchy.robot import Robot
 from hierarchy.robots.library import pin
 from hierarchy.state import State
@@ -75,7 +75,6 @@ class Posture(Measured):
         if not isinstance(self.target, Mapping):
             finite_numbers(f"task {self.name!r}: target", self.target)
         if self.robot is not None:
-            expect(f"task {self.name!r}: robot", self.robot, Robot, "give Robot.load(NAME)")
             with naming(f"task {self.name!r}"):
                 rest = self.robot.configuration(self.target)
             if isinstance(self.target, Mapping) and self.robot.loops:
@@ -153,13 +152,9 @@ class JointDamping(JointTask):
     """
 
     joints: int
-    damping: float = 5.0
+    damping: NotNegative = 5.0
     weight: Literal["identity", "mass"] = "identity"
     name: str = "damping"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        number(f"task {self.name!r}: damping", self.damping, 0.0)
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
