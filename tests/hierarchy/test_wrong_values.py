@@ -217,7 +217,7 @@ def limits(**settings):
     (lambda: Limits([0], [NAN], [1], [1], 1e-3), "joint 0: no position lies between lower and upp"),
     (lambda: Limits([0], [1], [0], [1], 1e-3), "joint 0: velocity must be positive, got 0.0"),
     (lambda: Stack([tasks.TorqueLimits(ROBOT)], "velocity").hierarchy(STATE),
-     "'torque limits': torque limits need the acceler"),
+     "'torque limits': its rows are for the level acceleration or torque, not 'velocity'"),
     *((lambda fraction=fraction: tasks.TorqueLimits(ROBOT, fraction),
        f"fraction = {fraction:g}: expected a finite number from 0 to 1")
       for fraction in (-1.0, 80.0)),
@@ -248,7 +248,7 @@ def limits(**settings):
       for make in (tasks.TorqueLimits, partial(tasks.TorqueStep, step=1.0))),
     (lambda: tasks.TorqueStep(ROBOT, 0.0), "step = 0: expected a number > 0"),
     (lambda: Stack([tasks.TorqueStep(ROBOT, 1.0)], "acceleration").hierarchy(STATE),
-     "steps of torques need the level torque, not 'acceleration'"),
+     "'torque step': its rows are for the level torque, not 'acceleration'"),
     (lambda: tasks.DangerBounds(tasks.JointLimits(HUMANOID, 5.0, 0.01), HUMANOID.control_points),
      "floating base"),
     *((lambda given=given: rows_after(given), f"'joint limits': state.commanded = {said}")
