@@ -129,11 +129,9 @@ class Momentum(NamedRows, Measured):
         """The components."""
         return np.arange(*_ROWS[self.part])
 
-    def goal(self, state: State) -> Array:
-        """The target in the place of a velocity (3, 6)."""
-        goal = np.zeros((3, 6))
+    def follow(self, state: State, goal: Array) -> None:
+        """The target is in the place of a velocity."""
         goal[1, self.columns] = 0.0 if self.target is None else self.target
-        return goal
 
 
 @measured

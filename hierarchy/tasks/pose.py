@@ -134,12 +134,8 @@ class FrameLog(Pose):
         """See `Measured.measure`."""
         return _frame_log, (self, state)
 
-    def goal(self, state: State) -> Array:
-        """The part of de/dt that comes from the path, and its derivative, in rows 1 and 2."""
-        return np.zeros((3, 6))
-
     def follow(self, state: State, goal: Array) -> None:
-        """The measure writes the goal, which depends on the error."""
+        """The measure writes the goal: the part of de/dt that comes from the path, and its rate."""
 
 
 @plain

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import finite_numbers, naming
 from hierarchy.jit import bind, compiled
@@ -106,28 +107,27 @@ class Posture(Measured):
         positions = state.q[robot.nq - m:] if _plain(robot) else np.zeros(m)
         return _posture, (positions, robot.actuated)
 
-    def goal(self, state: State) -> Array:
-        """See `Measured.goal`: the target, or the step there."""
-        robot, m = state.robot, self.dimension
-        goal = np.zeros((3, m))
-        goal[0] = self.rest[robot.nq - m:] if _plain(robot) else 0.0
-        return goal
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """A coordinate for each row."""
+        return np.arange(self.dimension)
 
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
-        """See `Measured.follow`."""
+        """See `Measured.follow`: the goal is the target, or the step there."""
         robot, rest, target, m = state.robot, self.rest, self.target, self.dimension
+        place = goal[0, :m]
+
+        def move(t: float) -> None:
+            place[:] = pin.difference(robot.model, state.q, rest)[robot.actuated:]  # both sound
+
         if not _plain(robot):
-            def move(t: float) -> None:
-                goal[0] = pin.difference(robot.model, state.q, rest)[robot.actuated:]  # both sound
-
             return move
-        if not isinstance(target, np.ndarray):
-            return None
+        place[:] = rest[robot.nq - m:]
+        return partial(_read, target, place) if isinstance(target, np.ndarray) else None
 
-        def read(t: float) -> None:
-            goal[0] = target[len(target) - m:]
 
-        return read
+def _read(target: Array, place: Array, t: float) -> None:
+    place[:] = target[len(target) - len(place):]
 
 
 def _plain(robot: Robot) -> bool:
