@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,15 +26,13 @@ from hierarchy.errors import (
     expect,
     expect_each,
     finite_numbers,
-    number,
-    positive,
     refuse,
 )
-from hierarchy.gate import array_of
+from hierarchy.gate import array_of, axes_along
 from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
+from hierarchy.records import NotNegative, Positive, check_fields, set_frozen
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 
@@ -67,11 +65,11 @@ class Contact:
 
     frame: Frame
     points: Sequence[Vector] = ((0.0, 0.0, 0.0),)
-    friction: float = 0.7
+    friction: Positive = 0.7
     normal: Vector = (0.0, 0.0, 1.0)
     name: str = ""
     open: Sequence[tuple[float, float]] = ()
-    ramp: float = 0.1
+    ramp: Annotated[NotNegative, "s"] = 0.1
     slides: bool = False
     up: Vector = (0.0, 0.0, 1.0)
     axes: Array = field(init=False, repr=False, compare=False)  # (3, 3) rows: two tangents, normal
@@ -82,20 +80,19 @@ class Contact:
         expect("contact: name", self.name, str, "give a text")
         expect("contact: slides", self.slides, bool, "give True or False")
         set_frozen(self, name=self.name or self.frame.name)
+        check_fields(self, f"contact {self.name!r}")
         points = array_of(f"contact {self.name!r}: points", self.points)
         refuse(points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all(),
                f"contact {self.name!r}: points {self.points!r} are not (k, 3) numbers")
         refuse(len(points) != 1 and np.linalg.matrix_rank(points - points.mean(0), tol=1e-6) < 2,
                f"contact {self.name!r}: {len(points)} points on one line; a contact has one "
                "point, or at least three of a surface")
-        positive(f"contact {self.name!r}: friction", self.friction)
-        axes, sole = (_axes(direction, f"contact {self.name!r}: {key}")
-                      for key, direction in (("normal", self.normal), ("up", self.up)))
+        axes, sole = (axes_along(f"contact {self.name!r}: {key}", getattr(self, key))
+                      for key in ("normal", "up"))
         spans = array_of(f"contact {self.name!r}: open", self.open)
         refuse(spans.size and (spans.shape[1:] != (2,) or not (spans[:, 0] < spans[:, 1]).all()),
                f"contact {self.name!r}: open {self.open!r}, expected pairs of times [s], each from "
                "a time until a later one")
-        number(f"contact {self.name!r}: ramp [s]", self.ramp, 0.0)
         refuse(self.slides and len(points) > 1, f"contact {self.name!r}: {len(points)} points "
                "that slide; only a contact of one point does")
         set_frozen(self, axes=axes, sole=sole)
@@ -245,19 +242,7 @@ def corners(x: tuple[float, float], y: tuple[float, float], up: Vector = (0.0, 0
     """
     sides = finite_numbers("sole: x [m]", x, 2), finite_numbers("sole: y [m]", y, 2)
     around = np.array([sides[0][[0, 1, 1, 0]], sides[1][[0, 0, 1, 1]]])
-    return np.asarray(around.T @ _axes(up, "sole: up")[:2])
-
-
-def _axes(normal: Vector, what: str) -> Array:
-    """Return two tangents and the normal as rows (3, 3); x, y and z for normal z."""
-    given = array_of(what, normal)
-    refuse(given.shape != (3,) or not 0.0 < np.linalg.norm(given) < np.inf,
-           f"{what} {normal!r} is no direction")
-    n = np.array(normal, dtype=float) / np.linalg.norm(normal)
-    x = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]
-    tangent = x - (x @ n) * n
-    tangent /= np.linalg.norm(tangent)
-    return np.array([tangent, np.cross(n, tangent), n])
+    return np.asarray(around.T @ axes_along("sole: up", up)[:2])
 
 
 @internal

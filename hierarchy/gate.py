@@ -2,12 +2,12 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, brief, refuse
+from hierarchy.errors import HierarchyError, brief, finite_numbers, refuse
 
 Array = NDArray[np.float64]
 Sizes = NDArray[np.int64]
@@ -45,6 +45,29 @@ def check_rotation(what: str, rotation: ArrayLike) -> None:
     if np.linalg.det(R) < 0.0:
         raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), but it is a "
                              f"reflection, of determinant -1; got {brief(R.tolist())}")
+
+
+Rotation = Annotated[ArrayLike, check_rotation]  # (3, 3), of a field; see `records`
+
+
+def direction(what: str, value: ArrayLike) -> Array:
+    """Return a direction (3,) at length one; raises a HierarchyError for numbers that are none."""
+    given = finite_numbers(what, value, 3)
+    length = float(np.linalg.norm(given))
+    refuse(not 1e-9 < length < np.inf, f"{what}: {brief(value)} is no direction")
+    return given / length
+
+
+def axes_along(what: str, z: ArrayLike) -> Array:
+    """Return axes as rows (3, 3), of which the third is a direction; see `direction`.
+
+    The first is x as seen across it, or y where it is along x.
+    """
+    third = direction(what, z)
+    toward = np.eye(3)[0 if abs(third[0]) < 0.9 else 1]
+    first = toward - (toward @ third) * third
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(third, first), third])
 
 
 def readable(what: str, value: Any) -> Array:

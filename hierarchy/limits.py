@@ -43,15 +43,16 @@ rounding:
 
 from dataclasses import dataclass, field
 from math import sqrt
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, brief, number, positive, refuse
+from hierarchy.errors import HierarchyError, brief, refuse
 from hierarchy.gate import array_of
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
+from hierarchy.records import NotNegative, Positive, check_fields, set_frozen
 from hierarchy.task import Level
 
 ROUNDING = 1e-12  # of a position, relative to 1 + its limit: closer to a limit counts as on it
@@ -75,8 +76,8 @@ class Limits:
     upper: Array
     velocity: Array
     acceleration: Array
-    period: float
-    horizon: float = 0.0
+    period: Annotated[Positive, "s"]
+    horizon: Annotated[NotNegative, "s"] = 0.0
     packed: Array = field(init=False, repr=False, compare=False)  # (6, n), for the kernels
 
     def __post_init__(self) -> None:
@@ -90,8 +91,7 @@ class Limits:
         _refuse(~(velocity > 0.0), "velocity must be positive", velocity)
         _refuse(~((acceleration > 0.0) & (acceleration < np.inf)),
                 "acceleration must be positive and finite", acceleration)
-        positive("limits: period [s]", self.period)
-        number("limits: horizon [s]", self.horizon, 0.0)
+        check_fields(self, "limits")
         times = [np.full(len(lower), time) for time in (self.period, self.horizon)]
         set_frozen(self, packed=np.array([*rows, *times]))
 

@@ -79,12 +79,11 @@ class Measured(Task):
             columns[:3] = range(len(columns[:3]))
         return columns
 
-    def goal(self, state: State) -> Array:
-        """Return an array for p_d, dp_d/dt and d2p_d/dt2 (3, k), which `follow` may move."""
-        return np.zeros((3, 3))
-
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
-        """Return a function of t [s] that moves `goal`; None where it rests."""
+        """Return a function of t [s] that moves the goal; None where it rests.
+
+        `goal` (3, k), zero before, is for p_d, dp_d/dt and d2p_d/dt2, k three or more `columns`.
+        """
         return None if self.path is None else self.path.writer(goal)
 
     def error(self, state: State) -> Array:
@@ -161,7 +160,8 @@ class Measured(Task):
             row[:] = np.asarray(value)
         derivative = (_NONE if level == "velocity" else
                       _EXACT if self.exact or state.period == 0.0 else _DIFFERENCE)
-        return _Asked(self.goal(state), settings, derivative, motion, np.zeros((m, state.n)))
+        goal = np.zeros((3, 1 + self.columns.max(initial=2)))
+        return _Asked(goal, settings, derivative, motion, np.zeros((m, state.n)))
 
     def _measured(self, state: State, kinematics: Kinematics | None = None
                   ) -> tuple[Array, Motion, Array]:

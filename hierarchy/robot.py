@@ -227,6 +227,11 @@ class Robot:
         return cls(model, name)
 
     @property
+    def shares(self) -> Array:
+        """The share of all `masses` (joints + 1,) that each body has."""
+        return self.masses / float(self.masses.sum())
+
+    @property
     def frame_names(self) -> list[str]:
         """Names of the frames that `frame` finds, including those of joints and links."""
         unclear = set(ambiguous(self.model))
@@ -241,7 +246,7 @@ class Robot:
     @property
     def velocity_units(self) -> list[str]:
         """The unit of the position of each velocity (n): "rad" or "m"."""
-        return [unit for joint in self.model.joints[1:] for unit in _units(joint)]
+        return [part.unit for part in self.parts for _ in range(part.velocities)]
 
     @property
     def coordinate_names(self) -> list[str]:
@@ -341,12 +346,8 @@ class Robot:
     @cached_property
     def supports(self) -> NDArray[np.bool_]:
         """Whether a velocity moves a body (joints + 1, n); the first body is the world."""
-        supports = np.zeros((self.model.njoints, self.n), dtype=np.bool_)
-        for body in range(1, self.model.njoints):
-            for joint in self.model.supports[body].tolist()[1:]:  # the world is the first
-                first = self.model.joints[joint].idx_v
-                supports[body, first:first + self.model.joints[joint].nv] = True
-        return supports
+        joints = [part.joint for part in self.parts for _ in range(part.velocities)]
+        return np.array([np.isin(joints, above.tolist()) for above in self.model.supports])
 
     def position_limits(self) -> tuple[Array, Array]:
         """Return lower and upper (n,), (n,) [rad or m], one per velocity.
@@ -457,13 +458,3 @@ def _part(locked: object, root: object) -> tuple[Mapping[str, ArrayLike], Sequen
 
 
 _UNIT = 1.01  # limit in pinocchio of a cosine, a sine or an entry of a quaternion
-
-
-def _units(joint: Any) -> tuple[str, ...]:
-    kind = joint.shortname().removeprefix("JointModel")
-    if kind == "Planar":
-        return ("m", "m", "rad")
-    if kind == "Composite":
-        return tuple(unit for inner in joint.extract().joints for unit in _units(inner))
-    slides = kind.startswith(("FreeFlyer", "Translation", "P"))
-    return tuple("m" if slides and i < 3 else "rad" for i in range(joint.nv))

@@ -208,6 +208,13 @@ class State:
         """Joint efforts h(q, v) (n,) [N m or N] of gravity, Coriolis and centrifugal forces."""
         return np.asarray(pin.nonLinearEffects(self._model, self._data, self.q, self.v))
 
+    def centre_of_mass(self) -> Array:
+        """World position (3,) [m] of the centre of mass of the bodies that joints move."""
+        self._with_masses()
+        R = self.placements[:, :9].reshape(-1, 3, 3)  # column by column
+        points = self.placements[:, 9:] + np.einsum("jki,jk->ji", R, self.robot.centres)
+        return np.asarray(self.robot.shares @ points)
+
     def position(self, frame: Frame | str) -> Array:
         """World position (3,) [m] of the origin of a frame, or of the frame of that name."""
         known = self._frame(frame)

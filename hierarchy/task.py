@@ -2,35 +2,24 @@
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
-from ast import literal_eval
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import Field, fields, is_dataclass
-from functools import cache, wraps
-from inspect import formatannotation
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from functools import wraps
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.avoidance.body import pack_points
+from hierarchy.avoidance.body import ControlPoint, pack_points
 from hierarchy.avoidance.laws import Barrier
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import (
-    HierarchyError,
-    brief,
-    check_choice,
-    expect,
-    real,
-    refuse,
-    whole,
-)
+from hierarchy.errors import HierarchyError, brief, check_choice, expect, refuse
 from hierarchy.gate import check_rows, shaped
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
+from hierarchy.records import NUMBERS, Check, check_fields
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 
@@ -44,13 +33,29 @@ _GAINS = ("stiffness", "damping", "gain")
 _OF_STATE = ("error", "jacobian", "jacobian_derivative", "desired_velocity",
              "desired_acceleration", "reference_velocity", "reference_acceleration", "measure",
              "error_reader", "writer")
-# Parts of a task by the type of the field, and how to make one.
-_PARTS: dict[str, tuple[type, str]] = {
-    "Robot": (Robot, "Robot.load(NAME)"), "Frame": (Frame, "robot.frame(NAME)"),
-    "Path": (Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
-    "Contacts": (Contacts, "Contacts(robot, ...) of hierarchy.contacts"),
-    "Barrier": (Barrier, "Barrier(distance) of hierarchy.avoidance")}
-_NUMBERS = {"float": real, "int": whole}
+
+
+def _made(kind: type, remedy: str) -> Check:
+    """Return a check of a part of a task; a task has no robot at hand to look up a name."""
+    def check(what: str, value: object) -> None:
+        if isinstance(value, str) and "NAME" in remedy:
+            raise HierarchyError(f"{what} is the name {value!r}; give "
+                                 f"{remedy.replace('NAME', repr(value))}")
+        expect(what, value, kind, f"give {remedy}")
+
+    return check
+
+
+def _some_points(what: str, value: Sequence[ControlPoint]) -> None:
+    refuse(not len(pack_points(value)[0]), f"{what}: expected at least one control point")
+
+
+_PARTS: dict[Any, Check] = {  # of a task, by the type of the field
+    **NUMBERS, Sequence[ControlPoint]: _some_points,
+    Robot: _made(Robot, "Robot.load(NAME)"), Frame: _made(Frame, "robot.frame(NAME)"),
+    Path: _made(Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
+    Contacts: _made(Contacts, "Contacts(robot, ...) of hierarchy.contacts"),
+    Barrier: _made(Barrier, "Barrier(distance) of hierarchy.avoidance")}
 
 
 class Rows(NamedTuple):
@@ -264,42 +269,12 @@ def parts(task: Task) -> Iterator[Task]:
 
 
 def check_parts(task: Task) -> None:
-    """Raise a HierarchyError where a part of a task that is a dataclass has another type.
-
-    A task has no robot at hand in which it could look up a frame.
-    """
+    """Raise a HierarchyError where a part of a task is not what its type asks for."""
     refuse(not isinstance(task.name, str) or not task.name, f"{type(task).__name__}: name: "
            f"expected a text, got {brief(task.name)}")
     check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
-    for part, written in _typed(type(task)):
-        value: Any = getattr(task, part.name, None)
-        named = written.removesuffix(" | None")
-        if not part.init or (value is None and named != written):
-            continue
-        if named in _PARTS:
-            kind, remedy = _PARTS[named]
-            if isinstance(value, str) and "NAME" in remedy:
-                raise HierarchyError(f"task {task.name!r}: {part.name} is the name {value!r}; "
-                                     f"give {remedy.replace('NAME', repr(value))}")
-            expect(f"task {task.name!r}: {part.name}", value, kind, f"give {remedy}")
-        elif named in _NUMBERS and part.name not in _GAINS:
-            value = _NUMBERS[named](f"task {task.name!r}: {part.name}", value)
-            set_frozen(task, **{part.name: value})
-        elif named.startswith("Literal["):
-            check_choice(f"task {task.name!r}: {part.name}", value,
-                         literal_eval(named.removeprefix("Literal")))
-        refuse(named == "Barrier" and task.kind != "inequality", f"task {task.name!r}: its rows "
-               "are inequalities")
-        refuse(written == "Sequence[ControlPoint]" and not len(pack_points(value)[0]),
-               f"task {task.name!r}: needs at least one control point")
-
-
-@cache
-def _typed(kind: type[Task]) -> list[tuple[Field[Any], str]]:
-    """Return the fields of a dataclass with their types as text, without modules."""
-    parts: tuple[Field[Any], ...] = fields(kind) if is_dataclass(kind) else ()
-    return [(part, re.sub(r"\b(\w+\.)+", "", part.type if isinstance(part.type, str) else
-                          formatannotation(part.type))) for part in parts]
+    if is_dataclass(task):
+        check_fields(task, f"task {task.name!r}", _PARTS, free=_GAINS)
 
 
 def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:

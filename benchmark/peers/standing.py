@@ -88,7 +88,7 @@ def make_scene(folder: Path) -> Stand:
     order = [table.coordinate(name) for name in robot.joint_names[1:]]
     rest = np.concatenate([table.rest[:7], table.rest[order]])
     state = State.at(robot, rest)
-    com = CentreOfMass(robot, Still((0.0, 0.0, 0.0))).position(state)
+    com = state.centre_of_mass()
     circles = [(com, (_SWAY[0], 0.0, 0.0), (0.0, _SWAY[1], 0.0)), *(
         (state.position(robot.frame(name)), (_HAND, 0.0, 0.0), (0.0, 0.0, _HAND))
         for name in names)]

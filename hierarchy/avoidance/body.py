@@ -2,16 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from math import sqrt
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import expect_each, finite_numbers, number, whole
+from hierarchy.errors import expect_each, finite_numbers
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import dot, less, place, plus, times, turned
 from hierarchy.problem import Array
+from hierarchy.records import NotNegative, check_fields
 
 
 @dataclass(frozen=True)
@@ -46,15 +49,12 @@ class Capsule:
 
     name: str
     joint: int
-    start: Vector
-    end: Vector
-    radius: float
+    start: Annotated[Vector, partial(finite_numbers, size=3), "m"]
+    end: Annotated[Vector, partial(finite_numbers, size=3), "m"]
+    radius: Annotated[NotNegative, "m"]
 
     def __post_init__(self) -> None:
-        whole(f"capsule {self.name!r}: joint", self.joint)
-        number(f"capsule {self.name!r}: radius [m]", self.radius, 0.0)
-        for name in ("start", "end"):
-            finite_numbers(f"capsule {self.name!r}: {name} [m]", getattr(self, name), 3)
+        check_fields(self, f"capsule {self.name!r}")
 
 
 def pairs_of_chain(capsules: Sequence[Capsule]) -> tuple[tuple[int, int], ...]:

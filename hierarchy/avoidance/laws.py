@@ -18,12 +18,14 @@ Ames et al., "Control barrier functions: theory and applications" (2019); Nguyen
 
 from dataclasses import astuple, dataclass
 from math import exp
+from typing import Annotated
 
 import numpy as np
 
-from hierarchy.errors import number, positive, refuse
+from hierarchy.errors import number, refuse
 from hierarchy.jit import compiled, inlined, internal
 from hierarchy.problem import Array
+from hierarchy.records import NotNegative, Positive, check_fields
 
 _ROUNDING = 1e-13  # [m] entries of a row below this are rounding errors
 
@@ -41,20 +43,16 @@ class Barrier:
     Raises HierarchyError, naming the setting, if one is out of range.
     """
 
-    distance: float
-    rate: float = 10.0
-    influence: float = 0.3
-    recovery: float = 0.2
-    limit: float = 50.0
+    distance: NotNegative
+    rate: Positive = 10.0
+    influence: Annotated[float, number] = 0.3
+    recovery: NotNegative = 0.2
+    limit: Positive = 50.0
 
     def __post_init__(self) -> None:
-        for name in ("distance", "rate", "recovery", "limit"):
-            value = number(f"barrier: {name}", getattr(self, name), 0.0)
-            refuse(name in ("rate", "limit") and value == 0.0, f"barrier: {name} = {value} is out "
-                   "of range")
-        refuse(not self.distance < number("barrier: influence", self.influence),
-               f"barrier: influence = {self.influence} m must be more than the distance to keep, "
-               f"{self.distance} m")
+        check_fields(self, "barrier")
+        refuse(not self.distance < self.influence, f"barrier: influence = {self.influence} m must "
+               f"be more than the distance to keep, {self.distance} m")
 
     def packed(self) -> Array:
         """The settings as one array (5,) for the kernels."""
@@ -95,14 +93,13 @@ class Repulsion:
     uses scale 3 (body) and 1.5 (end effector).
     """
 
-    maximum: float
-    reach: float
-    shape: float
-    scale: float = 2.0
+    maximum: Positive
+    reach: Positive
+    shape: Positive
+    scale: Positive = 2.0
 
     def __post_init__(self) -> None:
-        for name in ("maximum", "reach", "shape", "scale"):
-            positive(f"repulsion: {name}", getattr(self, name))
+        check_fields(self, "repulsion")
 
     def __call__(self, distance: float) -> float:
         """Magnitude at a distance [m]."""

@@ -7,27 +7,25 @@ import numpy as np
 
 from hierarchy.avoidance.laws import repulsion
 from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turning_off_obstacle
-from hierarchy.errors import number, refuse, whole
+from hierarchy.errors import refuse, whole
 from hierarchy.jit import compiled
 from hierarchy.kinematics import Readings, dot, place, plus
 from hierarchy.problem import Array
+from hierarchy.records import NotNegative, check_fields
 
 
 @dataclass(frozen=True)
 class SurveillanceAreas:
     """Danger thresholds [m]: eps_1 = near, eps_2 = far of the body, eps_ee = end_effector."""
 
-    near: float
-    far: float
-    end_effector: float
+    near: NotNegative
+    far: NotNegative
+    end_effector: NotNegative
 
     def __post_init__(self) -> None:
-        for name in ("near", "far", "end_effector"):
-            number(f"surveillance area {name}", getattr(self, name))
-        refuse(not 0.0 <= self.near <= self.far, "surveillance areas need 0 <= near <= far, got "
-               f"near = {self.near} m, far = {self.far} m")
-        refuse(self.end_effector < 0.0, f"surveillance area end_effector = {self.end_effector} m "
-               "must not be negative")
+        check_fields(self, "surveillance areas")
+        refuse(self.near > self.far, "surveillance areas need near <= far, got near = "
+               f"{self.near} m, far = {self.far} m")
 
 
 class Measurement:

@@ -7,12 +7,13 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import check_name, expect, expect_each, finite_numbers, refuse
-from hierarchy.gate import array_of, check_rotation
+from hierarchy.errors import check_name, expect, expect_each, refuse
+from hierarchy.gate import Rotation, array_of
 from hierarchy.jit import inlined, internal
 from hierarchy.kinematics import dot, less
 from hierarchy.paths import Path
 from hierarchy.problem import Array
+from hierarchy.records import Vector3, check_fields
 
 # One obstacle is one row of the packed table: shape, size, centre, rotation.
 # The number of a shape is also how many sizes it has.
@@ -32,9 +33,9 @@ class Obstacle:
     """
 
     shape: str
-    centre: tuple[float, float, float]
+    centre: Vector3
     size: tuple[float, ...] = ()
-    rotation: ArrayLike = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    rotation: Rotation = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
     path: Path | None = None
     name: str = "obstacle"
 
@@ -44,8 +45,7 @@ class Obstacle:
         refuse(size.shape != (expected,) or not ((size > 0.0) & (size < inf)).all(),
                f"{self.name}: a {self.shape} takes {expected} positive size(s), got "
                f"{size.tolist()}")
-        finite_numbers(f"{self.name}: centre", self.centre, 3)
-        check_rotation(f"{self.name}: rotation", self.rotation)
+        check_fields(self, self.name)
         if self.path is not None:
             expect(f"{self.name}: path", self.path, Path, "see hierarchy.paths")
 

@@ -6,9 +6,11 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from math import cos, inf, sin
 from pathlib import Path as File
+from typing import Annotated
 
 import numpy as np
 
@@ -24,9 +26,10 @@ from hierarchy.errors import (
     refuse,
     whole,
 )
+from hierarchy.gate import axes_along
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
+from hierarchy.records import NotNegative, Positive, Vector3, check_fields, set_frozen
 
 Vector = Sequence[float]
 _NUMBER = "+-.0123456789"  # how one may begin
@@ -54,10 +57,10 @@ class Path(ABC):
 class Still(Path):
     """A point at rest, `position` (3,) [m]; what is written into an array moves it."""
 
-    position: Vector
+    position: Annotated[Vector3, "m"]
 
     def __post_init__(self) -> None:
-        finite_numbers("position [m]", self.position, 3)
+        check_fields(self, "still")
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -69,16 +72,14 @@ class Still(Path):
 class Ellipse(Path):
     """p(t) = centre + cosine cos(rate t) + sine sin(rate t); vectors [m], rate [rad/s]."""
 
-    centre: Vector
-    cosine: Vector
-    sine: Vector
-    rate: float = 1.0
+    centre: Annotated[Vector3, "m"]
+    cosine: Annotated[Vector3, "m"]
+    sine: Annotated[Vector3, "m"]
+    rate: Annotated[float, number] = 1.0
     _packed: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for name in ("centre", "cosine", "sine"):
-            finite_numbers(f"{name} [m]", getattr(self, name), 3)
-        number("ellipse: rate", self.rate)
+        check_fields(self, "ellipse")
         set_frozen(self, _packed=np.array([self.centre, self.cosine, self.sine], dtype=float))
 
     def write(self, t: float, out: Array) -> None:
@@ -100,13 +101,7 @@ def circle(centre: Vector, radius: float, normal: Vector = (0.0, 0.0, 1.0), rate
     finite_numbers("centre [m]", centre, 3)
     number("circle: radius [m]", radius, 0.0)
     number("circle: phase [rad]", phase)
-    z = finite_numbers("circle: normal", normal, 3)
-    length = float(np.linalg.norm(z))
-    refuse(length <= 1e-9, f"circle: normal {brief(normal)} is no direction")
-    z = z / length
-    toward = np.eye(3)[1 if abs(z[0]) > 0.9 else 0]
-    x = toward - (toward @ z) * z
-    x, y = x / np.linalg.norm(x), np.cross(z, x / np.linalg.norm(x))
+    x, y, _ = axes_along("circle: normal", normal)
     c, s = cos(phase), sin(phase)
     return Ellipse(centre, tuple((radius * (c * x + s * y)).tolist()),
                    tuple((radius * (c * y - s * x)).tolist()), rate)
@@ -117,10 +112,10 @@ class Shifted(Path):
     """Another path, shifted by `offset` (3,) [m]."""
 
     path: Path
-    offset: Vector
+    offset: Annotated[Vector3, "m"]
 
     def __post_init__(self) -> None:
-        finite_numbers("offset [m]", self.offset, 3)
+        check_fields(self, "shifted")
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -149,16 +144,14 @@ class Jittered(Path):
     """
 
     path: Path
-    amplitude: float
-    rate: float
-    seed: int
+    amplitude: NotNegative
+    rate: Annotated[Positive, "Hz"]
+    seed: Annotated[int, partial(whole, largest=SEEDS)]
     _sines: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        number("jitter: amplitude", self.amplitude, 0.0)
-        positive("jitter: rate [Hz]", self.rate)
+        check_fields(self, "jitter")
         expect("jitter: path", self.path, Path, "see hierarchy.paths")
-        whole("jitter: seed", self.seed, largest=SEEDS)
         random = np.random.default_rng(self.seed)
         speeds = 2.0 * np.pi * self.rate * random.uniform(0.5, 1.0, (3, 5))  # rad/s
         set_frozen(self, _sines=np.stack([speeds, random.uniform(0.0, 2.0 * np.pi, (3, 5))]))

@@ -4,7 +4,6 @@ Besides `hierarchy.robot` and `hierarchy.state` only the readers here call pinoc
 `Found`.
 """
 
-from hierarchy.robots.shapes import link_capsules
 from hierarchy.robots.shipped import DUAL_ARM, HUMANOID, KUKA_LWR, QUADRUPED
 from hierarchy.robots.table import DHTable, Link, Table, TreeFrame, TreeJoint, TreeTable
 
@@ -12,4 +11,4 @@ TABLES: dict[str, Table] = {table.name: table
                             for table in (KUKA_LWR, DUAL_ARM, HUMANOID, QUADRUPED)}
 
 __all__ = ["DUAL_ARM", "HUMANOID", "KUKA_LWR", "QUADRUPED", "TABLES", "DHTable", "Link", "Table",
-           "TreeFrame", "TreeJoint", "TreeTable", "link_capsules"]
+           "TreeFrame", "TreeJoint", "TreeTable"]

@@ -1,18 +1,19 @@
-"""Models of robots that are given as tables."""
+"""Models of robots that are given as tables, and the capsules of their links."""
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
 
-from hierarchy.avoidance.body import ControlPoint, Vector
+from hierarchy.avoidance.body import Capsule, ControlPoint, Vector
 from hierarchy.problem import Array
 from hierarchy.robots.found import Found
 from hierarchy.robots.library import pin
-from hierarchy.robots.shapes import link_capsules
 from hierarchy.robots.table import Base, DHTable, Link, Table, TreeTable
 
 END_EFFECTOR = "end_effector"
 ROOT = "root_joint"
+_HERE = (0.0, 0.0, 0.0)
 
 
 def from_table(table: Table, base: Base | None = None) -> Found:
@@ -24,8 +25,8 @@ def from_table(table: Table, base: Base | None = None) -> Found:
 
 def _from_chain(table: DHTable, base: Base) -> Found:
     model = _empty(table.name, base)
-    first = joint = model.njoints - 1
-    placement = pin.SE3.Identity()
+    joint = model.njoints - 1
+    placement, links = pin.SE3.Identity(), list[Capsule]()
     for i, d in enumerate(table.d):
         limit = np.deg2rad([table.range[i]])
         joint = model.addJoint(joint, pin.JointModelRZ(), placement, f"joint_{i + 1}",
@@ -37,9 +38,11 @@ def _from_chain(table: DHTable, base: Base) -> Found:
                             np.array([table.a[i], 0.0, d]))
         model.appendBodyToJoint(joint, _rod(table, i), pin.SE3.Identity())
         model.addJointFrame(joint, -1)
+        if (end := (table.a[i], 0.0, d)) != _HERE:  # neighbours cover a link of length zero
+            links.append(Capsule(f"link {i + 1}", joint, _HERE, end, table.radius))
     model.addFrame(pin.Frame(END_EFFECTOR, joint, placement, pin.FrameType.OP_FRAME))
-    return Found(model, END_EFFECTOR, link_capsules(table, base=first),
-                 _points(model, table.control_points), table=table)
+    return Found(model, END_EFFECTOR, tuple(links), _points(model, table.control_points),
+                 table=table)
 
 
 def _from_tree(table: TreeTable, base: Base) -> Found:
@@ -52,10 +55,15 @@ def _from_tree(table: TreeTable, base: Base) -> Found:
             pin.SE3(np.eye(3), np.array(joint.at)), joint.name, np.array([joint.effort]),
             np.array([joint.velocity]), np.array([lower]), np.array([upper]))
         model.addJointFrame(index, -1)
-    links = [*((joint.name, joint.link) for joint in table.joints), *table.links]
-    for name, link in links:
-        model.appendBodyToJoint(_index(model, name, root), _capsule_inertia(link),
-                                pin.SE3.Identity())
+    seen, capsules = Counter[str](), list[Capsule]()
+    for name, link in (*((joint.name, joint.link) for joint in table.joints), *table.links):
+        index = _index(model, name, root)
+        model.appendBodyToJoint(index, _capsule_inertia(link), pin.SE3.Identity())
+        if link.radius > 0.0:
+            seen[name] += 1
+            number = f" {seen[name]}" if seen[name] > 1 else ""
+            capsules.append(Capsule(f"{name or 'base'}{number}", index, link.start, link.end,
+                                    link.radius))
     for frame in table.frames:
         placement = pin.SE3(_axes_with_z(frame.z_axis), np.array(frame.offset))
         model.addFrame(pin.Frame(frame.name, _index(model, frame.joint, root), placement,
@@ -64,8 +72,8 @@ def _from_tree(table: TreeTable, base: Base) -> Found:
     if base == "floating":
         q[2] = table.base_height
     q[model.nq - len(table.joints):] = np.deg2rad([joint.rest for joint in table.joints])
-    return Found(model, table.end_effector, link_capsules(table, base=root),
-                 _points(model, table.control_points), q, table=table)
+    return Found(model, table.end_effector, tuple(capsules), _points(model, table.control_points),
+                 q, table=table)
 
 
 def _empty(name: str, base: Base) -> Any:

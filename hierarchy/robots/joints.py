@@ -25,12 +25,14 @@ class Part(NamedTuple):
     """A part of joint number `joint`: its coordinates begin at `q`, its velocities at `v`.
 
     It has `size` coordinates: 1, 2 (cos, sin; one velocity) or 4 (a quaternion; three velocities).
+    `unit` is that of its value, "rad" or "m".
     """
 
     joint: int
     q: int
     v: int
     size: int
+    unit: str = "rad"
 
     @property
     def velocities(self) -> int:
@@ -43,26 +45,29 @@ def parts_of(model: Any) -> tuple[Part, ...]:
     parts: list[Part] = []
     for number, joint in enumerate(model.joints):
         q, v = joint.idx_q, joint.idx_v
-        for size in _sizes(joint) if number else ():
-            parts.append(Part(number, q, v, size))
+        for size, unit in _pieces(joint) if number else ():
+            parts.append(Part(number, q, v, size, unit))
             q, v = q + size, v + parts[-1].velocities
     return tuple(parts)
 
 
-def _sizes(joint: Any) -> Sequence[int]:
-    """Return how many coordinates each part of a joint has."""
+_SEVERAL = {"Spherical": [(4, "rad")], "Planar": [(1, "m"), (1, "m"), (2, "rad")],
+            "FreeFlyer": [(1, "m"), (1, "m"), (1, "m"), (4, "rad")]}
+
+
+def _pieces(joint: Any) -> Sequence[tuple[int, str]]:
+    """Return the number of coordinates and the unit of each part of a joint."""
     kind = joint.shortname().removeprefix("JointModel")
     if kind == "Composite":
-        return [size for inner in joint.extract().joints for size in _sizes(inner)]
+        return [piece for inner in joint.extract().joints for piece in _pieces(inner)]
     if joint.nq == joint.nv > 0:
-        return [1] * joint.nq
+        return [(1, "m" if kind.startswith(("Translation", "P")) else "rad")] * joint.nq
     if (joint.nq, joint.nv) == (2, 1):
-        return [2]
-    known = {"Spherical": [4], "Planar": [1, 1, 2], "FreeFlyer": [1, 1, 1, 4]}
-    if kind not in known:
+        return [(2, "rad")]
+    if kind not in _SEVERAL:
         raise RobotError(f"joint {joint.id}: a joint of {joint.nq} coordinates and {joint.nv} "
                          f"velocities of the kind {kind} is not known")
-    return known[kind]
+    return _SEVERAL[kind]
 
 
 def values_of(parts: Iterable[Part], q: Array) -> Array:

@@ -1,14 +1,13 @@
-"""pinocchio and its coal as everything here imports them: missing or old, named in one line."""
+"""pinocchio as everything here imports it: missing or old, named in one line."""
 
 from hierarchy.errors import RobotError, missing
 
 try:
-    import coal
     import pinocchio as pin
 except ModuleNotFoundError as error:
     raise missing(error, "robots") from None
 
-__all__ = ["coal", "pin"]
+__all__ = ["pin"]
 
 _OLDEST = 4  # as pyproject.toml asks
 

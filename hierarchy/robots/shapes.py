@@ -1,17 +1,15 @@
-"""Capsules: around collision geometry, and around the links of a robot given as a table."""
+"""Capsules around collision geometry."""
 
-from collections import Counter
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from hierarchy.avoidance.body import Capsule, Vector
-from hierarchy.errors import brief, number, refuse
 from hierarchy.problem import Array
-from hierarchy.robots.table import Table, TreeTable
 
-_CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
+Ends = tuple[Array, Array, float]  # start (3,) [m], end (3,) [m] and radius [m] of a capsule
+CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
 _MOST = 2000  # vertices of a mesh that are used to choose the axis
 
 
@@ -25,20 +23,26 @@ def capsules_of(geometries: Any) -> tuple[tuple[Capsule, ...], tuple[str, ...]]:
             left_out.append(f"collision geometry {name!r} is a {kind}, for which there is no "
                             "capsule")
             continue
-        start, end, radius = found
-        placement = geometry.placement
-        capsules.append(Capsule(
-            name, int(geometry.parentJoint), _vector(placement.act(start)),
-            _vector(placement.act(end)), float(radius)))
+        capsules.append(placed(name, int(geometry.parentJoint), geometry.placement, found))
     return tuple(capsules), tuple(left_out)
 
 
-def _capsule_of(shape: Any, kind: str) -> tuple[Array, Array, float] | None:
+def placed(name: str, joint: int, placement: Any, ends: Ends) -> Capsule:
+    """Return a capsule that is at a placement on the body of a joint."""
+    start, end, radius = ends
+    return Capsule(name, joint, _vector(placement.act(start)), _vector(placement.act(end)),
+                   float(radius))
+
+
+def around_z(half: float, radius: float) -> Ends:
+    """Return the capsule of a half length [m] and radius [m] along z, about the origin."""
     z = np.array([0.0, 0.0, 1.0])
-    if kind == "Sphere":
-        return 0.0 * z, 0.0 * z, shape.radius
-    if kind in ("Capsule", "Cylinder"):
-        return -shape.halfLength * z, shape.halfLength * z, shape.radius
+    return -half * z, half * z, radius
+
+
+def _capsule_of(shape: Any, kind: str) -> Ends | None:
+    if kind in ("Sphere", "Capsule", "Cylinder"):
+        return around_z(0.0 if kind == "Sphere" else shape.halfLength, shape.radius)
     points = _points_of(shape, kind)
     return None if points is None or len(points) == 0 else bounding_capsule(points)
 
@@ -46,9 +50,9 @@ def _capsule_of(shape: Any, kind: str) -> tuple[Array, Array, float] | None:
 def _points_of(shape: Any, kind: str) -> Array | None:
     """Points whose convex hull is the shape, or contains it."""
     if kind == "Box":
-        return np.asarray(_CORNERS * shape.halfSide, dtype=float)
+        return np.asarray(CORNERS * shape.halfSide, dtype=float)
     if kind == "Ellipsoid":  # the box around it
-        return np.asarray(_CORNERS * shape.radii, dtype=float)
+        return np.asarray(CORNERS * shape.radii, dtype=float)
     for of_mesh in ("vertices", "points"):
         if hasattr(shape, of_mesh):
             points = getattr(shape, of_mesh)
@@ -56,7 +60,7 @@ def _points_of(shape: Any, kind: str) -> Array | None:
     return None
 
 
-def bounding_capsule(points: Array) -> tuple[Array, Array, float]:
+def bounding_capsule(points: Array) -> Ends:
     """Return start (3,), end (3,) and radius [m] of a capsule that contains points (N, 3).
 
     Its axis is the one of x, y, z and the three principal axes of the points, through the middle of
@@ -74,7 +78,7 @@ def bounding_capsule(points: Array) -> tuple[Array, Array, float]:
     return _around(points, best)
 
 
-def _around(points: Array, axis: Array) -> tuple[Array, Array, float]:
+def _around(points: Array, axis: Array) -> Ends:
     """Return the capsule along `axis` that contains the points."""
     first = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     first /= np.linalg.norm(first)
@@ -95,35 +99,3 @@ def _around(points: Array, axis: Array) -> tuple[Array, Array, float]:
 def _vector(point: Array) -> Vector:
     x, y, z = (float(value) for value in point)
     return x, y, z
-
-
-def link_capsules(table: Table, foot: float = 0.0, base: int | None = None) -> tuple[Capsule, ...]:
-    """Capsules of a robot given as a table; for an arm, each link from its joint to the next.
-
-    Links of length zero are omitted because their neighbours cover them. With `foot` > 0 [m] the
-    first capsule of an arm is a column from that far below the base frame up to it. Each touches
-    the next. `base` is the index of the joint that moves the base, None for that of the table.
-    """
-    refuse(not isinstance(table, Table), f"link_capsules: expected a table, got {brief(table)}")
-    number("link_capsules: foot [m]", foot)
-    if isinstance(table, TreeTable):
-        return _tree_capsules(table, int(table.base == "floating") if base is None else base)
-    first = 1 + (base or 0)
-    column = [Capsule("foot", first - 1, (0.0, 0.0, -foot), (0.0, 0.0, 0.0), table.radius)]
-    links = [Capsule(f"link {i + 1}", i + first, (0.0, 0.0, 0.0), (a, 0.0, d), table.radius)
-             for i, (a, d) in enumerate(zip(table.a, table.d, strict=True)) if (a, d) != (0.0, 0.0)]
-    return tuple((column if foot > 0.0 else []) + links)
-
-
-def _tree_capsules(table: TreeTable, base: int) -> tuple[Capsule, ...]:
-    index = {"": base, **{joint.name: base + i for i, joint in enumerate(table.joints, 1)}}
-    links = [(name, link) for name, link in
-             (*((joint.name, joint.link) for joint in table.joints), *table.links)
-             if link.radius > 0.0]
-    seen, capsules = Counter[str](), list[Capsule]()
-    for name, link in links:
-        seen[name] += 1
-        number = f" {seen[name]}" if seen[name] > 1 else ""
-        capsules.append(Capsule(f"{name or 'base'}{number}", index[name], link.start, link.end,
-                                link.radius))
-    return tuple(capsules)

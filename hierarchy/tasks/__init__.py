@@ -23,21 +23,11 @@ from hierarchy.tasks.position import Along, Position
 from hierarchy.tasks.separation import SelfSeparation, Separation
 from hierarchy.tasks.together import Together
 
-TASKS: dict[str, type[Task]] = {
-    "along": Along, "avoidance": Avoidance, "base dynamics": BaseDynamics,
-    "centre of mass": CentreOfMass,
-    "centre of pressure": CentreOfPressure, "contact force": ContactForce,
-    "contact motion": ContactMotion, "coupling": JointCoupling,
-    "cumulated repulsion": CumulatedRepulsion, "damping": JointDamping,
-    "danger bounds": DangerBounds, "frame": FrameLog, "friction": Friction,
-    "joint limits": JointLimits,
-    "least force": LeastForce, "look-at": LookAt, "manipulability": Manipulability,
-    "momentum": Momentum, "orientation": Orientation, "pointing": Pointing, "pose": Pose,
-    "position": Position,
-    "posture": Posture, "relative pose": RelativePose, "self-separation": SelfSeparation,
-    "separation": Separation, "together": Together, "torque limits": TorqueLimits,
-    "torque step": TorqueStep,
-}
+TASKS: dict[str, type[Task]] = {kind.name: kind for kind in (
+    Along, Avoidance, BaseDynamics, CentreOfMass, CentreOfPressure, ContactForce, ContactMotion,
+    JointCoupling, CumulatedRepulsion, JointDamping, DangerBounds, FrameLog, Friction, JointLimits,
+    LeastForce, LookAt, Manipulability, Momentum, Orientation, Pointing, Pose, Position, Posture,
+    RelativePose, SelfSeparation, Separation, Together, TorqueLimits, TorqueStep)}
 
 __all__ = ["TASKS", "Along", "Avoidance", "BaseDynamics", "CentreOfMass", "CentreOfPressure",
            "ContactForce", "ContactMotion", "CumulatedRepulsion", "DangerBounds", "FrameLog",

@@ -25,13 +25,13 @@ velocity at contact.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from hierarchy.avoidance.body import ControlPoint, pack_points
-from hierarchy.avoidance.laws import Repulsion, repulsion
-from hierarchy.errors import HierarchyError, expect, naming, positive
+from hierarchy.avoidance.laws import repulsion
+from hierarchy.errors import HierarchyError, expect
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     add_row,
@@ -44,6 +44,7 @@ from hierarchy.kinematics import (
 from hierarchy.limits import clipped
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
+from hierarchy.records import NotNegative, Positive
 from hierarchy.state import State
 from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written, in_turn, seen_by
 from hierarchy.tasks.joints.joint_limits import JointLimits
@@ -116,12 +117,11 @@ class CumulatedRepulsion(JointTask):
     points: Sequence[ControlPoint]
     within: float
     base: Task | None = None
-    lever: float = 0.05
+    lever: Annotated[Positive, "m"] = 0.05
     name: str = "cumulated repulsion"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        positive(f"task {self.name!r}: lever [m]", self.lever)
         if self.base is not None:
             expect(f"task {self.name!r}: base", self.base, Task, "give a task such as Posture")
             self.refuse(self.base.dimension != self.joints, f"{self.base.name!r} has "
@@ -182,9 +182,9 @@ class DangerBounds(NamedRows, Written):
 
     limits: JointLimits
     points: Sequence[ControlPoint]
-    reach: float = 0.4
-    shape: float = 6.0
-    lever: float = 1e-9
+    reach: Annotated[Positive, "m"] = 0.4
+    shape: Positive = 6.0
+    lever: Annotated[NotNegative, "m"] = 1e-9
     name: str = "danger bounds"
     kind = "inequality"
 
@@ -193,12 +193,9 @@ class DangerBounds(NamedRows, Written):
         expect(f"task {self.name!r}: limits", self.limits, JointLimits, "give a JointLimits task")
         self.refuse(self.limits.robot.base == "floating", f"robot {self.limits.robot.name!r} has "
                     "a floating base, whose speed no joint bounds")
-        self.refuse(not 0.0 <= self.lever < np.inf, f"lever {self.lever} m must not be negative")
         for (i,) in np.argwhere(~np.isfinite(self.limits.robot.velocity_limit))[:1]:
             raise HierarchyError(f"task {self.name!r}: joint {self.limits.robot.velocity_names[i]} "
                                  "has no velocity limit to scale")
-        with naming(f"task {self.name!r}"):
-            Repulsion(1.0, self.reach, self.shape)
 
     @property
     def row_names(self) -> tuple[str, ...]:

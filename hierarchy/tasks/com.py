@@ -47,20 +47,9 @@ class CentreOfMass(Measured):
         """One row per axis."""
         return len(self.axes)
 
-    @property
-    def shares(self) -> Array:
-        """The share of the mass that each body has."""
-        return self.robot.masses / float(self.robot.masses.sum())
-
-    def position(self, state: State) -> Array:
-        """World position of the centre of mass (3,) [m]."""
-        R = state.placements[:, :9].reshape(-1, 3, 3)  # column by column
-        points = state.placements[:, 9:] + np.einsum("jki,jk->ji", R, self.robot.centres)
-        return np.asarray(self.shares @ points)
-
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
-        return _centre_of_mass, (self.shares, self.robot.centres, self.columns)
+        return _centre_of_mass, (self.robot.shares, self.robot.centres, self.columns)
 
     @property
     def columns(self) -> NDArray[np.int64]:
@@ -140,11 +129,9 @@ class Momentum(NamedRows, Measured):
         """The components."""
         return np.arange(*_ROWS[self.part])
 
-    def goal(self, state: State) -> Array:
-        """The target in the place of a velocity (3, 6)."""
-        goal = np.zeros((3, 6))
+    def follow(self, state: State, goal: Array) -> None:
+        """The target is in the place of a velocity."""
         goal[1, self.columns] = 0.0 if self.target is None else self.target
-        return goal
 
 
 @measured

@@ -10,10 +10,10 @@ from typing import Literal
 
 import numpy as np
 
-from hierarchy.errors import number
 from hierarchy.kinematics import Kinematics, Placed, cross
 from hierarchy.measured import Measure, Measured, Motion, plain
 from hierarchy.problem import Array
+from hierarchy.records import NotNegative
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Kind
@@ -33,7 +33,7 @@ class Manipulability(Measured):
     """
 
     frame: Frame
-    least: float
+    least: NotNegative
     part: Literal["position", "pose"] = "position"
     kind: Kind = "inequality"
     stiffness: float = 20.0
@@ -41,10 +41,6 @@ class Manipulability(Measured):
     gain: float = 5.0
     name: str = "manipulability"
     dimension = 1
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        number(f"task {self.name!r}: least", self.least, 0.0)
 
     @property
     def rows(self) -> int:

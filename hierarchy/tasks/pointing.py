@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from math import cos
+from typing import Annotated
 
 import numpy as np
 
-from hierarchy.errors import finite_numbers, number
-from hierarchy.gate import readable
+from hierarchy.errors import number
+from hierarchy.gate import direction, readable
 from hierarchy.jit import bind, compiled, inlined
 from hierarchy.kinematics import (
     Spot,
@@ -28,7 +30,7 @@ from hierarchy.kinematics import (
 )
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
+from hierarchy.records import Vector3, set_frozen
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import Kind
@@ -67,7 +69,7 @@ class Pointing(Measured):
 
     frame: Frame
     axis: tuple[float, float, float]
-    half_angle: float
+    half_angle: Annotated[float, partial(number, least=0.0, largest=np.pi), "rad"]
     kind: Kind = "equality"
     stiffness: float = 5.0
     damping: float = 2.0
@@ -80,12 +82,8 @@ class Pointing(Measured):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        axis = finite_numbers(f"task {self.name!r}: axis", self.axis)
-        length = float(np.linalg.norm(axis))
-        self.refuse(axis.shape != (3,) or not 1e-9 < length < np.inf, f"axis {axis.tolist()} "
-                    "has no direction")
-        number(f"task {self.name!r}: half_angle [rad]", self.half_angle, 0.0, np.pi)
-        set_frozen(self, z_d=axis / length, cos_alpha_d=cos(self.half_angle),
+        set_frozen(self, z_d=direction(f"task {self.name!r}: axis", self.axis),
+                   cos_alpha_d=cos(self.half_angle),
                    z_e=np.ascontiguousarray(self.frame.rotation[:, 2]))
 
     def cone_error(self, state: State) -> float:
@@ -120,17 +118,13 @@ class LookAt(Measured):
     """
 
     frame: Frame
-    target: tuple[float, float, float]
+    target: Annotated[Vector3, "m"]
     stiffness: float = 20.0
     damping: float = 10.0
     gain: float = 5.0
     name: str = "look-at"
     dimension = 2
     row_names = ("x", "y")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        finite_numbers(f"task {self.name!r}: target [m]", self.target, 3)
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`: the error is -2 (u_x, u_y) / (1 + u_z)."""

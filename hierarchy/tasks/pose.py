@@ -4,10 +4,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from hierarchy.errors import finite_numbers
-from hierarchy.gate import check_rotation, readable
+from hierarchy.gate import Rotation, readable
 from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import (
     Kinematics,
@@ -32,6 +31,7 @@ from hierarchy.kinematics import (
 from hierarchy.measured import Measure, Measured, Motion, measured, plain
 from hierarchy.paths import Path
 from hierarchy.problem import Array
+from hierarchy.records import Vector3
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import NamedRows
@@ -63,17 +63,13 @@ class Pose(Measured):
 
     frame: Frame
     path: Path = field()  # required here
-    rotation: ArrayLike
+    rotation: Rotation
     stiffness: float = 40.0
     damping: float = 20.0
     gain: float = 10.0
     name: str = "pose"
     dimension = 6
     row_names = ("x", "y", "z", "about x", "about y", "about z")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_rotation(f"task {self.name!r}: rotation", self.rotation)
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
@@ -100,17 +96,13 @@ class Orientation(Measured):
     """
 
     frame: Frame
-    rotation: ArrayLike
+    rotation: Rotation
     stiffness: float = 40.0
     damping: float = 20.0
     gain: float = 10.0
     name: str = "orientation"
     dimension = 3
     row_names = Pose.row_names[3:]
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_rotation(f"task {self.name!r}: rotation", self.rotation)
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
@@ -142,12 +134,8 @@ class FrameLog(Pose):
         """See `Measured.measure`."""
         return _frame_log, (self, state)
 
-    def goal(self, state: State) -> Array:
-        """The part of de/dt that comes from the path, and its derivative, in rows 1 and 2."""
-        return np.zeros((3, 6))
-
     def follow(self, state: State, goal: Array) -> None:
-        """The measure writes the goal, which depends on the error."""
+        """The measure writes the goal: the part of de/dt that comes from the path, and its rate."""
 
 
 @plain
@@ -215,18 +203,12 @@ class RelativePose(NamedRows, Measured):
 
     frame: Frame
     to: Frame
-    position: ArrayLike
-    rotation: ArrayLike | None = None
+    position: Vector3
+    rotation: Rotation | None = None
     stiffness: float = 40.0
     damping: float = 20.0
     gain: float = 10.0
     name: str = "relative"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        finite_numbers(f"task {self.name!r}: position", self.position, 3)
-        if self.rotation is not None:
-            check_rotation(f"task {self.name!r}: rotation", self.rotation)
 
     @property
     def row_names(self) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, NamedRows, Rows, Writer, Written
+from hierarchy.task import Level, NamedRows, Rows, Writer, Written
 from hierarchy.tasks.pairs import separable_pairs
 
 _SHARPEST = 1e-3  # [m] smallest radius of turning that is used
@@ -86,7 +87,7 @@ class Separation(NamedRows, Written):
     barrier: Barrier
     obstacles: int | None = None
     name: str = "separation"
-    kind: Kind = "inequality"
+    kind: Literal["inequality"] = "inequality"
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -181,7 +182,7 @@ class SelfSeparation(NamedRows, Written):
     barrier: Barrier
     pairs: Sequence[tuple[int, int]] | None = None
     name: str = "self-separation"
-    kind: Kind = "inequality"
+    kind: Literal["inequality"] = "inequality"
     indices: NDArray[np.int64] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

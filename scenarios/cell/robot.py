@@ -14,7 +14,7 @@ from hierarchy.avoidance import Capsule, ControlPoint
 from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.paths import Still
 from hierarchy.problem import Array
-from hierarchy.tasks import CentreOfMass, Position
+from hierarchy.tasks import Position
 from hierarchy.tasks.joints.mechanism import Mechanism, model_rows
 from scenarios.cell.plants.mjcf import BALL
 from scenarios.config import Scenario, ScenarioError
@@ -210,7 +210,7 @@ def _refuse_buried(start: State, floor: float) -> None:
     """Raise a ScenarioError for a floating base that hangs from its contacts below the floor."""
     if start.robot.base != "floating":
         return
-    above = float(CentreOfMass(start.robot, Still((0.0, 0.0, 0.0))).position(start)[2]) - floor
+    above = float(start.centre_of_mass()[2]) - floor
     if above < 0.0:
         raise ScenarioError(f"start: the centre of mass is {-1e3 * above:.3g} mm below the floor. "
                             "Is the base upside down? Its quaternion in start.q is x, y, z, w")

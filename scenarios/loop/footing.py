@@ -4,9 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hierarchy.paths import Still
 from hierarchy.problem import Array
-from hierarchy.tasks import CentreOfMass
 from hierarchy.words import some
 from scenarios.cell.plants.mjcf import of_drives
 from scenarios.cell.plants.torque import inside
@@ -67,8 +65,7 @@ def _unsupported(controller: Controller) -> Iterator[str]:
         return
     points = [state.position(one.frame) + np.array(one.points) @ state.rotation(one.frame).T
               for one in closed]
-    centre = CentreOfMass(robot, Still((0.0, 0.0, 0.0))).position(state)
-    margin = inside(np.concatenate([np.empty((0, 3)), *points])[:, :2], centre[:2])
+    margin = inside(np.concatenate([np.empty((0, 3)), *points])[:, :2], state.centre_of_mass()[:2])
     if np.isnan(margin):
         yield "the contacts span no area, so the robot cannot stand still"
     elif margin < 0.0:

@@ -165,7 +165,7 @@ def robot_facts(robot: Robot, foot: float = 0.0) -> RobotFacts:
         robot.base == "fixed" and robot.parents[1:] == chain, tuple(robot.rest.tolist()),
         tuple(robot.velocity_names),
         tuple(unit for part in robot.parts
-              for unit in ((units[part.v],) if part.size == 1 else ("1",) * part.size)),
+              for unit in ((part.unit,) if part.size == 1 else ("1",) * part.size)),
         units, points, (x, y, z), links, -foot if foot else lowest(robot, links))
 
 

@@ -60,7 +60,7 @@ def _position(task: Task, state: State) -> Array | None:
         task = task.task
     if isinstance(task, Position | Pose):
         return state.position(task.frame)
-    return task.position(state) if isinstance(task, CentreOfMass) else None
+    return state.centre_of_mass() if isinstance(task, CentreOfMass) else None
 
 
 def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:

@@ -42,7 +42,7 @@ def moving_state(seed):
 
 def standing_stack(state, contacts, shift=(0.0, 0.0, 0.0), fraction=1.0, faces=4):
     """Seven levels: the centre of mass is asked `shift` [m] beside where it is."""
-    com = tasks.CentreOfMass(ROBOT, Still((0.0, 0.0, 0.0))).position(state)
+    com = state.centre_of_mass()
     hands = [tasks.Position(ROBOT.frame(hand), Still(state.position(ROBOT.frame(hand))), name=hand)
              for hand in ("left_hand", "right_hand")]
     return Stack([

@@ -11,9 +11,9 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Barrier, Capsule, Measurement, Obstacle, Obstacles, Pairs
 from hierarchy.avoidance.body import measure_capsules, pack_capsules
 from hierarchy.paths import Ellipse
-from hierarchy.robots import TABLES, link_capsules
 from hierarchy.task import Rows
 from hierarchy.tasks import SelfSeparation, Separation
+from scenarios.cell.robot import on_column
 from scenarios.cell.sensors import ExactDistances
 
 ROUND = Ellipse((0.3, 0.5, 0.2), (0.2, 0.1, 0.0), (0.0, 0.1, 0.3), rate=2.0)
@@ -71,7 +71,7 @@ ODD = (Capsule("ball", 1, (0.1, 0.1, 0.1), (0.1, 0.1, 0.1), 0.05),
        Capsule("rod", 5, (0.1, -0.3, 0.1), (0.0, 0.4, 0.3), 0.03),
        Capsule("hand", 7, (0.0, -0.2, 0.1), (0.0, 0.2, 0.0), 0.0))
 ALL_PAIRS = Barrier(0.02, influence=5.0)
-TASKS = {"arm": SelfSeparation(link_capsules(TABLES["kuka_lwr"], foot=0.3105), ALL_PAIRS),
+TASKS = {"arm": SelfSeparation(on_column(ROBOT, ROBOT.capsules, 0.3105), ALL_PAIRS),
          "odd": SelfSeparation(ODD, ALL_PAIRS, ((0, 1), (0, 2), (3, 1), (1, 2), (2, 3)))}
 IDENTITY = np.r_[np.eye(3).ravel(), np.zeros(3)][None]
 
@@ -93,8 +93,8 @@ def segments():
 
 
 def test_capsules_of_an_arm_on_a_moving_base_are_of_the_joints_behind_it():
-    fixed, moved = (link_capsules(TABLES["kuka_lwr"], 0.3, base=base) for base in (0, 2))
-    assert moved == tuple(replace(one, joint=one.joint + 2) for one in fixed)
+    moved = Robot.named("kuka_lwr", "floating").capsules
+    assert moved == tuple(replace(one, joint=one.joint + 1) for one in ROBOT.capsules)
 
 
 def test_distance_of_segments_is_the_least_there_is():

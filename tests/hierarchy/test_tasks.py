@@ -16,8 +16,6 @@ from hierarchy.avoidance import Barrier
 from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
 from hierarchy.robot import Frame
-from hierarchy.robots import TABLES as ROBOT_TABLES
-from hierarchy.robots import link_capsules
 from hierarchy.task import Rows
 from scenarios.config.sections import kinds
 
@@ -169,7 +167,7 @@ def test_a_wrong_task_is_named(method, value, said, monkeypatch):
     *TASKS.values(), tasks.JointLimits(ROBOT, 10.0, 1e-3), tasks.TorqueLimits(ROBOT),
     tasks.DangerBounds(tasks.JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
     tasks.TorqueStep(ROBOT, 1.0), tasks.Separation(ROBOT.control_points, Barrier(0.05)),
-    tasks.SelfSeparation(link_capsules(ROBOT_TABLES["kuka_lwr"], foot=0.3), Barrier(0.05))],
+    tasks.SelfSeparation(ROBOT.capsules, Barrier(0.05))],
     ids=lambda task: task.name)
 def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(task):
     assert replace(task) == task

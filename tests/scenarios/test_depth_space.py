@@ -12,8 +12,8 @@ from scene import ROBOT, deproject
 from hierarchy import State
 from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles
 from hierarchy.avoidance.body import pack_capsules
-from hierarchy.robots import TABLES, link_capsules
 from scenarios import load, simulate
+from scenarios.cell.robot import on_column
 from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage
@@ -21,7 +21,7 @@ from scenarios.cell.sensors.rendering import draw_robot
 from scenarios.cell.sensors.sensor import Asked, ExactDistances
 from scenarios.config.sections.sensor import CameraSection, ImageSection
 
-CAPSULES = link_capsules(TABLES["kuka_lwr"], foot=0.31)
+CAPSULES = on_column(ROBOT, ROBOT.capsules, 0.31)
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
 FACING = Pinhole(101, 81, 100.0, 100.0)  # at the origin, z forward, its middle in pixel (50, 40)
 SIDE = Pinhole(320, 240, 262.0, 262.0, position=(0.3, 2.2, 0.8),

@@ -3,19 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hierarchy.avoidance.body import Capsule
 from hierarchy.errors import RobotError, naming
 from hierarchy.robots.found import Found, neutral_within_limits, proposed_end_effector
-from hierarchy.robots.library import coal
 from hierarchy.robots.mjcf import constraints
 from hierarchy.robots.mjcf.model import Built, build, compare, configuration, pose
 from hierarchy.robots.mjcf.part import compiled, part_of
-from hierarchy.robots.shapes import capsules_of
+from hierarchy.robots.shapes import CORNERS, Ends, around_z, bounding_capsule, placed
 from hierarchy.robots.table import Base
 
 _PLANE, _HEIGHTS, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX = range(7)  # mjtGeom
@@ -50,14 +49,13 @@ def read(path: Path, base: Base | None, shapes: bool, locked: Mapping[str, Array
         missing=(*file.missing, *said, *unkept, *unclosed, *constraints.left_out(built)))
     if not shapes:
         return found
-    geometries, without = _shapes(built)
-    capsules, shapeless = capsules_of(geometries)
-    return replace(found, capsules=capsules, missing=(*found.missing, *without, *shapeless))
+    capsules, without = _capsules(built)
+    return replace(found, capsules=tuple(capsules), missing=(*found.missing, *without))
 
 
-def _shapes(built: Built) -> tuple[list[Any], list[str]]:
-    """Return the geoms that collide, as `capsules_of` takes them, and sentences on the others."""
-    mj, shapes, said = built.part.compiled.model, [], []
+def _capsules(built: Built) -> tuple[list[Capsule], list[str]]:
+    """Return capsules around the geoms that collide, and sentences on those without one."""
+    mj, capsules, said = built.part.compiled.model, [], []
     paired = {*mj.pair_geom1.tolist(), *mj.pair_geom2.tolist()}
     for geom in range(mj.ngeom):
         body = int(mj.geom_bodyid[geom])
@@ -72,21 +70,18 @@ def _shapes(built: Built) -> tuple[list[Any], list[str]]:
                         "capsule")
             continue
         joint, place = built.placed[body]
-        shapes.append(SimpleNamespace(
-            name=name, parentJoint=joint, geometry=_shape(mj, geom, kind),
-            placement=place * pose(mj.geom_pos[geom], mj.geom_quat[geom])))
-    return shapes, said
+        capsules.append(placed(name, joint, place * pose(mj.geom_pos[geom], mj.geom_quat[geom]),
+                               _ends(mj, geom, kind)))
+    return capsules, said
 
 
-def _shape(mj: Any, geom: int, kind: int) -> Any:
+def _ends(mj: Any, geom: int, kind: int) -> Ends:
     size = mj.geom_size[geom]
-    if kind == _SPHERE:
-        return coal.Sphere(size[0])
-    if kind in (_CAPSULE, _CYLINDER):
-        return (coal.Capsule if kind == _CAPSULE else coal.Cylinder)(size[0], 2 * size[1])
+    if kind in (_SPHERE, _CAPSULE, _CYLINDER):
+        return around_z(0.0 if kind == _SPHERE else size[1], size[0])
     if kind in (_ELLIPSOID, _BOX):  # of an ellipsoid the box around it
-        return coal.Box(*(2 * size))
+        return bounding_capsule(CORNERS * size)
     mesh = mj.geom_dataid[geom]
     first = mj.mesh_vertadr[mesh]
-    return SimpleNamespace(vertices=np.array(mj.mesh_vert[first:first + mj.mesh_vertnum[mesh]],
-                                             dtype=float))
+    return bounding_capsule(np.array(mj.mesh_vert[first:first + mj.mesh_vertnum[mesh]],
+                                     dtype=float))

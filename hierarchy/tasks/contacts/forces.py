@@ -3,20 +3,22 @@
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from hierarchy.contacts import Contacts, Points, write_dynamics, zero_while_open
-from hierarchy.errors import HierarchyError, finite_numbers, number, positive
+from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.gate import shaped
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import less, place
 from hierarchy.problem import Array
+from hierarchy.records import Positive
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, NamedRows, Rows, Writer, Written
+from hierarchy.task import Level, NamedRows, Rows, Writer, Written, in_turn
 from hierarchy.tasks.joints.joint_limits import JointRows
 
 WRENCH = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
@@ -164,6 +166,8 @@ class TorqueRows(JointRows):
     kind = "inequality"
     of_forces: ClassVar[bool] = True
     straight = False
+    levels: ClassVar[tuple[Level, ...]] = ("torque",)
+    moving: ClassVar[bool] = False  # whether the bounds are others in each tick
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -180,10 +184,18 @@ class TorqueRows(JointRows):
     def bounds(self, state: State) -> tuple[Array, Array]:
         """The bounds of the torques (n,), (n,) [N m or N]."""
 
-    def write_within(self, limit: Array, state: State, rows: Rows) -> Writer:
-        """Return what writes rows of torques from -limit to limit (n,) [N m or N]."""
+    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
+        """See `Task.writer`; HierarchyError at another level than `levels`."""
+        self.refuse(level not in self.levels, "its rows are for the level "
+                    f"{' or '.join(self.levels)}, not {level!r}")
         contacts = Contacts(self.robot) if self.contacts is None else self.contacts
-        return _efforts(contacts, self.robot.actuated, limit, state, rows)
+        bounds = np.array(self.bounds(state))
+        write_rows = _efforts(contacts, self.robot.actuated, bounds, state, rows)
+
+        def follow() -> None:
+            bounds[:] = self.bounds(state)
+
+        return in_turn(follow, write_rows) if self.moving else write_rows
 
 
 @dataclass(frozen=True)
@@ -198,29 +210,19 @@ class TorqueLimits(TorqueRows):
     """
 
     robot: Robot
-    fraction: float = 1.0
+    fraction: Annotated[float, partial(number, least=0.0, largest=1.0)] = 1.0
     name: str = "torque limits"
     contacts: Contacts | None = None
+    levels = "acceleration", "torque"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.refuse(number(f"task {self.name!r}: fraction", self.fraction, 0.0, 1.0) == 0.0,
-                    f"fraction {self.fraction} is not more than 0")
-
-    @property
-    def limit(self) -> Array:
-        """The largest torque of each row (n,) [N m or N]."""
-        return self.fraction * self.robot.effort_limit[self.robot.actuated:]
+        self.refuse(self.fraction == 0.0, f"fraction {self.fraction} is not more than 0")
 
     def bounds(self, state: State) -> tuple[Array, Array]:
         """The limits, at any state."""
-        return -self.limit, self.limit
-
-    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
-        """See `Task.writer`; HierarchyError at velocity level."""
-        self.refuse(level == "velocity", "torque limits need the acceleration level, not "
-                    f"{level!r}")
-        return self.write_within(self.limit, state, rows)
+        limit = self.fraction * self.robot.effort_limit[self.robot.actuated:]
+        return -limit, limit
 
 
 @dataclass(frozen=True)
@@ -234,13 +236,10 @@ class TorqueStep(TorqueRows):
     """
 
     robot: Robot
-    step: float
+    step: Positive
     name: str = "torque step"
     contacts: Contacts | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        positive(f"task {self.name!r}: step", self.step)
+    moving = True
 
     def bounds(self, state: State) -> tuple[Array, Array]:
         """The commanded torques less and plus the step."""
@@ -250,35 +249,23 @@ class TorqueStep(TorqueRows):
         last = shaped(f"task {self.name!r}: state.commanded", last, (self.dimension,))
         return last - self.step, last + self.step
 
-    def writer(self, state: State, level: Level, rows: Rows) -> Writer:
-        """See `Task.writer`; HierarchyError at another level."""
-        self.refuse(level != "torque", f"steps of torques need the level torque, not {level!r}")
-        write_rows = self.write_within(np.full(self.dimension, inf), state, rows)
-        efforts = state.dynamics[1][self.robot.actuated:]
 
-        def write() -> None:
-            write_rows()
-            for side, bound in zip(rows[1:], self.bounds(state), strict=True):
-                np.subtract(bound, efforts, out=side)
-
-        return write
-
-
-def _efforts(contacts: Contacts, first: int, limit: Array, state: State, rows: Rows) -> Writer:
-    """Return what writes M a + h - J_c^T f from -limit to limit; open contacts transmit nothing."""
+def _efforts(contacts: Contacts, first: int, bounds: Array, state: State, rows: Rows) -> Writer:
+    """Return what writes M a + h - J_c^T f within bounds (2, m); open contacts transmit nothing."""
     M, h = state.dynamics
-    write_rows = bind(write_torques, (M, h, state.kinematics, contacts.points, first), limit, *rows)
+    write_rows = bind(write_torques, (M, h, state.kinematics, contacts.points, first), bounds,
+                      *rows)
     forces = [(rows.A[:, contacts.blocks[contact.name]],) for contact in contacts.contacts]
     return zero_while_open(write_rows, state, contacts, forces)
 
 
 @compiled
-def write_torques(parameters, limit, A, lower, upper):
-    """Write rows of M a + h - J_c^T f from -limit to limit, of the velocities from `first` on."""
+def write_torques(parameters, bounds, A, lower, upper):
+    """Write rows of M a + h - J_c^T f within bounds (2, m), of the velocities from `first` on."""
     M, h, kinematics, points, first = parameters
     write_dynamics(M, kinematics, points, A, first)
-    for i in range(len(limit)):
-        lower[i], upper[i] = -limit[i] - h[first + i], limit[i] - h[first + i]
+    for i in range(len(lower)):
+        lower[i], upper[i] = bounds[0, i] - h[first + i], bounds[1, i] - h[first + i]
 
 
 @dataclass(frozen=True)
@@ -303,4 +290,4 @@ class BaseDynamics(NamedRows, ForceTask):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        return _efforts(self.contacts, 0, np.zeros(self.dimension), state, rows)
+        return _efforts(self.contacts, 0, np.zeros((2, self.dimension)), state, rows)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import zip_longest
 from math import lcm, pi
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,7 @@ class JointCoupling(_Coupling):
 
     robot: Robot
     joints: Mapping[str, float]
-    value: float = 0.0
+    value: Annotated[float, number] = 0.0
     stiffness: float = 100.0
     damping: float = 20.0
     gain: float = 10.0
@@ -75,7 +75,6 @@ class JointCoupling(_Coupling):
         expect(f"task {self.name!r}: joints", self.joints, Mapping, "give {name: factor, ...}")
         for name, factor in self.joints.items():
             number(f"task {self.name!r}: joints.{name}", factor)
-        number(f"task {self.name!r}: value", self.value)
         self.refuse(not any(self.joints.values()), f"joints {dict(self.joints)} have no factor "
                     "other than zero")
         constants = [-self.value, *[0.0] * (len(self.joints) - 1)]

@@ -11,7 +11,7 @@ from hierarchy.jit import bind
 from hierarchy.kinematics import write_identity
 from hierarchy.limits import Limits, write_box
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
+from hierarchy.records import NotNegative, set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level, NamedRows, Rows, Writer, Written
@@ -55,7 +55,7 @@ class JointLimits(JointRows):
     robot: Robot
     acceleration: float | ArrayLike
     period: float
-    margin: float = 0.0
+    margin: NotNegative = 0.0
     name: str = "joint limits"
     base_speed: tuple[float, float] | None = None
     base_acceleration: tuple[float, float] | None = None
@@ -70,8 +70,6 @@ class JointLimits(JointRows):
         n = robot.n - robot.actuated
         self.refuse(acceleration.shape not in ((), (n,)), "acceleration has shape "
                     f"{acceleration.shape}, expected a number or ({n},)")
-        self.refuse(number(f"task {self.name!r}: margin", self.margin) < 0.0,
-                    f"margin {self.margin} must not be negative")
         lower, upper = robot.position_limits()
         for i in np.flatnonzero(upper - lower < 2.0 * self.margin)[:1]:
             raise HierarchyError(f"task {self.name!r}: margin {self.margin:g} leaves "

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import expect, finite_numbers, naming, number
+from hierarchy.errors import finite_numbers, naming
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import row_times, write_identity
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
+from hierarchy.records import NotNegative, set_frozen
 from hierarchy.robot import Robot
 from hierarchy.robots.library import pin
 from hierarchy.state import State
@@ -75,7 +76,6 @@ class Posture(Measured):
         if not isinstance(self.target, Mapping):
             finite_numbers(f"task {self.name!r}: target", self.target)
         if self.robot is not None:
-            expect(f"task {self.name!r}: robot", self.robot, Robot, "give Robot.load(NAME)")
             with naming(f"task {self.name!r}"):
                 rest = self.robot.configuration(self.target)
             if isinstance(self.target, Mapping) and self.robot.loops:
@@ -107,28 +107,27 @@ class Posture(Measured):
         positions = state.q[robot.nq - m:] if _plain(robot) else np.zeros(m)
         return _posture, (positions, robot.actuated)
 
-    def goal(self, state: State) -> Array:
-        """See `Measured.goal`: the target, or the step there."""
-        robot, m = state.robot, self.dimension
-        goal = np.zeros((3, m))
-        goal[0] = self.rest[robot.nq - m:] if _plain(robot) else 0.0
-        return goal
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """A coordinate for each row."""
+        return np.arange(self.dimension)
 
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
-        """See `Measured.follow`."""
+        """See `Measured.follow`: the goal is the target, or the step there."""
         robot, rest, target, m = state.robot, self.rest, self.target, self.dimension
+        place = goal[0, :m]
+
+        def move(t: float) -> None:
+            place[:] = pin.difference(robot.model, state.q, rest)[robot.actuated:]  # both sound
+
         if not _plain(robot):
-            def move(t: float) -> None:
-                goal[0] = pin.difference(robot.model, state.q, rest)[robot.actuated:]  # both sound
-
             return move
-        if not isinstance(target, np.ndarray):
-            return None
+        place[:] = rest[robot.nq - m:]
+        return partial(_read, target, place) if isinstance(target, np.ndarray) else None
 
-        def read(t: float) -> None:
-            goal[0] = target[len(target) - m:]
 
-        return read
+def _read(target: Array, place: Array, t: float) -> None:
+    place[:] = target[len(target) - len(place):]
 
 
 def _plain(robot: Robot) -> bool:
@@ -153,13 +152,9 @@ class JointDamping(JointTask):
     """
 
     joints: int
-    damping: float = 5.0
+    damping: NotNegative = 5.0
     weight: Literal["identity", "mass"] = "identity"
     name: str = "damping"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        number(f"task {self.name!r}: damping", self.damping, 0.0)
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""

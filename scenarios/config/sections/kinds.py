@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hierarchy.paths import Still
 from hierarchy.plugins import register
 from hierarchy.problem import Array
 from scenarios.config import sections as keys
@@ -207,10 +206,7 @@ class ListedCentreOfMass(base.Listed, base.AlongSection):
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the path and the numbers of the axes."""
-        from hierarchy.tasks import CentreOfMass
-
-        anywhere = CentreOfMass(at.robot, Still((0.0, 0.0, 0.0)))
-        return {"path": self.along(anywhere.position(at.start)),
+        return {"path": self.along(at.start.centre_of_mass()),
                 "axes": tuple("xyz".index(axis) for axis in self.axes)}
 
     def wanted(self, position: Array, error: Array) -> Array | None:
