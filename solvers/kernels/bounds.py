@@ -11,7 +11,7 @@ import numpy as np
 from hierarchy.jit import compiled, inlined, inner_product, internal
 from solvers.kernels.active_set.exact import DAMPING, solve, work_size
 from solvers.kernels.linalg.rows import all_equal, finish, only_entry
-from solvers.kernels.linalg.space import View, fill, vector
+from solvers.kernels.linalg.space import View, assign, fill, vector
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL, UNPROVED
@@ -29,48 +29,43 @@ class Box(NamedTuple):
 
 
 @compiled
-def solve_within_bounds(A, lower, upper, sizes, reference, x, record, settings, work):
+def solve_within_bounds(A, lower, upper, sizes, x, record, settings, work):
     """Solve like `Tpm`: from a record at bounds exactly; else, or if none is active there, anew.
 
-    reference (n,), or (0,) for zero. x (n,): the answer, zero on failure. record
+    x (n,) is the reference on entry and the answer on return, zero on failure. record
     (n + L + 3 m + 3,): see `_is_at_bound`; that of an earlier solve or zeros on entry, and zeros
     on return where all rows are equalities. settings: those of `Hcod`. Returns a status, TOO_SMALL,
     or -(i + 1) if row i is an inequality but not a bound.
     """
     (m, n), inner, known = A.shape, record[x.size + sizes.size:], False
-    if work_size(n, m, sizes.size, settings[DAMPING] > 0.0) > work.size:
+    size = work_size(n, m, sizes.size, settings[DAMPING] > 0.0)
+    if size + n > work.size:
         return TOO_SMALL
+    reference, work = work[size:size + n], work[:size]
+    assign(reference, x)
     for i in range(record.size):
         known |= record[i] != 0.0
     if known:
-        _begin(x, reference)
         code = solve(A, lower, upper, sizes, x, inner, settings, work)
         if code == NUMERICAL_FAILURE or _is_at_bound(A, lower, upper, sizes, x, record, work):
             return code
         fill(record, 0.0)
-    _begin(x, reference)
+        assign(x, reference)
     code = solve_by_staircase(A, lower, upper, sizes, x, settings, work)
     if code == INACCURATE:
-        _begin(x, reference)
+        assign(x, reference)
         code = solve(A, lower, upper, sizes, x, inner, settings, work)
         fill(record, 0.0)
     if code >= 0:
         return code
-    _begin(x, reference)
+    assign(x, reference)
     code = _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work)
     if code == UNPROVED:
-        _begin(x, reference)
+        assign(x, reference)
         code = solve(A, lower, upper, sizes, x, inner, settings, work)
     if code >= 0 and code != NUMERICAL_FAILURE:
         _is_at_bound(A, lower, upper, sizes, x, record, work)
     return code
-
-
-@inlined
-def _begin(x, reference):
-    """Write the reference."""
-    for c in range(x.size):
-        x[c] = reference[c] if reference.size > 0 else 0.0
 
 
 @inlined
