@@ -124,7 +124,7 @@ def pivot_in_blocks(s, limit, patience):
     """
     levels, best, left, tries = s.multiplier.shape[0] - 1, s.A.shape[0] + 1, patience, 0
     s.count[SOUND] = 0
-    _copy_states(s, STATE, SEED)
+    assign(s.index[SEED], s.index[STATE])
     while tries < limit:
         tries += 1
         meet(s, levels)
@@ -147,7 +147,7 @@ def pivot_in_blocks(s, limit, patience):
             change = s.index[CHANGE, i]
             if change != 0:
                 s.index[STATE, i] = FREE if change == LEAVES else change
-    _copy_states(s, SEED, STATE)
+    assign(s.index[STATE], s.index[SEED])
     if s.count[SOUND] == 1:
         assign(s.x, s.number[KEPT])
     return UNPROVED, tries
@@ -160,7 +160,7 @@ def _keep_sound(s):
     That is the level that it holds back, or an upper one in which another row is to leave.
     """
     s.count[SOUND] = 1
-    _copy_states(s, STATE, SEED)
+    assign(s.index[SEED], s.index[STATE])
     assign(s.number[KEPT, :s.x.size], s.x)
     changed = s.multiplier.shape[0]
     for i in range(s.A.shape[0]):
@@ -200,7 +200,7 @@ def pivot_one_by_one(s, current, saved, limit, level):
         elif found.leaving > 0:
             _release_first(s, current)
         elif found.most >= 0:
-            _copy_states(s, STATE, SEED)
+            assign(s.index[SEED], s.index[STATE])
             _enter(s, current, found.most)
             newest, fresh, accepted = found.most, False, accepted + 1
         elif last < levels:
@@ -214,7 +214,7 @@ def pivot_one_by_one(s, current, saved, limit, level):
         else:
             return INACCURATE, tries, last - 1
     if accepted > 1:  # go on later from the last accepted set; if this step is long, from within
-        _copy_states(s, SEED, STATE)
+        assign(s.index[STATE], s.index[SEED])
     return UNPROVED, tries, last - 1
 
 
@@ -223,18 +223,12 @@ def _count_recurrences(s, last, tries, recurred):
     """Return how often the working set of the last power of two of tries has come again since."""
     if tries & (tries - 1) == 0:
         s.count[SEEN_LAST] = last
-        _copy_states(s, STATE, SEEN)
+        assign(s.index[SEEN], s.index[STATE])
         return 0
     same = s.count[SEEN_LAST] == last
     for i in range(s.A.shape[0] if same else 0):
         same = same and s.index[STATE, i] == s.index[SEEN, i]
     return recurred + same
-
-
-@inlined
-def _copy_states(s, source, target):
-    for i in range(s.A.shape[0]):
-        s.index[target, i] = s.index[source, i]
 
 
 @internal
