@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, inner_product, internal
+from hierarchy.jit import compiled, inlined, internal
 from solvers.kernels.active_set.exact import DAMPING, solve, work_size
+from solvers.kernels.box import first_level, narrow, refused
 from solvers.kernels.linalg.rows import all_equal, finish, only_entry
-from solvers.kernels.linalg.space import View, assign, fill, vector
+from solvers.kernels.linalg.space import View, assign, fill
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL, UNPROVED
@@ -74,17 +75,14 @@ def _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work):
 
     Other codes: NUMERICAL_FAILURE, or -(i + 1) if row i is an inequality but not a bound.
     """
-    n = x.size
-    sides, at = vector(work, 0, 2 * n)
-    box = _first_level(sizes, sides, n)
-    code = _refused(A, lower, upper, box.end)
+    top, end = first_level(sizes)
+    code = refused(A, lower, upper, end)
     if code != SOLVED:
         return finish(x, code) if code == NUMERICAL_FAILURE else code
-    _intersect(A, lower, upper, box)
-    end = box.end
-    within = SOLVED == solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[box.top + 1:],
-                                          x, settings, work[at:])
-    for c in range(n):
+    box = _intersect(A, lower, upper, top, end, work)
+    within = SOLVED == solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[top + 1:], x,
+                                          settings, work[2 * x.size:])
+    for c in range(x.size):
         within &= box.low[c] <= x[c] <= box.high[c]
     inner[inner.size - 3] = 1.0 if within else 0.0
     return SOLVED if within else UNPROVED
@@ -100,11 +98,11 @@ def _is_at_bound(A, lower, upper, sizes, x, record, work):
     """
     if all_equal(lower, upper):
         return False
-    n, found = x.size, False
-    inner, box = record[n + sizes.size:], _first_level(sizes, work, n)
-    if _refused(A, lower, upper, box.end) != SOLVED:
+    n, found, (top, end) = x.size, False, first_level(sizes)
+    inner = record[n + sizes.size:]
+    if refused(A, lower, upper, end) != SOLVED:
         return False
-    _intersect(A, lower, upper, box)
+    box = _intersect(A, lower, upper, top, end, work)
     for c in range(n):
         record[c] = CONFLICT if box.low[c] >= box.high[c] else NONE
         if box.low[c] <= box.high[c]:
@@ -121,54 +119,15 @@ def _is_at_bound(A, lower, upper, sizes, x, record, work):
 
 
 @inlined
-def _first_level(sizes, sides, n):
-    """Return a Box for the first level that has rows, its sides not yet written."""
-    top = 0
-    while sizes[top] == 0:
-        top += 1
-    return Box(sides[:n], sides[n:2 * n], sizes[top], top)
-
-
-@inlined
-def _refused(A, lower, upper, end):
-    """Return SOLVED, NUMERICAL_FAILURE for bad data, or -(i + 1) if row i must be rejected.
-
-    An inequality that is not a bound is rejected. If the first level also has an equality with
-    several entries, its bounds do not count as bounds, and the first of them is rejected.
-    """
-    sane, mixed, refused, bound = True, False, 0, 0
-    for i in range(lower.size):
-        only = only_entry(A[i])
-        single, entry = only >= 0, A[i, only] if only >= 0 else 1.0
-        sane &= np.isfinite(inner_product(A[i], A[i])) and lower[i] <= upper[i]
-        sane &= lower[i] < np.inf and upper[i] > -np.inf
-        if i < end and single:
-            sane &= np.isfinite(lower[i] / entry) or not np.isfinite(lower[i])
-            sane &= np.isfinite(upper[i] / entry) or not np.isfinite(upper[i])
-        mixed |= i < end and not single
-        if lower[i] == upper[i]:
-            continue
-        if i < end and single and bound == 0:
-            bound = -(i + 1)
-        elif refused == 0 and (i >= end or not single):
-            refused = -(i + 1)
-    if not sane:
-        return NUMERICAL_FAILURE
-    if refused == 0 and mixed:
-        refused = bound
-    return refused if refused < 0 else SOLVED
-
-
-@inlined
-def _intersect(A, lower, upper, box):
-    """Write the bounds of each unknown; low exceeds high where its rows contradict each other."""
+def _intersect(A, lower, upper, top, end, sides):
+    """Return the Box of the first level; low exceeds high where its rows contradict each other."""
+    n = A.shape[1]
+    box = Box(sides[:n], sides[n:2 * n], end, top)
     fill(box.low, -np.inf)
     fill(box.high, np.inf)
-    for i in range(box.end):
-        c = only_entry(A[i])
-        one, other = lower[i] / A[i, c], upper[i] / A[i, c]
-        box.low[c] = max(box.low[c], min(one, other))
-        box.high[c] = min(box.high[c], max(one, other))
+    for i in range(end):
+        narrow(box.low, box.high, A[i], lower[i], upper[i])
+    return box
 
 
 @inlined

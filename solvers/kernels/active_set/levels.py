@@ -39,7 +39,6 @@ from solvers.kernels.active_set.tableau import (
     ROW,
     ROWS,
     SCALE,
-    SHARE,
     SIZE,
     SPEED,
     STEP,
@@ -370,8 +369,8 @@ def _held_wrongly(t, whole, tolerance):
     """Write the forces of the held rows; return the row whose force is wrong the most, or -1."""
     s, begin, end = t.of, t.count[FIX], t.count[FIX] + t.count[HARD]
     measure(t, length_of(s.x))
-    for r in range(begin, end):
-        s.number[PULL, r] = s.number[FORCE, r] = s.number[SHARE, r] = 0.0
+    fill(s.number[PULL, begin:end], 0.0)
+    fill(s.number[FORCE, begin:end], 0.0)
     t.count[MISSED] = _misses_goal(t, tolerance) if whole else not weigh_rows(t) <= tolerance
     if t.count[MISSED] == 0:
         return -1

@@ -19,7 +19,6 @@ from solvers.kernels.active_set.working_set import (
     BEGIN,
     CHANGE,
     DIRTY,
-    ENTERED,
     FINISHED,
     FIRST,
     GOAL,
@@ -43,14 +42,7 @@ from solvers.kernels.active_set.working_set import (
 )
 from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import View, assign, fill
-from solvers.kernels.tolerances import (
-    MET,
-    RECURRENCES,
-    RELEASED,
-    RESTORED,
-    SHADOW,
-    VIOLATED,
-)
+from solvers.kernels.tolerances import MET, RECURRENCES, RESTORED, SHADOW, VIOLATED
 from solvers.status import FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
 LEAVES = 5    # change of a row that acts; else the side at which it is to act, or 0
@@ -184,7 +176,6 @@ def pivot_one_by_one(s, current, saved, limit, level):
     levels, last, newest, fresh = (
         s.multiplier.shape[0] - 1, _next_level(s, max(level, 0)), -1, True)
     clean, accepted, tries, recurred = 0, 0, 0, 0
-    fill(s.index[ENTERED], 0)
     while tries < limit:
         tries += 1
         recurred = _count_recurrences(s, last, tries, recurred)
@@ -259,16 +250,10 @@ def _release_all(s):
 
 @inlined
 def _enter(s, current, newest):
-    """Let a row enter; rows that nothing holds at their side leave."""
+    """Let a row enter, and keep the multipliers from which it does."""
     for p in range(current.shape[0]):
         assign(current[p], s.multiplier[p])
-    for q in range(s.index[BEGIN, current.shape[0] - 1]):
-        i = s.index[LIST, q]
-        if s.index[SIGN, q] == UNDECIDED and s.index[ENTERED, i] < RELEASED:
-            s.index[STATE, i] = FREE
-            fill(current[:, i], 0.0)
     s.index[STATE, newest] = s.index[CHANGE, newest]
-    s.index[ENTERED, newest] += 1
 
 
 @inlined

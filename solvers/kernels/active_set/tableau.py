@@ -47,8 +47,8 @@ from solvers.status import EQUAL
 # Rows of `number` after those of the data. Per row of A: its value and the rate of that; its
 # residual before the step of its level and its excess after (in the order of the list). Per unknown
 # or basis vector: the goal of a level that sets all of x, the step in x, its step in the basis, the
-# gradient of the level, the force that balances it, and the part of the gradient that it balances.
-VALUE, SPEED, REST, OVER, GOAL, STEP, Z, PULL, FORCE, SHARE = range(REFERENCE + 1, REFERENCE + 11)
+# gradient of the level, and the force that balances it.
+VALUE, SPEED, REST, OVER, GOAL, STEP, Z, PULL, FORCE = range(REFERENCE + 1, REFERENCE + 10)
 # Rows of `index` after those of the data. Per row of A: its column of M (-1: none), its kind; the
 # list of the rows of the level that act, in pivot order. Per basis vector: the row that owns it, -1
 # for none. Per column: the row that it belongs to. Scratch.
@@ -373,12 +373,10 @@ def balance(t, begin, end):
     A pull that may be rounding alone counts as zero: every entry of a row is rounded relative to
     its norm.
     """
-    s, pull, force, share = t.of, t.of.number[PULL], t.of.number[FORCE], t.of.number[SHARE]
-    rounding = t.scalar[ROUNDING]
+    s, pull, force, rounding = t.of, t.of.number[PULL], t.of.number[FORCE], t.scalar[ROUNDING]
     for k in range(end - 1, begin - 1, -1):
-        force[k], share[k] = 0.0, abs(pull[k])
-        i = s.index[OWNER, k]
-        if i < 0 or share[k] <= rounding:
+        force[k], i = 0.0, s.index[OWNER, k]
+        if i < 0 or abs(pull[k]) <= rounding:
             continue
         column, entry = s.index[COLUMN, i], entry_of(t, i)
         force[k] = -pull[k] / (entry * t.M[k, column])
