@@ -146,12 +146,12 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     batch = replace(batch)  # numpy lets its holder change the shape of an array: through the gate
     _, m, n = batch.A.shape
     kernel, settings, size, warm = _way(resolver, m, n, len(batch.sizes))
-    x, codes = np.zeros(batch.A.shape[::2]), np.zeros(len(batch), dtype=np.int64)
+    x, codes = batch.reference.copy(), np.zeros(len(batch), dtype=np.int64)
     record = np.zeros((len(batch), size))
     before = None if memory is None else readable("memory", memory)
     if before is not None and before.shape == record.shape and warm:
         record[:] = before
-    problems = batch.A, batch.lower, batch.upper, batch.sizes, batch.reference
+    problems = batch.A, batch.lower, batch.upper, batch.sizes
     _in_parallel(partial(run, kernel, problems, x, codes, record, settings), batch,
                  threads)
     for p in np.flatnonzero(codes < 0)[:1]:

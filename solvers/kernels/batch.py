@@ -1,7 +1,7 @@
 """Loops over the problems of a batch, for one thread.
 
-problems: A (B, m, n), lower, upper (B, m), sizes (L,), references (B, n). The other arrays also
-have the problem as their first axis: x (B, n), the codes, and the records of the resolver. The
+problems: A (B, m, n), lower, upper (B, m), sizes (L,). The other arrays also have the problem as
+their first axis: x (B, n), references on entry, the codes, and the records of the resolver. The
 kernels release the GIL, so that other threads run their own part. Each returns TOO_SMALL before it
 solves anything if `work` is too small.
 """
@@ -9,7 +9,6 @@ solves anything if `work` is too small.
 from hierarchy.jit import unlocked
 from solvers.kernels.active_set.exact import solve
 from solvers.kernels.bounds import solve_within_bounds
-from solvers.kernels.linalg.space import assign
 from solvers.kernels.merged import merged
 from solvers.status import SOLVED, TOO_SMALL
 
@@ -17,10 +16,10 @@ from solvers.status import SOLVED, TOO_SMALL
 @unlocked
 def batch_within_bounds(problems, x, codes, records, settings, which, work):
     """Solve the problems `which` like `Tpm`."""
-    A, lower, upper, sizes, references = problems
+    A, lower, upper, sizes = problems
     for p in which:
-        codes[p] = solve_within_bounds(A[p], lower[p], upper[p], sizes, references[p], x[p],
-                                       records[p], settings, work)
+        codes[p] = solve_within_bounds(A[p], lower[p], upper[p], sizes, x[p], records[p], settings,
+                                       work)
         if codes[p] == TOO_SMALL:
             return TOO_SMALL
     return SOLVED
@@ -29,9 +28,8 @@ def batch_within_bounds(problems, x, codes, records, settings, which, work):
 @unlocked
 def batch_exact(problems, x, codes, records, settings, which, work):
     """Solve the problems `which` with the exact kernel."""
-    A, lower, upper, sizes, references = problems
+    A, lower, upper, sizes = problems
     for p in which:
-        assign(x[p], references[p])
         codes[p] = solve(A[p], lower[p], upper[p], sizes, x[p], records[p], settings, work)
         if codes[p] == TOO_SMALL:
             return TOO_SMALL
@@ -41,9 +39,8 @@ def batch_exact(problems, x, codes, records, settings, which, work):
 @unlocked
 def batch_merged(problems, x, codes, records, settings, which, work):
     """Solve the problems `which` with the kernel of `merged`."""
-    A, lower, upper, sizes, references = problems
+    A, lower, upper, sizes = problems
     for p in which:
-        assign(x[p], references[p])
         codes[p] = merged(A[p], lower[p], upper[p], sizes, x[p], records[p], settings, work)
         if codes[p] == TOO_SMALL:
             return TOO_SMALL

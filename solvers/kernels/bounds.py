@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, inner_product, internal
+from hierarchy.jit import compiled, inlined, internal
 from solvers.kernels.active_set.exact import DAMPING, solve, work_size
+from solvers.kernels.box import first_level, narrow, refused
 from solvers.kernels.linalg.rows import all_equal, finish, only_entry
-from solvers.kernels.linalg.space import View, fill, vector
+from solvers.kernels.linalg.space import View, assign, fill
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL, UNPROVED
@@ -29,48 +30,43 @@ class Box(NamedTuple):
 
 
 @compiled
-def solve_within_bounds(A, lower, upper, sizes, reference, x, record, settings, work):
+def solve_within_bounds(A, lower, upper, sizes, x, record, settings, work):
     """Solve like `Tpm`: from a record at bounds exactly; else, or if none is active there, anew.
 
-    reference (n,), or (0,) for zero. x (n,): the answer, zero on failure. record
+    x (n,) is the reference on entry and the answer on return, zero on failure. record
     (n + L + 3 m + 3,): see `_is_at_bound`; that of an earlier solve or zeros on entry, and zeros
     on return where all rows are equalities. settings: those of `Hcod`. Returns a status, TOO_SMALL,
     or -(i + 1) if row i is an inequality but not a bound.
     """
     (m, n), inner, known = A.shape, record[x.size + sizes.size:], False
-    if work_size(n, m, sizes.size, settings[DAMPING] > 0.0) > work.size:
+    size = work_size(n, m, sizes.size, settings[DAMPING] > 0.0)
+    if size + n > work.size:
         return TOO_SMALL
+    reference, work = work[size:size + n], work[:size]
+    assign(reference, x)
     for i in range(record.size):
         known |= record[i] != 0.0
     if known:
-        _begin(x, reference)
         code = solve(A, lower, upper, sizes, x, inner, settings, work)
         if code == NUMERICAL_FAILURE or _is_at_bound(A, lower, upper, sizes, x, record, work):
             return code
         fill(record, 0.0)
-    _begin(x, reference)
+        assign(x, reference)
     code = solve_by_staircase(A, lower, upper, sizes, x, settings, work)
     if code == INACCURATE:
-        _begin(x, reference)
+        assign(x, reference)
         code = solve(A, lower, upper, sizes, x, inner, settings, work)
         fill(record, 0.0)
     if code >= 0:
         return code
-    _begin(x, reference)
+    assign(x, reference)
     code = _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work)
     if code == UNPROVED:
-        _begin(x, reference)
+        assign(x, reference)
         code = solve(A, lower, upper, sizes, x, inner, settings, work)
     if code >= 0 and code != NUMERICAL_FAILURE:
         _is_at_bound(A, lower, upper, sizes, x, record, work)
     return code
-
-
-@inlined
-def _begin(x, reference):
-    """Write the reference."""
-    for c in range(x.size):
-        x[c] = reference[c] if reference.size > 0 else 0.0
 
 
 @inlined
@@ -79,17 +75,14 @@ def _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work):
 
     Other codes: NUMERICAL_FAILURE, or -(i + 1) if row i is an inequality but not a bound.
     """
-    n = x.size
-    sides, at = vector(work, 0, 2 * n)
-    box = _first_level(sizes, sides, n)
-    code = _refused(A, lower, upper, box.end)
+    top, end = first_level(sizes)
+    code = refused(A, lower, upper, end)
     if code != SOLVED:
         return finish(x, code) if code == NUMERICAL_FAILURE else code
-    _intersect(A, lower, upper, box)
-    end = box.end
-    within = SOLVED == solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[box.top + 1:],
-                                          x, settings, work[at:])
-    for c in range(n):
+    box = _intersect(A, lower, upper, top, end, work)
+    within = SOLVED == solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[top + 1:], x,
+                                          settings, work[2 * x.size:])
+    for c in range(x.size):
         within &= box.low[c] <= x[c] <= box.high[c]
     inner[inner.size - 3] = 1.0 if within else 0.0
     return SOLVED if within else UNPROVED
@@ -105,11 +98,11 @@ def _is_at_bound(A, lower, upper, sizes, x, record, work):
     """
     if all_equal(lower, upper):
         return False
-    n, found = x.size, False
-    inner, box = record[n + sizes.size:], _first_level(sizes, work, n)
-    if _refused(A, lower, upper, box.end) != SOLVED:
+    n, found, (top, end) = x.size, False, first_level(sizes)
+    inner = record[n + sizes.size:]
+    if refused(A, lower, upper, end) != SOLVED:
         return False
-    _intersect(A, lower, upper, box)
+    box = _intersect(A, lower, upper, top, end, work)
     for c in range(n):
         record[c] = CONFLICT if box.low[c] >= box.high[c] else NONE
         if box.low[c] <= box.high[c]:
@@ -126,54 +119,15 @@ def _is_at_bound(A, lower, upper, sizes, x, record, work):
 
 
 @inlined
-def _first_level(sizes, sides, n):
-    """Return a Box for the first level that has rows, its sides not yet written."""
-    top = 0
-    while sizes[top] == 0:
-        top += 1
-    return Box(sides[:n], sides[n:2 * n], sizes[top], top)
-
-
-@inlined
-def _refused(A, lower, upper, end):
-    """Return SOLVED, NUMERICAL_FAILURE for bad data, or -(i + 1) if row i must be rejected.
-
-    An inequality that is not a bound is rejected. If the first level also has an equality with
-    several entries, its bounds do not count as bounds, and the first of them is rejected.
-    """
-    sane, mixed, refused, bound = True, False, 0, 0
-    for i in range(lower.size):
-        only = only_entry(A[i])
-        single, entry = only >= 0, A[i, only] if only >= 0 else 1.0
-        sane &= np.isfinite(inner_product(A[i], A[i])) and lower[i] <= upper[i]
-        sane &= lower[i] < np.inf and upper[i] > -np.inf
-        if i < end and single:
-            sane &= np.isfinite(lower[i] / entry) or not np.isfinite(lower[i])
-            sane &= np.isfinite(upper[i] / entry) or not np.isfinite(upper[i])
-        mixed |= i < end and not single
-        if lower[i] == upper[i]:
-            continue
-        if i < end and single and bound == 0:
-            bound = -(i + 1)
-        elif refused == 0 and (i >= end or not single):
-            refused = -(i + 1)
-    if not sane:
-        return NUMERICAL_FAILURE
-    if refused == 0 and mixed:
-        refused = bound
-    return refused if refused < 0 else SOLVED
-
-
-@inlined
-def _intersect(A, lower, upper, box):
-    """Write the bounds of each unknown; low exceeds high where its rows contradict each other."""
+def _intersect(A, lower, upper, top, end, sides):
+    """Return the Box of the first level; low exceeds high where its rows contradict each other."""
+    n = A.shape[1]
+    box = Box(sides[:n], sides[n:2 * n], end, top)
     fill(box.low, -np.inf)
     fill(box.high, np.inf)
-    for i in range(box.end):
-        c = only_entry(A[i])
-        one, other = lower[i] / A[i, c], upper[i] / A[i, c]
-        box.low[c] = max(box.low[c], min(one, other))
-        box.high[c] = min(box.high[c], max(one, other))
+    for i in range(end):
+        narrow(box.low, box.high, A[i], lower[i], upper[i])
+    return box
 
 
 @inlined

@@ -71,7 +71,7 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
     x (n + m + K n,): the reference, what the rows give, in K levels, and anything; on return the
     answer and, behind what rows give, the witnesses that were found. record: for each witness that
     of the levels down to the last that gives, zeros where none had to be looked for; then that of
-    all levels. settings, work, and the codes: as of `solve_exactly`.
+    all levels. settings, work, and the codes: as of `solve_hierarchy`.
     """
     (m, n), whole = A.shape, record.size - 3 * A.shape[0] - 3
     if exact_size(n, m, sizes.size) > work.size:

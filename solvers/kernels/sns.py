@@ -12,16 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, inner_product, internal
+from solvers.kernels.box import first_level, narrow, refused
 from solvers.kernels.linalg.block import solve_level
 from solvers.kernels.linalg.rows import (
-    all_finite,
+    all_equal,
     factor_level,
     finish,
     finish_unless_missed,
     has_outlier,
     load_rows,
     make_reflector,
-    only_entry,
     reflect,
     reflect_back,
 )
@@ -40,7 +40,7 @@ from solvers.kernels.linalg.space import (
 )
 from solvers.kernels.staircase import carve_staircase, climb
 from solvers.kernels.tolerances import BOUND_KEPT, NEGLIGIBLE, TERMS
-from solvers.status import CONTRADICTION, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
+from solvers.status import CONTRADICTION, SOLVED, TOO_SMALL
 
 NO_JOINT = -1
 
@@ -68,9 +68,9 @@ class Space(NamedTuple):
     task instead of b. low, up, reference (n,).
 
     Q has columns for the tasks above, then one for each held joint in the order of holding; the
-    rest is free. basis: its reflectors; kept: those of the tasks alone. E (n, n): unit vectors of
-    the held joints, in coordinates of Q. joint (n,): their indices. side (n,): +1, -1 for a joint
-    held at its upper, lower bound, else 0. y (n,): the step in each column of Q.
+    rest is free. basis: its reflectors. E (n, n): unit vectors of the held joints, in coordinates
+    of Q. joint (n,): their indices. side (n,): +1, -1 for a joint held at its upper, lower bound,
+    else 0. y (n,): the step in each column of Q.
 
     rows: the factored rows of the task. seen (m, n): the same in Q, not factored. now (m,):
     J_k x_{k-1}. zero (m,): of all tasks. line (2, n): a and c of x_k(s) = s a + c. y_a (n,): a in
@@ -84,7 +84,6 @@ class Space(NamedTuple):
     up: View
     reference: View
     basis: View
-    kept: View
     E: View
     joint: View
     side: View
@@ -107,7 +106,6 @@ def _carve(settings, work, m, n):
     up, at = vector(work, at, n)
     reference, at = vector(work, at, n)
     basis, at = matrix(work, at, n, n)
-    kept, at = matrix(work, at, n, n)
     E, at = matrix(work, at, n, n)
     joint, at = integers(work, at, n)
     side, at = vector(work, at, n)
@@ -122,7 +120,7 @@ def _carve(settings, work, m, n):
     best, at = vector(work, at, n)
     of_block, at = vector(work, at, (m + n) * (n + 1))
     return Space(shared(settings), settings[3] > 0.0, settings[4] > 0.0, low, up, reference, basis,
-                 kept, E, joint, side, y, rows, seen, now, zero, line, y_a, trial, best,
+                 E, joint, side, y, rows, seen, now, zero, line, y_a, trial, best,
                  of_block), at
 
 
@@ -137,14 +135,17 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
     if row i is an inequality that is not handled.
     """
     m, n = A.shape
-    bounds, below = _bounds_above(lower, upper, sizes)
+    top, bounds = first_level(sizes)
+    below = top + 1
+    if all_equal(lower[:bounds], upper[:bounds]):
+        bounds, below = 0, top
     _, of_equalities = carve_staircase(work, 3 * n, m - bounds, n)
     space, of_tasks = _carve(settings, work, m - bounds, n)
     if max(of_equalities, of_tasks) > work.size:
         return TOO_SMALL
     fill(record[:n], 0.0)
     fill(record[n:], 1.0)
-    code = _read_box(A, lower, upper, bounds, space, record)
+    code = _read_box(A[:bounds], lower[:bounds], upper[:bounds], space, record)
     if code < 0 or code == CONTRADICTION:
         return code
     if code != SOLVED:
@@ -180,43 +181,18 @@ def _touches(x, side):
 
 
 @inlined
-def _bounds_above(lower, upper, sizes):
-    """Return the rows of the first level with rows, 0 if it has no inequality; the next level."""
-    top = 0
-    while top < sizes.size and sizes[top] == 0:
-        top += 1
-    for i in range(sizes[top] if top < sizes.size else 0):
-        if lower[i] < upper[i]:
-            return sizes[top], top + 1
-    return 0, top
-
-
-@inlined
-def _read_box(A, lower, upper, bounds, space, record):
-    """Write the sides of the box; return a code of `sns`."""
-    fill(space.low, -np.inf)
-    fill(space.up, np.inf)
-    refused = bounds  # the first inequality, if an equality of the level is no bound
-    for i in range(bounds - 1, -1, -1):
-        refused = i if lower[i] < upper[i] else refused
-    for i in range(bounds):
-        low, up = lower[i], upper[i]
-        if not low <= up or low == np.inf or up == -np.inf:
-            return NUMERICAL_FAILURE
-        at = only_entry(A[i])
-        if not all_finite(A[i]):
-            return NUMERICAL_FAILURE
-        if at < 0:
-            return -((i if low < up else refused) + 1)
-        low, up = low / A[i, at], up / A[i, at]
-        space.low[at] = max(min(low, up), space.low[at])
-        space.up[at] = min(max(low, up), space.up[at])
-        if space.low[at] > space.up[at]:
-            if space.low[at] - space.up[at] > BOUND_KEPT * (1.0 + abs(space.low[at])):
-                record[record.size - 1] = i
-                return CONTRADICTION
-            space.low[at] = space.up[at]
-    return SOLVED
+def _read_box(A, lower, upper, space, record):
+    """Write the sides of the box, of a level of bounds; return a code of `sns`."""
+    low, up, code = space.low, space.up, refused(A, lower, upper, lower.size)
+    fill(low, -np.inf)
+    fill(up, np.inf)
+    for i in range(lower.size if code == SOLVED else 0):
+        c = narrow(low, up, A[i], lower[i], upper[i])
+        if low[c] > up[c] and low[c] - up[c] > BOUND_KEPT * (1.0 + abs(low[c])):
+            record[record.size - 1] = i
+            return CONTRADICTION
+        low[c] = min(low[c], up[c])
+    return code
 
 
 @internal
@@ -245,7 +221,9 @@ def _level(task, x, space, above):
     Returns its scaling, the columns of Q including those of the task alone, and the sets tried.
     """
     seen, tolerance = space.seen[:task.b.size], space.shared.rank_tolerance
-    _begin(task, x, space)
+    fill(space.side, 0.0)
+    for i in range(task.b.size):
+        space.now[i] = inner_product(task.J[i], x)
     _see(task, space.basis, seen, above)
     rank, taken, largest, sets = above, 0, -1.0, 0
     while sets < 2 * x.size + 2:  # the basic form saturates at most n joints
@@ -254,7 +232,6 @@ def _level(task, x, space, above):
         end = _factor(task, space, begin)  # J_k Pbar_k
         if sets == 1:
             rank = end
-            _copy_reflectors(space.basis, space.kept, above, rank)
         elif end - begin < rank - above:  # rank(J_k Pbar_k) < rank(J_k P_{k-1})
             break
         at = Columns(above, begin, end)
@@ -268,22 +245,18 @@ def _level(task, x, space, above):
             continue
         if s == 1.0 or critical == NO_JOINT:
             break
-        taken = _hold_critical(critical, x, space, seen, at, tolerance)
+        beyond = space.line[0, critical] + space.line[1, critical] > space.up[critical]
+        space.side[critical] = 1.0 if beyond else -1.0
+        taken = _hold(space, seen, critical, x, above, taken, tolerance)
         if above + taken == begin:  # tasks above and saturated joints already hold it
             break
-    _copy_reflectors(space.kept, space.basis, above, rank)
+    if sets > 1:  # back to the columns of the task alone
+        _see(task, space.basis, seen, above)
+        _factor(task, space, above)
     if largest >= 0.0:
         for j in range(x.size):
             x[j] = min(max(x[j] + space.best[j], space.low[j]), space.up[j])
     return max(largest, 0.0), rank, sets
-
-
-@inlined
-def _begin(task, x, space):
-    """Start with no joint saturated; write the current value of the task."""
-    fill(space.side, 0.0)
-    for i in range(task.b.size):
-        space.now[i] = inner_product(task.J[i], x)
 
 
 @internal
@@ -302,15 +275,6 @@ def _factor(task, space, begin):
         rows.row[i], rows.zero[i] = i, task.zero[i]
         assign(rows.W[i], space.seen[i])
     return factor_level(rows, space.basis, 0, task.b.size, begin)
-
-
-@inlined
-def _hold_critical(j, x, space, seen, at, least):
-    """Saturate the critical joint; return the new number of saturated joints."""
-    a, c = space.line[0], space.line[1]
-    space.side[j] = 1.0 if a[j] + c[j] > space.up[j] else -1.0
-    way = _bound_of(space, j) - x[j]
-    return _hold(space, seen, j, way, at.above, at.joints - at.above, least)
 
 
 @internal
@@ -336,13 +300,6 @@ def _write_line(task, x, space, at):
     reflect_back(space.basis, at.task, line, 0, 2)
     for j in range(x.size):
         line[1, j] += x[j]
-
-
-@inlined
-def _copy_reflectors(source, target, k0, k1):
-    """Copy reflectors k0 .. k1 - 1."""
-    for k in range(k0, k1):
-        assign(target[k], source[k])
 
 
 @inlined
@@ -425,19 +382,12 @@ def _release(space, at, s):
     return wrong
 
 
-@inlined
-def _bound_of(space, j):
-    """Return the bound at which joint j is held."""
-    return space.up[j] if space.side[j] > 0.0 else space.low[j]
-
-
 @internal
-def _hold(space, seen, j, way, above, count, least):
-    """Give joint j, whose side is written, a column of Q, and write its step there into y.
+def _hold(space, seen, j, x, above, count, least):
+    """Give joint j, whose side is written, a column of Q, and write its step to that bound into y.
 
-    way: its distance to the bound. seen: the rows of a task in coordinates of Q, reflected too.
-    Returns the number of held joints: still `count` if the remainder of its unit vector is at most
-    `least`.
+    seen: the rows of a task in coordinates of Q, reflected too. Returns the number of held joints:
+    still `count` if the remainder of its unit vector is at most `least`.
     """
     k, e, basis = above + count, space.E[count], space.basis
     fill(e, 0.0)
@@ -450,6 +400,7 @@ def _hold(space, seen, j, way, above, count, least):
     make_reflector(basis, k, e, square)
     reflect(basis, k, k + 1, space.E, count, count + 1)
     reflect(basis, k, k + 1, seen, 0, seen.shape[0])
+    way = (space.up[j] if space.side[j] > 0.0 else space.low[j]) - x[j]
     space.y[k] = (way - inner_product(e[above:k], space.y[above:])) / e[k]
     space.joint[count] = j
     return count + 1
@@ -462,8 +413,7 @@ def _hold_again(space, seen, x, above, count, least):
     for t in range(count):
         j = space.joint[t]
         if space.side[j] != 0.0:
-            way = _bound_of(space, j) - x[j]
-            holding = _hold(space, seen, j, way, above, holding, least)
+            holding = _hold(space, seen, j, x, above, holding, least)
     return holding
 
 
@@ -487,7 +437,7 @@ def _to_reference(space, x, rank):
         stopped = _step(x, d, space)
         if stopped != NO_JOINT:
             space.side[stopped] = 1.0 if d[stopped] > 0.0 else -1.0
-            count = _hold(space, no_rows, stopped, 0.0, rank, count, TERMS)
+            count = _hold(space, no_rows, stopped, x, rank, count, TERMS)
             if rank + count == begin:
                 break
         elif release and _drop(space, rank, begin):

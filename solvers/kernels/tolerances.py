@@ -55,7 +55,6 @@ PASS_STEPS = 2
 SOLVE_STEPS = 4
 SPARED = 3           # rows over columns that are left to them: fewer are reflected one by one
 PATIENCE = 2         # block pivots that may not reduce the number of wrong rows
-RELEASED = 3         # times that a row may enter and leave again because nothing holds it
 RECURRENCES = 1      # of a working set in one search: after more it goes in circles
 RESTORED = 3         # times that a final working set is solved anew from uncut rows
 SWEEPS = 40          # of Jacobi rotations, which need 6 to 10

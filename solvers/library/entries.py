@@ -228,8 +228,8 @@ def work_size(n, m, levels):
     """
     block = (m + n) * (n + 1)
     recursive = 2 * m * n + 2 * n * n + 2 * m + 2 * n + 2 * block
-    saturation = 3 * n * n + 13 * n + m * (2 * n + 5) + block  # the staircase needs less
-    return SETTINGS + max(exact_size(n, m, levels, True), recursive, saturation,
+    saturation = 2 * n * n + 13 * n + m * (2 * n + 5) + block  # the staircase needs less
+    return SETTINGS + max(n + exact_size(n, m, levels, True), recursive, saturation,
                           OWN + 3 * levels + merged_size(n, m, levels, False))
 
 
@@ -339,8 +339,8 @@ def solve_tpm(call, s):
     n, size = call.x.size, call.x.size + call.sizes.size + 3 * call.lower.size + 3
     begun(call, size)
     record = call.values[:size]
-    code = solve_within_bounds(call.A, call.lower, call.upper, call.sizes, call.reference, call.x,
-                               record, call.settings, call.work)
+    code = solve_within_bounds(call.A, call.lower, call.upper, call.sizes, call.x, record,
+                               call.settings, call.work)
     steps = np.int64(record[size - 3] + record[size - 2])
     call.state[USED], call.state[ITERATIONS] = size if steps > 0 else 0, max(steps, 1)
     for c in range(n if steps > 0 else 0):

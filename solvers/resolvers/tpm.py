@@ -80,9 +80,9 @@ class Tpm(Resolver):
                 return Resolution(x)
             if not self.strict:
                 return self._otherwise(h, x, code)
-        x, levels = np.empty(h.n), len(h.names)
+        x, levels = h.start(), len(h.names)
         record = warm_record(None if self.damping > 0.0 else memory, h.n + levels + 3 * h.m + 3)
-        code = run(solve_within_bounds, *h.rows, h.start(), x, record, self._settings)
+        code = run(entry(solve_within_bounds), *h.rows, x, record, self._settings)
         if code < 0:
             refuse_inequality(self, h, -code - 1)
         steps = int(record.item(-3) + record.item(-2))

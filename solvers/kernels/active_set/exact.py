@@ -75,7 +75,7 @@ DAMPING, RANK_TOLERANCE, TOLERANCE, MOST = 0, 2, 3, 4  # places in the settings 
 
 @inlined
 def exact_size(n, m, levels):
-    """Return the numbers that `solve_exactly` needs."""
+    """Return the numbers that `open_working_set` and `answer` need."""
     return ((2 * levels + 2) * m + n + working_set_size(n, m, levels) + tableau_size(n, m)
             + m * (n + 2))
 
@@ -101,15 +101,16 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
     n = x.size
     if n + exact_size(n, lower.size, sizes.size) > work.size:
         return TOO_SMALL
-    reference, at = vector(work, 0, n)
+    reference, work = work[:n], work[n:]
     if all_equal(lower, upper):
         assign(reference, x)
-        code = solve_by_staircase(A, lower, upper, sizes, x, settings, work[at:])
+        code = solve_by_staircase(A, lower, upper, sizes, x, settings, work)
         if code != INACCURATE:
             keep_staircase(lower, upper, record)
             return code
         assign(x, reference)
-    return solve_exactly(A, lower, upper, sizes, x, record, settings, work[at:])
+    s, code, at = open_working_set(A, lower, upper, sizes, x, record, settings, work)
+    return answer(s, record, settings, work[at:]) if code == SOLVED else finish(x, code)
 
 
 @compiled
@@ -200,15 +201,8 @@ def keep_staircase(lower, upper, record):
 
 
 @internal
-def solve_exactly(A, lower, upper, sizes, x, record, settings, work):
-    """Like `solve_hierarchy`, for any rows without damping."""
-    s, code, at = open_working_set(A, lower, upper, sizes, x, record, settings, work)
-    return answer(s, record, settings, work[at:]) if code == SOLVED else finish(x, code)
-
-
-@internal
 def answer(s, record, settings, work):
-    """Find the working set of the answer, beginning with the rows that act; see `solve_exactly`."""
+    """Find the working set of the answer, beginning with the rows that act; `solve_hierarchy`."""
     (m, n), levels, x = s.A.shape, s.multiplier.shape[0] - 1, s.x
     current, at = matrix(work, 0, levels + 1, m)
     saved, at = vector(work, at, n)
@@ -280,8 +274,7 @@ def _second_pass(s, current, saved, settings, most, level, work):
     Returns what `_pass` does, and the tries in blocks. Unless SOLVED, the working set is again that
     of the first pass.
     """
-    for i in range(s.A.shape[0]):
-        current[0, i] = s.index[STATE, i]
+    assign(current[0], s.index[STATE])
     code, blocks = pivot_in_blocks(s, 1, 0)
     if code == SOLVED or level >= 0 or blocks >= most:
         return code, level, 0, blocks
@@ -293,8 +286,7 @@ def _second_pass(s, current, saved, settings, most, level, work):
     if code == SOLVED and _costs_more(s, saved):
         code = UNPROVED
     if code != SOLVED:
-        for i in range(s.A.shape[0]):
-            s.index[STATE, i] = np.int64(current[0, i])
+        assign(s.index[STATE, :s.A.shape[0]], current[0])
         restore(s)
     return code, level, steps, blocks
 
@@ -393,21 +385,14 @@ def open_working_set(A, lower, upper, sizes, x, record, settings, work):
     s, own.scalar[SCALE] = own, 1.0
     code = load(s, lower, upper, sizes, record, settings[RANK_TOLERANCE])
     if code == UNPROVED:
-        scaled, end = _carve_scaled(work, end, m, n)
+        rows, end = matrix(work, end, m, n)
+        sides, end = matrix(work, end, 2, m)
+        scaled = Scaled(rows, sides[0], sides[1])
         code = rescale(own, lower, upper, scaled)
         s, _ = carve_working_set(scaled.A, sizes, x, multiplier, work, at)
         if code == SOLVED:
             code = load(s, scaled.lower, scaled.upper, sizes, record, settings[RANK_TOLERANCE])
     return s, code, end
-
-
-@inlined
-def _carve_scaled(work, at, m, n):
-    """Return a `Scaled` without data, and where it ends."""
-    A, at = matrix(work, at, m, n)
-    lower, at = vector(work, at, m)
-    upper, at = vector(work, at, m)
-    return Scaled(A, lower, upper), at
 
 
 @inlined

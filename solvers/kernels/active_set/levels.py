@@ -19,13 +19,6 @@ The basis vectors of the tableau belong, in this order, to rows that are permane
 import numpy as np
 
 from hierarchy.jit import add_multiple, inlined, internal
-from solvers.kernels.active_set.level import (
-    balance,
-    pull_of_rows,
-    push_by,
-    step_of_rows,
-    weigh_rows,
-)
 from solvers.kernels.active_set.tableau import (
     BASE,
     FIX,
@@ -38,6 +31,7 @@ from solvers.kernels.active_set.tableau import (
     OVER,
     OWNER,
     PULL,
+    QUEUE,
     RANKS,
     REACH,
     REST,
@@ -45,7 +39,6 @@ from solvers.kernels.active_set.tableau import (
     ROW,
     ROWS,
     SCALE,
-    SHARE,
     SIZE,
     SPEED,
     STEP,
@@ -53,10 +46,10 @@ from solvers.kernels.active_set.tableau import (
     TURNING,
     VALUE,
     WEIGHT,
-    WORST,
     Z,
     add_column,
     around,
+    balance,
     close_column,
     fold_to,
     is_independent,
@@ -65,7 +58,11 @@ from solvers.kernels.active_set.tableau import (
     missed_side,
     open_tableau,
     pivot_rows,
+    pull_of_rows,
+    push_by,
+    step_of_rows,
     turn_to,
+    weigh_rows,
 )
 from solvers.kernels.active_set.working_set import (
     ACTED,
@@ -372,9 +369,9 @@ def _held_wrongly(t, whole, tolerance):
     """Write the forces of the held rows; return the row whose force is wrong the most, or -1."""
     s, begin, end = t.of, t.count[FIX], t.count[FIX] + t.count[HARD]
     measure(t, length_of(s.x))
-    for r in range(begin, end):
-        s.number[PULL, r] = s.number[FORCE, r] = s.number[SHARE, r] = 0.0
-    t.count[MISSED] = _misses_goal(t, tolerance) if whole else _misses_rows(t, tolerance)
+    fill(s.number[PULL, begin:end], 0.0)
+    fill(s.number[FORCE, begin:end], 0.0)
+    t.count[MISSED] = _misses_goal(t, tolerance) if whole else not weigh_rows(t) <= tolerance
     if t.count[MISSED] == 0:
         return -1
     if whole:
@@ -395,13 +392,6 @@ def _misses_goal(t, tolerance):
     size, scale = max(t.scalar[SIZE], np.sqrt(square)), max(t.scalar[SCALE], np.sqrt(square))
     t.scalar[ROUNDING] = CANCELLED * t.scalar[WEIGHT] * size
     return not np.sqrt(gap) <= tolerance * scale
-
-
-@inlined
-def _misses_rows(t, tolerance):
-    """Whether a soft row violates its side by more than rounding."""
-    weigh_rows(t)
-    return not t.scalar[WORST] <= tolerance
 
 
 @inlined
@@ -509,35 +499,28 @@ def _has_misses(s, k):
 @inlined
 def _order(t, whole):
     """Give the level's basis vectors to the fixed rows first, then to the held rows."""
-    s, count = t.of, t.count
-    owner, soft, kind = s.index[OWNER], s.index[LIST], s.index[KIND]
-    fixed, hard, rows, held = count[FIX], count[HARD], count[ROWS], t.of.number[SPEED]
+    s, count, owner, kind = t.of, t.count, t.of.index[OWNER], t.of.index[KIND]
+    listed, fixed, hard, held = s.index[QUEUE], count[FIX], count[HARD], 0
+    rows, at = 0 if whole else hard + count[ROWS], fixed  # all of x is settled: no row is open
     end = s.x.size if whole else fixed + hard + count[RANKS]
-    at, open_rows = fixed, 0
-    for q in range(0 if whole else hard + rows):  # all of x is settled: no row is open
-        i = owner[fixed + q] if q < hard else soft[q - hard]
-        if kind[i] == HELD:
-            held[open_rows] = i
-            open_rows += 1
-    if open_rows == 0:
+    for q in range(rows):
+        listed[q] = owner[fixed + q] if q < hard else s.index[LIST, q - hard]
+        held += kind[listed[q]] == HELD
+    if held == 0:
         for r in range(fixed + hard, end):
-            owner[r] = -1 if whole else soft[r - fixed - hard]
+            owner[r] = -1 if whole else s.index[LIST, r - fixed - hard]
         at = end
-    for q in range(hard + rows if open_rows > 0 else 0):
-        i = owner[fixed + q] if q < hard else soft[q - hard]
-        t.room[t.room.size - 1 - q] = i
-    for q in range(hard + rows if open_rows > 0 else 0):
-        i = np.int64(t.room[t.room.size - 1 - q])
-        if kind[i] == FIXED:
-            at = _own(t, i, at, end)
+    for q in range(rows if held > 0 else 0):
+        if kind[listed[q]] == FIXED:
+            at = _own(t, listed[q], at, end)
     count[FIX] = at
-    for q in range(open_rows):
-        i = np.int64(held[q])
-        before = at
-        at = _own(t, i, at, end)
-        if at == before:
-            kind[i], s.index[STATE, i] = WATCHED, FREE
-            s.number[VALUE, i] = row_times_x(s, i)
+    for q in range(rows if held > 0 else 0):
+        i, before = listed[q], at
+        if kind[i] == HELD:
+            at = _own(t, i, at, end)
+            if at == before:
+                kind[i], s.index[STATE, i] = WATCHED, FREE
+                s.number[VALUE, i] = row_times_x(s, i)
     count[HARD] = at - count[FIX]
     _close_columns(t)
 

@@ -19,7 +19,6 @@ from solvers.kernels.active_set.working_set import (
     BEGIN,
     CHANGE,
     DIRTY,
-    ENTERED,
     FINISHED,
     FIRST,
     GOAL,
@@ -43,14 +42,7 @@ from solvers.kernels.active_set.working_set import (
 )
 from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import View, assign, fill
-from solvers.kernels.tolerances import (
-    MET,
-    RECURRENCES,
-    RELEASED,
-    RESTORED,
-    SHADOW,
-    VIOLATED,
-)
+from solvers.kernels.tolerances import MET, RECURRENCES, RESTORED, SHADOW, VIOLATED
 from solvers.status import FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
 LEAVES = 5    # change of a row that acts; else the side at which it is to act, or 0
@@ -124,7 +116,7 @@ def pivot_in_blocks(s, limit, patience):
     """
     levels, best, left, tries = s.multiplier.shape[0] - 1, s.A.shape[0] + 1, patience, 0
     s.count[SOUND] = 0
-    _copy_states(s, STATE, SEED)
+    assign(s.index[SEED], s.index[STATE])
     while tries < limit:
         tries += 1
         meet(s, levels)
@@ -147,7 +139,7 @@ def pivot_in_blocks(s, limit, patience):
             change = s.index[CHANGE, i]
             if change != 0:
                 s.index[STATE, i] = FREE if change == LEAVES else change
-    _copy_states(s, SEED, STATE)
+    assign(s.index[STATE], s.index[SEED])
     if s.count[SOUND] == 1:
         assign(s.x, s.number[KEPT])
     return UNPROVED, tries
@@ -160,7 +152,7 @@ def _keep_sound(s):
     That is the level that it holds back, or an upper one in which another row is to leave.
     """
     s.count[SOUND] = 1
-    _copy_states(s, STATE, SEED)
+    assign(s.index[SEED], s.index[STATE])
     assign(s.number[KEPT, :s.x.size], s.x)
     changed = s.multiplier.shape[0]
     for i in range(s.A.shape[0]):
@@ -184,7 +176,6 @@ def pivot_one_by_one(s, current, saved, limit, level):
     levels, last, newest, fresh = (
         s.multiplier.shape[0] - 1, _next_level(s, max(level, 0)), -1, True)
     clean, accepted, tries, recurred = 0, 0, 0, 0
-    fill(s.index[ENTERED], 0)
     while tries < limit:
         tries += 1
         recurred = _count_recurrences(s, last, tries, recurred)
@@ -200,7 +191,7 @@ def pivot_one_by_one(s, current, saved, limit, level):
         elif found.leaving > 0:
             _release_first(s, current)
         elif found.most >= 0:
-            _copy_states(s, STATE, SEED)
+            assign(s.index[SEED], s.index[STATE])
             _enter(s, current, found.most)
             newest, fresh, accepted = found.most, False, accepted + 1
         elif last < levels:
@@ -214,7 +205,7 @@ def pivot_one_by_one(s, current, saved, limit, level):
         else:
             return INACCURATE, tries, last - 1
     if accepted > 1:  # go on later from the last accepted set; if this step is long, from within
-        _copy_states(s, SEED, STATE)
+        assign(s.index[STATE], s.index[SEED])
     return UNPROVED, tries, last - 1
 
 
@@ -223,18 +214,12 @@ def _count_recurrences(s, last, tries, recurred):
     """Return how often the working set of the last power of two of tries has come again since."""
     if tries & (tries - 1) == 0:
         s.count[SEEN_LAST] = last
-        _copy_states(s, STATE, SEEN)
+        assign(s.index[SEEN], s.index[STATE])
         return 0
     same = s.count[SEEN_LAST] == last
     for i in range(s.A.shape[0] if same else 0):
         same = same and s.index[STATE, i] == s.index[SEEN, i]
     return recurred + same
-
-
-@inlined
-def _copy_states(s, source, target):
-    for i in range(s.A.shape[0]):
-        s.index[target, i] = s.index[source, i]
 
 
 @internal
@@ -265,16 +250,10 @@ def _release_all(s):
 
 @inlined
 def _enter(s, current, newest):
-    """Let a row enter; rows that nothing holds at their side leave."""
+    """Let a row enter, and keep the multipliers from which it does."""
     for p in range(current.shape[0]):
         assign(current[p], s.multiplier[p])
-    for q in range(s.index[BEGIN, current.shape[0] - 1]):
-        i = s.index[LIST, q]
-        if s.index[SIGN, q] == UNDECIDED and s.index[ENTERED, i] < RELEASED:
-            s.index[STATE, i] = FREE
-            fill(current[:, i], 0.0)
     s.index[STATE, newest] = s.index[CHANGE, newest]
-    s.index[ENTERED, newest] += 1
 
 
 @inlined

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import add_multiple, inlined, inner_product, internal
+from hierarchy.jit import add_multiple, as_matrix, inlined, inner_product, internal
 from solvers.kernels.active_set.working_set import (
     CUT,
     ENTRY,
@@ -29,29 +29,37 @@ from solvers.kernels.active_set.working_set import (
     UNIT,
     UPPER,
     note_pivot,
+    side_at,
 )
+from solvers.kernels.linalg.least_squares import least_squares
 from solvers.kernels.linalg.rows import swap
 from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, vector
-from solvers.kernels.tolerances import CLEAR_SQUARE, FLOOR, NEGLIGIBLE
+from solvers.kernels.tolerances import (
+    CANCELLED,
+    CLEAR_SQUARE,
+    EPSILON,
+    FAINT,
+    FLOOR,
+    NEGLIGIBLE,
+)
 from solvers.status import EQUAL
 
 # Rows of `number` after those of the data. Per row of A: its value and the rate of that; its
 # residual before the step of its level and its excess after (in the order of the list). Per unknown
 # or basis vector: the goal of a level that sets all of x, the step in x, its step in the basis, the
-# gradient of the level, the force that balances it, and the part of the gradient that it balances.
-VALUE, SPEED, REST, OVER, GOAL, STEP, Z, PULL, FORCE, SHARE = range(REFERENCE + 1, REFERENCE + 11)
+# gradient of the level, and the force that balances it.
+VALUE, SPEED, REST, OVER, GOAL, STEP, Z, PULL, FORCE = range(REFERENCE + 1, REFERENCE + 10)
 # Rows of `index` after those of the data. Per row of A: its column of M (-1: none), its kind; the
 # list of the rows of the level that act, in pivot order. Per basis vector: the row that owns it, -1
-# for none. Per column: the row that it belongs to.
-COLUMN, KIND, LIST, OWNER, ROW = range(FIRST + 1, FIRST + 6)
+# for none. Per column: the row that it belongs to. Scratch.
+COLUMN, KIND, LIST, OWNER, ROW, QUEUE = range(FIRST + 1, FIRST + 7)
 # In `count`: columns at the left that turn no more; the first of those that do; the first of the
 # unknowns; basis vectors of the fixed, hard and soft rows, soft rows; whether
 # the level is missed; steps.
 SETTLED, TURNING, BASE, FIX, HARD, RANKS, ROWS, MISSED, STEPS = range(9)
 # In `scalar`: the largest number so far, the scale of tolerances; the square of a level's weight;
-# the largest miss of its rows, the sum of their pulls, the part of that which may be rounding; the
-# largest number of a whole step.
-SIZE, SCALE, WEIGHT, WORST, PULLED, ROUNDING, REACH = range(7)
+# what of the sum of its rows' pulls may be rounding; the largest number of a whole step.
+SIZE, SCALE, WEIGHT, ROUNDING, REACH = range(5)
 
 
 class Tableau(NamedTuple):
@@ -82,8 +90,8 @@ def carve_tableau(s, work, at):
     for i in range(m):
         general += s.index[UNIT, i] < 0
     count, at = integers(work, at, 9)
-    scalar, at = vector(work, at, 7)
-    M, at = matrix(work, at, n, general + n)
+    scalar, at = vector(work, at, 5)
+    M, at = matrix(work, at + (-at & 3), n, general + n)
     return Tableau(s, count, scalar, M, work[at:]), at
 
 
@@ -274,3 +282,104 @@ def measure(t, length):
     """Write the scale of tolerances: the length of x, but at least the size of rounding."""
     t.scalar[SIZE] = max(t.scalar[SIZE], length)
     t.scalar[SCALE] = max(length, FLOOR * t.scalar[SIZE])
+
+
+@inlined
+def step_of_rows(t, begin, rank):
+    """Write the step of a level into Z, and the excess of its rows after the step.
+
+    Independent rows are met. Returns the size of the largest numbers involved.
+    """
+    if t.count[ROWS] > rank:
+        return _least_squares_step(t, begin, rank)
+    s, size, y = t.of, 0.0, t.of.number[Z, begin:]
+    for q in range(rank):
+        i, left = s.index[LIST, q], s.number[REST, q]
+        column, entry = s.index[COLUMN, i], entry_of(t, i)
+        diagonal = entry * t.M[begin + q, column]
+        size = max(size, abs(left / diagonal))
+        for c in range(q):
+            left -= entry * t.M[begin + c, column] * y[c]
+        y[q] = left / diagonal
+        s.number[OVER, q] = 0.0
+    return size
+
+
+@inlined
+def _least_squares_step(t, begin, rank):
+    """Like `step_of_rows`, for more rows than rank."""
+    s, rows, size, y = t.of, t.count[ROWS], 0.0, t.of.number[Z, begin:]
+    L = as_matrix(t.room[:rows * (rank + 1)], rank + 1, rows)
+    for q in range(rows):
+        i, rest = s.index[LIST, q], s.number[REST, q]
+        column, entry, least = s.index[COLUMN, i], entry_of(t, i), s.scalar[TOLERANCE]
+        seen = left_of(t, i, begin, begin + rank) > (least * s.number[NORM, i]) ** 2
+        for c in range(rank):  # entries of a row in the span of the rows above are rounding
+            L[c, q] = entry * t.M[begin + c, column] if c <= q and seen else 0.0
+        L[rank, q] = rest
+        if q < rank:
+            size = max(size, abs(rest / L[q, q]))
+    least_squares(L[:rank], L[rank], y)
+    for q in range(rows):
+        s.number[OVER, q] = -L[rank, q]
+    return size
+
+
+@inlined
+def weigh_rows(t):
+    """Return the largest violation of the rows of a level; note the rounding in their pulls.
+
+    If the misses are rounding in all rows, they count as zero; in a single row the miss may be what
+    balances a light row. The share of rounding in a pull is that in the miss.
+    """
+    s, worst, pulled, missed = t.of, 0.0, 0.0, False
+    for q in range(t.count[ROWS]):
+        i, over = s.index[LIST, q], abs(s.number[OVER, q])
+        side = side_at(s, i)
+        missed |= over > EPSILON * around(s, i, side, t.scalar[SIZE])
+        pulled += s.number[NORM, i] * over
+        if over > 0.0:
+            worst = max(worst, over / around(s, i, side, t.scalar[SCALE]))
+    if not missed:
+        worst = pulled = 0.0
+        fill(s.number[OVER, :t.count[ROWS]], 0.0)
+    length = worst * t.scalar[SCALE]
+    share = min(EPSILON * t.scalar[SIZE] / length, 1.0) if length > 0.0 else 0.0
+    t.scalar[ROUNDING] = pulled * max(CANCELLED, share)
+    return worst
+
+
+@inlined
+def pull_of_rows(t, begin, end):
+    """Add the excess of the rows of a level, times the rows, in the basis vectors begin .. end."""
+    for q in range(t.count[ROWS]):
+        if t.of.number[OVER, q] != 0.0:
+            push_by(t, t.of.index[LIST, q], t.of.number[OVER, q], begin, end)
+
+
+@inlined
+def push_by(t, i, over, begin, end):
+    """Add row i times its excess, without entries so faint that they decide nothing."""
+    s, column, entry = t.of, t.of.index[COLUMN, i], entry_of(t, i)
+    faint, push = FAINT * abs(s.number[NORM, i] / entry), over * entry
+    for k in range(begin, end):
+        s.number[PULL, k] += push * t.M[k, column] if abs(t.M[k, column]) > faint else 0.0
+
+
+@inlined
+def balance(t, begin, end):
+    """Write the forces of the rows that own the basis vectors begin .. end - 1.
+
+    A pull that may be rounding alone counts as zero: every entry of a row is rounded relative to
+    its norm.
+    """
+    s, pull, force, rounding = t.of, t.of.number[PULL], t.of.number[FORCE], t.scalar[ROUNDING]
+    for k in range(end - 1, begin - 1, -1):
+        force[k], i = 0.0, s.index[OWNER, k]
+        if i < 0 or abs(pull[k]) <= rounding:
+            continue
+        column, entry = s.index[COLUMN, i], entry_of(t, i)
+        force[k] = -pull[k] / (entry * t.M[k, column])
+        rounding += CANCELLED * abs(force[k]) * s.number[NORM, i]
+        for c in range(begin, k):
+            pull[c] += force[k] * entry * t.M[c, column]

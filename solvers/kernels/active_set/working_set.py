@@ -32,15 +32,14 @@ from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
  DIAGONAL, SIZES, PIVOTS, SECONDS, KEPT) = range(18)
 NUMBERS = 18  # `levels.py` keeps its own behind REFERENCE
 # Rows of `index`. Per row of A: its unknown (-1 for several entries), the side at which it acts,
-# the change that the search asks for, how often it entered,
-# the side before a search and at its last checkpoint. By place in the list: the row, the sign
-# of its multipliers. The unknown of each column, the column of each unknown. Per level: its first
-# row, its first place in the list, its first column, whether W lacks the columns above it.
-# Per row of A: the side at which it acted when its level was factored; the level from which on a
-# SOUND set holds it, -1 for none.
-(UNIT, STATE, FIRST, CHANGE, ENTERED, SEED, SEEN, LIST, SIGN, ORDER, PLACE, BEGIN,
- RANK, SHORT, ACTED, HOLDS) = range(16)
-INDICES = 16
+# the change that the search asks for, the side before a search and at its last checkpoint. By place
+# in the list: the row, the sign of its multipliers. The unknown of each column, the column of each
+# unknown. Per level: its first row, its first place in the list, its first column, whether W lacks
+# the columns above it. Per row of A: the side at which it acted when its level was factored; the
+# level from which on a SOUND set holds it, -1 for none.
+(UNIT, STATE, FIRST, CHANGE, SEED, SEEN, LIST, SIGN, ORDER, PLACE, BEGIN, RANK, SHORT, ACTED,
+ HOLDS) = range(15)
+INDICES = 15
 # In `count`: columns that are unknowns, the level that sets all of x (-1: none), whether a row was
 # cut since the rows were those of A, the number of rows that are negligible beside those of other
 # levels alone, the number of levels that the saved x meets, the number of levels in the search at
