@@ -14,7 +14,7 @@ from scenarios.export import foxglove
 from scenarios.files import OutputError, named, write_text, written
 from scenarios.recording.recording import Recording
 from scenarios.recording.signals import OTHER, known
-from scenarios.scene import scene
+from scenarios.scene.drawn import scene
 
 __all__ = ["export"]
 

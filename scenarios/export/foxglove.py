@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from hierarchy.avoidance import Capsule
 from hierarchy.avoidance.obstacles import Obstacle
 from hierarchy.problem import Array
-from scenarios.scene import Scene
+from scenarios.scene.drawn import Scene
 
 WORLD = "world"
 Message = dict[str, Any]

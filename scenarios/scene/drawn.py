@@ -1,11 +1,8 @@
 """What is drawn of a run: arm, obstacles, paths, cone, stack and curves, as arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import radians
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +13,13 @@ from hierarchy.errors import positive, refuse
 from hierarchy.jit import bind
 from hierarchy.problem import Array
 from scenarios.cell.sensors.sensor import make_obstacles, packed_laws
+from scenarios.config import Scenario
 from scenarios.recording import listed
 from scenarios.recording.facts import RobotFacts, ends
 from scenarios.recording.fate import Fate, Levels, levels_at
+from scenarios.recording.recording import Recording
 from scenarios.scene.curves import Areas, Series, marks_of, series
 from scenarios.scene.pushes import Pushes, pushes
-
-if TYPE_CHECKING:
-    from scenarios.config import Scenario
-    from scenarios.recording.recording import Recording
 
 SEPARATION = "separation"  # the task that keeps all points away from all obstacles
 
@@ -74,7 +69,7 @@ class Scene:
     centres (F, H, 3) : of `stage.obstacles`, which has shape, size and rotation.
     axis (F, 3) : the end effector's z axis. desired (F, 3) : its path, or None.
     order (F,) : index into `orders`, which name tasks. switches (S,) : times of changes of it.
-    paths : of the points that listed tasks move. levels, pushes : see scenarios.scene.
+    paths : of the points that listed tasks move. levels, pushes : see their classes.
     """
 
     stage: Stage

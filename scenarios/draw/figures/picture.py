@@ -14,9 +14,9 @@ from hierarchy.avoidance import Obstacle
 from hierarchy.problem import Array
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK
-from scenarios.recording.facts import RobotFacts
+from scenarios.recording.facts import RobotFacts, ends
 from scenarios.recording.recording import Recording
-from scenarios.scene import Stage, ends, frames_at, moved_by_tasks, stage
+from scenarios.scene.drawn import Stage, frames_at, moved_by_tasks, stage
 
 _VERTICES = 800
 _OTHER_POSES = 5

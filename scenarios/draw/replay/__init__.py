@@ -16,7 +16,7 @@ from scenarios.measure.happenings import Happening, happened
 from scenarios.measure.verdict import verdict
 from scenarios.recording.fate import PHRASES, Fate
 from scenarios.recording.recording import Recording
-from scenarios.scene import Scene, scene
+from scenarios.scene.drawn import Scene, scene
 from scenarios.scene.pushes import key
 from scenarios.templates import render, resource
 
