@@ -24,6 +24,7 @@ import numpy as np
 from scenarios.results.pool import ended
 
 CALLS = Path(__file__).with_name("calls.txt")
+_OTHERS = CALLS.with_name("others.toml")
 # The first part of a name of a kernel decides which object file it is in.
 PARTS = {"solvers": ("solvers",), "robots": ("hierarchy", "scenarios")}
 # Together they have every kind of task, sensor and plant of the shipped scenarios.
@@ -31,31 +32,6 @@ _SCENARIOS = ("crawl", "dual-arm", "ellipse", "ellipse-3d", "ellipse-danger-boun
               "ellipse-inertia", "ellipse-mass", "ellipse-nullspace", "ellipse-published",
               "ellipse-set-based", "human", "humanoid", "reach-torque", "wipe")
 _KUKA = [0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3]  # a configuration [rad]
-# Kinds of tasks that only users' scenarios have.
-_OTHERS = f"""
-name = "others"
-robot.model = "kuka_lwr"
-start.q = {_KUKA}
-damping.value = 1.0
-control = {{ stack = "hierarchical", resolver = "hcod" }}
-[[tasks]]
-kind = "coupling"
-joints = {{ joint_2 = 1.0, joint_5 = -0.5 }}
-[[tasks]]
-kind = "frame"
-frame = "end_effector"
-[[tasks]]
-kind = "relative"
-frame = "end_effector"
-to = "joint_3"
-[[tasks]]
-kind = "relative"
-name = "reach"
-frame = "end_effector"
-to = "joint_2"
-position = [0.4, 0.0, 0.5]
-orientation = false
-"""
 
 
 def main() -> None:
@@ -134,12 +110,12 @@ def _say(what: str) -> None:
     print(f"task-hierarchy: {what}", file=sys.stderr, flush=True)
 
 
-def _run(text: str, folder: Path) -> None:
+def _run(scenario: str, folder: Path, *options: str) -> None:
     """Make a run of a few ticks."""
     from scenarios.cli.main import run_command
 
-    if run_command(["run", *text.split(), "--duration", "0.01", "--out", str(folder / "out")]) > 1:
-        raise SystemExit(f"hierarchy run {text} failed")
+    if run_command(["run", scenario, *options, "--duration", "0.01", "--out", str(folder)]) > 1:
+        raise SystemExit(f"hierarchy run {scenario} failed")
 
 
 def _arrays(_: Path) -> None:
@@ -193,10 +169,8 @@ def _robot(_: Path) -> None:
 
 def _others(folder: Path) -> None:
     """Run the tasks of no shipped scenario, at both levels."""
-    file = folder / "others.toml"
-    file.write_text(_OTHERS)
     for level in ("velocity", "acceleration"):
-        _run(f"{file} --set control.level={level}", folder / level)
+        _run(str(_OTHERS), folder / level, "--set", f"control.level={level}")
 
 
 def _tasks_of_pink(_: Path) -> None:
