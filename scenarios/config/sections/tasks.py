@@ -266,11 +266,6 @@ class OwnTask(Listed, OwnSection):
     group: ClassVar[Group] = "tasks"
     unit: ClassVar[str] = ""
 
-    @property
-    def one_sided(self) -> bool:
-        """Whether its rows are inequalities, as the plugin's class says with `kind`."""
-        return str(getattr(type(self).maker, "kind", "equality")) == "inequality"
-
     def make(self, at: References, **more: Any) -> Task:
         """Return the task; raises ScenarioError for whatever goes wrong in the user's code."""
         from hierarchy import Task
