@@ -181,9 +181,7 @@ def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
     elif lines := reference.explained_kind(what):
         print(*lines, sep="\n")
     else:
-        known = {f"{place.strip('[]')}.{key.name}".lstrip(".")
-                 for place, section in reference.sections() for key in reference.keys_of(section)}
-        raise UnknownNameError("key or command", what, {*known, *commands})
+        raise UnknownNameError("key or command", what, {*reference.places_of(), *commands})
 
 
 @app.command()
