@@ -3,7 +3,6 @@
 import atexit
 import glob
 import hashlib
-import itertools
 import json
 import os
 import platform
@@ -140,17 +139,13 @@ def in_runs(name: str) -> Path:
 
 def next_free(base: str | Path) -> Path:
     """Return the first of base, base-2, base-3, ... that does not exist yet, claimed."""
-    base = Path(base)
-    numbered = (base.with_name(f"{base.name}-{i}") for i in itertools.count(2))
-    return next(path for path in itertools.chain([base], numbered)
-                if not path.exists() and _free(path))
-
-
-def _free(path: Path) -> bool:
-    """Claim a path, unless another process has."""
-    with suppress(TakenError):
-        return bool(claim(path))
-    return False
+    path, number = Path(base), 1
+    while True:
+        with suppress(TakenError):
+            if not path.exists():
+                return claim(path)
+        number += 1
+        path = path.with_name(f"{Path(base).name}-{number}")
 
 
 @contextmanager

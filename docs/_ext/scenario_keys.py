@@ -4,6 +4,7 @@ They stand below a mark, and are what `hierarchy help KEY` prints. A key that se
 is described in the first of them.
 """
 
+import inspect
 import re
 from pathlib import Path
 
@@ -19,7 +20,7 @@ def written():
 
 def _lines():
     """Yield the lines of every place."""
-    from scenarios.config.reference import about, keys_of, sections
+    from scenarios.config.reference import keys_of, sections
 
     groups, meaning = {}, {}
     for place, section in sections():
@@ -29,7 +30,7 @@ def _lines():
                 meaning.setdefault(below, key.meaning)
     writer = _Writer({one: place for place, group in groups.items() for one in group})
     for place, group in groups.items():
-        said = about(group[0]) if len(group) == 1 else meaning[group[0]]
+        said = inspect.getdoc(group[0]) if len(group) == 1 else meaning[group[0]]
         yield from (f"## {f'`{place}`' if place else 'Top of the file'}", "", _escaped(said), "")
         yield from _single(writer, place, group[0]) if len(group) == 1 else (
             _several(writer, place, group))
@@ -48,7 +49,7 @@ def _single(writer, place, section):
 
 def _several(writer, place, group):
     """Yield what all kinds of a place have, then each kind."""
-    from scenarios.config.reference import about, keys_of, kinds_of
+    from scenarios.config.reference import keys_of, kinds_of
 
     kinds = {kinds_of(one)[0]: one for one in group if kinds_of(one)}
     yield f"- **kind**: one of these{'' if len(kinds) == len(group) else ', or of a plug-in'}"
@@ -57,8 +58,8 @@ def _several(writer, place, group):
         key for key in keys_of(group[0]) if _same(key) in common))
     for kind, one in kinds.items():
         entries = [*writer.entries((place, kind), keys_of(one))]
-        yield from ("", f"### `{kind}`", "", _escaped(about(one)), *([""] if entries else []),
-                    *entries)
+        yield from ("", f"### `{kind}`", "", _escaped(inspect.getdoc(one)),
+                    *([""] if entries else []), *entries)
 
 
 class _Writer:

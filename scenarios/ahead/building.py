@@ -9,9 +9,10 @@ call: each kind of call of the documents, once.
 """
 
 import os
+import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from functools import partial
 from io import StringIO
@@ -24,38 +25,17 @@ import numpy as np
 from scenarios.results.pool import ended
 
 CALLS = Path(__file__).with_name("calls.txt")
+_OTHERS = CALLS.with_name("others.toml")
 # The first part of a name of a kernel decides which object file it is in.
 PARTS = {"solvers": ("solvers",), "robots": ("hierarchy", "scenarios")}
 # Together they have every kind of task, sensor and plant of the shipped scenarios.
 _SCENARIOS = ("crawl", "dual-arm", "ellipse", "ellipse-3d", "ellipse-danger-bounds", "ellipse-hqp",
               "ellipse-inertia", "ellipse-mass", "ellipse-nullspace", "ellipse-published",
               "ellipse-set-based", "human", "humanoid", "reach-torque", "wipe")
-_KUKA = [0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3]  # a configuration [rad]
-# Kinds of tasks that only users' scenarios have.
-_OTHERS = f"""
-name = "others"
-robot.model = "kuka_lwr"
-start.q = {_KUKA}
-damping.value = 1.0
-control = {{ stack = "hierarchical", resolver = "hcod" }}
-[[tasks]]
-kind = "coupling"
-joints = {{ joint_2 = 1.0, joint_5 = -0.5 }}
-[[tasks]]
-kind = "frame"
-frame = "end_effector"
-[[tasks]]
-kind = "relative"
-frame = "end_effector"
-to = "joint_3"
-[[tasks]]
-kind = "relative"
-name = "reach"
-frame = "end_effector"
-to = "joint_2"
-position = [0.4, 0.0, 0.5]
-orientation = false
-"""
+_DOCUMENTS = Path(__file__).parents[2] / "docs"
+_PAGES = ("adapters.md", "batch.md", *(f"theory/{path.name}"  # of resolvers, each with an example
+                                       for path in sorted(_DOCUMENTS.glob("theory/*.md"))))
+_PYTHON = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
 def main() -> None:
@@ -134,115 +114,40 @@ def _say(what: str) -> None:
     print(f"task-hierarchy: {what}", file=sys.stderr, flush=True)
 
 
-def _run(text: str, folder: Path) -> None:
+def _run(scenario: str, folder: Path, *options: str) -> None:
     """Make a run of a few ticks."""
     from scenarios.cli.main import run_command
 
-    if run_command(["run", *text.split(), "--duration", "0.01", "--out", str(folder / "out")]) > 1:
-        raise SystemExit(f"hierarchy run {text} failed")
+    if run_command(["run", scenario, *options, "--duration", "0.01", "--out", str(folder)]) > 1:
+        raise SystemExit(f"hierarchy run {scenario} failed")
+
+
+def _read(page: str, _: Path) -> None:
+    """Run the Python code of a page of the documents."""
+    blocks = _PYTHON.findall((_DOCUMENTS / page).read_text(encoding="utf-8"))
+    exec("\n".join(blocks), {"__name__": "document"})
 
 
 def _arrays(_: Path) -> None:
-    """Solve hierarchies of plain arrays with every resolver, once and again from memory."""
-    from solvers import certify, explain, make, names
-
-    for h, handled in _hierarchies():
-        for name in names():
-            for damping in (0.0, 0.05):
-                resolver: Any = make(name, damping=damping)
-                if resolver.handles in handled:
-                    result = resolver.solve(h)
-                    resolver.solve(h, memory=result.memory)
-        result = make("hcod").solve(h)
-        explain(h, result)
-        certify(h, result.x)
-        result.verified(h)
-        for name in ("hcod", "hqp"):
-            make(name).solve(h.changed(give=np.append(np.ones(h.m - 1), 0.0)))
-
-
-def _hierarchies() -> Iterator[tuple[Any, tuple[str, ...]]]:
-    """Yield hierarchies, each with what a resolver must be able to handle."""
+    """Solve hierarchies of plain arrays in the ways that no page shows."""
     from hierarchy import Hierarchy
-
-    yield Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])]), (
-        "equalities", "bounds", "inequalities", "activations")
-    yield Hierarchy.from_levels([([[1, 0], [0, 1]], [-0.1] * 2, [0.1] * 2), ([[1.0, 0.5]], [0.3])]
-                                ), ("bounds", "inequalities")
-    r = np.random.default_rng(0)
-    for _ in range(20):  # some need the second ways of a resolver
-        A, b = r.normal(size=(3, 3, 6)), r.normal(size=(3, 3))
-        A[1, 2] = 2.0 * A[1, 0]
-        yield Hierarchy.from_levels([(A[0], b[0] - 1.0, b[0]), (A[1], b[1]),
-                                     (A[2], b[2] - 0.1, b[2])]), ("inequalities",)
-
-
-def _robot(_: Path) -> None:
-    """Move a robot of seven joints within its limits, in one call."""
-    from hierarchy import Robot
-    from hierarchy.paths import Still
-    from hierarchy.tasks import Orientation, Position, Posture
-    from solvers import solve_ik
-
-    robot = Robot.load("kuka_lwr")
-    frame = robot.frame("end_effector")
-    tasks = [Position(frame, Still([0.3, 0.5, 0.1])), Orientation(frame, np.eye(3)),
-             Posture((0.5,) * 7)]
-    solve_ik(robot, _KUKA, tasks, limits=True, dt=0.01)
-
-
-def _others(folder: Path) -> None:
-    """Run the tasks of no shipped scenario, at both levels."""
-    file = folder / "others.toml"
-    file.write_text(_OTHERS)
-    for level in ("velocity", "acceleration"):
-        _run(f"{file} --set control.level={level}", folder / level)
-
-
-def _tasks_of_pink(_: Path) -> None:
-    """Resolve tasks of another package, with its limits and its damping."""
-    import pink
-    from pink.tasks import FrameTask, PostureTask
-
-    from hierarchy import Robot
-    from solvers.adapters.for_pink import solve_ik
-
-    robot = Robot.load("kuka_lwr")
-    now = pink.Configuration(robot.model, robot.model.createData(), np.array(_KUKA))
-    tasks: list[Any] = [FrameTask("end_effector", 1.0, 0.5), PostureTask(cost=1.0)]
-    for task in tasks:
-        task.set_target_from_configuration(now)
-    for damping in (0.0, 0.1):
-        solve_ik(now, tasks, 0.01, damping=damping)
-
-
-def _batches(_: Path) -> None:
-    """Solve many hierarchies in one call."""
     from solvers import make
     from solvers.batch import Batch, solve
 
     r: Any = np.random.default_rng(0)
-    A, b = r.normal(size=(3, 5, 7)), r.normal(size=(3, 5))
-    for name in ("tpm", "hcod"):
-        solve(Batch(A, b, b, sizes=np.array([3, 1, 1])), make(name))
+    A, b, sizes = r.normal(size=(3, 5, 7)), r.normal(size=(3, 5)), np.array([3, 1, 1])
+    solve(Batch(A, b, b, sizes=sizes), make("hcod"))
+    h = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])])
+    make("hcod", damping=0.05).solve(h).verified(h)
+    make("hqp").solve(h.changed(give=np.array([1.0, 1.0, 0.0])))
 
 
-def _kept_factorised(_: Path) -> None:
-    """Change a stack that is kept factorised."""
-    from solvers.factorization import Factorization
-
-    r = np.random.default_rng(0)
-    hand, elbow, gaze = (r.normal(size=(m, 30)) for m in (3, 2, 2))
-    stack = Factorization([hand, elbow, gaze], names=["hand", "elbow", "gaze"])
-    stack.solve({"hand": [0.1, -0.2, 0.3], "elbow": [0.0, 0.1], "gaze": [0.2, 0.0]})
-    stack.swap("hand", "gaze")
-    stack.insert("limit", np.eye(30)[:1], at=0)
-    stack.delete("elbow")
-    stack.solve({"gaze": [0.2, 0.0], "limit": [0.0], "hand": [0.1, -0.2, 0.3]},
-                reference=np.ones(30))
+def _others(folder: Path) -> None:
+    """Run the tasks of no shipped scenario, at both levels."""
+    for level in ("velocity", "acceleration"):
+        _run(str(_OTHERS), folder / level, "--set", f"control.level={level}")
 
 
 JOBS: dict[str, Callable[[Path], None]] = {
     **{name: partial(_run, name) for name in _SCENARIOS},
-    "others": _others, "arrays": _arrays, "robot": _robot, "pink": _tasks_of_pink,
-    "batches": _batches, "kept": _kept_factorised}
+    **{page: partial(_read, page) for page in _PAGES}, "others": _others, "arrays": _arrays}

@@ -35,19 +35,8 @@ from solvers.resolvers.set_based import SetBased
 from solvers.resolvers.settled import Settled
 from solvers.resolvers.smooth import Activated, Smooth
 
-
-@dataclass(frozen=True)
-class Order:
-    """The selection and order of the tasks in the stack of a tick; `possible` has every order."""
-
-    choose: Callable[[float, float, float], Allocation]
-    possible: Collection[tuple[str, ...]]
-
-    def __call__(self, seen: Measurement | None, cone_error: float) -> Allocation:
-        """Return the order for measured distances and the cone error cos(alpha_d) - cos(alpha)."""
-        if seen is None:
-            return self.choose(inf, inf, cone_error)
-        return self.choose(seen.minimal_distance, seen.end_effector_distance, cone_error)
+Order = Callable[[Measurement | None, float], Allocation]
+"""Selects and orders the tasks in the stack of a tick, by what is measured and the cone error."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +44,9 @@ class Cell:
     """Everything the control loop needs: robot, start, tasks and sensor.
 
     `start` is q (nq,) and v (n,). `order` selects the tasks in the stack from the measurement and
-    the cone error. `activation` is that of the stack's rows with control.stack = "smooth", else
-    None. `contacts` are those at level "torque", else None.
+    the cone error cos(alpha_d) - cos(alpha), one of `orders`. `activation` is that of the stack's
+    rows with control.stack = "smooth", else None. `contacts` are those at level "torque", else
+    None.
     """
 
     scenario: Scenario
@@ -68,6 +58,7 @@ class Cell:
     tasks: Tasks
     stack: Stack
     order: Order
+    orders: Collection[tuple[str, ...]]
     activation: Activation | None = None
     contacts: Contacts | None = None
 
@@ -109,10 +100,10 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     stack = Stack(rows, scenario.control.level, tasks.reference, at.contacts,
                   "mass" if scenario.control.metric == "mass" else None, tasks.give)
     return Cell(scenario, at.robot, (at.start.q, at.start.v), state, plant, sensor, tasks, stack,
-                _order(scenario, tasks), activation, at.contacts)
+                *_order(scenario, tasks), activation, at.contacts)
 
 
-def _order(scenario: Scenario, tasks: Tasks) -> Order:
+def _order(scenario: Scenario, tasks: Tasks) -> tuple[Order, Collection[tuple[str, ...]]]:
     """Return all tasks in every tick, or Algorithm 1 below those that are always at the top.
 
     Without areas only the cone is switched, and the position has the repulsion of (30) within the
@@ -120,7 +111,7 @@ def _order(scenario: Scenario, tasks: Tasks) -> Order:
     """
     if scenario.control.stack != "switched":
         fixed = Allocation(tuple(task.name for task in tasks.all), repulsion=False)
-        return Order(lambda body, end, cone_error: fixed, [fixed.order])
+        return lambda seen, cone_error: fixed, [fixed.order]
     areas, section = tasks.areas, scenario.avoidance
     first = tuple(task.name for task in tasks.always)
     always_point = bool(scenario.pointing and scenario.pointing.rows == "equality")
@@ -130,7 +121,7 @@ def _order(scenario: Scenario, tasks: Tasks) -> Order:
     def behind_first(chosen: Allocation) -> Allocation:
         return Allocation((*first, *chosen.order), chosen.repulsion)
 
-    def choose(body: float, end: float, cone_error: float) -> Allocation:
+    def chosen_at(body: float, end: float, cone_error: float) -> Allocation:
         if areas is not None:
             chosen = allocate(body, end, cone_error, areas, always_point)
         else:
@@ -139,8 +130,13 @@ def _order(scenario: Scenario, tasks: Tasks) -> Order:
                                 repulsion=end <= tip)
         return behind_first(chosen) if first else chosen
 
+    def choose(seen: Measurement | None, cone_error: float) -> Allocation:
+        if seen is None:
+            return chosen_at(inf, inf, cone_error)
+        return chosen_at(seen.minimal_distance, seen.end_effector_distance, cone_error)
+
     distances = (inf,) if areas is None else (areas.near, areas.far, inf)
-    return Order(choose, {choose(*at).order for at in product(distances, (0.0, inf), (1.0, nan))})
+    return choose, {chosen_at(*at).order for at in product(distances, (0.0, inf), (1.0, nan))}
 
 
 def _rows(scenario: Scenario, tasks: Sequence[Task],

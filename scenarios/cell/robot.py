@@ -55,7 +55,7 @@ def make_robot(section: RobotSection) -> Robot:
     robot = Robot.load(section.model, section.end_effector, section.base, section.locked,
                        section.root)
     if section.control_points is not None:
-        robot.control_points = tuple(_point(robot, point, i)
+        robot.control_points = tuple(point_of(robot, point, f"control_points.{i}")
                                      for i, point in enumerate(section.control_points))
     if section.capsules is not None:
         base = 1 if robot.base == "floating" else 0
@@ -67,8 +67,9 @@ def make_robot(section: RobotSection) -> Robot:
     return robot
 
 
-def _point(robot: Robot, section: RobotPointSection, i: int) -> ControlPoint:
-    with naming(f"control_points.{i}"):
+def point_of(robot: Robot, section: RobotPointSection, key: str) -> ControlPoint:
+    """Return a point of the robot; raises ScenarioError, naming its key, if there is none."""
+    with naming(key):
         if section.joint is not None:
             return robot.control_point(section.joint, section.offset)
         return robot.control_point_of_frame(str(section.frame), section.offset)

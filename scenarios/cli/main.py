@@ -161,14 +161,7 @@ def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
           plugin: opt.Plugins = None) -> None:
     """Say what a key of a scenario file means."""
     from hierarchy.errors import UnknownNameError
-    from scenarios.config import Scenario
-    from scenarios.config.reference import (
-        explained,
-        explained_kind,
-        keys_of,
-        places_of,
-        sections,
-    )
+    from scenarios.config import Scenario, reference
 
     above = context.parent
     assert above is not None, "help is a command of the application"
@@ -178,19 +171,17 @@ def help_(context: typer.Context, what: Annotated[str | None, typer.Argument(
             "commands, see `hierarchy help COMMAND`":
                 {name: one.get_short_help_str(60) for name, one in commands.items()},
             "keys of a scenario file, see `hierarchy help KEY`":
-                {key.name: key.meaning for key in keys_of(Scenario)}})
-    elif lines := explained(what):
+                {key.name: key.meaning for key in reference.keys_of(Scenario)}})
+    elif lines := reference.explained(what):
         print(*lines, sep="\n")
     elif what in commands:
         print(commands[what].get_help(typer.Context(commands[what], above, what)))
-    elif places := places_of(what):
+    elif places := reference.places_of(what):
         print(f"{what} is a key of several sections:", *places, sep="\n  ")
-    elif lines := explained_kind(what):
+    elif lines := reference.explained_kind(what):
         print(*lines, sep="\n")
     else:
-        known = {f"{place.strip('[]')}.{key.name}".lstrip(".")
-                 for place, section in sections() for key in keys_of(section)}
-        raise UnknownNameError("key or command", what, {*known, *commands})
+        raise UnknownNameError("key or command", what, {*reference.places_of(), *commands})
 
 
 @app.command()

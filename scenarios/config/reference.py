@@ -56,11 +56,6 @@ def title_of(section: type[Section], place: str) -> str:
     return f"{place} with kind = {json.dumps(kinds[0])}" if len(kinds) == 1 else place
 
 
-def about(section: type[Section]) -> str:
-    """Return what a section is."""
-    return inspect.cleandoc(section.__doc__ or "")
-
-
 def explained(dotted: str) -> list[str]:
     """Return what a dotted key means, as lines for a terminal; none for an unknown key.
 
@@ -91,7 +86,7 @@ def explained_kind(dotted: str) -> list[str]:
 def _whole(section: type[Section], place: str) -> Iterator[str]:
     """Yield what a section is, and its keys."""
     yield title_of(section, place)
-    for text in about(section).split("\n\n"):
+    for text in (inspect.getdoc(section) or "").split("\n\n"):
         yield fill(text, 88, initial_indent="  ", subsequent_indent="  ")
     for key in keys_of(section):
         yield from _lines(key)
@@ -107,11 +102,11 @@ def _bracketed(path: list[str]) -> str:
         for key in keys_of(owner) if key.name == path[-1]) else dotted
 
 
-def places_of(name: str) -> list[str]:
-    """Return the dotted keys with a last part; of those below several sections the first."""
+def places_of(name: str | None = None) -> list[str]:
+    """Return the dotted keys with a last part, or all; of those in several sections the first."""
     return list(dict.fromkeys(
         f"{place.strip('[]')}.{key.name}".lstrip(".") for place, section in sections()
-        for key in keys_of(section) if key.name == name))
+        for key in keys_of(section) if name in (None, key.name)))
 
 
 def sections() -> Iterator[tuple[str, type[Section]]]:

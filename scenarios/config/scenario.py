@@ -84,7 +84,10 @@ class Scenario(Section):
     def _wrong(self) -> Iterator[str]:
         yield from self._has_the_level_of_its_forces()
         yield from self._sections_go_together()
-        yield from self._fits_its_stack()
+        asked = {"pointing": self.pointing} | {f"tasks.{i}": task
+                                               for i, task in enumerate(self.tasks)}
+        yield from unfit(self.control, self.limits, self.avoidance,
+                         {key: task for key, task in asked.items() if task})
         yield from self._lists_tasks_apart()
         yield from self._faults_have_a_sensor()
 
@@ -92,11 +95,10 @@ class Scenario(Section):
         torque = self.control.level == "torque"
         forces = next((task.title for task in self.tasks if task.of_forces), None)
         for what, given in (("[[contacts]]", self.contacts), (f"task {forces!r}", forces),
-                            ("[forces]", self.forces != ForcesSection())):
+                            ("[forces]", self.forces != ForcesSection()),
+                            ("start.on_floor", self.start.on_floor)):
             if given and not torque:
                 yield f'{what} needs control.level = "torque"'
-        if self.start.on_floor and not torque:
-            yield 'start.on_floor needs control.level = "torque"'
         if torque and self.control.stack != "hierarchical":
             yield ('control.level = "torque" goes with control.stack = "hierarchical", '
                    f'got "{self.control.stack}"')
@@ -128,11 +130,6 @@ class Scenario(Section):
         if self.limits and self.limits.torque_step and not clipped:
             yield "limits.torque_step needs control.level = \"torque\""
 
-    def _fits_its_stack(self) -> Iterator[str]:
-        pointing = {"pointing": self.pointing} if self.pointing else {}
-        listed = {f"tasks.{i}": task for i, task in enumerate(self.tasks)}
-        return unfit(self.control, self.limits, self.avoidance, {**pointing, **listed})
-
     def _lists_tasks_apart(self) -> Iterator[str]:
         if self.tasks and self.control.stack == "switched":
             yield '[[tasks]] goes with control.stack = "hierarchical"'
@@ -160,11 +157,6 @@ class Scenario(Section):
             yield "faults of frames need a sensor of kind \"camera\" or \"frames\""
         if self.sensor.is_recorded and "obstacle" in kinds:
             yield "a fault of kind 'obstacle' would not be in the recorded frames"
-
-    @property
-    def is_experiment(self) -> bool:
-        """Whether it belongs to the letter's section IV-B: physics, or sensed distances."""
-        return self.plant.kind != "kinematic" or self.sensor.kind != "exact"
 
     @property
     def limits_in_stack(self) -> bool:

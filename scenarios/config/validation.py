@@ -45,9 +45,8 @@ def tag_at(root: type[Section], path: Sequence[str]) -> Tag | None:
     tagged = {kind: kind.model_fields.get(kind.tag) for kind in found}
     if not all(tagged.values()) or (len(found) < 2 and all(kind.tag == "kind" for kind in found)):
         return None
-    key = next(iter(found)).tag if found else ""
     defaults = [field.default for field in tagged.values() if field and not field.is_required()]
-    return Tag(key, defaults[0] if defaults else None) if found else None
+    return Tag(next(iter(found)).tag, next(iter(defaults), None))
 
 
 def sections_at(root: type[Section], path: Sequence[str]) -> list[type[Section]]:

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from hierarchy.avoidance import Capsule
 from hierarchy.avoidance.obstacles import Obstacle
 from hierarchy.problem import Array
-from scenarios.scene import Scene
+from scenarios.scene.drawn import Scene
 
 WORLD = "world"
 Message = dict[str, Any]
@@ -32,8 +32,8 @@ def transforms(scene: Scene, frame: int) -> Message:
 
     The desired point has no rotation of its own and is given that of the world.
     """
-    robot, t = scene.stage.robot, float(scene.t[frame])
-    rows, tip = scene.placements[frame], scene.stage.robot.points[-1]
+    robot, t = scene.robot, float(scene.t[frame])
+    rows, tip = scene.placements[frame], scene.robot.points[-1]
     placed = [(name, rows[i, 9:], rows[i, :9].reshape(3, 3).T)
               for i, name in enumerate(robot.joint_names, 1)]
     turned = rows[tip.joint, :9].reshape(3, 3).T @ np.array(robot.tool)
@@ -58,13 +58,13 @@ def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
     for frame in range(len(scene.t)):
         t, entities = float(scene.t[frame]), []
         if frame == 0:
-            entities += [link(t, capsule, scene.stage.robot.joint_names)
-                         for capsule in scene.stage.robot.capsules]
+            entities += [link(t, capsule, scene.robot.joint_names)
+                         for capsule in scene.robot.capsules]
             if scene.desired is not None:
                 entities.append(line(t, "path asked for", scene.desired, _ASKED))
         moved = (scene.centres[frame] != scene.centres[frame - 1]).any(axis=1)
         entities += [obstacle(t, h, body, scene.centres[frame, h])
-                     for h, body in enumerate(scene.stage.obstacles.obstacles)
+                     for h, body in enumerate(scene.obstacles.obstacles)
                      if frame == 0 or moved[h]]
         if np.isfinite(scene.nearest[frame]).all() and scene.nearest.size:
             k = int(scene.linked[frame])

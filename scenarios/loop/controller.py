@@ -65,7 +65,7 @@ class Controller:
         cell.state.commanded = self.sent if self.level == "velocity" else None
         if cell.sensor is not None:
             cell.state.measurement = cell.sensor.measurement
-        for order in cell.order.possible:
+        for order in cell.orders:
             if set(order) <= set(cell.stack.names):
                 cell.stack.prepare(cell.state, order)
 

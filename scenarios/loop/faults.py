@@ -12,9 +12,9 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 from scenarios.cell.build import Cell
+from scenarios.cell.robot import point_of
 from scenarios.cell.sensors import DepthSensor, Sensor
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.sections import naming
 from scenarios.config.sections.avoidance import ObstacleSection
 from scenarios.config.sections.control import FaultSection
 from solvers import Resolution, Resolver, Status
@@ -39,7 +39,7 @@ class Faults:
         self._standing: set[int] = set()
 
     def around(self, cell: Cell, resolver: Resolver) -> tuple[Cell, Resolver, Clock]:
-        """Return a cell, a resolver and a clock with these faults.
+        """Return a cell, a resolver and a clock [s] with these faults, which may advance it.
 
         The cell is that of the scenario `with_room`. Raises ScenarioError where a fault does not
         fit the robot.
@@ -49,7 +49,8 @@ class Faults:
             cell = replace(cell, sensor=FaultySensor(cell.sensor, self))
         self._plant, self._robot, self._sensor = cell.plant, cell.robot, cell.sensor
         self._last = cell.plant.q.copy(), cell.plant.v.copy(), 0.0
-        return cell, _FaultyResolver(inner=resolver, faults=self), self._clock
+        return (cell, _FaultyResolver(inner=resolver, faults=self),
+                lambda: perf_counter() + self._skipped)
 
     def measure(self, t: float) -> tuple[Array, Array, float]:
         """Return q (nq,) and v (n,) as measured at time t [s], and when that was [s]."""
@@ -69,10 +70,6 @@ class Faults:
     def now(self, kind: str) -> Iterator[FaultSection]:
         """Yield the active faults of a kind."""
         return (fault for fault in self._sections if fault.kind == kind and self._on(fault))
-
-    def _clock(self) -> float:
-        """Return the time [s] of a clock that faults may advance."""
-        return perf_counter() + self._skipped
 
     def overrun(self) -> None:
         """Let the present tick take as long as the active faults say."""
@@ -158,15 +155,14 @@ def check(faults: Iterable[FaultSection], robot: Robot) -> None:
             if value is not None and value > most:
                 raise ScenarioError(f"faults.{i}.{key} = {value}: robot {robot.name!r} has {most}")
         if fault.place is not None:
-            with naming(f"faults.{i}.place"):
-                robot.joint(fault.place.joint)
+            point_of(robot, fault.place, f"faults.{i}.place")
 
 
 def _place(fault: FaultSection, robot: Robot, q: Array) -> Array:
     if fault.place is None:
         return np.array(fault.centre)
-    frame = Frame("place", robot.joint(fault.place.joint), np.array(fault.place.offset), np.eye(3))
-    return State.at(robot, q).position(frame)
+    point = point_of(robot, fault.place, "place")
+    return State.at(robot, q).position(Frame("", point.joint, np.array(point.offset), np.eye(3)))
 
 
 def _spoil(values: Array, numbers: list[int | None]) -> None:

@@ -49,10 +49,9 @@ def first_tick(scenario: Scenario) -> FirstTick:
     distances = _distances(controller)
     unmet = tuple(_unmet(controller)) if controller.answered else ()
     warnings = (*_warnings(scenario, distances), *_itself(controller.cell), *footing(controller))
-    if not controller.answered:
-        return FirstTick(None, (), (), distances, warnings)
-    return FirstTick(controller.resolution.status, controller.hierarchy.names, unmet, distances,
-                     warnings)
+    status, levels = (controller.resolution.status, controller.hierarchy.names) \
+        if controller.answered else (None, ())
+    return FirstTick(status, levels, unmet, distances, warnings)
 
 
 def contact_warnings(scenario: Scenario) -> tuple[str, ...]:

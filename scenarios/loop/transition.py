@@ -49,7 +49,9 @@ class Blend:
 
         `hierarchy` has the rows of `order` at `state`, before and after the call.
         """
-        present = _key(state, order)
+        seen = state.measurement
+        active = seen.active if seen is not None and AVOIDANCE in order else -1
+        present = Key(order, active)
         shares = self._shares(present, state.t)
         own, former = shares.pop(present, 0.0), {}
         for key in shares:
@@ -98,11 +100,6 @@ class Blend:
         resolution = resolver.solve(hierarchy, self._memories.get(key))
         self._memories[key] = resolution.memory
         return resolution
-
-
-def _key(state: State, order: tuple[str, ...]) -> Key:
-    seen = state.measurement
-    return Key(order, seen.active) if seen is not None and AVOIDANCE in order else Key(order)
 
 
 def _rows(stack: Stack, state: State, key: Key) -> Hierarchy:

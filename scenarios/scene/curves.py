@@ -1,19 +1,14 @@
 """Curves of a run, sampled at the frames that are shown."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 from scenarios.recording import listed
-
-if TYPE_CHECKING:
-    from scenarios.recording.recording import Recording
+from scenarios.recording.recording import Recording
 
 _ERRORS = {"m": ", positions", "deg": ", directions", "rad": ", joints", "": "",
            "N s": ", linear momentum", "N m s": ", angular momentum"}

@@ -1,11 +1,8 @@
 """What is drawn of a run: arm, obstacles, paths, cone, stack and curves, as arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import radians
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,35 +16,11 @@ from scenarios.cell.sensors.sensor import make_obstacles, packed_laws
 from scenarios.recording import listed
 from scenarios.recording.facts import RobotFacts, ends
 from scenarios.recording.fate import Fate, Levels, levels_at
+from scenarios.recording.recording import Recording
 from scenarios.scene.curves import Areas, Series, marks_of, series
 from scenarios.scene.pushes import Pushes, pushes
 
-if TYPE_CHECKING:
-    from scenarios.config import Scenario
-    from scenarios.recording.recording import Recording
-
 SEPARATION = "separation"  # the task that keeps all points away from all obstacles
-
-
-@dataclass(frozen=True)
-class Stage:
-    """What does not change during a run.
-
-    robot: its tree, links, points and floor; areas: (symbol, radius [m]) of the thresholds
-    around an obstacle for control points; axis (3,) of the cone of half_angle [rad] for the end
-    effector's z axis, or None.
-    """
-
-    robot: RobotFacts
-    obstacles: Obstacles
-    areas: Areas
-    axis: Array | None
-    half_angle: float
-
-    @property
-    def azimuth(self) -> float:
-        """Direction [rad] of the view: a robot that branches is seen from the front, along -x."""
-        return radians(135.0 if self.robot.is_chain else 40.0)
 
 
 @dataclass(frozen=True)
@@ -71,13 +44,17 @@ class Scene:
         the scenario's geometry even with a camera; NaN and infinite without obstacles.
     active (F,) : the point that the stack keeps away from an obstacle, or -1; under the task
         `separation` the nearest point, in ticks in which one of its rows acts.
-    centres (F, H, 3) : of `stage.obstacles`, which has shape, size and rotation.
+    centres (F, H, 3) : of `obstacles`, which has shape, size and rotation.
     axis (F, 3) : the end effector's z axis. desired (F, 3) : its path, or None.
     order (F,) : index into `orders`, which name tasks. switches (S,) : times of changes of it.
-    paths : of the points that listed tasks move. levels, pushes : see scenarios.scene.
+    paths : of the points that listed tasks move. levels, pushes : see their classes.
     """
 
-    stage: Stage
+    robot: RobotFacts
+    obstacles: Obstacles
+    areas: Areas  # (symbol, radius) of the thresholds around an obstacle for control points
+    cone: Array | None  # its axis (3,), for the end effector's z axis
+    half_angle: float  # [rad] of the cone
     t: Array
     ticks: NDArray[np.int64]
     placements: Array
@@ -97,6 +74,11 @@ class Scene:
     pushes: Pushes | None = None
 
     @property
+    def azimuth(self) -> float:
+        """Direction [rad] of the view: a robot that branches is seen from the front, along -x."""
+        return radians(135.0 if self.robot.is_chain else 40.0)
+
+    @property
     def traced(self) -> Array:
         """The path of the end effector: (F, 3) [m]."""
         return np.asarray(self.points[:, -1])
@@ -104,7 +86,7 @@ class Scene:
     @property
     def links(self) -> Array:
         """Start and end of each capsule of the arm in the world: (F, C, 2, 3) [m]."""
-        return ends(self.stage.robot.capsules, self.placements)
+        return ends(self.robot.capsules, self.placements)
 
     @property
     def linked(self) -> NDArray[np.int64]:
@@ -112,43 +94,35 @@ class Scene:
         return np.where(self.active >= 0, self.active, self.distance.argmin(axis=1))
 
 
-def stage(robot: RobotFacts, scenario: Scenario) -> Stage:
-    """Return what is drawn of a scenario before it runs."""
-    avoidance, pointing = scenario.avoidance, scenario.pointing
-    axis = None if pointing is None else np.asarray(pointing.axis) / np.linalg.norm(pointing.axis)
-    return Stage(robot, make_obstacles(avoidance.placed if avoidance else ()),
-                 marks_of(avoidance.thresholds if avoidance else {}),
-                 axis, radians(pointing.alpha_d) if pointing else 0.0)
-
-
-def scene(recording: Recording, rate: float = 30.0) -> Scene:
-    """Return what is drawn of a run at `rate` frames per second.
+def scene(recording: Recording, rate: float = 30.0,
+          ticks: NDArray[np.int64] | None = None) -> Scene:
+    """Return what is drawn of a run at `rate` frames per second, or in the given ticks.
 
     Raises HierarchyError if nothing was recorded or `rate` is not positive and finite.
     """
     positive("rate [Hz]", rate)
-    ticks = _frames(recording, rate)
-    fixed, t = stage(recording.facts.robot, recording.scenario), recording["t"][ticks]
-    order = recording["order"].astype(np.int64)
-    moved = frames_at(fixed, recording, ticks)
+    ticks = _frames(recording, rate) if ticks is None else ticks
+    t, scenario, facts = recording["t"][ticks], recording.scenario, recording.facts
+    robot, avoidance, pointing = facts.robot, scenario.avoidance, scenario.pointing
+    cone = None if pointing is None else np.asarray(pointing.axis) / np.linalg.norm(pointing.axis)
+    obstacles = make_obstacles(avoidance.placed if avoidance else ())
+    placements = robot.placements(_joints(recording)[ticks])
+    z = placements[:, robot.points[-1].joint, :9].reshape(-1, 3, 3).swapaxes(1, 2) @ np.array(
+        robot.tool)[:, 2]
+    moved = _distances(obstacles, recording, ticks, placements)
     levels = levels_at(recording, ticks)
-    return Scene(fixed, t, ticks, **moved,
-                 active=_active(recording, ticks, levels, moved["distance"]),
+    pushed = pushes(facts, scenario, t, placements, recording["planned_force"][ticks],
+                    recording["com"][ticks] if "com" in recording else None
+                    ) if facts.contacts else None
+    return Scene(robot, obstacles, marks_of(avoidance.thresholds if avoidance else {}), cone,
+                 radians(pointing.alpha_d) if pointing else 0.0, t, ticks, placements, **moved,
+                 active=_active(recording, ticks, levels, moved["distance"]), axis=z,
                  desired=recording["desired_position"][ticks]
                  if "desired_position" in recording else None,
-                 order=order[ticks], orders=recording.order_names,
+                 order=recording["order"].astype(np.int64)[ticks], orders=recording.order_names,
                  paths=tuple(moved_by_tasks(recording, ticks)), levels=levels,
                  series=tuple(series(recording, ticks)),
-                 switches=recording["t"][recording.switches()],
-                 pushes=_pushes(recording, ticks, moved["placements"]))
-
-
-def _pushes(recording: Recording, ticks: NDArray[np.int64], placements: Array) -> Pushes | None:
-    if not recording.facts.contacts:
-        return None
-    com = recording["com"][ticks] if "com" in recording else None
-    return pushes(recording.facts, recording.scenario, recording["t"][ticks], placements,
-                  recording["planned_force"][ticks], com)
+                 switches=recording["t"][recording.switches()], pushes=pushed)
 
 
 def _frames(recording: Recording, rate: float) -> NDArray[np.int64]:
@@ -167,33 +141,25 @@ def _joints(recording: Recording) -> Array:
     return np.asarray(recording["true_q" if "true_q" in recording else "q"])
 
 
-def frames_at(fixed: Stage, recording: Recording, ticks: NDArray[np.int64]) -> dict[str, Array]:
-    """Return what follows from the joints at each tick, as in `Scene` and by its names."""
-    placements = fixed.robot.placements(_joints(recording)[ticks])
-    tip = fixed.robot.points[-1].joint
-    z = placements[:, tip, :9].reshape(-1, 3, 3).swapaxes(1, 2) @ np.array(fixed.robot.tool)[:, 2]
-    return {"placements": placements, "axis": z,
-            **_distances(fixed, recording, ticks, placements)}
-
-
-def _distances(fixed: Stage, recording: Recording, ticks: NDArray[np.int64],
+def _distances(obstacles: Obstacles, recording: Recording, ticks: NDArray[np.int64],
                placements: Array) -> dict[str, Array]:
     """Return points, distances, nearest points and the obstacles' centres, frame by frame."""
-    seen, now = Measurement(len(fixed.robot.points) - 1), np.empty(placements.shape[1:])
-    measure = bind(measure_exactly, now, np.array([point.joint for point in fixed.robot.points]),
-                   np.array([point.offset for point in fixed.robot.points]),
-                   fixed.obstacles.table, packed_laws(), np.zeros(2), seen.arrays)
+    points = recording.facts.robot.points
+    seen, now = Measurement(len(points) - 1), np.empty(placements.shape[1:])
+    measure = bind(measure_exactly, now, np.array([point.joint for point in points]),
+                   np.array([point.offset for point in points]), obstacles.table, packed_laws(),
+                   np.zeros(2), seen.arrays)
     frames = []
     offsets = recording.get("obstacle_offset", np.empty((recording.ticks, 0, 3)))
     for k, placed in zip(ticks.tolist(), placements, strict=True):
         now[:] = placed
-        fixed.obstacles.at(float(recording["t"][k]))
+        obstacles.at(float(recording["t"][k]))
         for h, offset in enumerate(offsets[k]):
-            fixed.obstacles.shift(h, offset)
+            obstacles.shift(h, offset)
         measure()
         away = np.where(np.isfinite(seen.distance), seen.distance, np.nan)[:, None]
         frames.append((seen.points.copy(), seen.points - away * seen.direction,
-                       seen.distance.copy(), fixed.obstacles.centres.copy()))
+                       seen.distance.copy(), obstacles.centres.copy()))
     return dict(zip(("points", "nearest", "distance", "centres"),
                     map(np.array, zip(*frames, strict=True)), strict=True))
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hierarchy.problem import Array
+from scenarios.config import Scenario
 from scenarios.config.sections.plant import PushSection
 from scenarios.recording.facts import ContactPoint, Facts, RobotFacts, placed_points
-
-if TYPE_CHECKING:
-    from scenarios.config import Scenario
 
 _LENGTH = 0.002   # [m] of an arrow per newton
 _CONE = 0.05      # [m] height of a friction cone

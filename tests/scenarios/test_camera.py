@@ -8,7 +8,7 @@ from scene import TURN, deproject, distance
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacle, Obstacles
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, looking_at
-from scenarios.config.sections.sensor import CameraSection, DepthErrors
+from scenarios.config.sections.sensor import CameraSection
 
 STATE = State.at(Robot.named("kuka_lwr"), [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
 SMALL = {"width": 80, "height": 60, "fx": 70.0, "fy": 65.0}
@@ -84,7 +84,7 @@ def test_rounding_is_to_steps_of_the_depth_or_of_its_inverse_and_bounded(roundin
     steps = seen[seen > 0] / step if rounding == "step" else 1.0 / seen[seen > 0] / step
     np.testing.assert_allclose(steps, np.rint(steps), atol=2e-3)
     assert len(np.unique(seen)) > 3
-    assert all(abs(a - z) <= bound(DepthErrors(**errors), z) + 1e-6
+    assert all(abs(a - z) <= bound(CameraSection(kind="camera", **errors), z) + 1e-6
                for a, z in zip(seen[true > 0], true[true > 0], strict=True))
 
 
@@ -95,7 +95,7 @@ def test_noise_has_the_stated_size_and_a_bound(depth):
     sigma = 1.2e-3 + 1.9e-3 * (depth - 0.4) ** 2
     assert abs(off.mean()) < 0.05 * sigma
     assert off.std() == pytest.approx(sigma, rel=0.05)
-    largest = bound(DepthErrors(**errors), depth)
+    largest = bound(CameraSection(kind="camera", **errors), depth)
     assert np.abs(off).max() - 1e-6 <= largest == pytest.approx(3.5 * sigma)
 
 

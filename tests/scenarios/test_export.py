@@ -14,7 +14,7 @@ from hierarchy.avoidance import Obstacle
 from scenarios import load, save, simulate
 from scenarios.export import export, foxglove
 from scenarios.recording.recording import Event
-from scenarios.scene import scene
+from scenarios.scene.drawn import scene
 
 
 @pytest.fixture(scope="module")

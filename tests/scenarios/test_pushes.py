@@ -15,7 +15,7 @@ from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
 from scenarios.recording.facts import ContactPoint, facts_of
 from scenarios.recording.fate import Fate, levels_at
-from scenarios.scene import scene
+from scenarios.scene.drawn import scene
 from scenarios.scene.pushes import pushes
 
 STANDING = load("stand-push")

@@ -20,7 +20,7 @@ from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
 from scenarios.results.page import comparison_page as page
 from scenarios.results.page import run_command
-from scenarios.scene import scene
+from scenarios.scene.drawn import scene
 
 LETTER = "tpm-published"
 TURNED = [[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]]

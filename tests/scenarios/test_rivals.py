@@ -91,7 +91,7 @@ def at_the_start(scenario):
 
 def test_in_the_null_space_avoidance_is_never_in_the_stack():
     cell, _ = at_the_start(load("ellipse-nullspace"))
-    assert set(cell.order.possible) == {("position",), ("position", "pointing")}
+    assert set(cell.orders) == {("position",), ("position", "pointing")}
     assert isinstance(cell.stack.reference, CumulatedRepulsion)
     assert (len(cell.stack.reference.points), cell.stack.reference.within) == (8, 0.15)
 

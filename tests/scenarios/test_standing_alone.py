@@ -16,7 +16,7 @@ from scenarios import load, load_run, save, simulate
 from scenarios.cell.robot import make_robot
 from scenarios.draw.replay import html
 from scenarios.recording.fate import Fate
-from scenarios.scene import scene
+from scenarios.scene.drawn import scene
 
 LIMIT = '<limit lower="-2.5" upper="2.5" effort="50" velocity="3"/>'
 ARM = urdf(

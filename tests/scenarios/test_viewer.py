@@ -21,7 +21,7 @@ from scenarios.draw.replay import NOTHING, html
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.live_page import LivePage
 from scenarios.draw.viewer.server import is_own, served
-from scenarios.scene import scene
+from scenarios.scene.drawn import scene
 
 LIMITED = load("ellipse-limits", ["control.duration=0.6"])
 

@@ -85,11 +85,9 @@ class PhysicsArm:
         self._follow = bind(
             _follow, self._command, self.q, self._servo,
             _Reference(self.reference_q, self.reference_v, self.a, self._references))
-        self._contacts = np.zeros((), dtype=np.int16)
-        self._depth, self._force = np.zeros(()), np.zeros(())
         self.extra: dict[str, NDArray[Any]] = {
-            "contacts": self._contacts, "contact_depth": self._depth,
-            "contact_force": self._force}
+            "contacts": np.zeros((), np.int16), "contact_depth": np.zeros(()),
+            "contact_force": np.zeros(())}
         self._place(0.0)
         mujoco.mj_forward(self.model, self.data)
 
@@ -97,7 +95,8 @@ class PhysicsArm:
         """Apply a command (n,) for one period."""
         self._command[:] = command
         self._follow()
-        self._contacts[...], self._depth[...], self._force[...] = 0, 0.0, 0.0
+        for most in self.extra.values():
+            most[...] = 0
         dt = self._period / self._steps
         for i, reference in enumerate(self._references):
             self._place(self._time + i * dt)
@@ -130,12 +129,12 @@ class PhysicsArm:
 
     def _look_at_contacts(self) -> None:
         """Record the contacts of one step; all are between the arm and an obstacle."""
-        contacts = self.data.contact
-        self._contacts[...] = max(int(self._contacts), len(contacts))
-        self._depth[...] = max(float(self._depth), -float(contacts.dist.min()))
+        contacts, (count, depth, force) = self.data.contact, self.extra.values()
+        count[...] = max(int(count), len(contacts))
+        depth[...] = max(float(depth), -float(contacts.dist.min()))
         for i in range(len(contacts)):
             self._force_of(self.model, self.data, i, self._wrench)
-            self._force[...] = max(float(self._force), float(self._wrench[0]))
+            force[...] = max(float(force), float(self._wrench[0]))
 
 
 def mujoco_module() -> Any:

@@ -13,14 +13,9 @@ from hierarchy.avoidance.body import pack_capsules, pack_points
 from hierarchy.jit import bind
 from hierarchy.problem import Array
 from scenarios.cell.robot import on_column
+from scenarios.cell.sensors import pixels
 from scenarios.cell.sensors.camera import DepthCamera, Image, Pinhole, RecordedFrames, looking_at
-from scenarios.cell.sensors.pixels import (
-    ObstacleImage,
-    Space,
-    farthest,
-    find_obstacles,
-    measure_pixels,
-)
+from scenarios.cell.sensors.pixels import ObstacleImage, Space
 from scenarios.cell.sensors.rendering import draw_robot
 from scenarios.cell.sensors.sensor import Asked, ExactDistances, packed_laws
 from scenarios.config.sections.sensor import CameraSection, FramesSection, ImageSection
@@ -72,17 +67,18 @@ class DepthSpace:
         """
         section = self._section
         draw_robot(self._robot, self._eye, placements, self._links, self._capsules, section.margin)
-        beyond = farthest(placements, self._space.joints, self._space.offsets, self._eye)
-        return float(find_obstacles(reading, self._robot, section.support, section.band,
-                                    beyond + self.region + _ON_ITS_WAY, into.depth, into.tiles))
+        beyond = pixels.farthest(placements, self._space.joints, self._space.offsets, self._eye)
+        return float(pixels.find_obstacles(
+            reading, self._robot, section.support, section.band,
+            beyond + self.region + _ON_ITS_WAY, into.depth, into.tiles))
 
     def measure(self, obstacles: ObstacleImage, placements: Array) -> Measurement:
         """Measure the points of the robot at its current placements; valid until the next call."""
         seen = self.measurement
         if obstacles is not self._image or placements is not self._placements:
             self._image, self._placements = obstacles, placements
-            self._measure = bind(measure_pixels, placements, self._space, obstacles, seen.arrays,
-                                 self._pairs.table)
+            self._measure = bind(pixels.measure_pixels, placements, self._space, obstacles,
+                                 seen.arrays, self._pairs.table)
         seen.active = self._measure()
         return seen
 

@@ -11,7 +11,7 @@ from scenarios.config.sections.avoidance import (
     BarrierSection,
     SeparationSection,
 )
-from scenarios.config.sections.robot import ControlPointSection
+from scenarios.config.sections.robot import RobotPointSection
 from scenarios.config.sections.tasks import LimitsSection, Made, PointingTask
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
@@ -123,20 +123,18 @@ def unfit(control: ControlSection, limits: LimitsSection | None,
 
     `tasks` has the sections of tasks by their dotted keys.
     """
-    section = avoidance if isinstance(avoidance, SeparationSection) else None
+    apart: dict[str, Any] = {"avoidance": avoidance} if isinstance(
+        avoidance, SeparationSection) else {}
     pointing = {key: task for key, task in tasks.items() if isinstance(task, PointingTask)}
     if control.stack in RIVALS:
         yield from _unfit_control(control, limits)
     if control.stack == "smooth":
-        yield from _unfit_buffers(section, pointing, {
+        yield from _unfit_buffers(pointing, apart | {
             key: task for key, task in tasks.items() if isinstance(task, BarrierSection)})
         return
     if control.stack == "set-based":
-        yield from _unused(section, tasks)
-    buffered: dict[str, PointingTask | SeparationSection] = {**pointing}
-    if section:
-        buffered["avoidance"] = section
-    for key, one in buffered.items():
+        yield from _unused(tasks, apart)
+    for key, one in {**pointing, **apart}.items():
         if one.buffer is not None:
             yield (f'{key}.buffer = {one.buffer:g} goes with control.stack = "smooth", got '
                    f'"{control.stack}"')
@@ -155,14 +153,14 @@ def _unfit_control(control: ControlSection, limits: LimitsSection | None) -> Ite
         yield f"control.strictness = true does not go with {kind}"
 
 
-def _unused(section: SeparationSection | None, tasks: Mapping[str, Made]) -> Iterator[str]:
+def _unused(tasks: Mapping[str, Made], apart: Mapping[str, Any]) -> Iterator[str]:
     """Yield the keys of pushing back that are set: a set-based task is frozen; or what gives."""
     for where, task in tasks.items():
         if not task.one_sided and (give := getattr(task, "give", 0.0)):
             yield (f'{where}.give = {give:g} does not go with control.stack = "set-based": an '
                    "equality that gives has two sides")
     frozen = {key: task for key, task in tasks.items() if task.one_sided}
-    for where, one in {**({"avoidance": section} if section else {}), **frozen}.items():
+    for where, one in {**apart, **frozen}.items():
         for key in _PUSHES:
             field = type(one).model_fields.get(key)
             if field is not None and (value := getattr(one, key)) != field.default:
@@ -170,9 +168,9 @@ def _unused(section: SeparationSection | None, tasks: Mapping[str, Made]) -> Ite
                        "task is frozen, not pushed")
 
 
-def _unfit_buffers(section: SeparationSection | None, pointing: Mapping[str, PointingTask],
+def _unfit_buffers(pointing: Mapping[str, PointingTask],
                    apart: Mapping[str, BarrierSection]) -> Iterator[str]:
-    """Yield the buffers that are missing, not used, or too wide; `apart` has that of `section`."""
+    """Yield the buffers that are missing, not used, or too wide; `apart` are in [avoidance]'s."""
     lacks = 'control.stack = "smooth" needs {}.buffer, in which an inequality comes into effect'
     for where, task in pointing.items():
         if task.rows == "equality" and task.buffer is not None:
@@ -182,8 +180,8 @@ def _unfit_buffers(section: SeparationSection | None, pointing: Mapping[str, Poi
         if task.rows == "inequality" and (task.buffer or 0.0) > task.alpha_d:
             yield (f"{where}.buffer = {task.buffer:g} deg is wider than {where}.alpha_d = "
                    f"{task.alpha_d:g} deg")
-    buffer = section.buffer if section else None
-    for where, one in {**({"avoidance": section} if section else {}), **apart}.items():
+    buffer = getattr(apart.get("avoidance"), "buffer", None)
+    for where, one in apart.items():
         widest = max(one.distance, getattr(one, "self_collision", None) or 0.0)
         if buffer is None:
             yield lacks.format("avoidance")
@@ -210,7 +208,7 @@ class FaultSection(keys.Section):
                     "inaccurate"] | None = None  #: What the resolver reports.
     takes: keys.Span | None = None  #: Time that a tick takes longer.
     centre: keys.Point | None = None  #: Middle of the sphere.
-    place: ControlPointSection | None = None  #: Point of the body, in place of `centre`.
+    place: RobotPointSection | None = None  #: Point of the robot, in place of `centre`.
     radius: keys.Length | None = None  #: Radius of the sphere.
 
     def _wrong(self) -> Iterator[str]:

@@ -68,22 +68,17 @@ class ListedOrientation(_Turned, base.TaskSection):
     """The axes of a frame, wherever it is (3 rows)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:Orientation"
-
-    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
-        """Yield the angle [deg]."""
-        yield "deg", np.degrees(np.linalg.norm(error, axis=1))
+    shown: ClassVar[dict[str, slice]] = {"deg": slice(None)}
 
 
 class _AlongPose(_Turned, base.AlongSection):
     """The position and the rotation of a frame (6 rows)."""
 
+    shown: ClassVar[dict[str, slice]] = base.POSE
+
     def asked(self, at: References) -> dict[str, Any]:
         """Return the path of the frame, and its rotation."""
         return super().asked(at) | {"path": self.along(at.start.position(at.frame(self.frame)))}
-
-    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
-        """Yield the error of the position and of the rotation."""
-        return base.of_pose(error)
 
 
 @register("tasks", "pose", shipped=True)
@@ -92,16 +87,16 @@ class ListedPose(_AlongPose):
 
     made_by: ClassVar[str] = "hierarchy.tasks:Pose"
 
-    def wanted(self, position: Array, error: Array) -> Array | None:
-        """Return where the task wants the point."""
-        return np.asarray(position + error[..., :3])
-
 
 @register("tasks", "frame", shipped=True)
 class ListedFrame(_AlongPose):
     """As `pose`, with the error log(T^-1 T_d) of SE(3) in the axes of `frame` (6 rows)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:FrameLog"
+
+    def wanted(self, position: Array, error: Array) -> Array | None:
+        """Return None: its error is in axes that turn."""
+        return None
 
 
 @register("tasks", "pointing", shipped=True)
@@ -133,6 +128,7 @@ class ListedRelative(base.Listed, base.TaskSection):
     """The pose of a frame in another one (6 rows, or 3)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:RelativePose"
+    shown: ClassVar[dict[str, slice]] = base.POSE
     frame: str  #: Frame of the robot.
     to: str  #: The other frame.
     position: keys.Point | None = None
@@ -153,10 +149,6 @@ class ListedRelative(base.Listed, base.TaskSection):
                     else self.position)
         rotation = axes @ start.rotation(frame) if self.rotation is None else self.rotation
         return {"position": position, "rotation": rotation if self.orientation else None}
-
-    def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
-        """Yield the error of the position and of the rotation."""
-        return base.of_pose(error) if self.orientation else super().sizes(error)
 
 
 @register("tasks", "manipulability", shipped=True)
@@ -206,12 +198,7 @@ class ListedCentreOfMass(base.Listed, base.AlongSection):
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the path and the numbers of the axes."""
-        return {"path": self.along(at.start.centre_of_mass()),
-                "axes": tuple("xyz".index(axis) for axis in self.axes)}
-
-    def wanted(self, position: Array, error: Array) -> Array | None:
-        """Return where the task wants the centre of mass."""
-        return base.wanted_along(self.axes, position, error)
+        return {"path": self.along(at.start.centre_of_mass()), "axes": self.numbers}
 
 
 @register("tasks", "momentum", shipped=True)

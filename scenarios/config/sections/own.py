@@ -53,13 +53,14 @@ class PartSection(Section):
 class OwnSection(PartSection):
     """A section whose kind and keys are those of a plugin; `of` adds the keys.
 
-    `unit` is that of a task's error, as the plugin's class says.
+    `unit` is that of a task's error and `rows` their kind, as the plugin's class says.
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
     group: ClassVar[Group]
     maker: ClassVar[Maker]
     unit: ClassVar[str] = ""
+    rows: ClassVar[str] = "equality"
     kind: str  #: Which kind it is.
 
     @classmethod
@@ -79,6 +80,7 @@ class OwnSection(PartSection):
         made = create_model(cls.__name__, __base__=cls, __doc__=maker.__doc__ or cls.__doc__,
                             **fields)
         made.maker, made.unit = maker, str(getattr(maker, "unit", ""))
+        made.rows = str(getattr(maker, "kind", "equality"))
         return made
 
     def __reduce__(self) -> Any:  # a class that was made has no module to be unpickled from

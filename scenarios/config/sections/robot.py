@@ -9,13 +9,6 @@ from hierarchy.robots.table import Base
 from scenarios.config import sections as keys
 
 
-class ControlPointSection(keys.Section):
-    """A point on the body of a joint."""
-
-    joint: str  #: Joint that moves the body.
-    offset: keys.Point  #: Where the point is in the joint's frame.
-
-
 class RobotPointSection(keys.Section):
     """A point of a joint's body or of a frame."""
 

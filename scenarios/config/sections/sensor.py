@@ -66,8 +66,9 @@ class ImageSection(AnySensor):
     band: keys.Distance = 0.05  #: Difference in depth within which they do.
 
 
-class DepthErrors(keys.Section):
-    """Errors of a depth reading z of a simulated camera; the defaults resemble a Kinect."""
+@register("sensors", "camera", shipped=True)
+class CameraSection(ImageSection):
+    """A simulated depth camera; the defaults resemble a Kinect."""
 
     noise_floor: keys.Distance = 1.2e-3
     """Standard deviation of the noise of z at `noise_from`, clipped at 3.5 of them."""
@@ -77,13 +78,27 @@ class DepthErrors(keys.Section):
     """Rounds z ("step") or 1 / z ("disparity") to multiples of `step`."""
     step: keys.NotNegative = 2.85e-3  #: In [m], or [1/m] of a disparity; 0 for none.
     near: keys.Distance = 0.5  #: Depth below which readings are missing.
-    far: Annotated[float, Field(strict=True, gt=0.0), keys.Unit("m")] = 5.0
-    """Depth above which readings are missing."""
+    far: keys.Length = 5.0  #: Depth above which readings are missing.
     missing: keys.Share = 0.002  #: Probability of a missing reading.
     missing_at_edges: keys.Share = 0.3  #: The same beside a step in depth of 5 cm.
     outliers: keys.Share = 0.02  #: Probability of a square with a random, smaller depth in a frame.
     ideal: keys.Flag = False  #: Whether readings have no errors.
     outlier_size: keys.Count = 2  #: Largest half side of that square, in pixels.
+    width: Pixels = 640  #: Columns of the image.
+    height: Pixels = 480  #: Rows of the image.
+    fx: Focal = 525.0  #: Focal length, horizontally.
+    fy: Focal = 525.0  #: Focal length, vertically.
+    cx: Middle | None = None  #: Column of the optical axis, by default the middle one.
+    cy: Middle | None = None  #: Row of the optical axis, by default the middle one.
+    position: keys.Point = (0.0, 2.0, 0.7)  #: Where the camera is.
+    look_at: keys.Point = (0.0, 0.3, 0.1)  #: Point that it looks at.
+    rotation: keys.Rows3 | None = None
+    """In place of `look_at`: rows of the matrix from camera (right, down, forward) to world."""
+    rate: keys.Frequency = 30.0  #: Frames per second.
+    jitter: keys.Time = 0.0  #: Largest random shift of a frame; below 1 / rate.
+    seed: keys.Count = 0  #: Seed of errors and jitter.
+    point_radius: keys.Distance = 0.02  #: Radius at which obstacles that are points are seen.
+    backdrop: keys.Distance = 4.0  #: Depth of a wall behind everything, 0 for none.
 
     def _wrong(self) -> Iterator[str]:
         if self.near >= self.far:
@@ -111,28 +126,6 @@ class DepthErrors(keys.Section):
         behind = float(reading[v, u]) or self.far
         reading[max(v - half, 0):v + half + 1, max(u - half, 0):u + half + 1] = (
             rng.uniform(self.near, behind) if np.isfinite(behind) else self.near)
-
-
-@register("sensors", "camera", shipped=True)
-class CameraSection(DepthErrors, ImageSection):
-    """A simulated depth camera; the defaults resemble a Kinect."""
-
-    width: Pixels = 640  #: Columns of the image.
-    height: Pixels = 480  #: Rows of the image.
-    fx: Focal = 525.0  #: Focal length, horizontally.
-    fy: Focal = 525.0  #: Focal length, vertically.
-    cx: Middle | None = None  #: Column of the optical axis, by default the middle one.
-    cy: Middle | None = None  #: Row of the optical axis, by default the middle one.
-    position: keys.Point = (0.0, 2.0, 0.7)  #: Where the camera is.
-    look_at: keys.Point = (0.0, 0.3, 0.1)  #: Point that it looks at.
-    rotation: keys.Rows3 | None = None
-    """In place of `look_at`: rows of the matrix from camera (right, down, forward) to world."""
-    rate: keys.Frequency = 30.0  #: Frames per second.
-    jitter: keys.Time = 0.0  #: Largest random shift of a frame; below 1 / rate.
-    seed: keys.Count = 0  #: Seed of errors and jitter.
-    far: keys.Length = 5.0  #: Depth above which readings are missing.
-    point_radius: keys.Distance = 0.02  #: Radius at which obstacles that are points are seen.
-    backdrop: keys.Distance = 4.0  #: Depth of a wall behind everything, 0 for none.
 
 
 @register("sensors", "frames", shipped=True)

@@ -33,12 +33,13 @@ Axes = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
 class Made(PartSection):
     """What every section of a task has: a title, and the task that it makes.
 
-    `unit` is that of its error, "m", "rad" or ""; `of_forces` says that its rows are over contact
-    forces, at level "torque".
+    `unit` is that of its error, "m", "rad" or "", and `shown` has the rows that are shown in
+    another one; `of_forces` says that its rows are over contact forces, at level "torque".
     """
 
     title: ClassVar[str]
     unit: ClassVar[str] = "m"
+    shown: ClassVar[dict[str, slice]] = {}
     of_forces: ClassVar[bool] = False
 
     @property
@@ -58,9 +59,12 @@ class Made(PartSection):
         return {}
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
-        """Yield unit and size (T,) of the errors (T, m) of the task."""
+        """Yield unit and size (T,) of the errors (T, m) of the task, or of each part of them."""
         missed = np.maximum(error, 0.0) if self.one_sided else error
-        yield self.unit, np.linalg.norm(missed, axis=1)
+        for unit, rows in (self.shown or {self.unit: slice(None)}).items():
+            if (part := missed[:, rows]).shape[1]:
+                size = np.linalg.norm(part, axis=1)
+                yield unit, np.degrees(size) if unit == "deg" else size
 
     def wanted(self, position: Array, error: Array) -> Array | None:
         """Return where the task wants the point (..., 3) [m] that it moves, None if it is silent.
@@ -97,18 +101,19 @@ class AlongSection(TaskSection):
         path, shift = self.path.make(), offset + here * self.from_start
         return Shifted(path, shift.tolist()) if shift.any() else path
 
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The numbers of the axes of the world that count, from 0: all, or those of its `axes`."""
+        return tuple("xyz".index(axis) for axis in getattr(self, "axes", "xyz"))
 
-def wanted_along(axes: str, position: Array, error: Array) -> Array:
-    """Return where a task wants a point (..., 3) [m] from its errors (..., k) along k axes."""
-    goal = position.copy()
-    goal[..., ["xyz".index(axis) for axis in axes]] += error
-    return goal
+    def wanted(self, position: Array, error: Array) -> Array | None:
+        """Return where the task wants the point."""
+        goal = position.copy()
+        goal[..., self.numbers] += error[..., :len(self.numbers)]
+        return goal
 
 
-def of_pose(error: Array) -> Iterator[tuple[str, Array]]:
-    """Yield the sizes (T,) of errors (T, 6), of position [m] and of rotation [deg]."""
-    yield "m", np.linalg.norm(error[:, :3], axis=1)
-    yield "deg", np.degrees(np.linalg.norm(error[:, 3:], axis=1))
+POSE = {"m": slice(3), "deg": slice(3, None)}  # rows of the errors of position and rotation
 
 
 class PositionTask(AlongSection):
@@ -125,16 +130,12 @@ class PositionTask(AlongSection):
         task = super().make(at, **more)
         assert isinstance(task, Position)
         return task if self.axes == "xyz" else Along(
-            task, np.eye(3)[["xyz".index(axis) for axis in self.axes]].tolist(), self.title)
+            task, np.eye(3)[list(self.numbers)].tolist(), self.title)
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the frame and its path."""
         frame = at.frame(self.frame)
         return {"frame": frame, "path": self.along(at.start.position(frame))}
-
-    def wanted(self, position: Array, error: Array) -> Array | None:
-        """Return where the task wants the point."""
-        return wanted_along(self.axes, position, error)
 
 
 class PointingTask(TaskSection):
@@ -264,11 +265,6 @@ class OwnTask(Listed, OwnSection):
 
     group: ClassVar[Group] = "tasks"
     unit: ClassVar[str] = ""
-
-    @property
-    def one_sided(self) -> bool:
-        """Whether its rows are inequalities, as the plugin's class says with `kind`."""
-        return str(getattr(type(self).maker, "kind", "equality")) == "inequality"
 
     def make(self, at: References, **more: Any) -> Task:
         """Return the task; raises ScenarioError for whatever goes wrong in the user's code."""

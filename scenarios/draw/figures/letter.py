@@ -116,7 +116,9 @@ def write_all(recordings: Sequence[Recording], folder: Path) -> None:
 def figures(recordings: Sequence[Recording]) -> Iterator[tuple[str, Figure]]:
     """Yield the letter's figures whose runs are there, then the others of one run or of two."""
     alone, shown = len(recordings) == 1, set[str]()
-    usual = EXPERIMENT if all(run.scenario.is_experiment for run in recordings) else SIMULATION
+    # Section IV-B of the letter has physics and sensed distances.
+    usual = SIMULATION if any((run.scenario.plant.kind, run.scenario.sensor.kind) == (
+        "kinematic", "exact") for run in recordings) else EXPERIMENT
     for wanted in usual if alone else (*SIMULATION, *EXPERIMENT):
         runs = [next((run for run in recordings if is_letters(run, of)), None)
                 for _, of in wanted.parts]

@@ -164,21 +164,19 @@ PANELS = (
     Panel("pointing-error", "Pointing error", "cos α_d − cos α", "pointing_error", pointing_error,
           "Above zero the axis is outside the cone; red while the task is in the stack.",
           r"$\cos\alpha_d - \cos\alpha$"),
-)
-TASK_PANELS = (
     Panel("task-errors", "Errors of the tasks, lengths", "mm, logarithmic", "task_error_",
           task_errors, "Each task's own error, whatever its place in the stack.",
           shows=partial(_has_errors, "m")),
     Panel("task-angles", "Errors of the tasks, angles", "°, logarithmic", "task_error_",
           partial(task_errors, unit="deg", scale=1.0), shows=partial(_has_errors, "deg")),
 )
-for _panel in (*PANELS, *TASK_PANELS):
+for _panel in PANELS:
     plugins.register("figures", _panel.name, shipped=True)(_panel)
 _COMPONENTS = Panel("position-components", "Position error of the end effector", "mm",
                     "position_error",
                     partial(columns, signal="position_error", width=0.9,
                             named="xyz".__getitem__, scale=1e3))
-PANEL = {panel.name: panel for panel in (*PANELS, *TASK_PANELS, _COMPONENTS)}
+PANEL = {panel.name: panel for panel in (*PANELS, _COMPONENTS)}
 
 
 def _in_red(ax: Axes, t: Array, y: Array, mask: Array) -> None:

@@ -14,9 +14,9 @@ from hierarchy.avoidance import Obstacle
 from hierarchy.problem import Array
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import ALERT, INK
-from scenarios.recording.facts import RobotFacts
+from scenarios.recording.facts import RobotFacts, ends
 from scenarios.recording.recording import Recording
-from scenarios.scene import Stage, ends, frames_at, moved_by_tasks, stage
+from scenarios.scene.drawn import Scene, moved_by_tasks, scene
 
 _VERTICES = 800
 _OTHER_POSES = 5
@@ -48,9 +48,9 @@ def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str] | No
     if not first.facts.robot.is_chain:
         return _bodies(recordings, chosen)
     fig, (ax,) = drawing.figure(width=4.9, height=3.9)
-    fixed, tick = stage(first.facts.robot, first.scenario), _nearest(first)
-    seen = {name: part[0] for name, part in frames_at(fixed, first, np.array([tick])).items()}
-    _obstacles(ax, first, fixed, seen["centres"], seen["points"][-1])
+    tick = _nearest(first)
+    seen = scene(first, ticks=np.array([tick]))
+    _obstacles(ax, first, seen)
     _arms(ax, first, tick)
     _points(ax, seen, linked=_exact(first))
     for label, colour in reversed(list(chosen.items())):
@@ -79,13 +79,14 @@ def _line(ax: Axes, path: Array, **style: object) -> None:
     ax.plot(*path[:: max(1, len(path) // _VERTICES)].T, **style)  # type: ignore[arg-type]
 
 
-def _obstacles(ax: Axes, recording: Recording, fixed: Stage, centres: Array, tip: Array) -> None:
+def _obstacles(ax: Axes, recording: Recording, seen: Scene) -> None:
     """Draw the obstacles, static ones with their areas, and moving ones that are near the tip."""
     avoidance = recording.scenario.avoidance
     areas = sorted(avoidance.thresholds.values(), reverse=True) if avoidance else []
-    for obstacle, centre in zip(fixed.obstacles.obstacles, centres, strict=True):
+    for obstacle, centre in zip(seen.obstacles.obstacles, seen.centres[0], strict=True):
         balls, radius = hull(obstacle)
-        away = np.linalg.norm(centre - tip) - radius - np.linalg.norm(balls, axis=1).max()
+        away = np.linalg.norm(centre - seen.points[0, -1]) - radius - np.linalg.norm(
+            balls, axis=1).max()
         if obstacle.path is not None and away > _NEAR:
             continue
         ax.plot(*drawing.project(centre), "o", color=ALERT, markersize=5)
@@ -141,14 +142,14 @@ def _arms(ax: Axes, recording: Recording, nearest: int) -> None:
             ax.plot(*chain.T, "o", color=INK, markersize=6)
 
 
-def _points(ax: Axes, seen: Mapping[str, Array], linked: bool) -> None:
+def _points(ax: Axes, seen: Scene, linked: bool) -> None:
     """Draw the control points, and the shortest line to an obstacle, as in figure 3."""
-    body, distance = seen["points"][:-1], seen["distance"][:-1]
+    body, distance = seen.points[0, :-1], seen.distance[0, :-1]
     if len(body):
         ax.plot(*drawing.project(body).T, "o", color=ALERT, markersize=3)
     if linked and np.isfinite(distance).any():
         k = int(np.argmin(distance))
-        ax.plot(*drawing.project(np.array([body[k], seen["nearest"][k]])).T, color=ALERT,
+        ax.plot(*drawing.project(np.array([body[k], seen.nearest[0, k]])).T, color=ALERT,
                 linewidth=1.2)
 
 

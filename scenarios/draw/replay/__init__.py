@@ -16,7 +16,7 @@ from scenarios.measure.happenings import Happening, happened
 from scenarios.measure.verdict import verdict
 from scenarios.recording.fate import PHRASES, Fate
 from scenarios.recording.recording import Recording
-from scenarios.scene import Scene, scene
+from scenarios.scene.drawn import Scene, scene
 from scenarios.scene.pushes import key
 from scenarios.templates import render, resource
 
@@ -49,7 +49,7 @@ def packed(values: NDArray[Any], steps: bool = False) -> dict[str, Any]:
 def run_data(scene: Scene, scenario: Scenario, label: str, look: Look, **more: Any
              ) -> dict[str, Any]:
     """Return one run as the page's script reads it, with what `more` there is to say."""
-    fixed, levels, frames = scene.stage, scene.levels, np.arange(len(scene.t))
+    levels, frames = scene.levels, np.arange(len(scene.t))
     still = bool((scene.centres == scene.centres[:1]).all())
     places = {"links": scene.links, "points": scene.points, "axis": scene.axis,
               "nearest": scene.nearest[frames, scene.linked],
@@ -65,15 +65,15 @@ def run_data(scene: Scene, scenario: Scenario, label: str, look: Look, **more: A
     return {"label": label, **look._asdict(), "scenario": scenario.name, "title": scenario.title,
             "level": scenario.control.level,
             "limited": getattr(scenario, "limits", None) is not None, **more,
-            "radii": [capsule.radius for capsule in fixed.robot.capsules],
+            "radii": [capsule.radius for capsule in scene.robot.capsules],
             "obstacles": [{"shape": obstacle.shape, "size": list(obstacle.size),
                            "rotation": np.asarray(obstacle.rotation, float).ravel().tolist()}
-                          for obstacle in fixed.obstacles.obstacles],
-            "areas": fixed.areas, "floor": fixed.robot.floor, "azimuth": fixed.azimuth,
-            "halfAngle": fixed.half_angle,
-            "wanted": None if fixed.axis is None else fixed.axis.tolist(),
+                          for obstacle in scene.obstacles.obstacles],
+            "areas": scene.areas, "floor": scene.robot.floor, "azimuth": scene.azimuth,
+            "halfAngle": scene.half_angle,
+            "wanted": None if scene.cone is None else scene.cone.tolist(),
             "orders": scene.orders, "tasks": levels.names, "units": levels.units,
-            "joints": fixed.robot.velocity_names,
+            "joints": scene.robot.velocity_names,
             "paths": [{"task": path.task, "actual": packed(path.actual, steps=True),
                        "wanted": None if path.wanted is None else packed(path.wanted, steps=True)}
                       for path in scene.paths],

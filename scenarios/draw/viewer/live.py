@@ -22,7 +22,7 @@ from scenarios.measure.judging import Fates, completed
 from scenarios.measure.run_folder import save
 from scenarios.measure.verdict import verdict
 from scenarios.recording.recording import Recording
-from scenarios.scene import Scene, scene
+from scenarios.scene.drawn import Scene, scene
 
 _HAND = 1.0     # [m/s] greatest speed of a dragged obstacle
 _FARTHEST = 5.0  # [m] greatest distance of dragging
