@@ -331,5 +331,6 @@ _MAKERS: dict[str, Callable[[Random], Levels]] = {
     "sixty_unknowns": _sixty_unknowns, "fifteen_levels": _fifteen_levels,
     "near_ties": _near_ties, "nearly_parallel": _nearly_parallel, "tiny_rows": _tiny_rows,
     "shifted": _shifted, "near_singular_arm": _near_singular_arm, "scaled": _scaled}
-KINDS = tuple(_MAKERS)
-"""The names that `structured` knows."""
+_TEXTS = {name: str(make.__doc__).partition("\n")[0].rstrip(".") for name, make in _MAKERS.items()}
+KINDS = {name: f"{text[0].lower()}{text[1:]}" for name, text in _TEXTS.items()}
+"""What each kind has, by the names that `structured` knows."""
