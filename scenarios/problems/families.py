@@ -84,17 +84,14 @@ def _reference(name: str, seed: int, count: int) -> list[Hierarchy]:
     return [one.h for one in recorded.family(name)[:count]]
 
 
-def _kind(name: str, seed: int, count: int) -> list[Hierarchy]:
-    return [problems.structured(seed * _STRIDE + i, (name,)) for i in range(count)]
-
-
 def _other(name: str, seed: int, count: int) -> list[Hierarchy]:
     make = {"of-soth": made.of_soth, "of-lexls": made.of_lexls, "of-daqp": made.of_daqp}[name]
     return [make(np.random.default_rng([seed, i])) for i in range(count)]
 
 
-def _recipe(name: str, seed: int, count: int) -> list[Hierarchy]:
-    return [problems.generate(seed * _STRIDE + i) for i in range(count)]
+def _generated(name: str, seed: int, count: int) -> list[Hierarchy]:
+    return [problems.generate(one) if name == "recipe" else problems.structured(one, (name,))
+            for one in range(seed * _STRIDE, seed * _STRIDE + count)]
 
 
 _REFERENCE = {
@@ -130,9 +127,9 @@ FAMILIES = {name: Family(
     _FEW if name in _SIMULATED else _CONSECUTIVE if group == "recorded" else COUNT)
     for group, make, named in (
         ("reference", _reference, _REFERENCE), ("recorded", recorded.recorded, recorded.SCENARIOS),
-        ("postures", made.posed, _POSTURES), ("degenerate", _kind, problems.KINDS),
+        ("postures", made.posed, _POSTURES), ("degenerate", _generated, problems.KINDS),
         ("others", _other, _OTHERS), ("others", made.of_examples, _EXAMPLES),
-        ("random", _recipe, {"recipe": "random sizes, ranks, ties, scales"}))
+        ("random", _generated, {"recipe": "random sizes, ranks, ties, scales"}))
     for name, what in named.items()}
 """The families by name."""
 _NEEDS = {**dict.fromkeys(("singular-panda", "singular-romeo"),
