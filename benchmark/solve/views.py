@@ -35,6 +35,7 @@ _ANSWERS = (Column("asked", "asked", whole), Column("right", "right", percent),
 _QUALITY = (Column("miss", "absolute", power), Column("relative", "relative", power),
             Column("moved", "moved", power), Column("same", "same", report.yes),
             Column("rough", "rough"), Column("MB", "memory_mb", whole))
+IN_SHORT = (*_ANSWERS, _QUALITY[1], Column("median\n[us]", "median_us"))
 _INSIDE = (Column("Python", "median_us"), Column("C", "inside_median_us"),
            Column("warm, Python", "warm_median_us"), Column("C", "warm_inside_median_us"))
 
