@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmark.report import Column, Report, Row, Section, Table
+from benchmark.report import Report, Row, Section, Table, wide
 from benchmark.timing import machine
 from hierarchy.problem import Hierarchy
 from scenarios.problems.recorded import family
@@ -36,17 +36,13 @@ def run(counts: Sequence[int] | None = None, seconds: float = 1.0) -> Report:
     """
     rows, tables = list[Row](), []
     for name, resolver in ENTRIES:
-        sizes = []
-        for count in counts or COUNTS:
-            found = _timed(problems_like(name, count), make(resolver), seconds)
-            sizes.append({"problems": f"{count:,}"} | {
-                key: row[of] for row in found for key, of in (
-                    (row["way"], "rate"), (f"{row['way']} core", "per_core"))})
-            rows += [{"family": name, "resolver": resolver, "problems": count, **row}
-                     for row in found]
-        columns = [Column(head, key, "{:.3g}".format) for row in found for head, key in (
-            (f"{row['way']}\nfastest", row["way"]), ("\nper core", f"{row['way']} core"))]
-        tables.append(Table(f"{name}, {resolver}", sizes, columns, "problems"))
+        found = [{"family": name, "resolver": resolver, "problems": count, **row}
+                 for count in counts or COUNTS
+                 for row in _timed(problems_like(name, count), make(resolver), seconds)]
+        tables.append(Table(f"{name}, {resolver}", *wide(
+            [{**row, "problems": f"{row['problems']:,}"} for row in found], "problems", "way",
+            {"fastest": "rate", "per core": "per_core"}, "{:.3g}".format), "problems"))
+        rows += found
     return Report(f"Batches on {machine()['processor']}",
                   [Section("", tables, _NOTES)], {"batch": rows})
 

@@ -194,7 +194,9 @@ def open_(family: Family = None,
     more = compiled(library or [], name or [])
     table = more if check and more and not entrants else chosen(entrants or [], python, more)
     if check:
-        return int(not opened.check(table, limit))
+        tried = opened.check(table, limit)
+        tried.say()
+        return int(tried.failed)
     for left, why in ({} if family else unavailable()).items():
         tell(f"left out: {left}, which {why}")
     counts = {0: public or count, **dict.fromkeys(fresh or [1], count)}

@@ -102,14 +102,20 @@ def write_rows(rows: Sequence[Row], path: Path) -> None:
         writer.writerows(rows)
 
 
-def wide(rows: Sequence[Row], down: str, across: str, value: str,
+def wide(rows: Sequence[Row], down: str, across: str, values: Mapping[str, str],
          shown: Callable[[Any], str] = digits) -> tuple[list[Row], list[Column]]:
-    """Return rows by the key `down`, with a column for each value of the key `across`."""
-    made: dict[Any, dict[str, Any]] = {}
+    """Return rows by the key `down`, with columns for each value of the key `across`.
+
+    values : keys of what stands in them, by the second line of the heading, "" for none.
+    """
+    made: dict[Any, Row] = {}
     for row in rows:
-        made.setdefault(row[down], {down: row[down]})[str(row[across])] = row[value]
-    heads = dict.fromkeys(str(row[across]) for row in rows)
-    return list(made.values()), [Column(head, head, shown) for head in heads]
+        own = made.setdefault(row[down], {down: row[down]})
+        own |= {f"{row[across]} {key}": row.get(key) for key in values.values()}
+    return list(made.values()), [
+        Column(name * (i == 0) + f"\n{head}" * bool(head), f"{name} {key}", shown)
+        for name in dict.fromkeys(str(row[across]) for row in rows)
+        for i, (head, key) in enumerate(values.items())]
 
 
 @final

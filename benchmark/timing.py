@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib import metadata
 from math import nan
 from time import perf_counter
 from typing import Any
@@ -35,8 +34,7 @@ def one_core() -> Iterator[None]:
 
 def machine() -> dict[str, str]:
     """Return processor, cores and versions by name, without personal data."""
-    known = {one.metadata["Name"]: one.version for one in metadata.distributions()}
-    return {**versions(), **{name: known.get(name, "not installed") for name in _PACKAGES}}
+    return versions(*_PACKAGES)
 
 
 def times_of(nanoseconds: Sequence[float] | Array, prefix: str = "") -> dict[str, float]:

@@ -248,7 +248,7 @@ def growth(seconds: float = 40.0, larger: bool = False) -> Report:
                  "rows": f"{each} rows a task"}
         fixed = ", ".join(text for key, text in words.items() if key != figure)
         some = [row for row in rows if row["figure"] == figure]
-        made, columns = wide(some, "entrant", figure, "median_us", short)
+        made, columns = wide(some, "entrant", figure, {"": "median_us"}, short)
         powers = figures.exponents(some, figure)
         tables.append(Table(
             f"Median time of a solve [us], {fixed}, over the number of {figure}",

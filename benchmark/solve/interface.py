@@ -152,7 +152,7 @@ class Questions:
         self.before, self._answer = before or [None] * len(problems), (-1, None)
 
     def problem(self, file: str, p: int) -> dict[str, Any]:
-        """Return the raw row of a problem of a file; a new file is read, and solved once untimed.
+        """Return the raw row of a problem of a file; a new file is read, and asked once before.
 
         The row has the memory where the file begins, and the processor time that it took [s].
         """
@@ -161,7 +161,7 @@ class Questions:
             with np.load(file, allow_pickle=False) as kept:
                 sequence = bool(json.loads(kept["head.json"])["sequence"])
             self.take(read_problems(Path(file)), sequence=sequence)
-            self._rehearse(self.problems[p])
+            self.asked(p)  # loads and compiles
             self._file, self._ready = file, {"start_kib": resident()}
         return {**self._ready, **self.asked(p), "busy_s": process_time() - begin}
 
@@ -196,18 +196,6 @@ class Questions:
             earlier = self.before[p] or self.problems[p].moved(p)
             raw = self.solver.solve(self.solver.prepare(earlier))
         return None if getattr(raw, "memory", raw) is None else raw
-
-    def _rehearse(self, problem: Problem) -> None:
-        """Solve a problem, so that nothing is loaded or compiled while it is timed."""
-        solver = self.solver
-        try:
-            if not solver.refuses(problem):
-                raw = solver.solve(solver.prepare(problem))
-                solver.inside(solver.prepare(problem), None, Repeats(1, 1))
-                if solver.warm:
-                    solver.solve_from(solver.prepare(problem), raw)
-        except Exception:  # it is asked again, and what it raises is told
-            return
 
     def _solved(self, problem: Problem) -> Answer:
         return self.solver.read(self.solver.solve(self.solver.prepare(problem)))

@@ -13,10 +13,10 @@ import numpy as np
 
 from benchmark.packages import Entrant
 from benchmark.process import CRASHED, HUNG, Field
-from benchmark.report import Report, Row, tell
+from benchmark.report import Report, Row, Section, Table, tell
 from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
-from benchmark.solve.judge import ENDED, RAISED, SOLVED, WRONG, by, judge, miss_of, summary
+from benchmark.solve.judge import ENDED, RAISED, by, cells, judge, miss_of
 from hierarchy.errors import refuse
 from hierarchy.problem import Array
 from scenarios.files import make_folder, named, slug, write_json, written
@@ -183,12 +183,12 @@ def report(store: Store) -> Report:
     sections, kept = [], list[Row]()
     for seed in sorted({row["seed"] for row in rows}, key=lambda seed: (seed == 0, seed)):
         title = f"Fresh problems, seed {seed}" if seed else "Public problems"
-        section, cells = views.section(
+        section, some = views.section(
             title, [row for row in rows if row["seed"] == seed],
             {one.head.family: one for one in found if one.head.seed == seed},
-            {border: [row for row in some if row["seed"] == seed] for border, some in at.items()})
+            {border: [row for row in of if row["seed"] == seed] for border, of in at.items()})
         sections.append(section)
-        kept += [{"half": title, **row} for row in cells]
+        kept += [{"half": title, **row} for row in some]
     versions = {row["entrant"]: row["version"] for row in rows}
     return Report("The open benchmark of prioritized control",
                   [*sections, views.entrants(versions, store.notes("limits"))], {"summary": kept},
@@ -203,8 +203,8 @@ def _place(order: Sequence[str], name: str) -> int:
     return order.index(name) if name in order else len(order)
 
 
-def check(entrants: Sequence[Entrant], limit: float = LIMIT) -> bool:
-    """Try entrants on a few problems of each kind; print what came of it; return if all is well.
+def check(entrants: Sequence[Entrant], limit: float = LIMIT) -> Report:
+    """Try entrants on a few problems of each kind; it has failed unless all keep the rules.
 
     limit : [s] for one problem.
     """
@@ -212,15 +212,12 @@ def check(entrants: Sequence[Entrant], limit: float = LIMIT) -> bool:
         files = [export(FAMILIES[name], 0, _CHECKS, True, Path(folder)) for name in CHECKED]
         rows = [row for file in files for own in asked(field, file, limit).values() for row in own]
         judged = by(judge(rows, {one.digest: one for one in map(read, files)}), "entrant")
-    for label, why in field.missing.items():
-        print(f"{label}: cannot run: {why}")
     broken = {label: _broken(own) for label, own in judged}
-    for label, own in judged:
-        print(f"{label}: {own[0]['version']}",
-              *(f"  {name:12} {_line(some)}" for name, some in by(own, "family")),
-              *(f"  a rule is broken: {rule}" for rule in broken[label] or ()),
-              *(() if broken[label] else ("  the rules are kept",)), sep="\n")
-    return not field.missing and not any(broken.values())
+    return Report("A few problems of each kind", [
+        Section("", [Table(f"{label}: {own[0]['version']}", cells(own), views.IN_SHORT, "family")],
+                lead=[f"a rule is broken: {rule}" for rule in broken[label]]
+                or ["the rules are kept"]) for label, own in judged],
+        missing=field.missing, failed=bool(field.missing or any(broken.values())))
 
 
 def _broken(rows: Sequence[Row]) -> list[str]:
@@ -231,11 +228,3 @@ def _broken(rows: Sequence[Row]) -> list[str]:
              for row in rows if row.get("same") is False]
     return [*(f"it {_BREAKS[verdict]}: {why}" for verdict, why in early.items()), *rules[:1],
             *(["it answers nothing"] if all(row["x"] is None for row in rows) else [])]
-
-
-def _line(rows: list[Row]) -> str:
-    verdicts = [row["verdict"] for row in rows]
-    said = ", ".join(f"{verdict}: {verdicts.count(verdict)}" for verdict in dict.fromkeys(verdicts))
-    found = summary(rows)
-    return said if not {SOLVED, WRONG} & set(verdicts) else (
-        f"{said}; miss {found['relative']:.0e}; median {found['median_us']:.1f} us")

@@ -35,6 +35,7 @@ _ANSWERS = (Column("asked", "asked", whole), Column("right", "right", percent),
 _QUALITY = (Column("miss", "absolute", power), Column("relative", "relative", power),
             Column("moved", "moved", power), Column("same", "same", report.yes),
             Column("rough", "rough"), Column("MB", "memory_mb", whole))
+IN_SHORT = (*_ANSWERS, _QUALITY[1], Column("median\n[us]", "median_us"))
 _INSIDE = (Column("Python", "median_us"), Column("C", "inside_median_us"),
            Column("warm, Python", "warm_median_us"), Column("C", "warm_inside_median_us"))
 
@@ -81,7 +82,7 @@ def _at_borders(title: str, every: Mapping[float, Mapping[str, Row]]) -> Table:
     found = [{**row, "border": f"{border:.0e}"} for border, some in every.items()
              for row in some.values()]
     return Table(f"{title}: answers called solved that are wrong, over the border of rank",
-                 *report.wide(found, "entrant", "border", "wrong", whole))
+                 *report.wide(found, "entrant", "border", {"": "wrong"}, whole))
 
 
 def entrants(versions: Mapping[str, str], limits: Mapping[str, str]) -> Section:
@@ -96,17 +97,11 @@ def _times(title: str, cells: Sequence[Row], families: Sequence[str]) -> Table:
     """Return the table of times in a few families, as many as fit a terminal."""
     room = max(1, (Console().width - _LABEL) // _FAMILY)
     chosen = [name for name in TIMED if name in families][:room] or [*families[:room]]
-    rows: dict[str, dict[str, object]] = {}
-    for row in cells:
-        own = rows.setdefault(row["entrant"], {"entrant": row["entrant"]})
-        if row["family"] in chosen and row["answered"]:
-            own |= {f"{row['family']} {key}": row[key]
-                    for key in ("median_us", "p95_us", "warm_median_us")}
-    columns = [Column(f"{head}\n{key}", f"{name} {of}") for name in chosen
-               for head, key, of in ((name, "median", "median_us"), ("", "p95", "p95_us"),
-                                     ("", "warm", "warm_median_us"))]
+    some = [row if row["answered"] else {key: row[key] for key in ("entrant", "family")}
+            for row in cells if row["family"] in chosen]
     return Table(f"{title}: times; {len(chosen)} of {len(families)} families, all in summary.csv",
-                 list(rows.values()), columns)
+                 *report.wide(some, "entrant", "family", {
+                     "median": "median_us", "p95": "p95_us", "warm": "warm_median_us"}))
 
 
 def lead(title: str, total: Sequence[Row], cells: Sequence[Row]) -> list[str]:

@@ -26,6 +26,7 @@ from solvers.status import Status
 
 _ALWAYS = ("t", "q", "v", "a", "command", "ee_position", "order", "status", "iterations",
            "joint_lower", "joint_upper", "velocity_limit")  # what every run has, beside its times
+_PACKAGES = ("task-hierarchy", "numpy", "numba", "pin", "qpsolvers", "proxsuite", "osqp", "mujoco")
 _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 
 
@@ -132,12 +133,10 @@ def _facts(path: Path) -> Facts:
         return found
 
 
-def versions() -> dict[str, str]:
-    """Return the versions and the processor of this installation."""
-    packages = ("task-hierarchy", "numpy", "numba", "pin", "qpsolvers", "proxsuite", "osqp",
-                "mujoco")
+def versions(*more: str) -> dict[str, str]:
+    """Return the versions of packages, those of a run and `more`, and the processor."""
     found = {}
-    for name in packages:
+    for name in (*_PACKAGES, *more):
         try:
             found[name] = version(name)
         except PackageNotFoundError:

@@ -17,6 +17,7 @@ import numpy as np
 
 from hierarchy.errors import check_name, refuse
 from hierarchy.problem import Array, Hierarchy
+from scenarios.config import load
 from scenarios.files import named, written
 from scenarios.problems import made, recorded
 from solvers import make, problems
@@ -45,7 +46,7 @@ class Family:
     ----------
     name, group, what : what it is called, which families it goes with, and what it has.
     make : from the seed of the set, 0 for the public one, and a count to that many problems.
-    period : [s] between two problems that are consecutive ticks; 0 if they are not.
+    ticks : whether they are consecutive ticks of the scenario of that name.
     usual : number of problems of a set, unless asked otherwise.
     """
 
@@ -53,7 +54,7 @@ class Family:
     group: str
     what: str
     make: Make
-    period: float = 0.0
+    ticks: bool = False
     usual: int = COUNT
 
     def half(self, seed: int = 0, count: int | None = None) -> Collection:
@@ -62,8 +63,9 @@ class Family:
         refuse(seed < 0 or count < 1, f"family {self.name!r}: seed {seed} and count {count}; "
                "expected a seed of at least 0 and a count of at least 1")
         source = f"task-hierarchy {version('task-hierarchy')}"
-        head = Head(self.name, self.what, FRESH if seed else PUBLIC, seed, self.period > 0.0,
-                    self.period, source)
+        period = load(self.name).control.period if self.ticks else 0.0
+        head = Head(self.name, self.what, FRESH if seed else PUBLIC, seed, self.ticks, period,
+                    source)
         return Collection(head, tuple(self.make(seed, count)))
 
 
@@ -82,17 +84,14 @@ def _reference(name: str, seed: int, count: int) -> list[Hierarchy]:
     return [one.h for one in recorded.family(name)[:count]]
 
 
-def _kind(name: str, seed: int, count: int) -> list[Hierarchy]:
-    return [problems.structured(seed * _STRIDE + i, (name,)) for i in range(count)]
-
-
 def _other(name: str, seed: int, count: int) -> list[Hierarchy]:
     make = {"of-soth": made.of_soth, "of-lexls": made.of_lexls, "of-daqp": made.of_daqp}[name]
     return [make(np.random.default_rng([seed, i])) for i in range(count)]
 
 
-def _recipe(name: str, seed: int, count: int) -> list[Hierarchy]:
-    return [problems.generate(seed * _STRIDE + i) for i in range(count)]
+def _generated(name: str, seed: int, count: int) -> list[Hierarchy]:
+    return [problems.generate(one) if name == "recipe" else problems.structured(one, (name,))
+            for one in range(seed * _STRIDE, seed * _STRIDE + count)]
 
 
 _REFERENCE = {
@@ -105,26 +104,6 @@ _REFERENCE = {
     "HUM38": "38 unknowns: limits, four tasks, posture",
     "DEGEN7": "INEQ7 with rows repeated, negated, zero, nearly parallel",
     "DYN60": "a humanoid with torque motors: dynamics, contacts, friction (fresh: extra `sim`)"}
-_KINDS = {
-    "singular_arm": "random arms at multiples of 90 degrees",
-    "dusty_arm": "the same, with the rounding of cosines kept",
-    "tied_box": "limits of 0, and tasks into their corner",
-    "opposed": "avoidance from two sides with too little room",
-    "contacts": "forces of feet in friction pyramids",
-    "nested": "levels that repeat upper ones",
-    "mixed_units": "rows of norm 0.001, 1 and 1000 in one level",
-    "integers": "entries and sides from -2 to 2",
-    "chain": "bounds on differences of neighbours",
-    "signs": "all sides 0, 1 or -1",
-    "one_unknown": "one unknown, many rows that disagree",
-    "sixty_unknowns": "limits, tasks and posture of 60 unknowns",
-    "fifteen_levels": "fifteen levels, most without freedom",
-    "near_ties": "repeated rows whose sides differ by 1e-9",
-    "nearly_parallel": "rows at angles of 1e-9 to 1e-6 rad",
-    "tiny_rows": "rows of norm 1e-14",
-    "shifted": "another kind with all unknowns shifted",
-    "near_singular_arm": "singular arms with noise of 1e-14 to 1e-3",
-    "scaled": "integers, rows times 1e-5 to 1e5, columns times 0.001 to 1000"}
 _POSTURES = {
     "singular-lwr": "KUKA LWR at and near singular postures",
     "singular-dual-arm": "an upper body with two arms, likewise",
@@ -144,13 +123,13 @@ _EXAMPLES = {
 
 
 FAMILIES = {name: Family(
-    name, group, what, partial(make, name), recorded.PERIODS.get(name, 0.0),
-    _FEW if name in _SIMULATED else _CONSECUTIVE if name in recorded.PERIODS else COUNT)
+    name, group, what, partial(make, name), group == "recorded",
+    _FEW if name in _SIMULATED else _CONSECUTIVE if group == "recorded" else COUNT)
     for group, make, named in (
         ("reference", _reference, _REFERENCE), ("recorded", recorded.recorded, recorded.SCENARIOS),
-        ("postures", made.posed, _POSTURES), ("degenerate", _kind, _KINDS),
+        ("postures", made.posed, _POSTURES), ("degenerate", _generated, problems.KINDS),
         ("others", _other, _OTHERS), ("others", made.of_examples, _EXAMPLES),
-        ("random", _recipe, {"recipe": "random sizes, ranks, ties, scales"}))
+        ("random", _generated, {"recipe": "random sizes, ranks, ties, scales"}))
     for name, what in named.items()}
 """The families by name."""
 _NEEDS = {**dict.fromkeys(("singular-panda", "singular-romeo"),

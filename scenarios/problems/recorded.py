@@ -1,17 +1,16 @@
 """Reference problems, stored and fresh, and problems of closed loops: windows of consecutive ticks.
 
-DYN60 is recorded from `stand-push` (extra `sim`): `python -m scenarios.problems.recorded --out
-FILE` writes the stored set again, with another seed a fresh one.
+DYN60 is recorded from `stand-push` (extra `sim`): `hierarchy problems export DYN60 --seed 60
+--count 100` makes the stored set again, with another seed a fresh one.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import typer
 
 from hierarchy.problem import Array, Hierarchy
 from scenarios.config import Scenario, ScenarioError, load
@@ -20,7 +19,7 @@ from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import uninterrupted
 from solvers import certify, make
 from solvers.problems import family as make_problem
-from solvers.problems.files import FRESH, Collection, Head, read
+from solvers.problems.files import read
 from solvers.proof import Proof
 from solvers.qp.backends import BACKENDS, installed
 
@@ -30,7 +29,7 @@ RECORDED = ("DYN60",)
 FAMILIES = EQUALITIES + INEQUALITIES + RECORDED
 DATA = Path(__file__).parent / "data"
 SCENARIO = "stand-push"
-SEED, COUNT, TOGETHER = 60, 100, 10  # of the stored set; ticks in a row of one run
+TOGETHER = 10                        # ticks in a row of one run
 LEFT_OUT = "joint limits"            # a level of the scenario that the family lacks
 _FIRST, _LAST = 0.3, 1.0             # [s] between which the ticks lie: the push begins at 0.3 s
 _NEAREST = 1e-9                      # tolerance of `certify`
@@ -88,9 +87,6 @@ SCENARIOS = {
     "humanoid-reach": "a humanoid asked to reach farther than it can",
     "stand-push": "a pushed humanoid, torque motors: dynamics, contacts, friction (extra `sim`)"}
 """Scenarios that are recorded, by name."""
-PERIODS = {"ellipse-hqp": 0.001, "ellipse-limits": 0.001, "human-hqp": 0.005,
-           "humanoid-reach": 0.005, "stand-push": 0.001}
-"""Time between two ticks [s]."""
 _WITHIN = (0.1, 0.7)  # share of a run at which a window begins
 _PUBLIC = 0.4         # the same for the public set
 _RUNS = 20            # sampled runs tried until one lasts to the end of its window
@@ -176,21 +172,3 @@ def fresh(name: str, seed: int, count: int) -> list[Problem]:
         return _in_sequence(name, [Problem(h, certified(h, x))
                                    for h, x in islice(ticks(seed), count)])
     return [Problem(make_problem(name, seed + i), None) for i in range(count)]
-
-
-def main(out: Annotated[Path, typer.Option(metavar="FILE")], seed: int = SEED,
-         count: int = COUNT) -> None:
-    """Record problems of the family DYN60 and write its file."""
-    problems: list[Hierarchy] = []
-    answers: list[Proof] = []
-    for h, x in islice(ticks(seed), count):
-        problems.append(h)
-        answers.append(certified(h, x))
-        if len(problems) % TOGETHER == 0:
-            print(f"{len(problems)} of {count}", flush=True)
-    head = Head(*RECORDED, "a pushed humanoid", FRESH, seed, source=f"runs of {SCENARIO}")
-    Collection(head, tuple(problems), tuple(answers)).save(out)
-
-
-if __name__ == "__main__":
-    typer.run(main)

@@ -45,14 +45,6 @@ _LABELLED = 10  # curves of a panel that a legend can name
 _USUAL = ("q", "v", "position_error", "minimal_distance")  # what `plot` draws unless told
 
 
-class Column(NamedTuple):
-    """One number or text per tick: name such as `q[0]`, unit or "", values (T,)."""
-
-    name: str
-    unit: str
-    values: NDArray[Any]
-
-
 class Event(NamedTuple):
     """The kind of trouble in a tick and the action taken; see `scenarios.loop.policy`."""
 
@@ -140,32 +132,35 @@ class Recording:
         """
         if library is not None:
             check_name("library", library, _LIBRARIES)
-        columns = list(self.columns())
+        columns = self.columns()
         for name in _LIBRARIES if library is None else (library,):
             try:
                 package = import_module(name)
             except ImportError:
                 continue
-            frame = package.DataFrame({column.name: column.values for column in columns})
+            frame = package.DataFrame({one: values for one, (_, values) in columns.items()})
             if hasattr(frame, "attrs"):  # pandas has a place for them
-                frame.attrs["units"] = {one.name: one.unit for one in columns if one.unit}
+                frame.attrs["units"] = {one: unit for one, (unit, _) in columns.items() if unit}
             return frame
         raise HierarchyError(f"to_dataframe needs {library or ' or '.join(_LIBRARIES)}: pip "
                              f"install {library or _LIBRARIES[0]}")
 
-    def columns(self) -> Iterator[Column]:
-        """Yield every per-tick signal number by number, then the stack and the events as text."""
-        units = self.units()
+    def columns(self) -> dict[str, tuple[str, NDArray[Any]]]:
+        """Return unit, or "", and values (T,) of every number per tick, by names such as `q[0]`.
+
+        The stack and the events follow as text.
+        """
+        units, found = self.units(), dict[str, tuple[str, NDArray[Any]]]()
         for name, signal in self.of_ticks().items():
             unit_of = units.get(name, ("",))
             each = len(unit_of) == int(np.prod(signal.shape[1:]))
             for i, (index, values) in enumerate(_entries(signal)):
-                yield Column(name + index, unit_of[i if each else 0], values)
-        yield Column("stack", "", self.stacks())
+                found[name + index] = unit_of[i if each else 0], values
         events = [""] * self.ticks
         for tick, kind, action in self.events:
             events[tick] += f"{'; ' if events[tick] else ''}{kind}: {action}"
-        yield Column("events", "", np.array(events, dtype=np.str_))
+        return {**found, "stack": ("", self.stacks()),
+                "events": ("", np.array(events, dtype=np.str_))}
 
     def of_ticks(self) -> dict[str, NDArray[Any]]:
         """Return the signals that have one entry per tick, not one value for the whole run."""

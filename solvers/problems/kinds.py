@@ -60,7 +60,7 @@ def bounded(h: Hierarchy, seed: int) -> Hierarchy:
 
 
 def _singular_arm(rng: Random, digits: int = 12, noise: float = 0.0) -> Levels:
-    """Velocity box, position, orientation and posture of an arm at multiples of 90 degrees."""
+    """Random arms at multiples of 90 degrees; velocity box, position, orientation, posture."""
     n = int(rng.integers(2, 9))
     J = np.round(_jacobian(rng, n, planar=happens(rng, 0.3)), digits)
     if noise:
@@ -73,7 +73,7 @@ def _singular_arm(rng: Random, digits: int = 12, noise: float = 0.0) -> Levels:
 
 
 def _dusty_arm(rng: Random) -> Levels:
-    """A singular arm that keeps the rounding of cos and sin: rows of 1e-17 where nothing moves.
+    """The same, with the rounding of cosines kept; rows of 1e-17 where nothing moves.
 
     Strictly, a row of dust with a nonzero target requires an x of 1e17.
     """
@@ -81,19 +81,19 @@ def _dusty_arm(rng: Random) -> Levels:
 
 
 def _near_singular_arm(rng: Random) -> Levels:
-    """A singular arm, each entry of its Jacobian off by about 1e-14 to 1e-3."""
+    """Singular arms with noise of 1e-14 to 1e-3; in each entry of the Jacobian."""
     return _singular_arm(rng, noise=10.0**rng.uniform(-14.0, -3.0))
 
 
 def _tied_box(rng: Random) -> Levels:
-    """A velocity box with sides at 0, and tasks that push into its corner."""
+    """Limits of 0, and tasks into their corner; the limits are of velocities."""
     n = int(rng.integers(1, 8))
     tasks = [equal(_rows(rng, size, n), _few(rng, size)) for size in rng.integers(1, 4, 2)]
     return [_box_at_rest(rng, n), *tasks, _posture(rng, n)]
 
 
 def _opposed(rng: Random) -> Levels:
-    """Avoidance from two sides with too little room in between, and a box; in any order."""
+    """Avoidance from two sides with too little room; and a box; in any order."""
     n = int(rng.integers(1, 8))
     A = _rows(rng, int(rng.integers(1, 4)), n)
     room = rng.choice([-0.1, 0.0, 0.1, 0.5], len(A))
@@ -106,7 +106,7 @@ def _opposed(rng: Random) -> Levels:
 
 
 def _contacts(rng: Random) -> Levels:
-    """Foot forces: unilateral, in a friction pyramid, bounded, balanced and minimal."""
+    """Forces of feet in friction pyramids; unilateral, bounded, balanced and minimal."""
     feet = int(rng.integers(1, 5))
     mu, n = float(rng.choice([0.0, 0.3, 0.5, 1.0])), 3 * feet
     pyramid = np.array([[1.0, 0, -mu], [-1.0, 0, -mu], [0, 1.0, -mu], [0, -1.0, -mu]])
@@ -125,7 +125,7 @@ def _contacts(rng: Random) -> Levels:
 
 
 def _nested(rng: Random) -> Levels:
-    """Levels that repeat upper ones: equal, a subset or sums, with the same or new sides."""
+    """Levels that repeat upper ones; equal, a subset or sums, with the same or new sides."""
     n = int(rng.integers(1, 9))
     levels = [_sided(rng, _rows(rng, int(rng.integers(1, 5)), n))]
     for _ in range(int(rng.integers(1, 7))):
@@ -145,7 +145,7 @@ def _mixed_units(rng: Random) -> Levels:
 
 
 def _scaled(rng: Random) -> Levels:
-    """Integers times 0.001 to 1000 in each column, and times 1e-5 to 1e5 in each row."""
+    """Integers, rows times 1e-5 to 1e5, columns times 0.001 to 1000."""
     levels = _integers(rng)
     by = 10.0**rng.choice(np.arange(-3.0, 4.0), levels[0][0].shape[1])
     return _in_units(rng, [(A * by, lower, upper) for A, lower, upper in levels],
@@ -167,7 +167,7 @@ def _integers(rng: Random) -> Levels:
 
 
 def _chain(rng: Random) -> Levels:
-    """Bounds on the differences of neighbours, fixed ends, and targets."""
+    """Bounds on differences of neighbours; with fixed ends, and targets."""
     n = int(rng.integers(2, 13))
     step = float(rng.choice([0.0, 0.5, 1.0]))
     A = np.eye(n)[:-1] - np.eye(n)[1:]
@@ -178,20 +178,20 @@ def _chain(rng: Random) -> Levels:
 
 
 def _signs(rng: Random) -> Levels:
-    """All sides 0, 1 or -1, rows in any direction."""
+    """All sides 0, 1 or -1; rows in any direction."""
     n = int(rng.integers(1, 10))
     return [_sided(rng, _rows(rng, size, n), wide=1)
             for size in rng.integers(1, 9, int(rng.integers(1, 6)))]
 
 
 def _one_unknown(rng: Random) -> Levels:
-    """A single unknown, and many rows that disagree about it."""
+    """One unknown, many rows that disagree."""
     return [_sided(rng, rng.choice([-2.0, -1.0, 0.0, 1.0, 3.0], (size, 1)))
             for size in rng.integers(1, 6, int(rng.integers(1, 7)))]
 
 
 def _sixty_unknowns(rng: Random) -> Levels:
-    """A box, tasks with sides of 0 and 1, and a posture of 60 unknowns."""
+    """Limits, tasks and posture of 60 unknowns; tasks with sides of 0 and 1."""
     n = 60
     tasks = [_sided(rng, _rows(rng, size, n), wide=1)
              for size in rng.integers(3, 13, int(rng.integers(2, 7)))]
@@ -199,12 +199,12 @@ def _sixty_unknowns(rng: Random) -> Levels:
 
 
 def _fifteen_levels(rng: Random) -> Levels:
-    """Fifteen levels, most of which have no freedom left."""
+    """Fifteen levels, most without freedom."""
     return _around(rng, int(rng.integers(4, 12)), 15)
 
 
 def _near_ties(rng: Random) -> Levels:
-    """Rows repeated in lower levels with sides that differ by about 1e-9."""
+    """Repeated rows whose sides differ by 1e-9; in lower levels."""
     levels = _around(rng, int(rng.integers(2, 8)), int(rng.integers(1, 4)))
     for _ in range(int(rng.integers(1, 4))):
         A, lower, upper = stacked(*levels)
@@ -215,7 +215,7 @@ def _near_ties(rng: Random) -> Levels:
 
 
 def _nearly_parallel(rng: Random) -> Levels:
-    """Rows repeated in their level or below, at an angle of 1e-9 to 1e-6 rad."""
+    """Rows at angles of 1e-9 to 1e-6 rad; repeated in their level or below."""
     levels = _around(rng, int(rng.integers(2, 8)), int(rng.integers(2, 5)))
     for k, level in enumerate(levels):
         A, lower, upper = levels[int(rng.integers(k + 1))]
@@ -227,7 +227,7 @@ def _nearly_parallel(rng: Random) -> Levels:
 
 
 def _tiny_rows(rng: Random) -> Levels:
-    """Rows of norm 1e-14 below rows of norm 1, as in a Jacobian that should be zero."""
+    """Rows of norm 1e-14; below rows of norm 1, as in a Jacobian that should be zero."""
     levels = _around(rng, int(rng.integers(2, 8)), int(rng.integers(2, 5)))
     for k in range(1, len(levels)):
         A, lower, upper = levels[k]
@@ -237,7 +237,7 @@ def _tiny_rows(rng: Random) -> Levels:
 
 
 def _shifted(rng: Random) -> Levels:
-    """A problem of a kind listed before, with all unknowns shifted by the same vector."""
+    """Another kind with all unknowns shifted; one listed before, by the same vector."""
     kind = str(rng.choice(list(_MAKERS)[:list(_MAKERS).index("shifted")]))
     levels = _MAKERS[kind](rng)
     by = rng.normal(size=levels[0][0].shape[1]) * 10.0**rng.integers(-12, 3)
@@ -331,5 +331,7 @@ _MAKERS: dict[str, Callable[[Random], Levels]] = {
     "sixty_unknowns": _sixty_unknowns, "fifteen_levels": _fifteen_levels,
     "near_ties": _near_ties, "nearly_parallel": _nearly_parallel, "tiny_rows": _tiny_rows,
     "shifted": _shifted, "near_singular_arm": _near_singular_arm, "scaled": _scaled}
-KINDS = tuple(_MAKERS)
-"""The names that `structured` knows."""
+_LINES = {name: str(make.__doc__).partition("\n")[0] for name, make in _MAKERS.items()}
+KINDS = {name: f"{line[0].lower()}{line[1:].rstrip('.').partition(';')[0]}"
+         for name, line in _LINES.items()}
+"""What each kind has, in short, by the names that `structured` knows."""

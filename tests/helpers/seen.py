@@ -81,7 +81,7 @@ def seen_of_run(name):
             "exported": condensed([*mcap._entries(run, mcap.grouped(run))]),
             "layout": condensed(mcap.layout(run)), "plot": figure_facts(run.plot()),
             "shown": [repr(run), run._repr_html_()],
-            "columns": [[one.name, one.unit] for one in run.columns()]}
+            "columns": [[name, unit] for name, (unit, _) in run.columns().items()]}
 
 
 def seen_of_ticks(name):

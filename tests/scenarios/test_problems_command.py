@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from rank_cases import solved
 
-from scenarios import load
 from scenarios.problems import recorded
 from scenarios.problems.families import FAMILIES, available, export, family, save
 from scenarios.problems.made import posed
@@ -43,10 +42,6 @@ def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
     monkeypatch.setattr(recorded, "uninterrupted", lambda *_, **__: None)
     with pytest.raises(ScenarioError, match="ellipse-limits: no run with seed 3 has 2 problems"):
         recorded.recorded("ellipse-limits", 3, 2)
-
-
-def test_the_time_between_recorded_problems_is_the_period_of_their_scenario():
-    assert {name: load(name).control.period for name in recorded.SCENARIOS} == recorded.PERIODS
 
 
 def test_check_finds_an_answer_that_is_not_proved(command, tmp_path):
