@@ -51,8 +51,6 @@ def _points_of(shape: Any, kind: str) -> Array | None:
     """Points whose convex hull is the shape, or contains it."""
     if kind == "Box":
         return np.asarray(CORNERS * shape.halfSide, dtype=float)
-    if kind == "Ellipsoid":  # the box around it
-        return np.asarray(CORNERS * shape.radii, dtype=float)
     for of_mesh in ("vertices", "points"):
         if hasattr(shape, of_mesh):
             points = getattr(shape, of_mesh)

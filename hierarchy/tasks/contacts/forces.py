@@ -9,7 +9,8 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from hierarchy.contacts import Contacts, Points, write_dynamics, zero_while_open
+from hierarchy.avoidance.body import Points
+from hierarchy.contacts import Contacts, write_dynamics, zero_while_open
 from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.gate import shaped
 from hierarchy.jit import bind, compiled
