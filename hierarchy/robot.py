@@ -311,12 +311,10 @@ class Robot:
         return Frame(name, int(frame.parentJoint), frame.placement.translation,
                      frame.placement.rotation)
 
-    def control_point(self, joint: str, offset: ArrayLike,
-                      name: str | None = None) -> ControlPoint:
+    def control_point(self, joint: str, offset: ArrayLike) -> ControlPoint:
         """Attach a point to the body that `joint` moves; offset (3,) [m] in that joint's frame."""
         place = finite_numbers(f"control point on {joint!r}: offset", offset, 3)
-        return ControlPoint(name or f"{joint} {np.asarray(offset).tolist()}", self.joint(joint),
-                            place)
+        return ControlPoint(f"{joint} {place.tolist()}", self.joint(joint), place)
 
     def control_point_of_frame(self, frame: str, offset: ArrayLike) -> ControlPoint:
         """Attach a point to the body that carries `frame`; offset (3,) [m] in that frame."""
