@@ -194,7 +194,7 @@ class TorqueRows(JointRows):
         write_rows = _efforts(contacts, self.robot.actuated, bounds, state, rows)
 
         def follow() -> None:
-            bounds[:] = self.bounds(state)
+            bounds[0], bounds[1] = self.bounds(state)
 
         return in_turn(follow, write_rows) if self.moving else write_rows
 
