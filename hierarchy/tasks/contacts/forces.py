@@ -48,13 +48,11 @@ class FixedRows(NamedRows, ForceTask):
     @property
     @abstractmethod
     def fixed(self) -> tuple[Array, Array, Array]:
-        """The rows over the forces (m, 3 p), their lower and upper sides (m,)."""
+        """The rows over the unknowns (m, n + 3 p), their lower and upper sides (m,)."""
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        forces, *sides = self.fixed
-        A = np.hstack([np.zeros((len(forces), state.n)), forces])
-        return bind(_copy, A, *sides, *rows)
+        return bind(_copy, *self.fixed, *rows)
 
 
 def required(contacts: Contacts, task: str) -> Contacts:
@@ -151,9 +149,9 @@ class LeastForce(FixedRows):
 
     @property
     def fixed(self) -> tuple[Array, Array, Array]:
-        """The identity (3 p, 3 p), and zeros (3 p,), twice."""
-        count = 3 * len(self.contacts.points.joints)
-        return np.eye(count), np.zeros(count), np.zeros(count)
+        """Those of the identity for the forces, and zeros (3 p,), twice."""
+        unit = np.eye(self.contacts.unknowns)[self.contacts.robot.n:]
+        return unit, np.zeros(len(unit)), np.zeros(len(unit))
 
 
 class TorqueRows(JointRows):
