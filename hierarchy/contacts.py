@@ -15,11 +15,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hierarchy.avoidance.body import ControlPoint, Points, pack_points
 from hierarchy.errors import (
     HierarchyError,
     check_name,
@@ -37,13 +38,6 @@ from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 
 Vector = Sequence[float]
-
-
-class Points(NamedTuple):
-    """Contact points, for kernels: the joint (p,) that moves each, its offset (p, 3) [m] there."""
-
-    joints: NDArray[np.int64]
-    offsets: Array
 
 
 @dataclass(frozen=True)
@@ -143,12 +137,9 @@ class Contacts:
             refuse(contact.frame.joint == 0, f"contact {contact.name!r}: no joint moves frame "
                    f"{contact.frame.name!r}")
             self.robot.check_joint(f"contact {contact.name!r}", contact.frame.joint)
-        frames = [contact.frame for contact in contacts for _ in contact.points]
-        offsets = [contact.frame.offset + contact.frame.rotation @ np.array(point, dtype=float)
-                   for contact in contacts for point in contact.points]
-        set_frozen(self, points=Points(
-            np.array([frame.joint for frame in frames], dtype=np.int64),
-            np.array(offsets, dtype=float).reshape(len(offsets), 3)))
+        set_frozen(self, points=pack_points([
+            ControlPoint(contact.name, contact.frame.joint, contact.frame.placed(point))
+            for contact in contacts for point in contact.points]))
 
     @property
     def names(self) -> tuple[str, ...]:

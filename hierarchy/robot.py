@@ -67,6 +67,10 @@ class Frame:
                    offset=finite_numbers(f"{what}: offset", self.offset, 3),
                    rotation=array_of(f"{what}: rotation", self.rotation))
 
+    def placed(self, point: ArrayLike) -> Array:
+        """Return a point (3,) [m] of the frame as the joint's frame has it."""
+        return np.asarray(self.offset + self.rotation @ np.array(point, dtype=float))
+
 
 @dataclass(frozen=True)
 class Body:
@@ -278,18 +282,6 @@ class Robot:
         if robot is not self and robot.joint_names != self.joint_names:
             raise RobotError(f"{what} is of robot {robot.name!r}, not of {self.name!r}")
 
-    def coordinate(self, name: str) -> int:
-        """Index in q of the position of the joint called `name`; RobotError if it has several.
-
-        `configuration` and `values` set and read every joint by name.
-        """
-        joint = self.model.joints[self.joint(name)]
-        if joint.nq != 1:
-            raise RobotError(f"robot {self.name!r}: joint {name!r} has {joint.nq} coordinates; "
-                             f"robot.configuration({{{name!r}: value}}) sets them, "
-                             "robot.values(q) reads them")
-        return int(joint.idx_q)
-
     def limit_base(self, linear: float, angular: float) -> None:
         """Limit the speed of a floating base [m/s, rad/s], inf for none; RobotError if fixed.
 
@@ -319,19 +311,16 @@ class Robot:
         return Frame(name, int(frame.parentJoint), frame.placement.translation,
                      frame.placement.rotation)
 
-    def control_point(self, joint: str, offset: ArrayLike,
-                      name: str | None = None) -> ControlPoint:
+    def control_point(self, joint: str, offset: ArrayLike) -> ControlPoint:
         """Attach a point to the body that `joint` moves; offset (3,) [m] in that joint's frame."""
         place = finite_numbers(f"control point on {joint!r}: offset", offset, 3)
-        return ControlPoint(name or f"{joint} {np.asarray(offset).tolist()}", self.joint(joint),
-                            place)
+        return ControlPoint(f"{joint} {place.tolist()}", self.joint(joint), place)
 
     def control_point_of_frame(self, frame: str, offset: ArrayLike) -> ControlPoint:
         """Attach a point to the body that carries `frame`; offset (3,) [m] in that frame."""
-        held = self.frame(frame)
-        place = held.offset + held.rotation @ finite_numbers(
-            f"control point in {frame!r}: offset", offset, 3)
-        return ControlPoint(f"{frame} {np.asarray(offset).tolist()}", held.joint, place)
+        held, place = self.frame(frame), finite_numbers(f"control point in {frame!r}: offset",
+                                                        offset, 3)
+        return ControlPoint(f"{frame} {place.tolist()}", held.joint, held.placed(place))
 
     def bodies(self) -> tuple[Body, ...]:
         """Return the robot's bodies in the order of its joints, to build it in another engine."""

@@ -79,13 +79,13 @@ def make_scene(folder: Path) -> Stand:
     table = Robot.named("humanoid")
     feet = [table.frame(f"{side}_foot") for side in ("left", "right")]
     soles = [Frame(f"{foot.name[:-5]}_sole", foot.joint,
-                   foot.offset + foot.rotation @ [_SOLE, 0.0, 0.0], foot.rotation) for foot in feet]
+                   foot.placed([_SOLE, 0.0, 0.0]), foot.rotation) for foot in feet]
     hands = [table.frame(f"{side}_hand") for side in ("left", "right")]
     file = folder / "humanoid.urdf"
     file.write_text(urdf(table, [*soles, *hands]))
     names = [frame.name for frame in hands]
     robot = Robot.from_file(file, names[1], base="floating", shapes=False)
-    order = [table.coordinate(name) for name in robot.joint_names[1:]]
+    order = [table.coordinate_names.index(name) for name in robot.joint_names[1:]]
     rest = np.concatenate([table.rest[:7], table.rest[order]])
     state = State.at(robot, rest)
     com = state.centre_of_mass()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from math import sqrt
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,19 @@ class ControlPoint:
     offset: Array
 
 
-def pack_points(points: Sequence[ControlPoint]) -> tuple[NDArray[np.int64], Array]:
-    """Joint indices (K,) and offsets (K, 3) [m] of control points, for the kernels."""
+class Points(NamedTuple):
+    """Points fixed to bodies, for kernels: the joint (K,) of each, its offset (K, 3) [m] there."""
+
+    joints: NDArray[np.int64]
+    offsets: Array
+
+
+def pack_points(points: Sequence[ControlPoint]) -> Points:
+    """Return control points for the kernels."""
     expect_each("control points", points, ControlPoint, "make one with robot.control_point(...)")
     joints = np.array([point.joint for point in points], dtype=np.int64)
     offsets = np.array([point.offset for point in points], dtype=float).reshape(-1, 3)
-    return joints, offsets
+    return Points(joints, offsets)
 
 
 Vector = tuple[float, float, float]

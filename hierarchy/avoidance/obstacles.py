@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from hierarchy.errors import check_name, expect, expect_each, refuse
 from hierarchy.gate import Rotation, array_of
 from hierarchy.jit import inlined, internal
-from hierarchy.kinematics import dot, less
+from hierarchy.kinematics import dot, less, turned
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.records import Vector3, check_fields
@@ -99,10 +99,7 @@ class Obstacles:
 @inlined
 def _in_axes(obstacle, p):
     """A point in the axes of an obstacle, as a tuple."""
-    o = less(p, obstacle[4:7])
-    return (obstacle[7] * o[0] + obstacle[10] * o[1] + obstacle[13] * o[2],
-            obstacle[8] * o[0] + obstacle[11] * o[1] + obstacle[14] * o[2],
-            obstacle[9] * o[0] + obstacle[12] * o[1] + obstacle[15] * o[2])
+    return turned(obstacle[7:16], less(p, obstacle[4:7]))  # by the transposed rotation
 
 
 @inlined

@@ -43,20 +43,12 @@ def around_z(half: float, radius: float) -> Ends:
 def _capsule_of(shape: Any, kind: str) -> Ends | None:
     if kind in ("Sphere", "Capsule", "Cylinder"):
         return around_z(0.0 if kind == "Sphere" else shape.halfLength, shape.radius)
-    points = _points_of(shape, kind)
-    return None if points is None or len(points) == 0 else bounding_capsule(points)
-
-
-def _points_of(shape: Any, kind: str) -> Array | None:
-    """Points whose convex hull is the shape, or contains it."""
     if kind == "Box":
-        return np.asarray(CORNERS * shape.halfSide, dtype=float)
-    if kind == "Ellipsoid":  # the box around it
-        return np.asarray(CORNERS * shape.radii, dtype=float)
+        return bounding_capsule(CORNERS * shape.halfSide)
     for of_mesh in ("vertices", "points"):
         if hasattr(shape, of_mesh):
-            points = getattr(shape, of_mesh)
-            return np.array(points() if callable(points) else points, dtype=float).reshape(-1, 3)
+            points = np.array(getattr(shape, of_mesh)(), dtype=float).reshape(-1, 3)
+            return bounding_capsule(points) if len(points) else None
     return None
 
 

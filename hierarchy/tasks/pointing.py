@@ -86,13 +86,11 @@ class Pointing(Measured):
                    cos_alpha_d=cos(self.half_angle),
                    z_e=np.ascontiguousarray(self.frame.rotation[:, 2]))
 
-    def cone_error(self, state: State) -> float:
-        """The error cos(alpha_d) - cos(alpha), positive outside the cone."""
-        return float(_cone_error(state.placements, self.frame.joint, self.z_e, self.z_d,
-                                 self.cos_alpha_d))
-
     def follow_cone_error(self, state: State) -> Callable[[], float]:
-        """Return a function that gives the error at a state as it moves, for Algorithm 1."""
+        """Return a function that gives the error at a state as it moves, for Algorithm 1.
+
+        That is cos(alpha_d) - cos(alpha), positive outside the cone.
+        """
         return bind(_cone_error, state.placements, self.frame.joint, self.z_e, self.z_d,
                     self.cos_alpha_d)
 

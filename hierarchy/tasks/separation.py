@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +86,7 @@ class Separation(NamedRows, Written):
     barrier: Barrier
     obstacles: int | None = None
     name: str = "separation"
-    kind: Literal["inequality"] = "inequality"
+    kind = "inequality"
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -182,7 +181,7 @@ class SelfSeparation(NamedRows, Written):
     barrier: Barrier
     pairs: Sequence[tuple[int, int]] | None = None
     name: str = "self-separation"
-    kind: Literal["inequality"] = "inequality"
+    kind = "inequality"
     indices: NDArray[np.int64] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -171,7 +171,6 @@ def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_
     assert free.values(free.configuration({"a": 0.2, "c": 0.3}))["c"] == pytest.approx(0.3)
     assert free.values(free.configuration({"b": 0.2}))["c"] == pytest.approx(0.5)
     refused("locked: joint 'a'", Robot.load, path, locked={"a": (1.0, 1.0)}, error=RobotError)
-    refused("robot.configuration({'a': value})", free.coordinate, "a", error=RobotError)
     refused("unknown joint 'd'", free.configuration, {"d": 0.0}, error=UnknownNameError)
 
 

@@ -53,7 +53,7 @@ def largest_gap(q):
     for row in q:
         pin.framesForwardKinematics(robot.model, data, row)
         end, tip = (data.oMf[robot.model.getFrameId(name)].translation for name in ("end", "tip"))
-        finger, thumb = row[robot.coordinate("finger")], row[robot.coordinate("thumb")]
+        finger, thumb = (row[robot.coordinate_names.index(name)] for name in ("finger", "thumb"))
         worst = max(worst, np.linalg.norm(end - tip), abs(thumb - (0.1 - finger + 0.5 * finger**2)))
     return worst
 

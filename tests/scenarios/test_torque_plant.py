@@ -184,7 +184,7 @@ changed = load("stand-push").with_changes
 
 def tilted(degrees):
     """Both soles turned by their ankles from where they are flat."""
-    angle = float(ROBOT.rest[ROBOT.coordinate("left_ankle_pitch")] + np.radians(degrees))
+    angle = float(ROBOT.values(ROBOT.rest)["left_ankle_pitch"] + np.radians(degrees))
     return {"start.on_floor": True,
             "start.joints": {"left_ankle_pitch": angle, "right_ankle_pitch": angle}}
 
@@ -213,7 +213,7 @@ def test_a_joint_that_passes_its_stop_ends_the_run_with_a_fault():
     assert run.fault.startswith(f"joint {name} is 0.1")
     assert "beyond its stop at" in run.fault
     assert run.ticks < 300
-    column = ROBOT.coordinate(name)
+    column = ROBOT.coordinate_names.index(name)
     assert (run["q"][:, column] < ROBOT.upper[column] + 0.1).all()
 
 

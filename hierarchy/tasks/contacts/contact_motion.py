@@ -106,5 +106,4 @@ def _held(contact: Contact) -> Frame:
     frame = contact.frame
     if contact.is_surface:
         return frame
-    offset = frame.offset + frame.rotation @ np.array(contact.points[0], dtype=float)
-    return Frame(contact.name, frame.joint, offset, frame.rotation)
+    return Frame(contact.name, frame.joint, frame.placed(contact.points[0]), frame.rotation)

@@ -9,7 +9,8 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from hierarchy.contacts import Contacts, Points, write_dynamics, zero_while_open
+from hierarchy.avoidance.body import Points
+from hierarchy.contacts import Contacts, write_dynamics, zero_while_open
 from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.gate import shaped
 from hierarchy.jit import bind, compiled
@@ -47,13 +48,11 @@ class FixedRows(NamedRows, ForceTask):
     @property
     @abstractmethod
     def fixed(self) -> tuple[Array, Array, Array]:
-        """The rows over the forces (m, 3 p), their lower and upper sides (m,)."""
+        """The rows over the unknowns (m, n + 3 p), their lower and upper sides (m,)."""
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        forces, *sides = self.fixed
-        A = np.hstack([np.zeros((len(forces), state.n)), forces])
-        return bind(_copy, A, *sides, *rows)
+        return bind(_copy, *self.fixed, *rows)
 
 
 def required(contacts: Contacts, task: str) -> Contacts:
@@ -150,9 +149,9 @@ class LeastForce(FixedRows):
 
     @property
     def fixed(self) -> tuple[Array, Array, Array]:
-        """The identity (3 p, 3 p), and zeros (3 p,), twice."""
-        count = 3 * len(self.contacts.points.joints)
-        return np.eye(count), np.zeros(count), np.zeros(count)
+        """Those of the identity for the forces, and zeros (3 p,), twice."""
+        unit = np.eye(self.contacts.unknowns)[self.contacts.robot.n:]
+        return unit, np.zeros(len(unit)), np.zeros(len(unit))
 
 
 class TorqueRows(JointRows):
@@ -193,7 +192,7 @@ class TorqueRows(JointRows):
         write_rows = _efforts(contacts, self.robot.actuated, bounds, state, rows)
 
         def follow() -> None:
-            bounds[:] = self.bounds(state)
+            bounds[0], bounds[1] = self.bounds(state)
 
         return in_turn(follow, write_rows) if self.moving else write_rows
 

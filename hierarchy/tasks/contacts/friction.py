@@ -63,7 +63,7 @@ class Friction(FixedRows):
 
     @property
     def fixed(self) -> tuple[Array, Array, Array]:
-        """The rows over the forces (m, 3 p), their lower and upper sides (m,), (m,) [N].
+        """The rows over the unknowns (m, n + 3 p), their lower and upper sides (m,), (m,) [N].
 
         A `least` of zero has no side: opposite faces together already say that the point pushes,
         and a row that says it again is a tie at the tip of the pyramid.
@@ -73,7 +73,7 @@ class Friction(FixedRows):
             own, count, summed = self._of(contact), len(contact.points), _summed(contact)
             part = np.zeros((len(own), self.contacts.unknowns))
             part[:, self.contacts.blocks[contact.name]] = own
-            parts.append(part[:, self.contacts.robot.n:])
+            parts.append(part)
             low += [*[0.0] * self.faces, self.least or -inf] * count + [-inf] * summed
             up += [*[inf] * self.faces, self.largest] * count + [inf] * summed
         return np.vstack(parts), np.array(low), np.array(up)
@@ -176,14 +176,14 @@ class CentreOfPressure(FixedRows):
 
     @property
     def fixed(self) -> tuple[Array, Array, Array]:
-        """The rows over the forces (m, 3 p) [m], zero and infinity (m,)."""
+        """The rows over the unknowns (m, n + 3 p) [m], zero and infinity (m,)."""
         rows = []
         for contact in self._surfaces():
             block = self.contacts.blocks[contact.name]
             for distances in _distances(contact):
                 row = np.zeros(self.contacts.unknowns)
                 row[block] = np.outer(distances - self.margin, contact.axes[2]).ravel()
-                rows.append(row[self.contacts.robot.n:])
+                rows.append(row)
         return np.array(rows), np.zeros(len(rows)), np.full(len(rows), inf)
 
     def _surfaces(self) -> list[Contact]:

@@ -212,7 +212,7 @@ def _shape(contact: Contact) -> dict[str, Any]:
     """
     frame, points = contact.frame, np.array(contact.points, dtype=float)
     if not contact.is_surface:
-        return {"type": "sphere", "pos": frame.offset + frame.rotation @ points[0], "size": BALL}
+        return {"type": "sphere", "pos": frame.placed(points[0]), "size": BALL}
     corners, R = points @ contact.sole.T, frame.rotation @ contact.sole.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle = frame.offset + R @ ((low + high) / 2 + [0.0, 0.0, _THICKNESS])
