@@ -152,7 +152,7 @@ def _factor_equalities(d, A, sizes, settings, work, whole):
             for t in range(above, rank):
                 for c in range(n):
                     d.Q[begin + t - above, c] = 1.0 if c == t else 0.0
-            reflect_back(basis, rank, d.Q, begin, begin + rank - above)
+            reflect_back(basis, 0, rank, d.Q, begin, begin + rank - above)
         elif begin < end and not _are_bounds(d, A, last, k):
             d.factor[k] = level_damping(rows.W, Block(begin, end, above, rank), settings, of_block)
         else:

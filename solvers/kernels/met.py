@@ -49,7 +49,7 @@ def plainly_met(A, lower, upper, offsets, least):
             if least[k] >= 0.0 and not _is_short(rows, mu, first, end, above, least[k]):
                 return False
             assign(x[0], y)
-            reflect_back(basis, rank, x, 0, 1)
+            reflect_back(basis, 0, rank, x, 0, 1)
         if not inequalities_hold(A[:end], lower[:end], upper[:end], x[0]):
             return False
     return True

@@ -9,15 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined, inner_product, internal
+from hierarchy.jit import add_multiple, as_matrix, compiled, inlined, inner_product, internal
 from solvers.kernels.linalg.block import invert_triangle, orthogonalise_rows, smallest_square
-from solvers.kernels.linalg.rows import (
-    finish,
-    load_rows,
-    make_reflector,
-    reflect,
-    reflect_back,
-)
+from solvers.kernels.linalg.rows import finish, load_rows, make_reflector, reflect, reflect_back
 from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import SOLVED, TOO_SMALL
@@ -28,8 +22,7 @@ class Matrices(NamedTuple):
 
     R (m, N): R^T, the rows of J reflected. basis: the m reflectors of Q. F (m, m): F^T. T (m, m):
     R^-1. zero (m,): squared norm at or below which a row is zero. rest: m + 3 m^2 numbers. u (m,),
-    of_x (1, N), least (n,): intermediate results. whole (1,): all rows as one level. undamped (3,):
-    settings.
+    of_x (1, N): intermediate results.
     """
 
     R: View
@@ -40,9 +33,6 @@ class Matrices(NamedTuple):
     rest: View
     u: View
     of_x: View
-    least: View
-    whole: View
-    undamped: View
 
 
 @inlined
@@ -57,10 +47,7 @@ def _carve(work, m, n):
     rest, at = vector(work, at, m + 3 * m * m)
     u, at = vector(work, at, m)
     of_x, at = matrix(work, at, 1, N)
-    least, at = vector(work, at, n)
-    whole, at = integers(work, at, 1)
-    undamped, at = vector(work, at, 3)
-    return Matrices(R, basis, F, T, zero, rest, u, of_x, least, whole, undamped), at
+    return Matrices(R, basis, F, T, zero, rest, u, of_x), at
 
 
 @compiled
@@ -68,7 +55,7 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
     """Solve (14) with F of (10); arguments and return codes as in `solve_by_staircase`."""
     m, n = A.shape
     matrices, at = _carve(work, m, n)
-    _, end = carve_staircase(work, at, m, n)
+    _, end = carve_staircase(work, at + 4, m, n)
     if end > work.size:
         return TOO_SMALL
     settings, u = shared(settings), matrices.u
@@ -83,35 +70,33 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
     for k in range(m):
         for i in range(m):
             u[i] += matrices.F[k, i] * lower[k]  # F p - J q0, of (14); F here is its transpose
+    fill(matrices.of_x[0], 0.0)
     if square * tolerance * tolerance < 1.0:  # sigma_min(R) >= 1 / ||R^-1||_F > tolerance
-        _add_inverse(matrices, x)
-        return finish(x, SOLVED)
-    return finish(x, _add_least(A, matrices, x, settings, work[at:]))
+        _write_inverse(matrices)
+    else:
+        code = _write_least(A, matrices, settings, work[at:])
+    add_multiple(x, 1.0, matrices.of_x[0, :n])
+    return finish(x, code)
 
 
 @inlined
-def _add_inverse(matrices, x):
-    """Add J^# u = Q [R^-T u; 0] to x (11)."""
+def _write_inverse(matrices):
+    """Write J^# u = Q [R^-T u; 0] (11)."""
     u, of_x, m = matrices.u, matrices.of_x, matrices.u.size
-    fill(of_x[0], 0.0)
     for i in range(m):
         u[i] = (u[i] - inner_product(u[:i], matrices.R[i])) / matrices.R[i, i]
         of_x[0, i] = u[i]
-    reflect_back(matrices.basis, m, of_x, 0, 1)
-    for c in range(x.size):
-        x[c] += of_x[0, c]
+    reflect_back(matrices.basis, 0, m, of_x, 0, 1)
 
 
 @inlined
-def _add_least(A, matrices, x, settings, work):
-    """Add J^# u, at any rank, to x; return the code of the staircase that finds it."""
-    u, least, whole, undamped = matrices.u, matrices.least, matrices.whole, matrices.undamped
+def _write_least(A, matrices, settings, work):
+    """Write J^# u, at any rank; return the code of the staircase that finds it."""
+    whole, at = integers(work, 0, 1)  # all rows as one level
+    undamped, at = vector(work, at, 3)
     undamped[0], undamped[1], undamped[2] = 0.0, settings.threshold, settings.rank_tolerance
-    whole[0] = u.size
-    fill(least, 0.0)
-    code, _ = climb(A, u, u, whole, least, undamped, work)
-    for c in range(x.size):
-        x[c] += least[c]
+    u, whole[0] = matrices.u, A.shape[0]
+    code, _ = climb(A, u, u, whole, matrices.of_x[0, :A.shape[1]], undamped, work[at:])
     return code
 
 

@@ -297,7 +297,7 @@ def _write_line(task, x, space, at):
     for k in range(x.size):
         line[0, k] = y_a[k] if at.joints <= k < at.task else 0.0
         line[1, k] = y[k] if at.above <= k < at.task else 0.0
-    reflect_back(space.basis, at.task, line, 0, 2)
+    reflect_back(space.basis, 0, at.task, line, 0, 2)
     for j in range(x.size):
         line[1, j] += x[j]
 
@@ -313,7 +313,7 @@ def _improves(x, space, at, s):
         trial[0, k] = 0.0
         if at.above <= k < at.task:
             trial[0, k] = y[k] + s * y_a[k] if k >= at.joints else y[k]
-    reflect_back(space.basis, at.task, trial, 0, 1)
+    reflect_back(space.basis, 0, at.task, trial, 0, 1)
     for j in range(x.size):
         low, up, value = space.low[j], space.up[j], x[j] + trial[0, j]
         inside = inside and not value > up + 10.0 * BOUND_KEPT * (1.0 + abs(up))
@@ -456,7 +456,7 @@ def _free_way(space, x, target, begin):
     reflect(space.basis, 0, begin, ways, 0, 1)
     for k in range(begin):
         space.y[k], d[k] = d[k], 0.0
-    reflect_back(space.basis, begin, ways, 0, 1)
+    reflect_back(space.basis, 0, begin, ways, 0, 1)
 
 
 @inlined

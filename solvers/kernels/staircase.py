@@ -140,5 +140,5 @@ def _to_unknowns(basis, y, rank, x, of_x):
     if not zero_reference:
         reflect(basis, 0, rank, of_x, 0, 1)
     assign(of_x[0, :rank], y)
-    reflect_back(basis, rank, of_x, 0, 1)
+    reflect_back(basis, 0, rank, of_x, 0, 1)
     assign(x, of_x[0])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inlined
+from hierarchy.jit import as_matrix, inlined, internal
 from hierarchy.jit.exporting import INTEGER, STATUS, Entry, integers_at, numbers_at
 from solvers.kernels.active_set.exact import keep_staircase, solve, verify_answer
 from solvers.kernels.active_set.exact import work_size as exact_size
@@ -94,7 +94,7 @@ class Call(NamedTuple):
     work: View
 
 
-@compiled
+@internal
 def can_open(problem, settings, record, x, work, size):
     """Return SOLVED if a call can be opened, else INVALID or TOO_SMALL."""
     code = judged_problem(problem)
@@ -141,7 +141,7 @@ def _in_range(settings):
             and 0.0 <= s.regularisation < np.inf and -1 <= s.strict_levels < MOST_ITERATIONS)
 
 
-@compiled
+@internal
 def reset(problem, record, x):
     """Write x = 0 and a record without content, as far as they are there."""
     if record != 0:
@@ -279,7 +279,7 @@ def write_exact(settings, s):
     settings[3], settings[4] = s.tolerance, s.max_iterations
 
 
-@compiled
+@internal
 def solve_hcod(call, s):
     """Solve like `Hcod`."""
     size = 3 * call.lower.size + 3
@@ -291,7 +291,7 @@ def solve_hcod(call, s):
     return code
 
 
-@compiled
+@internal
 def solve_recursive(call, s):
     """Solve like `Recursive`."""
     call.settings[3], call.settings[4], call.settings[5] = s.method, s.isotropic, s.largest
@@ -299,7 +299,7 @@ def solve_recursive(call, s):
     return recursion(call.A, call.lower, call.upper, call.sizes, call.x, call.settings, call.work)
 
 
-@compiled
+@internal
 def solve_sns(call, s):
     """Solve like `Sns`."""
     call.settings[3], call.settings[4] = s.optimal, s.miss
@@ -310,7 +310,7 @@ def solve_sns(call, s):
     return code
 
 
-@compiled
+@internal
 def solve_merged(call, s):
     """Solve like `Merged`; INVALID with damping, or a scale that is not positive."""
     (m, n), levels = call.A.shape, call.sizes.size
@@ -333,7 +333,7 @@ def solve_merged(call, s):
     return code
 
 
-@compiled
+@internal
 def solve_tpm(call, s):
     """Solve like `Tpm`."""
     n, size = call.x.size, call.x.size + call.sizes.size + 3 * call.lower.size + 3

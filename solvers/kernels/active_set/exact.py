@@ -27,7 +27,6 @@ from solvers.kernels.active_set.working_set import (
     SOUND,
     STATE,
     UPPER,
-    Scaled,
     carve_working_set,
     load,
     meet,
@@ -38,13 +37,7 @@ from solvers.kernels.active_set.working_set import (
     working_set_size,
 )
 from solvers.kernels.active_set.working_set import TOLERANCE as RANK
-from solvers.kernels.damping import (
-    carve_damped,
-    damp_level,
-    damped_size,
-    keep_reached,
-    open_damped,
-)
+from solvers.kernels.damping import carve_damped, damp_level, damped_size, keep_reached, open_damped
 from solvers.kernels.linalg.rows import all_equal, finish, length_of
 from solvers.kernels.linalg.space import assign, fill, matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
@@ -385,13 +378,12 @@ def open_working_set(A, lower, upper, sizes, x, record, settings, work):
     s, own.scalar[SCALE] = own, 1.0
     code = load(s, lower, upper, sizes, record, settings[RANK_TOLERANCE])
     if code == UNPROVED:
-        rows, end = matrix(work, end, m, n)
+        scaled, end = matrix(work, end, m, n)
         sides, end = matrix(work, end, 2, m)
-        scaled = Scaled(rows, sides[0], sides[1])
-        code = rescale(own, lower, upper, scaled)
-        s, _ = carve_working_set(scaled.A, sizes, x, multiplier, work, at)
+        code = rescale(own, lower, upper, scaled, sides)
+        s, _ = carve_working_set(scaled, sizes, x, multiplier, work, at)
         if code == SOLVED:
-            code = load(s, scaled.lower, scaled.upper, sizes, record, settings[RANK_TOLERANCE])
+            code = load(s, sides[0], sides[1], sizes, record, settings[RANK_TOLERANCE])
     return s, code, end
 
 

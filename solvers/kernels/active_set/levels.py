@@ -58,7 +58,6 @@ from solvers.kernels.active_set.tableau import (
     missed_side,
     open_tableau,
     pivot_rows,
-    pull_of_rows,
     push_by,
     step_of_rows,
     turn_to,
@@ -86,11 +85,7 @@ from solvers.kernels.active_set.working_set import (
 )
 from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import assign, fill
-from solvers.kernels.tolerances import (
-    CANCELLED,
-    FLOOR,
-    REPIVOT,
-)
+from solvers.kernels.tolerances import CANCELLED, FLOOR, REPIVOT
 from solvers.status import EQUAL, FREE, SOLVED, UNPROVED
 
 # Kind of a row, 0 before its level. PARALLEL: the held rows keep it in place.
@@ -376,8 +371,9 @@ def _held_wrongly(t, whole, tolerance):
         return -1
     if whole:
         _pull_of_goal(t, begin, end)
-    else:
-        pull_of_rows(t, begin, end)
+    for q in range(0 if whole else t.count[ROWS]):
+        if s.number[OVER, q] != 0.0:
+            push_by(t, s.index[LIST, q], s.number[OVER, q], begin, end)
     balance(t, begin, end)
     return _worst(t)
 

@@ -38,9 +38,7 @@ from solvers.kernels.active_set.working_set import (
     side_at,
     value_at,
 )
-from solvers.kernels.active_set.working_set import (
-    ZEROED as FORCE,
-)
+from solvers.kernels.active_set.working_set import ZEROED as FORCE
 from solvers.kernels.linalg.least_squares import turn
 from solvers.kernels.linalg.rows import length_of, reflect
 from solvers.kernels.linalg.space import fill, matrix
@@ -63,18 +61,14 @@ def write_multipliers(s, tolerance):
     last = levels if whole < 0 else whole
     for k in range(last):
         _write_violations(s, k, reach, tolerance)
-    weight = _write_distances(s, whole) if whole >= 0 else 1.0
+    weight = 1.0
+    if whole >= 0:
+        weight = s.number[NORM, s.index[FIRST, whole]] ** 2
+        for i in range(s.index[FIRST, whole], s.index[FIRST, whole + 1]):
+            s.multiplier[whole, i] = value_at(s, i) - side_at(s, i)
     for p in range(last + 1):
         if _pull(s, p, reach) if p < last else _pull_of_goal(s, last, weight, reach):
             _balance(s, p)
-
-
-@inlined
-def _write_distances(s, k):
-    """Write the violations of a level that sets all of x; return the square of its weight."""
-    for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
-        s.multiplier[k, i] = value_at(s, i) - side_at(s, i)
-    return s.number[NORM, s.index[FIRST, k]] ** 2
 
 
 @inlined

@@ -34,14 +34,7 @@ from solvers.kernels.active_set.working_set import (
 from solvers.kernels.linalg.least_squares import least_squares
 from solvers.kernels.linalg.rows import swap
 from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, vector
-from solvers.kernels.tolerances import (
-    CANCELLED,
-    CLEAR_SQUARE,
-    EPSILON,
-    FAINT,
-    FLOOR,
-    NEGLIGIBLE,
-)
+from solvers.kernels.tolerances import CANCELLED, CLEAR_SQUARE, EPSILON, FAINT, FLOOR, NEGLIGIBLE
 from solvers.status import EQUAL
 
 # Rows of `number` after those of the data. Per row of A: its value and the rate of that; its
@@ -347,14 +340,6 @@ def weigh_rows(t):
     share = min(EPSILON * t.scalar[SIZE] / length, 1.0) if length > 0.0 else 0.0
     t.scalar[ROUNDING] = pulled * max(CANCELLED, share)
     return worst
-
-
-@inlined
-def pull_of_rows(t, begin, end):
-    """Add the excess of the rows of a level, times the rows, in the basis vectors begin .. end."""
-    for q in range(t.count[ROWS]):
-        if t.of.number[OVER, q] != 0.0:
-            push_by(t, t.of.index[LIST, q], t.of.number[OVER, q], begin, end)
 
 
 @inlined

@@ -17,7 +17,7 @@ import numpy as np
 
 from hierarchy.jit import as_matrix, inlined, inner_product, internal
 from solvers.kernels.linalg.least_squares import substitute_back, triangularise, turn
-from solvers.kernels.linalg.rows import factor_level, only_entry, reflect, swap
+from solvers.kernels.linalg.rows import factor_level, only_entry, reflect, reflect_back, swap
 from solvers.kernels.linalg.space import Rows, View, assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE, SPARED
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
@@ -49,14 +49,6 @@ PICKED, WHOLE, DIRTY, NEGLECTED, FINISHED, SEEN_LAST, FACTORED, SOUND = range(8)
 # In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm
 # and the next one, the factor by which the data are those of the caller.
 TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
-
-
-class Scaled(NamedTuple):
-    """Rows A (m, n) and sides (m,) after scaling."""
-
-    A: View
-    lower: View
-    upper: View
 
 
 class WorkingSet(NamedTuple):
@@ -179,10 +171,10 @@ def _small_length(a):
 
 
 @internal
-def rescale(s, lower, upper, scaled):
+def rescale(s, lower, upper, A, sides):
     """Write the rows and sides times a power of two that brings their norms into range.
 
-    scaled: a `Scaled`. Returns SOLVED, or NUMERICAL_FAILURE if a side is then no number.
+    A (m, n), sides (2, m). Returns SOLVED, or NUMERICAL_FAILURE if a side is then no number.
     """
     most, sane, factor = 0.0, True, 1.0
     for i in range(s.A.shape[0]):
@@ -193,10 +185,10 @@ def rescale(s, lower, upper, scaled):
         factor *= 0.5
     for i in range(s.A.shape[0]):
         for c in range(s.x.size):
-            scaled.A[i, c] = s.A[i, c] * factor
-        scaled.lower[i], scaled.upper[i] = lower[i] * factor, upper[i] * factor
-        sane &= np.isfinite(scaled.lower[i]) == np.isfinite(lower[i])
-        sane &= np.isfinite(scaled.upper[i]) == np.isfinite(upper[i])
+            A[i, c] = s.A[i, c] * factor
+        sides[0, i], sides[1, i] = lower[i] * factor, upper[i] * factor
+        sane &= np.isfinite(sides[0, i]) == np.isfinite(lower[i])
+        sane &= np.isfinite(sides[1, i]) == np.isfinite(upper[i])
     s.scalar[SCALE] = factor
     return SOLVED if sane else NUMERICAL_FAILURE
 
@@ -395,8 +387,7 @@ def _see_in_columns(s, begin, end, rank):
     for j in range(n - rank):
         for c in range(n):
             Z[j, c] = 1.0 if c == rank + j else 0.0
-    for k in range(rank - 1, s.count[PICKED] - 1, -1):
-        reflect(s.basis, k, k + 1, Z, 0, n - rank)
+    reflect_back(s.basis, s.count[PICKED], rank, Z, 0, n - rank)
     for q in range(begin, end):
         c = s.index[UNIT, s.index[LIST, q]]
         for t in range(n):
@@ -446,8 +437,7 @@ def _cut(s, q, rank):
         s.W[q, t] = s.W[q, t] if t < rank else 0.0
     if most <= NEGLIGIBLE * s.number[NORM, i]:
         return
-    for k in range(rank - 1, s.count[PICKED] - 1, -1):
-        reflect(s.basis, k, k + 1, s.number, SCRATCH, SCRATCH + 1)
+    reflect_back(s.basis, s.count[PICKED], rank, s.number, SCRATCH, SCRATCH + 1)
     square = 0.0
     for t in range(n):
         c = s.index[ORDER, t]
@@ -486,19 +476,8 @@ def _solve(s, begin, end, above, rank, short):
         substitute_back(T, miss[begin:], y[above:])
         fill(miss[begin:begin + rank - above], 0.0)
         turn(T, miss[begin:], True)
-        s.scalar[SIZE] = max(s.scalar[SIZE], _compromise(s, begin, end))
     for t in range(above, rank):
         s.scalar[SIZE] = max(s.scalar[SIZE], abs(y[t]))
-
-
-@inlined
-def _compromise(s, begin, end):
-    """Return the length of what cancels where rows of a level contradict each other."""
-    far, heaviest = 0.0, 0.0
-    for q in range(begin, end):
-        norm = s.number[NORM, s.index[LIST, q]]
-        far, heaviest = max(far, abs(s.number[MISS, q]) * norm), max(heaviest, norm)
-    return far / (heaviest * heaviest)
 
 
 @inlined
@@ -530,7 +509,6 @@ def _keep_goal(s, rank):
 def _write_x(s, rank):
     """Write x = Q y, by the first reflectors."""
     assign(s.number[SCRATCH, :s.x.size], s.number[Y])
-    for k in range(rank - 1, s.count[PICKED] - 1, -1):
-        reflect(s.basis, k, k + 1, s.number, SCRATCH, SCRATCH + 1)
+    reflect_back(s.basis, s.count[PICKED], rank, s.number, SCRATCH, SCRATCH + 1)
     for t in range(s.x.size):
         s.x[s.index[ORDER, t]] = s.number[SCRATCH, t]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hierarchy.jit import as_matrix, compiled, inner_product, internal
+from hierarchy.jit import as_matrix, inner_product, internal
 from solvers.kernels.linalg.least_squares import least_squares
 from solvers.kernels.linalg.space import matrix
 from solvers.kernels.tolerances import ORTHOGONAL, SWEEPS
@@ -132,7 +132,7 @@ def _rotate(V, i, j, cosine, t):
         V[j, k] = cosine * (t * above + V[j, k])
 
 
-@compiled
+@internal
 def _one_unknown(M, r, y, at, damped):
     """Write the minimiser into y."""
     k, along, square = at.k0, 0.0, damped * damped
@@ -142,7 +142,7 @@ def _one_unknown(M, r, y, at, damped):
     y[k] = along / square
 
 
-@compiled
+@internal
 def _least_squares(M, r, y, at, damped, work):
     """Write the minimiser into y, by reflections of [M r; lambda I 0]."""
     p, rows = at.k1 - at.k0, at.i1 - at.i0

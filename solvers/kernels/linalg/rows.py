@@ -145,9 +145,9 @@ def reflect_by(v, w):
 
 
 @inlined
-def reflect_back(basis, rank, W, i0, i1):
-    """Apply reflectors rank - 1 .. 0: from coordinates of Q to x, for rows i0 .. i1 - 1 of W."""
-    for k in range(rank - 1, -1, -1):
+def reflect_back(basis, k0, k1, W, i0, i1):
+    """Apply reflectors k1 - 1 .. k0: from coordinates of Q to x, for rows i0 .. i1 - 1 of W."""
+    for k in range(k1 - 1, k0 - 1, -1):
         reflect(basis, k, k + 1, W, i0, i1)
 
 
