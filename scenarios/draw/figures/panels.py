@@ -89,7 +89,7 @@ def distance(ax: Axes, recording: Recording, colour: str, signal: str) -> None:
     if tip:
         _in_red(ax, t, shown, recording["repulsion_active"])
     if avoidance is not None:
-        for symbol, value in (avoidance.tip_thresholds if tip else avoidance.thresholds).items():
+        for symbol, value in avoidance.thresholds["ee" if tip else "body"].items():
             ax.axhline(value, color=INK, linewidth=0.6, linestyle=_DASHED)
             ax.annotate(symbol, (1.0, value), xycoords=("axes fraction", "data"),
                         fontsize="small", va="bottom", ha="right", color=INK)
