@@ -21,12 +21,7 @@ from scenarios.config import Scenario, ScenarioError
 from scenarios.config.sections import naming
 from scenarios.config.sections.plant import TorqueSection
 from scenarios.config.sections.references import References
-from scenarios.config.sections.robot import (
-    ContactSection,
-    RobotPointSection,
-    RobotSection,
-    StartSection,
-)
+from scenarios.config.sections.robot import ContactSection, PointSection, RobotSection, StartSection
 from solvers import make
 
 _REACHED = 1e-6      # [m]
@@ -67,7 +62,7 @@ def make_robot(section: RobotSection) -> Robot:
     return robot
 
 
-def point_of(robot: Robot, section: RobotPointSection, key: str) -> ControlPoint:
+def point_of(robot: Robot, section: PointSection, key: str) -> ControlPoint:
     """Return a point of the robot; raises ScenarioError, naming its key, if there is none."""
     with naming(key):
         if section.joint is not None:

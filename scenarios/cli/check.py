@@ -267,7 +267,7 @@ def _sections(scenario: Scenario) -> Iterator[str]:
     if scenario.avoidance is not None:
         asked = scenario.avoidance
         body, tip = (" and ".join(f"{distance:g}" for distance in thresholds.values())
-                     for thresholds in (asked.thresholds, asked.tip_thresholds))
+                     for thresholds in asked.thresholds.values())
         yield (f"  avoidance {asked.kind}, {counted(len(asked.obstacles), 'obstacle')}; within "
                f"{body} m of the body, {tip} m of the end effector")
     if scenario.limits is not None:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar, get_args
 
 from pydantic import ValidationError
 
-from hierarchy.errors import HierarchyError, UnknownNameError, brief
+from hierarchy.errors import UnknownNameError, brief
 from hierarchy.words import listed
 from scenarios.config.sections import OneOf, ScenarioError, Section, Unit, kinds_of
 
@@ -28,8 +28,6 @@ def validated(kind: type[Kind], data: dict[str, Any], what: str) -> Kind:
     except ValidationError as error:
         raise ScenarioError("\n".join(f"{what}: {_said(kind, data, e)}" for e in error.errors())
                             ) from error
-    except HierarchyError as error:  # what a resolver says of its settings
-        raise ScenarioError(f"{what}: control: {error}") from error
 
 
 class Tag(NamedTuple):

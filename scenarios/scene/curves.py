@@ -53,13 +53,11 @@ def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
         yield _sampled("Angle to the cone's axis", "°", ("end effector",),
                        scenario.pointing.angle(recording["pointing_error"]), ticks,
                        (("α_d", scenario.pointing.alpha_d),))
-    for name, signal in (("Body to the nearest obstacle", "minimal_distance"),
-                         ("End effector to the nearest obstacle", "ee_distance")):
+    for what, of, signal in (("Body", "body", "minimal_distance"),
+                             ("End effector", "ee", "ee_distance")):
         if signal in recording and scenario.avoidance is not None:
-            at = (scenario.avoidance.thresholds if signal == "minimal_distance"
-                  else scenario.avoidance.tip_thresholds)
-            yield _sampled(name, "m", (name.partition(" to ")[0].lower(),), recording[signal],
-                           ticks, marks_of(at))
+            yield _sampled(f"{what} to the nearest obstacle", "m", (what.lower(),),
+                           recording[signal], ticks, marks_of(scenario.avoidance.thresholds[of]))
     yield from _task_errors(recording, ticks)
     yield from _forces(recording, ticks)
     yield _sampled("Joint speeds", "rad/s", recording.facts.robot.speed_names, recording["v"],

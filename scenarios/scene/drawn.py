@@ -114,8 +114,9 @@ def scene(recording: Recording, rate: float = 30.0,
     pushed = pushes(facts, scenario, t, placements, recording["planned_force"][ticks],
                     recording["com"][ticks] if "com" in recording else None
                     ) if facts.contacts else None
-    return Scene(robot, obstacles, marks_of(avoidance.thresholds if avoidance else {}), cone,
-                 radians(pointing.alpha_d) if pointing else 0.0, t, ticks, placements, **moved,
+    areas = marks_of(avoidance.thresholds["body"]) if avoidance else ()
+    return Scene(robot, obstacles, areas, cone, radians(pointing.alpha_d) if pointing else 0.0,
+                 t, ticks, placements, **moved,
                  active=_active(recording, ticks, levels, moved["distance"]), axis=z,
                  desired=recording["desired_position"][ticks]
                  if "desired_position" in recording else None,

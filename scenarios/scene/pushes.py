@@ -1,7 +1,5 @@
 """What pushes on a robot, and what holds it up, as segments: forces, cones, support polygon."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -42,10 +40,6 @@ class Pushes(NamedTuple):
     centre: Array
     push: Array
     table: Array
-
-    def at(self, frame: int) -> Pushes:
-        """Return the segments (S, 2, 3) of a frame that exist."""
-        return Pushes(*(part[frame][np.isfinite(part[frame]).all(axis=(1, 2))] for part in self))
 
 
 def key(facts: Facts, scenario: Scenario) -> dict[str, str]:

@@ -24,7 +24,8 @@ FAULTS = {
         "iteration_limit", "numerical_failure", "backend_failure", "inaccurate")},
     "overrun": ("overrun", "takes=60.0", "overrun", 0),
     "obstacle": ("obstacle", "place={joint='joint_4', offset=[0.0, 0.0, 0.0]}, radius=0.05",
-                 "inside", 0)}
+                 "inside", 0),
+    "obstacle at a frame": ("obstacle", "place={frame='end_effector'}, radius=0.05", "inside", 0)}
 
 
 def scenario(name, put, settings, *changes, kind, policy):

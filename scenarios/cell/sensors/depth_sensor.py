@@ -43,7 +43,7 @@ class DepthSpace:
 
     def __init__(self, section: ImageSection, pinhole: Pinhole, points: Sequence[ControlPoint],
                  capsules: Sequence[Capsule], asked: Asked, pairs: bool = False) -> None:
-        self.pinhole, self.points = pinhole, tuple(points)
+        self.pinhole = pinhole
         self.region = section.region or asked.region
         self.measurement = Measurement(len(points) - 1)
         self._pairs = Pairs(len(points), 1)
@@ -103,7 +103,6 @@ class DepthSensor:
     def __init__(self, section: ImageSection, source: Source, space: DepthSpace) -> None:
         self.source, self.space = source, space
         self.stale_after, self.least_readings = section.stale_after, section.least_readings
-        self.points: tuple[ControlPoint, ...] = space.points
         self.measurement, self.obstacles = space.measurement, source.obstacles
         self.reading: Image | None = None
         self.stopped = self.covered = False

@@ -67,6 +67,7 @@ def as_table(obstacle: Any) -> Any:
 
 
 Obstacles = tuple[Annotated[ObstacleSection, BeforeValidator(as_table)], ...]
+Thresholds = dict[str, dict[str, float]]  # by what keeps its distance, then by symbol
 
 
 class VariationSection(keys.Section):
@@ -152,17 +153,12 @@ class AvoidanceSection(_Avoiding):
             yield f"near = {self.near} m is beyond far = {self.far} m"
 
     @property
-    def thresholds(self) -> dict[str, float]:
-        """Distances of the body [m] at which avoidance changes, by symbol."""
-        if self.place == "null-space":
-            return {r"$\epsilon_2$": self.far}
-        outer = {r"$\epsilon_2$": self.far} if self.far > self.near else {}
-        return {r"$\epsilon_1$": self.near} | outer
-
-    @property
-    def tip_thresholds(self) -> dict[str, float]:
-        """The same for the end effector."""
-        return {r"$\epsilon_{ee}$": self.end_effector}
+    def thresholds(self) -> Thresholds:
+        """Distances [m] of the body and of the end effector, "ee", at which avoidance changes."""
+        inner, outer = {r"$\epsilon_1$": self.near}, {r"$\epsilon_2$": self.far}
+        body = outer if self.place == "null-space" else (
+            inner | outer if self.far > self.near else inner)
+        return {"body": body, "ee": {r"$\epsilon_{ee}$": self.end_effector}}
 
     @property
     def promised(self) -> dict[str, float]:
@@ -204,14 +200,9 @@ class SeparationSection(BarrierSection, _Avoiding):
             yield f"distance = {self.distance} m is not below influence = {self.influence} m"
 
     @property
-    def thresholds(self) -> dict[str, float]:
-        """Distances of the body [m] at which avoidance changes, by symbol."""
-        return {r"$d_{min}$": self.distance}
-
-    @property
-    def tip_thresholds(self) -> dict[str, float]:
-        """The same for the end effector."""
-        return self.thresholds
+    def thresholds(self) -> Thresholds:
+        """Distances [m] of the body and of the end effector, "ee", at which avoidance changes."""
+        return {who: {r"$d_{min}$": self.distance} for who in ("body", "ee")}
 
     @property
     def promised(self) -> dict[str, float]:

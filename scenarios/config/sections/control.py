@@ -6,12 +6,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from scenarios.config import sections as keys
-from scenarios.config.sections.avoidance import (
-    AvoidanceSection,
-    BarrierSection,
-    SeparationSection,
-)
-from scenarios.config.sections.robot import RobotPointSection
+from scenarios.config.sections.avoidance import AvoidanceKind, BarrierSection, SeparationSection
+from scenarios.config.sections.robot import PointSection
 from scenarios.config.sections.tasks import LimitsSection, Made, PointingTask
 
 AnswerPolicy = Literal["brake", "hold", "stop", "use"]
@@ -117,8 +113,7 @@ class ControlSection(keys.Section):
 
 
 def unfit(control: ControlSection, limits: LimitsSection | None,
-          avoidance: AvoidanceSection | SeparationSection | None,
-          tasks: Mapping[str, Made]) -> Iterator[str]:
+          avoidance: AvoidanceKind | None, tasks: Mapping[str, Made]) -> Iterator[str]:
     """Yield what a scenario asks for that its kind of stack does not have.
 
     `tasks` has the sections of tasks by their dotted keys.
@@ -208,7 +203,7 @@ class FaultSection(keys.Section):
                     "inaccurate"] | None = None  #: What the resolver reports.
     takes: keys.Span | None = None  #: Time that a tick takes longer.
     centre: keys.Point | None = None  #: Middle of the sphere.
-    place: RobotPointSection | None = None  #: Point of the robot, in place of `centre`.
+    place: PointSection | None = None  #: Point of the robot, in place of `centre`.
     radius: keys.Length | None = None  #: Radius of the sphere.
 
     def _wrong(self) -> Iterator[str]:

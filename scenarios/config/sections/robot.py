@@ -9,7 +9,7 @@ from hierarchy.robots.table import Base
 from scenarios.config import sections as keys
 
 
-class RobotPointSection(keys.Section):
+class PointSection(keys.Section):
     """A point of a joint's body or of a frame."""
 
     joint: str | None = None  #: Joint that moves the body.
@@ -37,7 +37,7 @@ class RobotSection(keys.Section):
     """A name of `hierarchy list`, a URDF or MJCF file, or "package:name" (extra `descriptions`)."""
     base: Base | None = None  #: Whether it is "fixed" or "floating"; by default that of the model.
     end_effector: str | None = None  #: Frame of [position] and [pointing].
-    control_points: tuple[RobotPointSection, ...] | None = None
+    control_points: tuple[PointSection, ...] | None = None
     """Points that keep their distance, besides the end effector."""
     capsules: tuple[CapsuleSection, ...] | None = None
     """Shapes of the links, for self-collision and the camera."""

@@ -50,12 +50,11 @@ class Panel:
         return known and recording.ticks > 1
 
 
-def columns(ax: Axes, recording: Recording, colour: str, signal: str, width: float,
-            named: Callable[[int], str], scale: float = 1.0) -> None:
-    """Draw each column of a signal, as figure 10 (a) does."""
-    for i, values in enumerate(recording[signal].T):
-        drawing.curve(ax, recording["t"], scale * values, **drawing.joint_line(i), linewidth=width,
-                      label=named(i))
+def position_components(ax: Axes, recording: Recording, colour: str) -> None:
+    """Draw each component of the position error [mm], as figure 10 (a) does."""
+    for i, axis in enumerate("xyz"):
+        drawing.curve(ax, recording["t"], 1e3 * recording["position_error"][:, i],
+                      **drawing.joint_line(i), linewidth=0.9, label=axis)
 
 
 def joints(ax: Axes, recording: Recording, colour: str, signal: str, width: float,
@@ -89,7 +88,7 @@ def distance(ax: Axes, recording: Recording, colour: str, signal: str) -> None:
     if tip:
         _in_red(ax, t, shown, recording["repulsion_active"])
     if avoidance is not None:
-        for symbol, value in (avoidance.tip_thresholds if tip else avoidance.thresholds).items():
+        for symbol, value in avoidance.thresholds["ee" if tip else "body"].items():
             ax.axhline(value, color=INK, linewidth=0.6, linestyle=_DASHED)
             ax.annotate(symbol, (1.0, value), xycoords=("axes fraction", "data"),
                         fontsize="small", va="bottom", ha="right", color=INK)
@@ -173,9 +172,7 @@ PANELS = (
 for _panel in PANELS:
     plugins.register("figures", _panel.name, shipped=True)(_panel)
 _COMPONENTS = Panel("position-components", "Position error of the end effector", "mm",
-                    "position_error",
-                    partial(columns, signal="position_error", width=0.9,
-                            named="xyz".__getitem__, scale=1e3))
+                    "position_error", position_components)
 PANEL = {panel.name: panel for panel in (*PANELS, _COMPONENTS)}
 
 

@@ -82,7 +82,7 @@ def _line(ax: Axes, path: Array, **style: object) -> None:
 def _obstacles(ax: Axes, recording: Recording, seen: Scene) -> None:
     """Draw the obstacles, static ones with their areas, and moving ones that are near the tip."""
     avoidance = recording.scenario.avoidance
-    areas = sorted(avoidance.thresholds.values(), reverse=True) if avoidance else []
+    areas = sorted(avoidance.thresholds["body"].values(), reverse=True) if avoidance else []
     for obstacle, centre in zip(seen.obstacles.obstacles, seen.centres[0], strict=True):
         balls, radius = hull(obstacle)
         away = np.linalg.norm(centre - seen.points[0, -1]) - radius - np.linalg.norm(
