@@ -78,11 +78,9 @@ def family(name: str) -> Family:
 
 def _reference(name: str, seed: int, count: int) -> list[Hierarchy]:
     """Return stored problems, or new ones of the same make."""
-    if seed and name in recorded.RECORDED:
-        return [one.h for one in recorded.fresh(name, seed, count)]
-    if seed:
-        return [problems.family(name, seed * _STRIDE + i) for i in range(count)]
-    return [one.h for one in recorded.family(name)[:count]]
+    first = seed if name in recorded.RECORDED else seed * _STRIDE
+    found = recorded.fresh(name, first, count) if seed else recorded.family(name)[:count]
+    return [one.h for one in found]
 
 
 def _other(name: str, seed: int, count: int) -> list[Hierarchy]:
