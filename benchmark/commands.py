@@ -35,7 +35,10 @@ bench = typer.Typer(invoke_without_command=True, rich_markup_mode=None)
 
 
 def _run(out: Path | None, *names: str, **options: Any) -> int:
-    """Run benchmarks, MODULE or MODULE:FUNCTION, with those of the options that each has."""
+    """Run benchmarks, MODULE or MODULE:FUNCTION, with those of the options that each has.
+
+    `out` is an option too, of those that write more than their report.
+    """
     from scenarios.files import claim, in_runs, next_free
 
     folder = next_free(in_runs("bench")) if out is None else claim(out)
@@ -44,7 +47,8 @@ def _run(out: Path | None, *names: str, **options: Any) -> int:
         module, _, function = name.partition(":")
         run = getattr(import_module(f"benchmark.{module}"), function or "run")
         known = signature(run).parameters
-        report = run(**{key: value for key, value in options.items() if key in known})
+        report = run(**{key: value for key, value in {**options, "out": folder}.items()
+                        if key in known})
         report.say()
         report.write(folder / (function or module).split(".")[-1] if len(names) > 1 else folder)
         failed = failed or report.failed
@@ -211,35 +215,18 @@ def open_(family: Family = None,
     return 0
 
 
-@bench.command()
-def stress(count: Annotated[int, typer.Option(
-               min=1, metavar="N", help="Number of problems.")] = 1_000_000,
-           resolver: Annotated[str, typer.Option(
-               metavar="NAME", help="Resolver to test.")] = "hcod",
-           kind: Annotated[str, typer.Option(metavar="KIND", help="Kind of problems.")] = "all",
-           first: Annotated[int, typer.Option(
-               min=0, max=2**53, metavar="SEED", help="First seed.")] = 0,
-           processes: Annotated[int | None, typer.Option(
-               "--processes", min=1, metavar="N", help="Default: one for each core.")] = None,
-           out: Annotated[Path, output("Where failing problems are saved.")
-                          ] = Path("runs/stress")) -> int:
-    """Certify a resolver's answers to generated problems.
+_add("stress", """Certify a resolver's answers to generated problems.
 
-    What is not certified is proved right or wrong. Exit code 1 if an answer fails.
-    """
-    from benchmark.stress import ALL, KINDS, Tally, report, run
-    from hierarchy.errors import check_name
-    from solvers import make
-
-    make(resolver)
-    check_name("kind", kind, (ALL, *KINDS))
-    found: dict[str, Tally] = {}
-    try:
-        run(count, resolver, found, first, processes, kind)
-    finally:  # what was judged before an interruption is said too
-        said = report(resolver, found, out)
-        said.say()
-    return int(said.failed)
+    What is not certified is proved right or wrong, and what fails is saved. Exit code 1 if an
+    answer fails.
+    """, "stress",
+     count=(Annotated[int, typer.Option(min=1, metavar="N", help="Number of problems.")],
+            1_000_000),
+     resolver=(Annotated[str, typer.Option(metavar="NAME", help="Resolver to test.")], "hcod"),
+     kind=(Annotated[str, typer.Option(metavar="KIND", help="Kind of problems.")], "all"),
+     first=(Annotated[int, typer.Option(min=0, max=2**53, metavar="SEED", help="First seed.")], 0),
+     processes=(Annotated[int | None, typer.Option(
+         "--processes", min=1, metavar="N", help="Default: one for each core.")], None))
 
 
 def reproduce(names: Annotated[list[str] | None, typer.Argument(

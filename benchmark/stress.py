@@ -9,7 +9,6 @@ NUMBA_BOUNDSCHECK=1 (and a separate NUMBA_CACHE_DIR) a kernel that accesses memo
 arrays raises instead of corrupting memory.
 """
 
-import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ import numpy as np
 
 from benchmark.report import Column, Report, Row, Section, Table, whole
 from benchmark.solve.judge import RIGHT, miss_of
+from hierarchy.errors import check_name
 from hierarchy.problem import Array, Hierarchy
 from scenarios.cli.terminal import bar
 from scenarios.problems.families import answer
@@ -120,24 +120,32 @@ def tally(job: tuple[str, range, str]) -> Tally:
     return found
 
 
-def run(count: int, name: str, found: dict[str, Tally], first: int = 0,
-        processes: int | None = None, kind: str = RECIPE) -> None:
-    """Judge a resolver on `count` problems starting at seed `first`.
+def run(out: Path, count: int, resolver: str, kind: str, first: int, processes: int | None
+        ) -> Report:
+    """Judge a resolver on `count` problems starting at seed `first`; save what fails in `out`.
 
-    found : the counts by kind, filled as they come: a run that is interrupted leaves them.
-    processes : number of processes; None for one per core.
     kind : one of KINDS, or "all" to distribute the problems evenly over them.
+    processes : number of processes; None for one per core.
+
+    An interrupted run says what was judged. Raises UnknownNameError.
     """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by the processes when they start
+    make(resolver)
+    check_name("kind", kind, (ALL, *KINDS))
     kinds = KINDS if kind == ALL else (kind,)
     each = -(-count // len(kinds))
-    found.update({one: Tally() for one in kinds})
-    jobs = [(name, range(i, min(i + _CHUNK, first + each)), one) for one in kinds
+    found = {one: Tally() for one in kinds}
+    jobs = [(resolver, range(i, min(i + _CHUNK, first + each)), one) for one in kinds
             for i in range(first, first + each, _CHUNK)]
-    with bar("problems") as told:
-        for (_, seeds, one), part in ended(tally, jobs, processes):
-            found[one].add(part or Tally(Counter({CRASHED: len(seeds)}), lost=[seeds]))
-            told(name, sum(some.counts.total() for some in found.values()), each * len(kinds))
+    try:
+        with bar("problems") as told:
+            for (_, seeds, one), part in ended(tally, jobs, processes):
+                found[one].add(part or Tally(Counter({CRASHED: len(seeds)}), lost=[seeds]))
+                done = sum(some.counts.total() for some in found.values())
+                told(resolver, done, each * len(kinds))
+    except KeyboardInterrupt:
+        report(resolver, found, out).say()
+        raise
+    return report(resolver, found, out)
 
 
 def report(name: str, found: Mapping[str, Tally], out: Path) -> Report:
@@ -149,16 +157,16 @@ def report(name: str, found: Mapping[str, Tally], out: Path) -> Report:
                   for seed, what in sorted(one.failing)[:_KEPT]]
         lines += [f"{kind}, seeds {seeds.start} to {seeds.stop - 1}: {CRASHED}"
                   for seeds in sorted(one.lost, key=lambda seeds: seeds.start)[:_KEPT]]
-    every = {**found, **({ALL: total} if len(found) > 1 else {})}
+    rows = [one.row(kind) for kind, one in {
+        **found, **({ALL: total} if len(found) > 1 else {})}.items()]
     others = sorted(set(total.counts) - {CERTIFIED, CRASHED, RAISED, NOT_FINITE})
     columns = [*(Column(key, key, whole) for key in ("problems", CERTIFIED, "failed", "lost")),
                *(Column(what.lower().replace("_", "\n").replace(" ", "\n"), what,
                         lambda n: whole(n or 0)) for what in others),
                *(Column(f"steps\n/ row\n{key}", key) for key in ("median", "most"))]
     return Report(f"{name} on generated problems", [Section("", [Table(
-        f"{name}: outcomes, each answer certified",
-        [one.row(kind) for kind, one in every.items()], columns, "kind")], "\n".join(lines))],
-        failed=bool(total.failing or total.lost))
+        f"{name}: outcomes, each answer certified", rows, columns, "kind")], "\n".join(lines))],
+        {"stress": rows}, failed=bool(total.failing or total.lost))
 
 
 def keep(name: str, seed: int, what: str, out: Path, kind: str = RECIPE) -> Path:

@@ -149,7 +149,7 @@ def doubtful_units(section: Section, above: str = "") -> Iterator[str]:
                  if unit.doubted}
         unit = units.pop() if len(units) == 1 else ""
         least, largest, remark = _USUAL.get(unit, (0.0, inf, ""))
-        for where, one in _leaves(value, key):
+        for where, one in leaves(value, key):
             if isinstance(one, Section):
                 yield from doubtful_units(one, f"{where}.")
             elif isinstance(one, float) and (0.0 < abs(one) < least or largest < abs(one) < inf):
@@ -157,10 +157,10 @@ def doubtful_units(section: Section, above: str = "") -> Iterator[str]:
                 break
 
 
-def _leaves(value: Any, key: str) -> Iterator[tuple[str, Any]]:
+def leaves(value: Any, key: str) -> Iterator[tuple[str, Any]]:
     """Yield a value by its key, or what is in a list, by its numbers."""
     if isinstance(value, list | tuple):
         for i, one in enumerate(value):
-            yield from _leaves(one, f"{key}.{i}")
+            yield from leaves(one, f"{key}.{i}")
     else:
         yield key, value

@@ -5,6 +5,7 @@ import json
 import os
 import platform
 import tempfile
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -135,15 +136,17 @@ def _facts(path: Path) -> Facts:
 
 def versions(*more: str) -> dict[str, str]:
     """Return the versions of packages, those of a run and `more`, and the processor."""
-    found = {}
-    for name in (*_PACKAGES, *more):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
+    found = {name: version_of(name) or "not installed" for name in (*_PACKAGES, *more)}
     return {"python": platform.python_version(), **found,
             "system": f"{platform.system()} {platform.machine()}",
             "processor": f"{_processor()}, {os.cpu_count()} cores"}
+
+
+def version_of(package: str) -> str | None:
+    """Return the version of a package, None if it is not installed."""
+    with suppress(PackageNotFoundError):
+        return version(package)
+    return None
 
 
 def _processor() -> str:

@@ -9,7 +9,7 @@ everybody may tune on; any other seed is fresh. Resolvers give candidates for an
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.metadata import PackageNotFoundError, distribution, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import final
 
@@ -19,6 +19,7 @@ from hierarchy.errors import check_name, refuse
 from hierarchy.problem import Array, Hierarchy
 from scenarios.config import load
 from scenarios.files import named, written
+from scenarios.measure.run_folder import version_of
 from scenarios.problems import made, recorded
 from solvers import make, problems
 from solvers.problems.files import FRESH, PUBLIC, Collection, Head
@@ -77,11 +78,9 @@ def family(name: str) -> Family:
 
 def _reference(name: str, seed: int, count: int) -> list[Hierarchy]:
     """Return stored problems, or new ones of the same make."""
-    if seed and name in recorded.RECORDED:
-        return [one.h for one in recorded.fresh(name, seed, count)]
-    if seed:
-        return [problems.family(name, seed * _STRIDE + i) for i in range(count)]
-    return [one.h for one in recorded.family(name)[:count]]
+    first = seed if name in recorded.RECORDED else seed * _STRIDE
+    found = recorded.fresh(name, first, count) if seed else recorded.family(name)[:count]
+    return [one.h for one in found]
 
 
 def _other(name: str, seed: int, count: int) -> list[Hierarchy]:
@@ -146,13 +145,9 @@ def available() -> list[Family]:
 
 def unavailable() -> dict[str, str]:
     """Return what to install for each of the other families, by name."""
-    found = {}
-    for name, (package, extra) in _NEEDS.items():
-        try:  # a wheel of example-robot-data has no module of Python
-            distribution(package)
-        except PackageNotFoundError:
-            found[name] = f"needs {package}: pip install 'task-hierarchy[{extra}]'"
-    return found
+    # A wheel of example-robot-data has no module of Python.
+    return {name: f"needs {package}: pip install 'task-hierarchy[{extra}]'"
+            for name, (package, extra) in _NEEDS.items() if version_of(package) is None}
 
 
 def answer(h: Hierarchy) -> Proof:

@@ -16,6 +16,7 @@ from typing import Any
 
 from hierarchy.errors import HierarchyError
 from scenarios import files
+from scenarios.config.validation import leaves
 from scenarios.measure.metrics import Metric
 from scenarios.results.plan import Job, Outcome
 
@@ -96,7 +97,7 @@ def rows(job: Job, outcome: Outcome) -> list[tuple[Any, ...]]:
     """Return the rows of a run; the last one says whether it reached its end, or why not."""
     head = job.key, job.scenario, job.resolver, job.sample
     sampled = [(name, value, "", name, _SAMPLED, "", "") for key, one in job.values.items()
-               for name, value in _flat(key, one)]
+               for name, value in leaves(one, key)]
     found = [(m.name, m.value, m.unit, m.label, m.group, _BETTER[m.lower_is_better], m.note)
              for m in outcome.metrics]
     told = [("ticks", outcome.ticks, "", "Ticks", _RUN, "", ""),
@@ -104,15 +105,6 @@ def rows(job: Job, outcome: Outcome) -> list[tuple[Any, ...]]:
             (_END, int(outcome.reason is None), "", "Reached the end", _RUN, "higher",
              outcome.reason or "")]
     return [(*head, *row) for row in (*sampled, *found, *told)]
-
-
-def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield a sampled value, each entry of a list by its number."""
-    if isinstance(value, list | tuple):
-        for i, one in enumerate(value):
-            yield from _flat(f"{key}.{i}", one)
-    else:
-        yield key, value
 
 
 def write_table(file: Path, found: Iterable[tuple[Job, Outcome]]) -> None:

@@ -15,11 +15,8 @@ from solvers.problems.files import read
 def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, command, tmp_path):
     from scenarios.problems import families
 
-    def distribution(name):
-        if name == "example-robot-data":
-            raise families.PackageNotFoundError(name)
-
-    monkeypatch.setattr(families, "distribution", distribution)
+    monkeypatch.setattr(families, "version_of",
+                        lambda name: None if name == "example-robot-data" else "1.0")
     absent = {"singular-panda", "singular-romeo"}
     assert {one.name for one in available()} == set(FAMILIES) - absent
     assert set(families.unavailable()) == absent
