@@ -23,6 +23,7 @@ from scenarios.measure.run_folder import version_of
 from scenarios.problems import made, recorded
 from solvers import make, problems
 from solvers.problems.files import FRESH, PUBLIC, Collection, Head
+from solvers.problems.kinds import TEXTS
 from solvers.proof import Proof, prove
 from solvers.qp.backends import installed
 
@@ -126,7 +127,7 @@ FAMILIES = {name: Family(
     _FEW if name in _SIMULATED else _CONSECUTIVE if group == "recorded" else COUNT)
     for group, make, named in (
         ("reference", _reference, _REFERENCE), ("recorded", recorded.recorded, recorded.SCENARIOS),
-        ("postures", made.posed, _POSTURES), ("degenerate", _generated, problems.KINDS),
+        ("postures", made.posed, _POSTURES), ("degenerate", _generated, TEXTS),
         ("others", _other, _OTHERS), ("others", made.of_examples, _EXAMPLES),
         ("random", _generated, {"recipe": "random sizes, ranks, ties, scales"}))
     for name, what in named.items()}

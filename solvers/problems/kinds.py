@@ -332,6 +332,8 @@ _MAKERS: dict[str, Callable[[Random], Levels]] = {
     "near_ties": _near_ties, "nearly_parallel": _nearly_parallel, "tiny_rows": _tiny_rows,
     "shifted": _shifted, "near_singular_arm": _near_singular_arm, "scaled": _scaled}
 _LINES = {name: str(make.__doc__).partition("\n")[0] for name, make in _MAKERS.items()}
-KINDS = {name: f"{line[0].lower()}{line[1:].rstrip('.').partition(';')[0]}"
+TEXTS = {name: f"{line[0].lower()}{line[1:].rstrip('.').partition(';')[0]}"
          for name, line in _LINES.items()}
-"""What each kind has, in short, by the names that `structured` knows."""
+"""What each kind has, in short, by its name."""
+KINDS = tuple(TEXTS)
+"""The names that `structured` knows."""
