@@ -68,12 +68,14 @@ def test_a_signal_has_its_largest_value_step_or_count(name, signals, value):
     assert measure(recording(**signals))[name].value == value
 
 
-@pytest.mark.parametrize(("unit", "shown"), [
-    ("m", "12346"), ("s", "1.2e+07"), ("deg", "12.346"), ("share", "1235"),
-    ("rad", "12.346"), ("rad/s", "12.346"), ("rad/s^2", "12.35"), ("rad/s^3", "12"),
-    ("N", "12.3"), ("", "12")])
-def test_each_unit_has_its_decimals(unit, shown):
-    assert Metric("some", "Some", 12.3456789, unit).shown() == shown
+@pytest.mark.parametrize(("value", "unit", "shown"), [
+    *((12.3456789, unit, shown) for unit, shown in (
+        ("m", "12346"), ("s", "1.2e+07"), ("deg", "12.346"), ("share", "1235"), ("rad", "12.346"),
+        ("rad/s", "12.346"), ("rad/s^2", "12.35"), ("rad/s^3", "12"), ("N", "12.3"), ("", "12"))),
+    (0.0123, "rad", "0.012"), (0.00649, "rad", "0.0065"), (0.0004, "rad", "4.0e-04"),
+    (0.0, "", "0"), (0.25, "", "0.25"), (1.5, "", "1.5"), (3.0, "", "3"), (12.5, "", "12")])
+def test_each_unit_has_its_decimals_and_a_small_number_a_digit_more(value, unit, shown):
+    assert Metric("some", "Some", value, unit).shown() == shown
 
 
 def test_joints_that_slide_are_not_measured_in_radians():
@@ -82,13 +84,6 @@ def test_joints_that_slide_are_not_measured_in_radians():
     found = measure(replace(run, facts=replace(run.facts, robot=robot)))
     assert [found[name].shown_unit for name in ("speed_max", "acceleration_max")] == [
         "rad/s or m/s", "rad/s² or m/s²"]
-
-
-def test_a_small_number_has_a_digit_more():
-    shown = [Metric("some", "Some", value, "rad").shown() for value in (0.0123, 0.00649, 0.0004)]
-    assert shown == ["0.012", "0.0065", "4.0e-04"]
-    counts = [Metric("some", "Some", value, "").shown() for value in (0.0, 0.25, 1.5, 3.0, 12.5)]
-    assert counts == ["0", "0.25", "1.5", "3", "12"]
 
 
 def test_times_are_given_by_median_and_tails_for_each_part():

@@ -7,7 +7,7 @@ from scene import FRAME, ROBOT, state_at, states
 
 from hierarchy import HierarchyError
 from hierarchy.task import Rows
-from hierarchy.tasks import CumulatedRepulsion, DangerBounds, Pointing
+from hierarchy.tasks import Pointing
 from hierarchy.tasks.together import TangentCone
 from scenarios import load
 from scenarios.cell.build import build
@@ -80,28 +80,3 @@ def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
         assert h.lower[30] == pytest.approx(5.0 * to_end)
         alone = make("smooth").solve_activated(h, cell.activation()).x
         np.testing.assert_array_equal(controller.resolution.x, alone)
-
-
-# The avoidance of the letter's references [5] and [10].
-def at_the_start(scenario):
-    cell = build(scenario)
-    cell.state.move(0.3, cell.start[0], np.linspace(-0.3, 0.3, 7))
-    return cell, cell.sensor.measure(cell.state)
-
-
-def test_in_the_null_space_avoidance_is_never_in_the_stack():
-    cell, _ = at_the_start(load("ellipse-nullspace"))
-    assert set(cell.order.possible) == {("position",), ("position", "pointing")}
-    assert isinstance(cell.stack.reference, CumulatedRepulsion)
-    assert (len(cell.stack.reference.points), cell.stack.reference.within) == (8, 0.15)
-
-
-def test_danger_closes_the_box_of_joints_and_pushes_nothing():
-    scenario = load("ellipse-danger-bounds")
-    cell, seen = at_the_start(scenario)
-    box = cell.stack["joint limits"]
-    assert isinstance(box, DangerBounds)
-    assert box.reach == 0.15
-    seen.distance[:8] = 0.04
-    assert "avoidance" not in cell.order(seen, 1.0).order
-    assert scenario.make_resolver().name == "sns"
