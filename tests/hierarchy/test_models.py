@@ -70,17 +70,8 @@ def test_the_capsule_of_a_mesh_here_or_in_a_folder_above_holds_its_corners(arm, 
 def test_a_collada_mesh_is_in_its_unit_and_scaled(arm, tmp_path):
     """Coal leaves the unit out: in millimetres, each link had the capsule of a building."""
     corners = " ".join(str(1000.0 * x) for corner in TETRAHEDRON for x in corner)
-    (tmp_path / "part.dae").write_text(f'''<?xml version="1.0"?>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>
-<unit name="millimeter" meter="0.001"/></asset><library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="a" count="12">{corners}</float_array><technique_common>
-<accessor source="#a" count="4" stride="3"><param name="X" type="float"/>
-<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices><triangles count="2">
-<input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2 0 1 3</p></triangles></mesh></geometry>
-</library_geometries><library_visual_scenes><visual_scene id="s"><node id="n">
-<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes><scene>
-<instance_visual_scene url="#s"/></scene></COLLADA>''')
+    (tmp_path / "part.dae").write_text(
+        (ROBOTS / "part.dae.txt").read_text().format(corners=corners))
     plain, double = (Robot.from_file(arm(f'<mesh filename="part.dae" {scale}/>')).capsules[2]
                      for scale in ("", 'scale="2 2 2"'))
     assert 0.02 < plain.radius < 0.06
