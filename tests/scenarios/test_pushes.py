@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hand_made import recording as hand_made
 
-from hierarchy import Robot, State
+from hierarchy import Robot
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.draw.replay import html
@@ -56,12 +56,6 @@ def test_the_support_is_the_hull_of_the_contacts_that_carry_something():
         np.testing.assert_array_equal(edge[:, 0], [(x, y, 0.0), (3 * x, 3 * y, 0.0)])
 
 
-def test_a_cross_on_the_floor_is_below_the_centre_of_mass():
-    found = drawn({"sole": [(0.0, 0.0, 0.0)]}, np.zeros((1, 1, 3)), np.array([[0.1, 0.2, 0.8]]))
-    np.testing.assert_allclose(found.centre.mean(axis=1), [[0.1, 0.2, FACTS.robot.floor]] * 2)
-    assert drawn({"sole": [(0.0, 0.0, 0.0)]}, np.zeros((1, 1, 3))).centre.size == 0
-
-
 def test_an_arrow_goes_to_the_middle_of_a_pushed_body_while_it_is_pushed():
     scenario = STANDING.with_changes({"plant.pushes.0": {
         "joint": "trunk_pitch", "force": 100.0, "direction": 90.0, "at": 0.2, "duration": 0.1}})
@@ -107,28 +101,6 @@ NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "
 @pytest.fixture(scope="module")
 def runs():
     return {name: simulate(load(name, ["control.duration=1.5"])) for name in NAMES}
-
-
-def test_frames_placements_and_distances_are_those_recorded(runs):
-    ellipse = scene(runs["ellipse"])
-    assert (ellipse.ticks[0], ellipse.ticks[-1]) == (0, runs["ellipse"].ticks - 1)
-    assert np.abs(np.diff(ellipse.t)[:-1] - 1 / 30).max() < 1.1e-3
-    assert np.array_equal(ellipse.t, runs["ellipse"]["t"][ellipse.ticks])
-    robot = Robot.named("kuka_lwr")
-    for f in (0, 20, -1):
-        state = State.at(robot, runs["ellipse"]["q"][ellipse.ticks[f]])
-        assert np.allclose(ellipse.placements[f], state.placements, rtol=0.0, atol=1e-14)
-        chain = ellipse.links[f]
-        assert np.allclose(chain[0, 1], 0.0)  # the foot ends at the base
-        assert np.allclose(chain[1:, 0], chain[:-1, 1], atol=1e-12)
-        tip = robot.frame(robot.end_effector)
-        assert np.allclose(chain[-1, 1], state.position(tip))
-        assert np.allclose(ellipse.axis[f], state.rotation(tip)[:, 2])
-    recording, ticks = runs["ellipse"], ellipse.ticks
-    assert np.allclose(ellipse.traced, recording["ee_position"][ticks], atol=1e-12)
-    assert np.allclose(ellipse.distance[:, :-1], recording["control_point_distance"][ticks])
-    assert np.allclose(ellipse.distance[:, -1], recording["ee_distance"][ticks])
-    assert np.allclose(np.linalg.norm(ellipse.points - ellipse.nearest, axis=2), ellipse.distance)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -6,7 +6,6 @@ from dataclasses import asdict
 from pathlib import Path
 from unittest import mock
 
-import numpy as np
 import pytest
 from refusals import refused
 from urdf_text import INERTIAL, joint, link, placed, shape, urdf
@@ -65,8 +64,6 @@ def test_what_is_loaded_is_what_was_run_and_its_scene_is_whole(made):
     assert again.facts.robot.position_units == ("rad", "rad", "rad", "1", "1")
     assert again.facts.robot.joint_names == ("turn", "shoulder", "elbow", "wrist")
     shown = scene(again)
-    assert np.allclose(shown.traced, run["ee_position"][shown.ticks], atol=1e-12)
-    assert np.allclose(shown.distance[:, -1], run["ee_distance"][shown.ticks], atol=1e-12)
     assert Fate.UNKNOWN not in shown.levels.fate
     assert shown.levels.names == ("joint limits", "separation", "position")
 
