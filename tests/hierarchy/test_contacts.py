@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 from standing import CONTACTS, ROBOT, drift_of, feet, moving_state, opening, wrenches_of, written
 
-from hierarchy import State, tasks
-from hierarchy.contacts import Contacts
+from hierarchy import Robot, Stack, State, tasks
+from hierarchy.contacts import Contact, Contacts
 from hierarchy.task import Rows, Task
 
 STEP = 1e-6
@@ -199,3 +199,44 @@ def test_momentum_rows_are_the_rate_of_the_momentum(part):
     target = np.arange(1.0, task.dimension + 1.0)
     aimed = tasks.Momentum(part, tuple(target), 5.0).reference_acceleration(state)
     np.testing.assert_allclose(aimed, 5.0 * (target - task.jacobian(state) @ state.v))
+
+
+# Contacts that slide.
+ARM = Robot.named("kuka_lwr")
+TIP = ARM.frame("end_effector")
+Q = np.array([0.0, -0.5, 0.0, 1.5, 0.0, -1.14, 0.0])
+
+
+def rows_at(v, friction=0.3, faces=4, least=0.0):
+    """Friction rows of a sliding tip with the joint velocity v: over the force, and their sides."""
+    contacts = Contacts(ARM, [Contact(TIP, friction=friction, slides=True)])
+    state = State.at(ARM, Q, v)
+    A, lower, upper = tasks.Friction(contacts, faces, least).rows(state)
+    return A[:, 7:], lower, upper, contacts.jacobian(state) @ v
+
+
+@pytest.mark.parametrize("faces", [4, 8])
+def test_the_force_on_a_sliding_point_is_friction_against_its_velocity(faces):
+    v = np.random.default_rng(3).normal(size=7)
+    A, lower, upper, moving = rows_at(v, faces=faces)
+    along = moving[:2]
+    force = np.array([*(-0.3 * 20.0 * along / np.linalg.norm(along)), 20.0])
+    equal = lower == upper
+    assert equal.sum() == 2
+    np.testing.assert_allclose((A @ force)[equal], 0.0, atol=1e-12)
+    assert np.linalg.matrix_rank(A[equal][:, :2]) == 2    # no other tangential force does
+    assert (lower[-1], upper[-1]) == (0.0, np.inf)        # and it pushes
+    assert np.isinf([side[:-1][~equal[:-1]] for side in (lower, upper)]).all()
+    assert rows_at(v, least=2.0)[1][-1] == 2.0
+
+
+def test_a_sliding_contact_is_held_along_its_normal_only():
+    normal = np.array([0.6, 0.0, 0.8])
+    contacts = Contacts(ARM, [Contact(TIP, normal=tuple(normal), slides=True)])
+    state, motion = State.at(ARM, Q, np.ones(7)), tasks.ContactMotion(contacts, damping=30.0)
+    h = Stack([motion], "torque", contacts=contacts).hierarchy(state)
+    J = contacts.jacobian(state)
+    np.testing.assert_allclose(h.A[:, :7], normal @ J[None], atol=1e-12)
+    expected = -30.0 * normal @ J @ state.v - normal @ drift_of(contacts, state)
+    np.testing.assert_allclose(h.lower, expected)
+    assert motion.row_names == ("end_effector along its normal",)
