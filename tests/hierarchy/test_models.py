@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from hierarchy import Robot, State
+from hierarchy import Robot
 from hierarchy.avoidance.body import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.tasks.pairs import separable_pairs
@@ -76,15 +76,6 @@ def test_a_collada_mesh_is_in_its_unit_and_scaled(arm, tmp_path):
                      for scale in ("", 'scale="2 2 2"'))
     assert 0.02 < plain.radius < 0.06
     assert double.radius == pytest.approx(2 * plain.radius)
-
-
-def test_locked_joints_are_no_joints(arm):
-    robot = Robot.load(str(arm()), locked={"elbow": 0.8})
-    assert robot.joint_names == ("shoulder", "turn")
-    free = Robot.load(str(arm()))
-    np.testing.assert_allclose(State.at(robot, [0.6, 0.7]).position("tool0"),
-                               State.at(free, [0.6, 0.8, 0.7]).position("tool0"))
-    refused("did you mean 'elbow'", Robot.load, arm(), locked={"elbo": 0.0}, error=UnknownNameError)
 
 
 def test_a_section_lists_its_own_points_and_capsules(arm):

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from refusals import refused
-from scene import FRAME, PATH, ROBOT, TASKS, Elbow, compiled_rows, place_of, state_at, states
+from scene import FRAME, PATH, ROBOT, TASKS, compiled_rows, place_of, state_at, states
 from scipy.linalg import expm
 
 from hierarchy import Robot, Stack, State, tasks
@@ -18,7 +18,6 @@ from hierarchy.paths import Ellipse
 from hierarchy.robot import Frame
 from hierarchy.robots import TABLES as ROBOT_TABLES
 from hierarchy.robots import link_capsules
-from hierarchy.task import Rows
 
 STEP = 1e-6
 STATES = states(11)
@@ -154,16 +153,6 @@ def test_what_is_written_into_the_array_of_a_target_moves_it_in_a_stack_too(kind
     np.testing.assert_array_equal(stack.hierarchy(state).lower, fresh.hierarchy(state).lower)
 
 
-@pytest.mark.parametrize(("method", "value", "said"), [
-    ("jacobian", np.eye(7), "task 'elbow': jacobian has shape (7, 7), expected (1, 7)"),
-    ("jacobian", np.full((1, 7), np.nan), "task 'elbow', row 0: A[0, 0] is nan"),
-    ("error", np.array([np.nan]), "task 'elbow', row 0: lower is nan")])
-def test_a_wrong_task_is_named(method, value, said, monkeypatch):
-    monkeypatch.setattr(Elbow, method, lambda self, state: value)
-    state = State.at(ROBOT, *STATES[0])
-    refused(said, lambda: Elbow().writer(state, "velocity", Rows.empty(1, 7))())
-
-
 @pytest.mark.parametrize("task", [
     *TASKS.values(), tasks.JointLimits(ROBOT, 10.0, 1e-3), tasks.TorqueLimits(ROBOT),
     tasks.DangerBounds(tasks.JointLimits(ROBOT, 10.0, 1e-3), ROBOT.control_points),
@@ -293,7 +282,6 @@ def test_a_reference_that_is_set_counts_from_the_next_tick_on():
     (lambda s: Stack().hierarchy(State.at(ROBOT, Q)), "stack is empty"),
     (lambda s: s.reorder(["position", "position", "pointing"]), "each of"),
     (lambda s: s.hierarchy(state_at(Q, V), ("posture",)), "unknown task 'posture'"),
-    (lambda s: Stack(level="effort"), "level must be"),
     (lambda s: Stack([tasks.JointDamping(6)]).hierarchy(state_at(Q, V)), "6 joints, the robot ha")])
 def test_bad_edits_are_named(edit, said):
     refused(said, edit, stack())

@@ -14,10 +14,6 @@ from scenarios.measure.metrics import measure
 from solvers import certify
 
 
-def names_of(*changes):
-    return build(load("ellipse-hqp", changes)).order(None, 0.0).order
-
-
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize("resolver", ["hcod", "weighted"])
 def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
@@ -32,14 +28,6 @@ def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
     assert np.abs(run["a"]).max() <= 10.0 * (1.0 + 1e-6)
     assert run["minimal_distance"].min() >= scenario.avoidance.distance - 1e-4
     assert not certified or run["certified"].all()
-
-
-def test_the_order_is_fixed_and_limits_come_first():
-    assert names_of() == ("joint limits", "separation", "position", "pointing")
-    assert names_of("limits.torque=0.5") == ("joint limits", "torque limits", "separation",
-                                             "position", "pointing")
-    assert names_of("avoidance.self_collision=0.02")[1:3] == ("separation", "self-separation")
-    assert names_of("posture={role='task', target=[0,0,0,0,0,0,0]}")[-1] == "posture"
 
 
 def test_the_strictness_scenario_measures_what_a_lower_task_moves():

@@ -29,22 +29,17 @@ def test_settings_of_every_resolver_are_checked_by_name(name):
     assert isinstance(make(name, damping=1).damping, float)
     refused("did you mean 'damping'", make, name, dampnig=0.1)
     refused("unknown setting", make, name, _settings=1)
-    for setting, value in [("damping", -0.1), ("damping", float("nan")), ("damping", "0.1"),
-                           ("threshold", 0.0), ("threshold", float("inf")),
-                           ("rank_tolerance", -1e-9), ("rank_tolerance", 1.0),
-                           ("rank_tolerance", True)]:
+    for setting, value in [("damping", float("nan")), ("threshold", float("inf")),
+                           ("rank_tolerance", True)]:  # others are in tests/helpers/computed.py
         refused(f"{name}: {setting} = ", make, name, **{setting: value})
 
 
 @pytest.mark.parametrize(("name", "settings"), [
-    ("hcod", {"tolerance": 0.0}), ("smooth", {"eta": 0.0}),
-    *(("hcod", {"max_iterations": wrong}) for wrong in (0, 2**31, 1.5, True)),
-    ("recursive", {"largest": 1.0}), ("recursive", {"method": "selective", "largest": 0.0}),
-    ("recursive", {"method": "nakamura", "isotropic": 0.1}), ("merged", {"scales": 3.0}),
-    *(("weighted", {setting: value}) for setting, value in [
-        ("weights", [1.0, 0.0]), ("weights", [1.0, "2"]), ("weights", "12"), ("weights", 3.0),
-        ("ratio", 0.5), ("regularisation", -1.0), ("strict_levels", -2), ("strict_levels", True),
-        ("tolerance", 0.0)])], ids=str)
+    ("smooth", {"eta": 0.0}),
+    *(("hcod", {"max_iterations": wrong}) for wrong in (2**31, 1.5, True)),
+    ("recursive", {"method": "selective", "largest": 0.0}),
+    ("recursive", {"method": "nakamura", "isotropic": 0.1}), ("weighted", {"strict_levels": True}),
+    *(("weighted", {"weights": wrong}) for wrong in ([1.0, 0.0], [1.0, "2"], "12"))], ids=str)
 def test_a_setting_that_makes_no_sense_is_named_with_its_value(name, settings):
     setting, value = list(settings.items())[-1]
     refused(f"{name}: {setting} = {value!r}", make, name, **settings)
