@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from refusals import refused
 from scipy.spatial.transform import Rotation
-from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape, urdf
+from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape
 
 from hierarchy import Robot, State
 from hierarchy.errors import RobotError
@@ -165,23 +165,3 @@ def test_a_name_at_two_places_is_refused_where_it_is_asked_for(load):
     parts = (*map(link, ("base", "gripper", "last")), joint("far", "revolute", "gripper", "last"),
              joint("tool", "revolute", "base", "gripper"))
     assert load(*parts).end_effector == "gripper", "neither a joint nor the last link"
-
-
-@pytest.mark.parametrize(("name", "text", "said"), [
-    ("a.sdf", "<sdf/>", r"is an SDF \(Gazebo\), which is not read; give the URDF"),
-    ("a.xacro", "<robot name='r'><xacro:include filename='b'/></robot>",
-     r"has macros, such as <xacro:include>; .*xacro in\.xacro > out\.urdf"),
-    ("a.urdf", "<robot name='r'><xacro:include filename='b'/></robot>", r"no link.*out\.urdf"),
-    ("a.urdf", "<launch/>", r"starts with <launch>; expected a URDF \(<robot>\) or an MJCF"),
-    ("a.xml", "<mujocoinclude/>", "give the file that includes it"),
-    ("a.toml", "name = 'a'", r"A scenario is read by scenarios\.load"),
-    ("a.urdf", "<robot/>", "its <robot> has no name"),
-    ("a.urdf", urdf(link("a", shape('<box size="1 -1 1"/>'))),
-     "link 'a': its box has size = '1 -1 1'"),
-    ("a.urdf", urdf(link("a"), link("b"), joint("j", "prismatic", "a", "b", "")),
-     "prismatic and has no <limit>$"),
-    ("a.urdf", "<robot name='r'><link name='table'/></robot>", "with base = 'floating'")])
-def test_another_file_is_refused_with_what_to_give(tmp_path, name, text, said):
-    (tmp_path / name).write_text(text)
-    with pytest.raises(RobotError, match=said):
-        Robot.load(tmp_path / name)
