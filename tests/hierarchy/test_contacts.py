@@ -207,9 +207,9 @@ TIP = ARM.frame("end_effector")
 Q = np.array([0.0, -0.5, 0.0, 1.5, 0.0, -1.14, 0.0])
 
 
-def rows_at(v, friction=0.3, faces=4, least=0.0):
+def rows_at(v, faces=4, least=0.0):
     """Friction rows of a sliding tip with the joint velocity v: over the force, and their sides."""
-    contacts = Contacts(ARM, [Contact(TIP, friction=friction, slides=True)])
+    contacts = Contacts(ARM, [Contact(TIP, friction=0.3, slides=True)])
     state = State.at(ARM, Q, v)
     A, lower, upper = tasks.Friction(contacts, faces, least).rows(state)
     return A[:, 7:], lower, upper, contacts.jacobian(state) @ v

@@ -213,10 +213,10 @@ CONTACTS = feet()
 STANDING = State.at(HUMANOID, HUMANOID.rest)
 
 
-def solved(stack, state, resolver="hcod"):
+def solved(stack, state):
     """The hierarchy of a stack at a state and its certified answer."""
     h = stack.hierarchy(state)
-    res = make(resolver).solve(h)
+    res = make("hcod").solve(h)
     assert res.status is Status.SOLVED
     assert certify(h, res.x).certified, certify(h, res.x)
     return h, res

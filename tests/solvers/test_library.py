@@ -33,9 +33,9 @@ RESOLVERS = [
     ("sns", {"form": "optimal", "scales": "miss"}, {"optimal": 1, "miss": 1})]
 
 
-def hierarchies(count, first=0):
+def hierarchies(count):
     """Generated and structured problems, equalities alone and with bounds above them."""
-    for seed in range(first, first + count):
+    for seed in range(count):
         equal = problems.structured(seed, equalities_only=True)
         yield from (problems.generate(seed), problems.structured(seed), equal,
                     problems.bounded(equal, seed))
