@@ -182,10 +182,10 @@ def test_the_interval_of_a_share_is_wilsons(met, of, low, high):
     assert wilson(met, of) == pytest.approx((low, high), abs=1e-4)
 
 
-def tick(box, task, rest=((0.0, 0.0), 0.0), reference=(0.0, 0.0), names=("box", "task", "rest")):
+def tick(box, task, reference=(0.0, 0.0), names=("box", "task", "rest")):
     """A box of two unknowns (2, 2), a task and a last row, each (row, target), answered."""
     levels = [(np.eye(2), *np.array(box, dtype=float)),
-              *((np.array([row], dtype=float), [target]) for row, target in (task, rest))]
+              *((np.array([row], dtype=float), [target]) for row, target in (task, ((0.0, 0.0), 0.0)))]
     h = Hierarchy.from_levels(levels, reference, names)
     return Tick(h, answer(h), np.hstack([np.eye(2), np.zeros((2, 1))]))
 
