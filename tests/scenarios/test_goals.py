@@ -183,9 +183,9 @@ def test_the_interval_of_a_share_is_wilsons(met, of, low, high):
 
 
 def tick(box, task, reference=(0.0, 0.0), names=("box", "task", "rest")):
-    """A box of two unknowns (2, 2), a task and a last row, each (row, target), answered."""
+    """A box of two unknowns (2, 2), a task (row, target) and a last row of zeros, answered."""
     levels = [(np.eye(2), *np.array(box, dtype=float)),
-              *((np.array([row], dtype=float), [target]) for row, target in (task, ((0.0, 0.0), 0.0)))]
+              (np.array([task[0]], dtype=float), [task[1]]), (np.zeros((1, 2)), [0.0])]
     h = Hierarchy.from_levels(levels, reference, names)
     return Tick(h, answer(h), np.hstack([np.eye(2), np.zeros((2, 1))]))
 

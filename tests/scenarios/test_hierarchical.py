@@ -1,4 +1,4 @@
-"""Stacks of scenarios: limits, distances, cones and listed tasks in one order; set-based; smooth."""
+"""Stacks: limits, distances, cones and listed tasks in one order; set-based tasks; smooth ones."""
 
 import numpy as np
 import pytest
@@ -105,7 +105,7 @@ BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
 COUPLING = {"kind": "coupling", "joints": {"joint_2": 1.0, "joint_5": -0.5}, "value": -1.0}
 HAND = {"kind": "position", "frame": "end_effector"}
 LOOK = {"kind": "look-at", "frame": "end_effector", "target": [0.3, 0.9, 0.9]}
-FRAME = {"kind": "frame", "frame": "end_effector", "offset": [0.03, 0.05, 0.02],
+POSED = {"kind": "frame", "frame": "end_effector", "offset": [0.03, 0.05, 0.02],
          "rotation": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]}
 RELATIVE = {"kind": "relative", "frame": "end_effector", "to": "joint_3",
             "position": [0.405, -0.065, 0.521]}
@@ -120,7 +120,7 @@ def scenario_of(tmp_path, *tasks, **sections):
 
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 @pytest.mark.parametrize(("task", "metric"), [
-    (COUPLING, "task_coupling_end"), (FRAME, "task_frame_end"), (LOOK, "task_look-at_end"),
+    (COUPLING, "task_coupling_end"), (POSED, "task_frame_end"), (LOOK, "task_look-at_end"),
     ({**RELATIVE, "orientation": False}, "task_relative_end"),
     (RELATIVE | {"position": None, "name": "hold"}, "task_hold_end")])
 def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path):
@@ -154,7 +154,7 @@ def test_a_recorded_path_is_followed(tmp_path):
     assert np.linalg.norm(run["position_error"][-30:], axis=1).max() < 2e-3
 
 
-# -- set-based tasks and smooth activation in place of Algorithm 1 ----------------------------------
+# -- set-based tasks and smooth activation in place of Algorithm 1 --------------------------------
 def distances(cell):
     """The distance of every point to every obstacle, point by point, by plain arithmetic."""
     seen, centres = cell.sensor.measurement, np.array([o.centre for o in
