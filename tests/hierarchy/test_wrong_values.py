@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pytest
 from refusals import refused
-from scene import FRAME, ROBOT, SENSOR, Elbow
+from scene import FRAME, ROBOT, SENSOR
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
@@ -287,7 +287,7 @@ def test_what_would_be_said_of_a_wrong_measure_is_not_written_for_a_right_one(mo
 
 
 @pytest.mark.parametrize("given", ["state", None, 3, ROBOT])
-@pytest.mark.parametrize("task", [HAND, tasks.Posture((0.0,) * 7), Elbow()],
+@pytest.mark.parametrize("task", [HAND, tasks.Posture((0.0,) * 7), Given()],
                          ids=lambda task: task.name)
 def test_what_takes_a_state_refuses_anything_else(task, given):
     for method in (task.error, task.jacobian, task.jacobian_derivative, task.reference_velocity,
