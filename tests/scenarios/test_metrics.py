@@ -66,7 +66,8 @@ def test_a_signal_has_its_largest_value_step_or_count(name, signals, value):
         ("rad/s", "12.346"), ("rad/s^2", "12.35"), ("rad/s^3", "12"), ("N", "12.3"), ("", "12"))),
     (0.0123, "rad", "0.012"), (0.00649, "rad", "0.0065"), (0.0004, "rad", "4.0e-04"),
     (0.0, "", "0"), (0.25, "", "0.25"), (1.5, "", "1.5"), (3.0, "", "3"), (12.5, "", "12"),
-    (0.01, "", "0.01"), (10.0, "", "10"), (1e3, "rad", "1000"), (1e5, "rad", "1.0e+05")])
+    (4e-3, "", "4.0e-03"), (0.01, "", "0.01"), (10.0, "", "10"), (1e3, "rad", "1000"),
+    (1e5, "rad", "1.0e+05")])
 def test_each_unit_has_its_decimals_and_a_small_number_a_digit_more(value, unit, shown):
     assert Metric("some", "Some", value, unit).shown() == shown
 
