@@ -126,16 +126,18 @@ def test_an_open_contact_moves_neither_the_base_nor_a_motor(task):
 def test_the_load_of_a_sole_falls_in_its_ramp_from_what_it_carried(largest):
     """The last row has all of its normal force."""
     state, rows = State.at(ROBOT, ROBOT.rest), Rows.empty(41, 60)
-    task = tasks.Friction(opening(), largest=largest)
+    task = tasks.Friction(opening(), least=2.0, largest=largest)
     assert task.row_names[::10] == ("left_foot point 1 face 1", "left_foot point 3 face 1",
                                     "right_foot point 1 face 1", "right_foot point 3 face 1",
                                     "right_foot load")
     write = task.writer(state, "torque", rows)
     state.carried = np.array([300.0, 92.0])
-    for t, up in ((0.5, np.inf), (0.79, np.inf), (0.9, 46.0), (0.99, 4.6), (1.5, np.inf)):
+    for t, up, least in ((0.5, np.inf, 2.0), (0.79, np.inf, 2.0), (0.9, 46.0, 1.0),
+                         (0.99, 4.6, 0.1), (1.5, np.inf, 0.0)):
         state.move(t, state.q, state.v)
         write()
         assert (rows[1][40], rows[2][40]) == (-np.inf, pytest.approx(up))
+        np.testing.assert_allclose(rows[1][24:40:5], least, atol=1e-12)  # of each point's normal
 
 
 def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_open():
