@@ -122,4 +122,4 @@ def folder(tmp_path_factory):
 def library(folder):
     from c_library import Library
 
-    return Library.of(folder)
+    return Library(folder)

@@ -88,6 +88,7 @@ SWAPS = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast
          ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn,
          ast.NotIn: ast.In, ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div,
          ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And}
+CHANGED = (ast.Compare, ast.BinOp, ast.BoolOp, ast.Constant, ast.Return)
 
 
 @dataclass(frozen=True)
@@ -97,12 +98,11 @@ class Mutant:
     module: str
     line: int
     index: int
-    kind: str
 
     def code(self) -> tuple[str, CodeType]:
         """Return what was and what is, and the changed module; lines stay where they are."""
         tree = parsed(self.module)
-        described = change(list(ast.walk(tree))[self.index], self.kind)
+        described = change(list(ast.walk(tree))[self.index])
         tree = ast.fix_missing_locations(tree)
         return described, compile(tree, str(ROOT / self.module), "exec")
 
@@ -127,9 +127,8 @@ def mutants(module: str) -> Iterator[Mutant]:
     tree = parsed(module)
     left_out = {id(node) for top in ast.walk(tree) if untested(top) for node in ast.walk(top)}
     for index, node in enumerate(ast.walk(tree)):
-        if id(node) not in left_out:
-            for kind in changes(node):
-                yield Mutant(module, node.lineno, index, kind)
+        if id(node) not in left_out and isinstance(node, CHANGED) and change(node):
+            yield Mutant(module, node.lineno, index)
 
 
 def untested(node: ast.AST) -> bool:
@@ -162,32 +161,24 @@ def read_by_kernels() -> frozenset[str]:
                      if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load))
 
 
-def changes(node: ast.AST) -> tuple[str, ...]:
-    """Return the kinds of change that a node allows."""
-    if isinstance(node, ast.Compare) and type(node.ops[0]) in SWAPS:
-        return ("compare",)
-    if isinstance(node, (ast.BinOp, ast.BoolOp)) and type(node.op) in SWAPS:
-        return ("operator",)
-    if isinstance(node, ast.Constant) and isinstance(node.value, (bool, int, float)):
-        return ("constant",)
-    if isinstance(node, ast.Return) and not isinstance(node.value, (ast.Constant, type(None))):
-        return ("return",)
-    return ()
-
-
-def change(node: ast.AST, kind: str) -> str:
-    """Change a node in place and return what it was and what it is."""
+def change(node: ast.AST) -> str:
+    """Change a node in place and return what it was and what it is; nothing if it stays."""
     before = ast.unparse(node)
-    if kind == "compare":
-        node.ops[0] = SWAPS[type(node.ops[0])]()
-    elif kind == "operator":
-        node.op = SWAPS[type(node.op)]()
-    elif kind == "constant":  # the other truth value, the next integer, or zero (one for zero)
-        value = node.value
-        node.value = not value if isinstance(value, bool) else (
-            value + 1 if isinstance(value, int) else float(value == 0.0))
-    else:
-        node.value = ast.Constant(None)
+    match node:
+        case ast.Compare(ops=[op, *_]) if type(op) in SWAPS:
+            node.ops[0] = SWAPS[type(op)]()
+        case ast.BinOp(op=op) | ast.BoolOp(op=op) if type(op) in SWAPS:
+            node.op = SWAPS[type(op)]()
+        case ast.Constant(value=bool(value)):
+            node.value = not value
+        case ast.Constant(value=int(value)):
+            node.value = value + 1
+        case ast.Constant(value=float(value)):
+            node.value = float(value == 0.0)
+        case ast.Return(value=ast.expr() as value) if not isinstance(value, ast.Constant):
+            node.value = ast.Constant(None)
+        case _:
+            return ""
     return f"{before}  ->  {ast.unparse(node)}"
 
 

@@ -76,37 +76,21 @@ class Memory:
 
 
 class Library:
-    """The functions of a library at their addresses."""
+    """The object in a static library, loaded by LLVM: no linker is needed."""
 
-    def __init__(self, address):
-        self.address = address
+    def __init__(self, folder):
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+        self.engine = llvm.create_mcjit_compiler(
+            llvm.parse_assembly(""), llvm.Target.from_default_triple().create_target_machine())
+        content = (folder / "lib" / "libtask_hierarchy.a").read_bytes()
+        start = content.index(b"kernels.o/") + 60
+        self.engine.add_object_file(llvm.ObjectFileRef.from_data(content[start:]))
+        self.engine.finalize_object()
+        self.address = address = self.engine.get_function_address
         sizes = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 3)
         self.work_size, self.record_size = (sizes(address(f"th_{name}_size"))
                                             for name in ("work", "record"))
-
-    @classmethod
-    def of(cls, folder):
-        """The library in a folder: a shared one, loaded by the system, or one not linked."""
-        shared = folder / "lib" / "libtask_hierarchy.so"
-        if not shared.exists():
-            return cls.unlinked(shared.with_suffix(".a"))
-        code = ctypes.CDLL(str(shared))
-        return cls(lambda name: ctypes.cast(code[name], ctypes.c_void_p).value)
-
-    @classmethod
-    def unlinked(cls, path):
-        """The object in a static library, loaded by LLVM: no linker is needed."""
-        llvm.initialize_native_target()
-        llvm.initialize_native_asmprinter()
-        engine = llvm.create_mcjit_compiler(
-            llvm.parse_assembly(""), llvm.Target.from_default_triple().create_target_machine())
-        content = path.read_bytes()
-        start = content.index(b"kernels.o/") + 60
-        engine.add_object_file(llvm.ObjectFileRef.from_data(content[start:]))
-        engine.finalize_object()
-        library = cls(engine.get_function_address)
-        library.engine = engine  # which owns the code
-        return library
 
     def memory(self, h, missing=0, missing_values=0):
         """Memory for a hierarchy, less so many numbers of work space and record."""

@@ -2,7 +2,6 @@
 
 import contextlib
 import dataclasses
-import gc
 import importlib
 import inspect
 import itertools
@@ -21,7 +20,6 @@ import hierarchy
 import scenarios
 import solvers
 from hierarchy import Hierarchy, HierarchyError, State, paths, tasks
-from hierarchy.loop import Loop
 from hierarchy.tasks.joints.mechanism import Mechanism, model_rows
 from scenarios.measure.goals import goals
 from scenarios.measure.metrics import measure
@@ -247,26 +245,6 @@ def solved():
     return [*found, [*h.rows], make("hcod").solve(h).x]
 
 
-def looped():
-    """Logs of loops on a clock of their own, by what a late tick leads to."""
-    found = []
-    for overrun, late in itertools.product(("skip", "catch up", "stop"), (0.125, 0.375, 1.5)):
-        now = [100.0]
-
-        def sleep(seconds, now=now):
-            now[0] += seconds
-
-        def step(t, now=now, late=late):
-            now[0] += late if t == 0.5 else 0.125
-            return np.array([t, -t, gc.isenabled()])
-
-        loop = Loop(0.25, overrun=overrun, behind=3, pause_gc=False, sleep=sleep,
-                    clock=lambda now=now: now[0])
-        log = loop.run(step, lambda: None, 2.0, lambda x: None, record=3)
-        found.append([str(log), log.arrays(), log.summary(), log.overruns, log.skipped, log.due])
-    return found
-
-
 def measured():
     """Metrics and goals of runs whose signals come to each threshold and pass it."""
     found, steps = {}, np.geomspace(1e-12, 1.0, 25)
@@ -287,5 +265,5 @@ def measured():
 
 COMPUTED = {"rows": rows, "derived": derived, "adapted": adapted, "defaults": defaults,
             "mechanism": mechanism, "certificates": certificates, "programs": programs,
-            "edited": edited, "solved": solved, "looped": looped, "measured": measured,
+            "edited": edited, "solved": solved, "measured": measured,
             "paths": lambda: [[path(t) for t in np.linspace(-0.2, 4.4, 24)] for path in PATHS]}

@@ -1,7 +1,5 @@
 """A KUKA LWR among obstacles, for tests of tasks and stacks."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from hierarchy import Robot, State, Task, tasks
@@ -59,26 +57,6 @@ def place_of(point, q):
     """Where a control point is at q, independent of the Jacobians."""
     rotation, translation = State.at(ROBOT, q)._placement(point.joint)
     return translation + rotation @ point.offset
-
-
-@dataclass(frozen=True)
-class Elbow(Task):
-    """A user's task in plain numpy: the fourth joint's angle."""
-
-    name: str = "elbow"
-    gain: float = 2.0
-    stiffness: float = 10.0
-    damping: float = 0.0
-    dimension = 1
-
-    def error(self, state):
-        return np.array([1.0 - state.q[3]])
-
-    def jacobian(self, state):
-        return np.eye(7)[3:4]
-
-    def jacobian_derivative(self, state):
-        return np.zeros((1, 7))
 
 
 def compiled_rows(task, state, level, rtol=1e-12):

@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 from standing import CONTACTS, ROBOT, drift_of, feet, moving_state, opening, wrenches_of, written
 
-from hierarchy import State, tasks
-from hierarchy.contacts import Contacts
+from hierarchy import Robot, Stack, State, tasks
+from hierarchy.contacts import Contact, Contacts
 from hierarchy.task import Rows, Task
 
 STEP = 1e-6
@@ -127,16 +127,18 @@ def test_an_open_contact_moves_neither_the_base_nor_a_motor(task):
 def test_the_load_of_a_sole_falls_in_its_ramp_from_what_it_carried(largest):
     """The last row has all of its normal force."""
     state, rows = State.at(ROBOT, ROBOT.rest), Rows.empty(41, 60)
-    task = tasks.Friction(opening(), largest=largest)
+    task = tasks.Friction(opening(), least=2.0, largest=largest)
     assert task.row_names[::10] == ("left_foot point 1 face 1", "left_foot point 3 face 1",
                                     "right_foot point 1 face 1", "right_foot point 3 face 1",
                                     "right_foot load")
     write = task.writer(state, "torque", rows)
     state.carried = np.array([300.0, 92.0])
-    for t, up in ((0.5, np.inf), (0.79, np.inf), (0.9, 46.0), (0.99, 4.6), (1.5, np.inf)):
+    for t, up, least in ((0.5, np.inf, 2.0), (0.79, np.inf, 2.0), (0.9, 46.0, 1.0),
+                         (0.99, 4.6, 0.1), (1.5, np.inf, 0.0)):
         state.move(t, state.q, state.v)
         write()
         assert (rows[1][40], rows[2][40]) == (-np.inf, pytest.approx(up))
+        np.testing.assert_allclose(rows[1][24:40:5], least, atol=1e-12)  # of each point's normal
 
 
 def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_open():
@@ -200,3 +202,44 @@ def test_momentum_rows_are_the_rate_of_the_momentum(part):
     target = np.arange(1.0, task.dimension + 1.0)
     aimed = tasks.Momentum(part, tuple(target), 5.0).reference_acceleration(state)
     np.testing.assert_allclose(aimed, 5.0 * (target - task.jacobian(state) @ state.v))
+
+
+# Contacts that slide.
+ARM = Robot.named("kuka_lwr")
+TIP = ARM.frame("end_effector")
+Q = np.array([0.0, -0.5, 0.0, 1.5, 0.0, -1.14, 0.0])
+
+
+def rows_at(v, faces=4, least=0.0):
+    """Friction rows of a sliding tip with the joint velocity v: over the force, and their sides."""
+    contacts = Contacts(ARM, [Contact(TIP, friction=0.3, slides=True)])
+    state = State.at(ARM, Q, v)
+    A, lower, upper = tasks.Friction(contacts, faces, least).rows(state)
+    return A[:, 7:], lower, upper, contacts.jacobian(state) @ v
+
+
+@pytest.mark.parametrize("faces", [4, 8])
+def test_the_force_on_a_sliding_point_is_friction_against_its_velocity(faces):
+    v = np.random.default_rng(3).normal(size=7)
+    A, lower, upper, moving = rows_at(v, faces=faces)
+    along = moving[:2]
+    force = np.array([*(-0.3 * 20.0 * along / np.linalg.norm(along)), 20.0])
+    equal = lower == upper
+    assert equal.sum() == 2
+    np.testing.assert_allclose((A @ force)[equal], 0.0, atol=1e-12)
+    assert np.linalg.matrix_rank(A[equal][:, :2]) == 2    # no other tangential force does
+    assert (lower[-1], upper[-1]) == (0.0, np.inf)        # and it pushes
+    assert np.isinf([side[:-1][~equal[:-1]] for side in (lower, upper)]).all()
+    assert rows_at(v, least=2.0)[1][-1] == 2.0
+
+
+def test_a_sliding_contact_is_held_along_its_normal_only():
+    normal = np.array([0.6, 0.0, 0.8])
+    contacts = Contacts(ARM, [Contact(TIP, normal=tuple(normal), slides=True)])
+    state, motion = State.at(ARM, Q, np.ones(7)), tasks.ContactMotion(contacts, damping=30.0)
+    h = Stack([motion], "torque", contacts=contacts).hierarchy(state)
+    J = contacts.jacobian(state)
+    np.testing.assert_allclose(h.A[:, :7], normal @ J[None], atol=1e-12)
+    expected = -30.0 * normal @ J @ state.v - normal @ drift_of(contacts, state)
+    np.testing.assert_allclose(h.lower, expected)
+    assert motion.row_names == ("end_effector along its normal",)

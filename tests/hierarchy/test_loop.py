@@ -76,20 +76,31 @@ def test_the_end_of_a_wait_is_watched_where_that_was_asked_for():
 
 
 # A tick that takes 0.625 s ends in the middle of the third period.
-@pytest.mark.parametrize(("durations", "overrun", "ticks", "late", "ended"), [
-    ([0.125] * 8, "skip", range(8), [0.0] * 8, "all ticks were run"),
-    ([0.0, 0.625], "skip", [0, 1, 4, 5, 6, 7], [0.0] * 6, "all other ticks were run"),
-    ([0.0, 0.625], "catch up", range(8), [0, 0, 0.375, 0.125, 0, 0, 0, 0], "all ticks were run"),
-    ([0.0, 0.0, 0.375], "stop", range(3), [0.0] * 3, "tick 2 ended 125 ms too late")])
+@pytest.mark.parametrize(("durations", "overrun", "ticks", "late", "skipped", "ended"), [
+    ([0.125] * 8, "skip", range(8), [0.0] * 8, 0, "all ticks were run"),
+    ([0.0, 0.625], "skip", [0, 1, 4, 5, 6, 7], [0.0] * 6, 2, "all other ticks were run"),
+    ([0.0, 0.625], "catch up", range(8), [0, 0, 0.375, 0.125, 0, 0, 0, 0], 0, "all ticks were run"),
+    ([0.0, 1.75], "catch up", [0, 1, 6, 7], [0, 0, 0.5, 0.25], 4, "all other ticks were run"),
+    ([0.0, 0.0, 0.375], "stop", range(3), [0.0] * 3, 0, "tick 2 ended 125 ms too late")])
 def test_every_tick_is_run_at_its_planned_time_and_missed_ones_as_asked(
-        durations, overrun, ticks, late, ended):
-    robot, log = ran(durations, overrun=overrun)
+        durations, overrun, ticks, late, skipped, ended):
+    robot, log = ran(durations, overrun=overrun, behind=3)
     np.testing.assert_array_equal(log.tick, ticks)
     np.testing.assert_array_equal(log.late, late)
     np.testing.assert_array_equal(robot.times, PERIOD * log.tick)
     np.testing.assert_array_equal(log.duration[:len(durations)], durations)
     assert (log.overruns > 0) == (max(durations) > PERIOD)
-    assert (log.skipped, log.ended, robot.stops) == (2 * (len(ticks) == 6), ended, 1)
+    assert (log.skipped, log.ended, robot.stops) == (skipped, ended, 1)
+    for name, array in log.arrays().items():
+        np.testing.assert_array_equal(array, getattr(log, name))
+
+
+def test_a_log_says_how_late_and_how_long_ticks_were():
+    _, log = ran([0.0, 0.625], overrun="catch up")
+    assert [line.split() for line in str(log).splitlines()] == [line.split() for line in (
+        "8 ticks of 250 ms, 2 overruns, 0 skipped; all ticks were run",
+        "late median 0.0 us p95 287500.0 us p99.9 373250.0 us max 375000.0 us",
+        "duration median 0.0 us p95 406250.0 us p99.9 620625.0 us max 625000.0 us")]
 
 
 @pytest.mark.parametrize("error", [ValueError("no cable"), KeyboardInterrupt()],
@@ -116,6 +127,9 @@ def test_the_collector_of_garbage_rests_while_the_loop_runs_and_only_then():
     Loop(PERIOD, clock=(clock := Clock()), sleep=clock.sleep).run(
         lambda t: seen.append(gc.isenabled()), lambda: seen.append(gc.isenabled()), 0.5)
     assert seen == [False, False, False]
+    Loop(PERIOD, clock=clock, sleep=clock.sleep, pause_gc=False).run(
+        lambda t: seen.append(gc.isenabled()), Event, PERIOD)
+    assert seen[3:] == [True]
     assert gc.isenabled()
     assert gc.get_freeze_count() == frozen > 0
 

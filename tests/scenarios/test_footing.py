@@ -1,5 +1,7 @@
 """What a first tick says of a robot with contacts whose run may fall, or prove nothing."""
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -11,6 +13,7 @@ from scenarios.cli.check import checked
 from scenarios.loop.controller import Controller
 from scenarios.loop.footing import footing
 
+DATA = Path(__file__).parents[1] / "data"
 pytestmark = pytest.mark.usefixtures("with_mujoco")
 
 
@@ -57,22 +60,12 @@ def test_what_may_make_a_run_fall_or_prove_nothing_is_said(case):
 
 def a_biped(folder):
     """Keys of a scenario with two legs of five joints, bent."""
-    legs = ""
-    for side, y in (("l", 0.1), ("r", -0.1)):
-        legs += f'<body pos="0 {y} 0">'
-        for name, axis, pos in (("yaw", "0 0 1", 0.0), ("roll", "1 0 0", 0.0),
-                                ("pitch", "0 1 0", 0.0), ("knee", "0 1 0", -0.3),
-                                ("foot", "0 1 0", -0.3)):
-            legs += (f'<body name="{side}_{name}" pos="0 0 {pos}"><joint name="{side}_{name}" '
-                     f'axis="{axis}"/><geom size=".03" pos="0 0 -.05"/>')
-        legs += "</body>" * 6
-    (folder / "biped.xml").write_text(
-        '<mujoco><compiler angle="radian"/><worldbody><body name="trunk" pos="0 0 1"><freejoint/>'
-        f'<geom size=".1"/>{legs}</body></worldbody></mujoco>')
+    file = folder / "biped.xml"
+    file.write_text((DATA / "robots" / "biped.xml.txt").read_text())
     bent = {f"{side}_{name}": value for side in "lr"
             for name, value in (("pitch", -0.4), ("knee", 0.8), ("foot", -0.4))}
     contacts = [{"frame": f"{side}_foot", "x": [-0.1, 0.1], "y": [-0.05, 0.05]} for side in "lr"]
-    return {"robot": {"model": str(folder / "biped.xml")}, "contacts": contacts,
+    return {"robot": {"model": str(file)}, "contacts": contacts,
             "start": {"on_floor": True, "joints": bent}, "plant.pushes": [],
             "tasks": [{"kind": "com"}, {"kind": "posture"}, {"kind": "least-force"}]}
 

@@ -1,18 +1,20 @@
-"""Limits, separation, cones and listed tasks in one stack at all times."""
+"""Stacks: limits, distances, cones and listed tasks in one order; set-based tasks; smooth ones."""
 
 import numpy as np
 import pytest
-from scene import ROBOT
+import tomli_w
+from refusals import refused
+from scene import FRAME, ROBOT, state_at, states
 
+from hierarchy import HierarchyError
+from hierarchy.task import Rows
+from hierarchy.tasks import Pointing, Separation
+from hierarchy.tasks.together import TangentCone
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
-from solvers import certify
-
-
-def names_of(*changes):
-    return build(load("ellipse-hqp", changes)).order(None, 0.0).order
+from solvers import certify, make
 
 
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
@@ -29,14 +31,6 @@ def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
     assert np.abs(run["a"]).max() <= 10.0 * (1.0 + 1e-6)
     assert run["minimal_distance"].min() >= scenario.avoidance.distance - 1e-4
     assert not certified or run["certified"].all()
-
-
-def test_the_order_is_fixed_and_limits_come_first():
-    assert names_of() == ("joint limits", "separation", "position", "pointing")
-    assert names_of("limits.torque=0.5") == ("joint limits", "torque limits", "separation",
-                                             "position", "pointing")
-    assert names_of("avoidance.self_collision=0.02")[1:3] == ("separation", "self-separation")
-    assert names_of("posture={role='task', target=[0,0,0,0,0,0,0]}")[-1] == "posture"
 
 
 def test_the_strictness_scenario_measures_what_a_lower_task_moves():
@@ -101,3 +95,128 @@ def test_all_levels_above_the_posture_are_met_and_their_errors_recorded():
     for task in cell.tasks.listed:
         np.testing.assert_allclose(standing[f"task_error_{task.name.replace(' ', '_')}"][k],
                                    task.error(cell.state), atol=1e-15)
+
+
+# Every kind of `[[tasks]]`: what it is made of, and what it reaches.
+BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
+        "start": {"q": [0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3]},
+        "control": {"level": "velocity", "stack": "hierarchical", "period": 0.01,
+                    "duration": 1.5, "resolver": "hcod"}, "damping": {"value": 1.0}}
+COUPLING = {"kind": "coupling", "joints": {"joint_2": 1.0, "joint_5": -0.5}, "value": -1.0}
+HAND = {"kind": "position", "frame": "end_effector"}
+LOOK = {"kind": "look-at", "frame": "end_effector", "target": [0.3, 0.9, 0.9]}
+POSED = {"kind": "frame", "frame": "end_effector", "offset": [0.03, 0.05, 0.02],
+         "rotation": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]}
+RELATIVE = {"kind": "relative", "frame": "end_effector", "to": "joint_3",
+            "position": [0.405, -0.065, 0.521]}
+
+
+def scenario_of(tmp_path, *tasks, **sections):
+    """A scenario with these tasks, read from a file as a user's is."""
+    file = tmp_path / "listed.toml"
+    file.write_text(tomli_w.dumps({**BASE, **sections, "tasks": list(tasks)}))
+    return load(file)
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+@pytest.mark.parametrize(("task", "metric"), [
+    (COUPLING, "task_coupling_end"), (POSED, "task_frame_end"), (LOOK, "task_look-at_end"),
+    ({**RELATIVE, "orientation": False}, "task_relative_end"),
+    (RELATIVE | {"position": None, "name": "hold"}, "task_hold_end")])
+def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path):
+    task = {key: value for key, value in task.items() if value is not None}
+    control = {**BASE["control"], "level": level, "period": 0.005, "duration": 3.0}
+    run = simulate(scenario_of(tmp_path, task, control=control))
+    assert run.fault is None
+    assert measure(run)[metric].value < (0.1 if "look" in metric else 1e-3)  # deg, or m and rad
+
+
+def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
+    avoidance = {"kind": "separation", "distance": 0.05, "obstacles": [[0.1, 0.5, 0.1]]}
+    first = build(scenario_of(tmp_path, HAND, avoidance=avoidance))
+    assert first.stack.names == ("separation", "position")
+    listed = {"kind": "collision", "give": 0.01}
+    later = build(scenario_of(tmp_path, HAND, listed, COUPLING, avoidance=avoidance))
+    assert later.stack.names == ("position", "separation", "coupling")
+    assert isinstance(later.stack["separation"], Separation)
+    assert later.tasks.give == {"separation": 0.01}
+    refused("tasks.0: name = 'hands'", scenario_of, tmp_path, {**listed, "name": "hands"},
+            avoidance=avoidance)
+
+
+def test_a_recorded_path_is_followed(tmp_path):
+    (tmp_path / "motion.csv").write_text("t,x,y,z\n0,0,0.6,0.1\n0.7,0.1,0.6,0.15\n"
+                                         "1.2,0.1,0.6,0.2\n")
+    path = {"kind": "recorded", "file": "motion.csv"}
+    run = simulate(scenario_of(tmp_path, position={"path": path, "gain": 20.0}))
+    assert run.fault is None
+    # What is left is what integrating velocities over a period leaves: v T / 2 and less.
+    assert np.linalg.norm(run["position_error"][-30:], axis=1).max() < 2e-3
+
+
+# -- set-based tasks and smooth activation in place of Algorithm 1 --------------------------------
+def distances(cell):
+    """The distance of every point to every obstacle, point by point, by plain arithmetic."""
+    seen, centres = cell.sensor.measurement, np.array([o.centre for o in
+                                                       cell.scenario.avoidance.obstacles])
+    return np.linalg.norm(seen.points[:, None] - centres[None], axis=2).ravel()
+
+
+def near_obstacles(name, *changes):
+    """A controller that has commanded at random joint positions with a point nearer than 0.1 m."""
+    for q, _ in states(60, seed=5):
+        controller = Controller(load(name, changes))
+        controller.command(0.0, q, np.zeros(7))
+        if 0.0 < distances(controller.cell).min() < 0.1:
+            yield controller
+
+
+def test_rows_ask_nothing_inside_a_set_and_no_worse_at_its_bound():
+    inside = set()
+    for controller in near_obstacles("ellipse-set-based", "avoidance.distance=0.1"):
+        h, d = controller.hierarchy, distances(controller.cell)
+        np.testing.assert_array_equal(h.lower[:27], np.where(d <= 0.1, 0.0, -np.inf))
+        assert h.lower[-1] == (0.0 if controller.cone_error >= 0.0 else -np.inf)
+        assert np.isinf(h.upper[[*range(27), -1]]).all()
+        inside |= set((d <= 0.1).tolist())
+    assert inside == {True, False}  # rows of both kinds were compared
+
+
+def test_the_tangent_cone_of_the_letters_cone_has_its_jacobian_and_refuses_accelerations():
+    cone = TangentCone(Pointing(FRAME, (1.0, 0.2, 0.0), 0.3, "inequality"))
+    assert (cone.name, cone.kind, cone.dimension) == ("pointing", "inequality", 1)
+    for q, v in states(20):
+        state = state_at(q, v)
+        cosine = np.array([1.0, 0.2, 0.0]) / np.sqrt(1.04) @ state.rotation(FRAME)[:, 2]
+        outside = cosine <= np.cos(0.3)
+        np.testing.assert_array_equal(cone.reference_velocity(state), [0.0 if outside else -np.inf])
+        np.testing.assert_array_equal(cone.jacobian(state), cone.task.jacobian(state))
+    with pytest.raises(HierarchyError, match="velocity level, got level = 'acceleration'"):
+        cone.writer(state, "acceleration", Rows.empty(1, ROBOT.n))
+    refused("kind = 'equality'", lambda: TangentCone(Pointing(FRAME, (1.0, 0.0, 0.0), 0.3)))
+
+
+def test_a_frozen_task_has_no_rate_that_could_be_too_fast_for_the_period():
+    assert build(load("ellipse-set-based", {"control.period": 0.11})).tasks.position
+
+
+def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():
+    for controller in near_obstacles("ellipse-smooth", "avoidance.rate=3.0",
+                                     "avoidance.recovery=0.1"):
+        cell, h, d = controller.cell, controller.hierarchy, distances(controller.cell)
+        missing = 0.1 - d  # distance 0.05 and buffer 0.05
+        seen = d <= 0.3
+        np.testing.assert_allclose(h.lower[:27][seen], np.minimum(3.0 * missing, 0.1)[seen],
+                                   atol=1e-12)
+        share = np.clip(missing / 0.05, 0.0, 1.0)
+        np.testing.assert_allclose(cell.activation()[:27], 0.5 - 0.5 * np.cos(np.pi * share),
+                                   atol=1e-12)
+        np.testing.assert_array_equal(cell.activation()[27:30], 1.0)
+        bound, end = np.cos(np.radians([5.0, 3.0]))
+        to_end = end - (bound - controller.cone_error)
+        share = np.clip(to_end / (end - bound), 0.0, 1.0)
+        np.testing.assert_allclose(cell.activation()[30], 0.5 - 0.5 * np.cos(np.pi * share),
+                                   atol=1e-9)
+        assert h.lower[30] == pytest.approx(5.0 * to_end)
+        alone = make("smooth").solve_activated(h, cell.activation()).x
+        np.testing.assert_array_equal(controller.resolution.x, alone)

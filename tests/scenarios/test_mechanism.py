@@ -76,21 +76,7 @@ def test_a_mechanism_stays_closed_in_every_stack_and_plant(settings):
     assert np.ptp(run["q"], axis=0).max() > 0.05, "it moved"
 
 
-def ankle(rod):
-    """The MJCF of a foot with two pushrods, like those of humanoids; `rod` are joints at a rod."""
-    side = """<body pos="0 {1} .2"><joint name="motor_{0}" axis="0 1 0"/>{2}
-      <body name="rod_{0}" pos="-.05 0 0">{3}{2}</body></body>"""
-    geom = '<geom type="capsule" fromto="0 0 0 -.05 0 0" size=".01"/>'
-    sides = "".join(side.format(name, y, geom, rod.format(name)) for name, y in (
-        ("left", 0.05), ("right", -0.05)))
-    connects = "".join(f'<connect name="{name}" body1="rod_{name}" body2="foot" anchor="0 0 -.2"/>'
-                       for name in ("left", "right"))
-    return f"""<mujoco><option><flag contact="disable"/></option><default><joint armature=".02"/>
-      </default><worldbody><body pos="0 0 .1"><body name="foot"><joint name="pitch" axis="0 1 0"/>
-      <joint name="roll" axis="1 0 0"/>{geom}<site name="toe" pos=".1 .02 -.03"/></body>{sides}
-      </body></worldbody><equality>{connects}</equality></mujoco>"""
-
-
+ROBOTS = Path(__file__).parents[1] / "data" / "robots"
 CROSS = '<joint name="rod_{0}_1" axis="0 1 0"/><joint name="rod_{0}_2" axis="1 0 0"/>'
 
 
@@ -112,8 +98,8 @@ def largest_residual(path, q):
                                             ("acceleration", CROSS), ("torque", CROSS)])
 def test_an_ankle_with_two_pushrods_stays_closed(level, rod, tmp_path):
     pytest.importorskip("mujoco")
-    path = tmp_path / "ankle.xml"
-    path.write_text(ankle(rod))
+    path, text = tmp_path / "ankle.xml", (ROBOTS / "ankle.xml.txt").read_text()
+    path.write_text(text.format(left=rod.format("left"), right=rod.format("right")))
     robot, asked = Robot.load(path), {"pitch": -0.35, "roll": 0.15}
     goal = Mechanism(robot).closed(robot.configuration(asked), asked)
     joints = {name: np.atleast_1d(value).tolist() for name, value in robot.values(goal).items()}
@@ -141,7 +127,7 @@ def test_an_ankle_with_two_pushrods_stays_closed(level, rod, tmp_path):
 @pytest.mark.parametrize("added", [0.0, 0.5])
 def test_the_torque_plant_has_the_armature_of_the_robots_file(added):
     mujoco = pytest.importorskip("mujoco")
-    path = Path(__file__).parents[1] / "data" / "robots" / "falling.xml"
+    path = ROBOTS / "falling.xml"
     robot, model = Robot.load(path), mujoco.MjModel.from_xml_path(str(path))
     q, v = np.array([0.0, 0.0, 1.0, 0.0, 0.6, 0.0, 0.8, 0.3, 0.1]), np.zeros(8)
     plant = TorqueRobot(robot, Contacts(robot, []), q, v,

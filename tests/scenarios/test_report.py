@@ -82,15 +82,6 @@ def test_a_page_is_whole_and_needs_nothing_outside_itself(runs, request):
     assert not re.search(r"<(?:link|img|(?:iframe|script)[^>]* src)\b|@import|url\((?!#)", text)
 
 
-def test_one_resolver_in_several_scenarios_is_one_table_and_nothing_is_best(undrawn):
-    runs = [dataclasses.replace(made(LETTER, scenario=asked(name=name), v=speed * np.eye(5, 7)),
-                                label=name) for name, speed in (("slow", 0.1), ("jumpy", 2.0))]
-    text = page(comparison(*runs))
-    assert list(comparison(*runs).groups()) == ["tpm-published"]
-    assert not any(best(line) for line in table(runs))
-    assert "none is marked as best" in text
-
-
 def test_the_page_shows_every_event_in_words_and_in_the_stack_over_time():
     run = made(LETTER, contacts=[0, 1, 0, 0, 0], contact_depth=np.zeros(5),
                contact_force=np.zeros(5))

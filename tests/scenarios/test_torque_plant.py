@@ -17,7 +17,7 @@ from hierarchy.contacts import Contacts
 from hierarchy.tasks import TorqueLimits
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.cell.plants.torque import TorqueRobot
+from scenarios.cell.plants.torque import TorqueRobot, inside
 from scenarios.config import ScenarioError
 from scenarios.config.sections.plant import PushSection, TorqueSection
 from scenarios.loop.first_tick import first_tick
@@ -242,3 +242,11 @@ def test_a_share_of_the_torques_limits_them_and_what_stays_the_same_is_kept():
     assert scenario.model_copy(update={"limits": None}).asks == "inequalities"
     seen = build(load("ellipse"))
     assert build(load("ellipse", ["position.gain=2.0"]), seen).sensor is seen.sensor
+
+
+@pytest.mark.parametrize(("place", "found"), [
+    ((0.5, 0.5), 0.5), ((0.9, 0.4), 0.1), ((1.2, 0.5), -0.2), ((0.0, 0.3), 0.0)])
+def test_the_margin_of_support_is_that_from_the_nearest_edge(place, found):
+    corners = np.array([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.2), (0.0, 0.0)])
+    assert inside(corners, np.array(place)) == pytest.approx(found)
+    assert np.isnan(inside(corners[:2], np.array(place)))

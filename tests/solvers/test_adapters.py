@@ -55,8 +55,8 @@ def posture_task(target, cost=0.1):
     return task
 
 
-def arm_scene(configuration, shift=(0.05, 0.02, -0.03), lm_damping=0.0, cost=1e-3, **arguments):
-    hand = frame_task(configuration, shift=shift)
+def arm_scene(configuration, lm_damping=0.0, cost=1e-3, **arguments):
+    hand = frame_task(configuration)
     hand.lm_damping = lm_damping
     return configuration, [hand, posture_task(Q + 0.3, cost)], arguments
 

@@ -143,16 +143,3 @@ def test_what_was_solved_and_wrong_is_right_or_inaccurate(name, kind, seeds):
     ("hcod", 7102002, ["nearly_parallel"])])  # rows are cut more than once
 def test_what_rounding_makes_hard_is_solved(name, seed, kinds):
     assert make(name).solve(problems.structured(seed, kinds)).status is Status.SOLVED
-
-
-def test_a_row_that_holds_a_level_back_by_its_difference_from_others_is_certified():
-    """x of r3 - r2 is the bound's: level 1 is held back, though r1, r2, r3 leave 2e-10 for y, w."""
-    rows = [[-0.05467989040106109, 0.46707819397159345, -0.7843439831547772, 0.40453996884221594],
-            [0, 0, 1, 0],
-            [2.8531509796440198e-07, -1.7516610740314598e-07, 1.0000001270083514,
-             -1.5193232374433123e-07]]
-    h = Hierarchy.from_levels([([[1, 0, 0, 0]], [2.3], [np.inf]), (rows, [2, -2, -2])])
-    res = make("hcod").solve(h)
-    assert certify(h, res.x).certified
-    for aside in 1e-6 * np.eye(4)[[0, 2]]:
-        assert not certify(h, res.x + aside).certified

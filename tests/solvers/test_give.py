@@ -16,14 +16,14 @@ from solvers.give import giving
 from solvers.problems import generate, structured
 
 
-def problem(seed, give, n=6, half=0.5):
+def problem(seed, give):
     """Levels that cannot all be met: two equalities, a conflict with them, a box, a posture."""
     rng = np.random.default_rng(seed)
-    A, B, C = rng.normal(size=(2, n)), rng.normal(size=(3, n)), rng.normal(size=(3, n))
+    A, B, C = (rng.normal(size=(m, 6)) for m in (2, 3, 3))
     B[2] = A[0] + A[1]  # which conflicts with the level above
     return Hierarchy.from_levels(
-        [(A, rng.normal(size=2)), (B, rng.normal(size=3)), (C, np.full(3, -half), np.full(3, half)),
-         (np.eye(n), rng.normal(size=n))], give=[0.0, give, 0.0, 0.0])
+        [(A, rng.normal(size=2)), (B, rng.normal(size=3)), (C, np.full(3, -0.5), np.full(3, 0.5)),
+         (np.eye(6), rng.normal(size=6))], give=[0.0, give, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("resolver", [make("hcod"), make("hqp", backend="proxqp"),

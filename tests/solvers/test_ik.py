@@ -212,36 +212,34 @@ CONTACTS = feet()
 STANDING = State.at(HUMANOID, HUMANOID.rest)
 
 
-def solved(stack, state, resolver="hcod"):
-    """The hierarchy of a stack at a state and its certified answer."""
-    h = stack.hierarchy(state)
-    res = make(resolver).solve(h)
+def physical(stack, fraction=1.0):
+    """The hierarchy of a stack where the robot stands, and its certified answer.
+
+    Newton and Euler hold, the feet rest, torques and forces are within their limits.
+    """
+    state, h = STANDING, stack.hierarchy(STANDING)
+    res = make("hcod").solve(h)
     assert res.status is Status.SOLVED
     assert certify(h, res.x).certified, certify(h, res.x)
-    return h, res
-
-
-def assert_physical(h, x, state, contacts, fraction=1.0):
-    """Newton and Euler hold, the feet rest, torques and forces are within their limits."""
-    assert h.violations(x)[:2].max() < 1e-7
-    forces = contacts.forces(x)
+    assert h.violations(res.x)[:2].max() < 1e-7
+    forces, torques = CONTACTS.forces(res.x), CONTACTS.torques(state, res.x)
     com = pin.centerOfMass(HUMANOID.model, HUMANOID.model.createData(), state.q)
     arms = np.concatenate([[state.position(c.frame) + state.rotation(c.frame) @ np.array(point)
-                            for point in c.points] for c in contacts.contacts]) - com
+                            for point in c.points] for c in CONTACTS.contacts]) - com
     A, dA = state.momentum
-    rate = A @ contacts.accelerations(x) + dA @ state.v
+    rate = A @ CONTACTS.accelerations(res.x) + dA @ state.v
     np.testing.assert_allclose(rate[:3], forces.sum(axis=0) - [0.0, 0.0, WEIGHT], atol=1e-6)
     np.testing.assert_allclose(rate[3:], np.cross(arms, forces).sum(axis=0), atol=1e-6)
-    assert (np.abs(contacts.torques(state, x)) <= fraction * HUMANOID.effort_limit[6:] + 1e-7).all()
+    assert (np.abs(torques) <= fraction * HUMANOID.effort_limit[6:] + 1e-7).all()
     assert (np.linalg.norm(forces[:, :2], axis=1) <= 0.7 * forces[:, 2] + 1e-7).all()
+    return h, res
 
 
 @pytest.mark.parametrize("faces", [4, 8])
 @pytest.mark.parametrize("shift", [  # all but the first out of reach
     (0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.6, 0.0), (0.0, 0.0, 1.0), (-2.0, 1.0, -1.0)])
 def test_hcod_is_certified_and_agrees_with_a_cascade_of_programs(shift, faces):
-    h, res = solved(standing_stack(STANDING, CONTACTS, shift, faces=faces), STANDING)
-    assert_physical(h, res.x, STANDING, CONTACTS)
+    h, res = physical(standing_stack(STANDING, CONTACTS, shift, faces=faces))
     other = make("hqp", backend="clarabel").solve(h)  # the one that solves all of them
     assert other.status is Status.SOLVED
     assert np.abs(other.x - res.x).max() <= 1e-8 * (1.0 + np.abs(res.x).max())
@@ -251,8 +249,7 @@ def test_torques_that_cannot_hold_the_weight_stay_within_limits_and_the_knees_ar
     """The body sinks: the stack says which torques hold the centre of mass back."""
     weak = 0.1
     stack = standing_stack(STANDING, CONTACTS, fraction=weak)
-    h, res = solved(stack, STANDING)
-    assert_physical(h, res.x, STANDING, CONTACTS, weak)
+    h, res = physical(stack, weak)
     assert (STANDING.momentum.A @ CONTACTS.accelerations(res.x))[2] < -1.0
     said = explain(h, res, rows=stack.row_names()).splitlines()[2]
     assert said.startswith("centre of mass is missed by")

@@ -33,9 +33,9 @@ RESOLVERS = [
     ("sns", {"form": "optimal", "scales": "miss"}, {"optimal": 1, "miss": 1})]
 
 
-def hierarchies(count, first=0):
+def hierarchies(count):
     """Generated and structured problems, equalities alone and with bounds above them."""
-    for seed in range(first, first + count):
+    for seed in range(count):
         equal = problems.structured(seed, equalities_only=True)
         yield from (problems.generate(seed), problems.structured(seed), equal,
                     problems.bounded(equal, seed))
@@ -77,24 +77,18 @@ def test_warm_sequences_give_the_same_bits(library, name):
     assert warm > 40
 
 
-def test_the_object_loaded_without_a_linker_gives_the_same_bits(folder):
-    library = c.Library.unlinked(folder / "lib" / "libtask_hierarchy.a")
-    for h in hierarchies(5):
-        c.check_same(library, RESOLVERS[0], h)
-
-
 def test_without_code_made_ahead_it_is_compiled_to_the_same_bits(tmp_path, monkeypatch):
     """As where a newer LLVM wrote it."""
     monkeypatch.setattr(caching, "FOLDER", tmp_path)
     (tmp_path / "solvers.bc").write_bytes(source_digest(can_open).encode() + b"of another LLVM")
     write(tmp_path, ("recursive",))
     for h in hierarchies(5):
-        c.check_same(c.Library.of(tmp_path), ("recursive", {}, {}), h)
+        c.check_same(c.Library(tmp_path), ("recursive", {}, {}), h)
 
 
 def test_code_for_fixed_sizes_gives_the_same_bits(tmp_path):
     write(tmp_path, ("hcod",), fix=(7, 5, 3))
-    library, resolver = c.Library.of(tmp_path), RESOLVERS[0]
+    library, resolver = c.Library(tmp_path), RESOLVERS[0]
     equal, others = family("EQ7"), [*family("EQ7sing"), *family("INEQ7")[:5]]
     assert equal[0].h.sizes.tolist() == [3, 1, 1]
     memory, before = library.memory(equal[0].h), None

@@ -171,7 +171,7 @@ def test_the_command_writes_a_library_for_any_x86_64_that_agrees_to_rounding_and
     line = "library --resolvers recursive --out", out
     assert "libtask_hierarchy.a" in command(*line, "--target", target).out
     assert "not empty" in command(*line, code=2).err
-    library = c.Library.of(out)
+    library = c.Library(out)
     kinds = problems.KINDS[:-2]  # without rows far lighter than others, where rounding is larger
     for seed in range(30):
         h = problems.structured(seed, kinds, equalities_only=True)

@@ -2,7 +2,7 @@
 
 Any two of COLOURS are at least 16 apart in CIELAB, also as seen with protanopia, deuteranopia or
 tritanopia (simulated after Machado, Oliveira, Fernandes 2009), and each is legible on white and on
-near-black; tests/scenarios/test_report.py checks this.
+near-black.
 """
 
 from collections.abc import Iterable
