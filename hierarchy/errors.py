@@ -5,7 +5,7 @@ import os
 from collections.abc import Collection, Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from errno import ENAMETOOLONG
-from math import copysign, inf, isfinite, isnan, nan
+from math import inf, isfinite, isnan, nan
 from numbers import Integral, Real
 from pathlib import Path
 
@@ -145,7 +145,7 @@ def as_float(value: object) -> float:
     try:
         return float(value)
     except OverflowError:
-        return copysign(inf, value)
+        return inf if value == abs(value) else -inf
 
 
 def _between(least: float, largest: float) -> str:
@@ -164,7 +164,8 @@ def finite_numbers(what: str, values: object, size: int | None = None) -> NDArra
         found = np.asarray(None)
     count = "" if size is None else f"{size} "
     if (found.dtype.kind not in "iuf" or found.ndim != 1 or not found.size
-            or size not in (None, found.size) or not np.isfinite(found).all()):
+            or size not in (None, found.size) or not np.isfinite(found).all()
+            or np.ma.is_masked(values)):
         raise HierarchyError(f"{what}: expected {count}finite numbers, got {brief(values)}")
     return found.astype(float)
 

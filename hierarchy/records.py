@@ -4,11 +4,14 @@
 `Annotated[type, check, unit]` the unit is named too.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+import builtins
+import sys
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import fields
-from functools import cache, partial
-from types import NoneType
+from dataclasses import Field, fields
+from functools import partial
+from inspect import get_annotations
+from types import NoneType, SimpleNamespace
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 from hierarchy.errors import check_choice, finite_numbers, number, positive, real, whole
@@ -18,6 +21,8 @@ Positive = Annotated[float, positive]
 NotNegative = Annotated[float, partial(number, least=0.0)]
 Vector3 = Annotated[Sequence[float], partial(finite_numbers, size=3)]
 NUMBERS: dict[Any, Check] = {float: real, int: whole}
+_Asked = tuple[str, Any, bool, Check | None, str]  # name, type, whether None will do, check, unit
+_known: dict[type, list[_Asked]] = {}  # what is asked of the fields of each class
 
 
 def set_frozen(record: object, **values: object) -> None:
@@ -33,35 +38,39 @@ def check_fields(record: object, what: str, plain: Mapping[Any, Check] = NUMBERS
 
     plain : checks of types that are not Annotated. free : names of fields that need none of these.
     """
-    for name, kind, optional, check, unit in _asked(type(record)):  # type: ignore[arg-type]
-        check = check or (None if name in free else plain.get(kind))
-        value = getattr(record, name)
+    kind = type(record)
+    if kind not in _known:
+        _known[kind] = list(_asked(kind, {one.__name__: one for one in plain}))
+    for name, own, optional, check, unit in _known[kind]:
+        check = check or (None if name in free else plain.get(own))
+        value = getattr(record, name, None)
         if check is not None and not (optional and value is None):
             found = check(f"{what}: {name}{unit}", value)
-            if kind in NUMBERS:
+            if own in NUMBERS:
                 set_frozen(record, **{name: found})
 
 
-@cache
-def _asked(kind: type) -> list[tuple[str, Any, bool, Check | None, str]]:
-    """Return name, type, whether None will do, check and unit of each field that can be given."""
-    hints, asked = _hints(kind), []
+def _asked(kind: Any, names: Mapping[str, Any]) -> Iterator[_Asked]:
+    """Yield what is asked of each field that can be given."""
     for field in (field for field in fields(kind) if field.init):
-        hint: Any = hints.get(field.name)
+        hint = _hint(kind, field, names)
         others = [part for part in get_args(hint) if part is not NoneType]
         optional = NoneType in get_args(hint) and len(others) == 1
         hint = others[0] if optional else hint
         check, *unit = getattr(hint, "__metadata__", (None,))
-        own = hint if check is None else hint.__origin__
+        own = hint if not hasattr(hint, "__metadata__") else hint.__origin__
+        if not callable(check) or isinstance(check, type):  # what other packages annotate with
+            check, unit = None, []
         if get_origin(own) is Literal:
             check = partial(check_choice, known=get_args(own))
-        asked.append((field.name, own, optional, check, "".join(f" [{one}]" for one in unit)))
-    return asked
+        yield field.name, own, optional, check, "".join(f" [{one}]" for one in unit)
 
 
-def _hints(kind: type) -> dict[str, Any]:
-    """Return the types of fields; of a class that names unknown ones, those of its base."""
-    for owner in kind.__mro__:
-        with suppress(Exception):  # a user may annotate with anything
-            return get_type_hints(owner, include_extras=True)
-    return {}
+def _hint(kind: type, field: Field[Any], names: Mapping[str, Any]) -> Any:
+    """Return the type of a field, None if that is unknown; `names` may be so where it is made."""
+    with suppress(Exception):  # a user may annotate with anything
+        owner = next(one for one in kind.__mro__ if field.name in get_annotations(one))
+        scope = {**names, **vars(sys.modules.get(owner.__module__, builtins))}
+        one = SimpleNamespace(__annotations__={field.name: field.type})
+        return get_type_hints(one, scope, include_extras=True)[field.name]
+    return None

@@ -101,6 +101,7 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     """
     expect("solve_ik: robot", robot, Robot, "make one with Robot.load(name or file)")
     expect_each("solve_ik: tasks", tasks, Task, "give a list of tasks")
+    tasks = tuple(tasks)
     dt = positive("solve_ik: dt [s]", dt)
     if not isinstance(limits, bool | Task):
         raise HierarchyError("solve_ik: limits: expected True, False or a task, got "
@@ -117,8 +118,12 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     before = _before(memory, v, limits)
     kept = _of_thread.kept
     asked = id(robot), *map(id, tasks), id(limits), id(resolver), dt, damping
-    if asked in kept:
-        return kept[asked].step(q, t, *before)
+    made = kept.pop(asked, None)  # away meanwhile: a task may ask the same at another q
+    if made is not None and made.sizes == _sizes(tasks):
+        try:
+            return made.step(q, t, *before)
+        finally:
+            kept[asked] = made
     made = _SetUp(robot, tasks, limits, resolver, dt, damping)
     step = made.step(q, t, *before)
     for oldest in list(kept)[:1 - _MOST_KEPT]:
@@ -128,6 +133,10 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     if limits is True:
         _warn_of_speeds(robot)
     return step
+
+
+def _sizes(tasks: Sequence[Task]) -> list[int]:
+    return [task.dimension for task in tasks]
 
 
 def _resolver(asked: str | Resolver) -> Resolver:
@@ -197,7 +206,7 @@ class _SetUp:
     def __init__(self, robot: Robot, tasks: Sequence[Task], limits: bool | Task,
                  resolver: str | Resolver, dt: float, damping: float) -> None:
         self.objects = robot, *tasks, limits, resolver  # kept, so that their `id` stays theirs
-        self.state = State(robot)
+        self.state, self.sizes = State(robot), _sizes(tasks)
         box = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
         self.stack, self.resolver = stacked(robot, tasks, dt, box, _resolver(resolver), damping)
         for task in (*box, *tasks):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pytest
@@ -71,10 +71,13 @@ class Kernel(Measured):
 
 @dataclass(frozen=True)
 class Own(tasks.Position):
-    """A task of a user, with types that are not text."""
+    """A task of a user, with types that are not text, notes, and a type that is not known here."""
 
     other: Frame | None = None
     side: Literal["left", "right"] = "left"
+    part: "Contacts | None" = None
+    more: "Unknown | None" = None  # noqa: F821
+    speed: Annotated[float, "m/s"] = 1
 
 
 def rows_after(commanded, task=None):
@@ -102,6 +105,8 @@ def limits(**settings):
     (lambda: tasks.Position("hand", THERE), "'position': frame is the name 'hand'; give"),
     (lambda: Own(FRAME, THERE, other="hand"), "'position': other is the name 'hand'; give"),
     (lambda: Own(FRAME, THERE, side="up"), "side = 'up': expected one of 'left', 'right'"),
+    (lambda: Own(FRAME, THERE, part="foot"), "part: expected a Contacts, got str 'foot'"),
+    (lambda: Own(FRAME, THERE, speed="fast"), "'position': speed = 'fast': expected a number"),
     (lambda: tasks.JointLimits("kuka_lwr", 10.0, 0.01), "give Robot.load('kuka_lwr')"),
     (lambda: Stack(["position"]), "a stack: expected a Task, got str 'position'"),
     (lambda: Stack([HAND]).hierarchy(ROBOT), "state: expected a State, got Rob"),
@@ -146,6 +151,7 @@ def limits(**settings):
     (lambda: Contact(FRAME, open=1.0), "open 1.0, expected pairs of times"),
     (lambda: Contacts(ROBOT, ["foot"]), "contacts[0]: expected a Contact, got str 'foot'"),
     (lambda: Contact(FOOT, friction=0.0), "'left_foot': friction = 0: expected a number > 0"),
+    (lambda: Contact(FOOT, normal=np.ma.masked_less([-1, 0, 1], 0)), "3 finite numbers, got Mask"),
     (lambda: Contact(FOOT, [(0, 0)]), "are not (k, 3) numbers"),
     (lambda: tasks.Friction(CONTACTS, 6), "faces = 6: expected one of 4, 8"),
     (lambda: tasks.Friction(CONTACTS, least=5.0, largest=5.0), "largest 5.0 N"),
@@ -160,6 +166,7 @@ def limits(**settings):
     (lambda: State.at(ROBOT, [1j] * 7), "'kuka_lwr': q is not an array of real numbers: it is co"),
     (lambda: tasks.model_rows("kuka_lwr"), "model_rows: robot: expected a Robot, got str"),
     (lambda: tasks.JointDamping(10**30), "joints = 1000000000000000000000000000000: expected a"),
+    (lambda: tasks.JointDamping(7, 10**400), "damping = inf: expected a finite number from 0 on"),
     (lambda: tasks.JointDamping(-1), "joints = -1: expected a whole number from 0 on"),
     (lambda: tasks.TorqueLimits(ROBOT, contacts="foot"), "contacts: expected a Contacts, got str"),
     (lambda: Obstacle("point", (0, 0, 0), path=THERE.position), "obstacle: path: expected a Path"),

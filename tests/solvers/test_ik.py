@@ -1,6 +1,7 @@
 """Inverse kinematics of a bare robot, and whole-body dynamics of a humanoid."""
 
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -10,7 +11,7 @@ from standing import ROBOT as HUMANOID
 from standing import WEIGHT, feet, standing_stack
 from urdf_text import LIMIT, joint, link, placed, urdf
 
-from hierarchy import HierarchyError, Robot, State
+from hierarchy import HierarchyError, Robot, State, Task
 from hierarchy.paths import Still, circle
 from hierarchy.tasks import (
     Along,
@@ -27,6 +28,7 @@ from solvers import Status, certify, explain, make, solve_ik
 from solvers.ik import _of_thread
 
 Q = np.array([0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3])
+AT = State.at(ROBOT, Q)
 
 
 def follow(tasks, ticks, **settings):
@@ -58,6 +60,33 @@ def test_what_a_call_has_set_up_serves_the_same_objects_and_changes_no_answer(ch
             anew = another.submit(solve_ik, **asked, memory=memory).result()
         np.testing.assert_array_equal(step.v, anew.v)
         memory, q = step.memory, ROBOT.integrate(q, step.v * 0.01)
+
+
+class Changing(Task):
+    """A position of a user who asks within it, or takes other rows, while its set-up is kept."""
+
+    name, dimension, gain, again = "changing", 3, 2.0, None
+
+    def error(self, state):
+        if self.again and state.q[0] == Q[0]:
+            self.again(Q + 0.1)
+        return (np.array([0.3, 0.5, 0.1]) - state.position(FRAME))[:self.dimension]
+
+    def jacobian(self, state):
+        return Position(FRAME, Still([0.3, 0.5, 0.1])).jacobian(state)[:self.dimension]
+
+    jacobian_derivative = jacobian
+
+
+def test_what_is_kept_serves_one_call_at_a_time_and_tasks_of_its_size():
+    changing = Changing()
+    tasks = [changing, Posture(tuple(Q + 0.05))]
+    ask = partial(solve_ik, ROBOT, tasks=tasks)
+    plain = [ask(Q).v for _ in range(2)][-1]
+    changing.again = ask
+    np.testing.assert_array_equal(ask(Q).v, plain)
+    changing.again, changing.dimension = None, 2
+    np.testing.assert_allclose(changing.jacobian(AT) @ ask(Q).v, 2.0 * changing.error(AT))
 
 
 def test_limits_of_the_robot_hold_whatever_is_asked():
