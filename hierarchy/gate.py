@@ -96,7 +96,8 @@ def level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
     """
     if names is None:
         return tuple(f"level {k + 1}" for k in range(count))
-    names = names if isinstance(names, str) or not isinstance(names, Iterable) else tuple(names)
+    if not isinstance(names, str | tuple) and isinstance(names, Iterable):
+        names = tuple(names)
     if not isinstance(names, tuple) or not all(isinstance(name, str) for name in names):
         raise HierarchyError(f"names: expected a list of texts, got {brief(names)}")
     if len(names) != count:

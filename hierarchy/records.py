@@ -21,7 +21,7 @@ Positive = Annotated[float, positive]
 NotNegative = Annotated[float, partial(number, least=0.0)]
 Vector3 = Annotated[Sequence[float], partial(finite_numbers, size=3)]
 NUMBERS: dict[Any, Check] = {float: real, int: whole}
-_Asked = tuple[str, Any, bool, Check | None, str]  # name, type, whether None will do, check, unit
+_Asked = tuple[str, str, bool, Check, bool]  # name, also with unit, may be None, check, a number
 _known: dict[type, list[_Asked]] = {}  # what is asked of the fields of each class
 
 
@@ -40,30 +40,32 @@ def check_fields(record: object, what: str, plain: Mapping[Any, Check] = NUMBERS
     """
     kind = type(record)
     if kind not in _known:
-        _known[kind] = list(_asked(kind, {one.__name__: one for one in plain}))
-    for name, own, optional, check, unit in _known[kind]:
-        check = check or (None if name in free else plain.get(own))
+        _known[kind] = list(_asked(kind, plain, free))
+    for name, said, optional, check, is_number in _known[kind]:
         value = getattr(record, name, None)
-        if check is not None and not (optional and value is None):
-            found = check(f"{what}: {name}{unit}", value)
-            if own in NUMBERS:
-                set_frozen(record, **{name: found})
+        if value is not None or not optional:
+            found = check(f"{what}: {said}", value)
+            if is_number:
+                object.__setattr__(record, name, found)
 
 
-def _asked(kind: Any, names: Mapping[str, Any]) -> Iterator[_Asked]:
-    """Yield what is asked of each field that can be given."""
+def _asked(kind: Any, plain: Mapping[Any, Check], free: Collection[str]) -> Iterator[_Asked]:
+    """Yield what is asked of each field that can be given and of which something is asked."""
+    names = {one.__name__: one for one in plain}
     for field in (field for field in fields(kind) if field.init):
         hint = _hint(kind, field, names)
         others = [part for part in get_args(hint) if part is not NoneType]
         optional = NoneType in get_args(hint) and len(others) == 1
         hint = others[0] if optional else hint
         check, *unit = getattr(hint, "__metadata__", (None,))
-        own = hint if not hasattr(hint, "__metadata__") else hint.__origin__
+        own = hint.__origin__ if hasattr(hint, "__metadata__") else hint
         if not callable(check) or isinstance(check, type):  # what other packages annotate with
-            check, unit = None, []
+            check, unit = None if field.name in free else plain.get(own), []
         if get_origin(own) is Literal:
             check = partial(check_choice, known=get_args(own))
-        yield field.name, own, optional, check, "".join(f" [{one}]" for one in unit)
+        if check is not None:
+            said = "".join((field.name, *(f" [{one}]" for one in unit)))
+            yield field.name, said, optional, check, own in NUMBERS
 
 
 def _hint(kind: type, field: Field[Any], names: Mapping[str, Any]) -> Any:

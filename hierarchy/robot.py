@@ -336,7 +336,8 @@ class Robot:
     def supports(self) -> NDArray[np.bool_]:
         """Whether a velocity moves a body (joints + 1, n); the first body is the world."""
         joints = [part.joint for part in self.parts for _ in range(part.velocities)]
-        return np.array([np.isin(joints, above.tolist()) for above in self.model.supports])
+        above = [set(chain.tolist()) for chain in self.model.supports]
+        return np.array([[joint in chain for joint in joints] for chain in above], dtype=np.bool_)
 
     def position_limits(self) -> tuple[Array, Array]:
         """Return lower and upper (n,), (n,) [rad or m], one per velocity.

@@ -119,7 +119,7 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     kept = _of_thread.kept
     asked = id(robot), *map(id, tasks), id(limits), id(resolver), dt, damping
     made = kept.pop(asked, None)  # away meanwhile: a task may ask the same at another q
-    if made is not None and made.sizes == _sizes(tasks):
+    if made is not None and made.fits():
         try:
             return made.step(q, t, *before)
         finally:
@@ -133,10 +133,6 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     if limits is True:
         _warn_of_speeds(robot)
     return step
-
-
-def _sizes(tasks: Sequence[Task]) -> list[int]:
-    return [task.dimension for task in tasks]
 
 
 def _resolver(asked: str | Resolver) -> Resolver:
@@ -206,11 +202,17 @@ class _SetUp:
     def __init__(self, robot: Robot, tasks: Sequence[Task], limits: bool | Task,
                  resolver: str | Resolver, dt: float, damping: float) -> None:
         self.objects = robot, *tasks, limits, resolver  # kept, so that their `id` stays theirs
-        self.state, self.sizes = State(robot), _sizes(tasks)
+        self.state = State(robot)
         box = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
         self.stack, self.resolver = stacked(robot, tasks, dt, box, _resolver(resolver), damping)
         for task in (*box, *tasks):
             check_period(task, dt)
+        self.tasks = [task.on(robot) for task in tasks]
+        self.sizes = [task.dimension for task in self.tasks]
+
+    def fits(self) -> bool:
+        """Whether all tasks still have as many rows; a user's may have more or fewer."""
+        return [task.dimension for task in self.tasks] == self.sizes
 
     def step(self, q: ArrayLike, t: float, memory: Array | None, v: ArrayLike | None) -> Step:
         """Return the answer at q and v; the memory is the resolver's."""
