@@ -77,7 +77,8 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
 
     Move on with `q = robot.integrate(q, step.v * dt)`. With the same objects, tasks among them, as
     one of the last calls of the thread, what that call has set up serves again, which saves most of
-    the time; for loops of a fixed rate see docs/loop.md.
+    the time: of the tasks of `hierarchy` only what is written into the array of a target counts
+    from then on. For loops of a fixed rate see docs/loop.md.
 
     q : (nq,) joint positions [rad or m].
     tasks : tasks of `hierarchy.tasks`, plugins or your own, at velocity level.

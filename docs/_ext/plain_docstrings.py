@@ -22,6 +22,7 @@ _ALIASES = {f"TypeAliasForwardRef('{name}')": name for name in ("Array", "ArrayL
     stringify_annotation(alias, "smart"): name for alias, name in (
         (ArrayLike, "ArrayLike"), (Array, "Array"), (NDArray[np.int64], "NDArray[int64]"),
         (NDArray[np.bool_], "NDArray[bool]"), (NDArray[Any], "NDArray[Any]"))}
+_ANNOTATED = re.compile(r"~?(?:\w+\.)*Annotated\[")
 _TICKS = re.compile(r"`([^`]+)`")
 _NAME = re.compile(r"[A-Za-z_][\w.]*")
 _SPECIAL = re.compile(r"([\\*|`]|_(?=\W|$))")
@@ -37,10 +38,25 @@ def setup(app):
 
 
 def _short(signature):
-    """Return a signature, or None, with the names of aliases."""
+    """Return a signature, or None, with the names of aliases and without what fields ask for."""
     for written, alias in _ALIASES.items() if signature else ():
         signature = signature.replace(written, alias)
+    while found := _ANNOTATED.search(signature or ""):
+        first, last = _parts_within(signature, found.end())
+        signature = signature[:found.start()] + signature[found.end():first] + signature[last + 1:]
     return signature
+
+
+def _parts_within(signature, start):
+    """Return where the first part of a bracket ends, after whose opening `start` is, and where it."""
+    depth, ends = 0, []
+    for i in range(start, len(signature)):
+        depth += (signature[i] in "[(") - (signature[i] in "])")
+        if depth < 0 or (depth == 0 and signature[i] == ","):
+            ends.append(i)
+        if depth < 0:
+            return ends[0], i
+    raise ValueError(signature)
 
 
 def converted(lines):

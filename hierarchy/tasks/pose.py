@@ -1,11 +1,13 @@
 """Pose of a frame: by a rotation vector and a line, by the logarithm of SE(3), in another frame."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from hierarchy.errors import finite_numbers
 from hierarchy.gate import Rotation, readable
 from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import (
@@ -31,7 +33,6 @@ from hierarchy.kinematics import (
 from hierarchy.measured import Measure, Measured, Motion, measured, plain
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.records import Vector3
 from hierarchy.robot import Frame
 from hierarchy.state import State
 from hierarchy.task import NamedRows
@@ -203,7 +204,7 @@ class RelativePose(NamedRows, Measured):
 
     frame: Frame
     to: Frame
-    position: Vector3
+    position: Annotated[ArrayLike, partial(finite_numbers, size=3)]
     rotation: Rotation | None = None
     stiffness: float = 40.0
     damping: float = 20.0

@@ -82,6 +82,8 @@ def test_every_public_name_is_in_the_reference(site):
                  for name in objects}
     missing = [" or ".join(names) for names in public_names() if not described & names]
     assert missing == [], "add their module to a page of docs/api"
+    text = "".join(path.read_text() for path in (site[0] / "api").glob("*.html"))
+    assert " at 0x" not in text, "a signature has an object in place of a type"
 
 
 def public_names():
