@@ -48,7 +48,7 @@ def _short(signature):
 
 
 def _parts_within(signature, start):
-    """Return where the first part of a bracket ends, after whose opening `start` is, and where it."""
+    """Return where the first part of what is in brackets from `start` on ends, and where all."""
     depth, ends = 0, []
     for i in range(start, len(signature)):
         depth += (signature[i] in "[(") - (signature[i] in "])")
