@@ -238,7 +238,7 @@ class Stack:
         n = joints if self.contacts is None else self.contacts.unknowns
         sizes = [self[name].dimension for name in order]
         m = sum(sizes)
-        give = np.concatenate([np.empty(0), *map(self._room, order)])
+        give = np.concatenate([np.empty(0), *(map(self._room, order) if self._give else ())])
         return Hierarchy.trusted(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, names=order,
                                  give=give if give.any() else None,
                                  named=partial(self.row_names, order))

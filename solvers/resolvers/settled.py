@@ -186,12 +186,14 @@ class _Above:
         h = self.stacked([*self.levels, (np.vstack([A, np.eye(n)]), side, side)],
                           np.zeros_like(x0))
         rows, lower, upper, _ = h.rows
-        weights = rows[-n:].reshape(-1)[::n + 1]
+        weights, memory = rows[-n:].reshape(-1)[::n + 1], None
 
         def probe(mu: float) -> _Reached:
+            nonlocal memory
             weights[:] = np.sqrt(mu)
             lower[-n:] = upper[-n:] = weights * x0
-            found = self.strict.solve(h)
+            found = self.strict.solve(h, memory)
+            memory = found.memory
             return _Reached(mu, found.x, float(np.linalg.norm(b - A @ found.x)), found.status)
 
         return probe

@@ -176,7 +176,8 @@ def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_
 
 def test_joint_limits_cover_a_floating_base_where_it_has_limits():
     robot = Robot.load("humanoid")
-    joints, both = JointLimits(robot, 5.0, T), JointLimits(robot, 5.0, T, base_speed=(0.1, 0.2))
+    joints = JointLimits(robot, 5.0, T)
+    both = JointLimits(robot, np.full(30, 5.0), T, base_speed=(0.1, 0.2))
     assert (joints.dimension, both.dimension) == (30, 36)
     state = State.at(robot, robot.rest, np.append([0.09, 0, 0, 0, 0, -0.19], np.zeros(30)))
     low, up = both.box(state, "acceleration")

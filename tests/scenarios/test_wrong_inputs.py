@@ -155,6 +155,7 @@ def test_a_wrong_argument_is_refused_and_named(call, said):
     ("resolver = “hcod”", 12, 'straight quotes'), ("q = [1 2]", 8, "write a comma before this"),
     ("x = 0.001 s", 11, "without unit"), ("x = 1,5", 6, "a decimal point as ."),
     ('file = "C:\\models"', 13, "write / for each"), ("x = {a = 1,}", 12, "the comma before }"),
+    ("q = [1,\nhcod]", 1, 'text in quotes: "hcod"'), ("q = [1,\nb = 2", 5, "close this ["),
     ("a = 1\na = 2", 1, "leave out one"), ("[a]\n[a]", 1, "[[name]]")])
 def test_a_slip_in_a_file_shows_line_caret_and_mend(line, caret, mend, tmp_path):
     file = tmp_path / "slip.toml"
@@ -192,9 +193,10 @@ def test_what_a_resolver_of_a_plugin_returns_is_judged_and_its_errors_are_shown(
 
 
 def test_a_long_command_says_every_ten_seconds_how_far_it_is_and_what_is_left(capsys):
-    now = [0.0]
+    now = [1e3]
     say = lines("ticks", clock=lambda: now[0])
-    for now[0], done in ((0.0, 20), (6.0, 30), (12.0, 40), (18.0, 50), (24.0, 60), (60.0, 100)):
+    for t, done in ((0.0, 20), (6.0, 30), (12.0, 40), (18.0, 50), (24.0, 60), (60.0, 100)):
+        now[0] = 1e3 + t
         say("tpm", done, 100)
     assert capsys.readouterr().err.splitlines() == ["tpm: 40 of 100 ticks, about 36 s left",
                                                     "tpm: 60 of 100 ticks, about 24 s left"]
