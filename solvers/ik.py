@@ -19,7 +19,7 @@ from hierarchy.notebook import numbers
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Task, check_period
+from hierarchy.task import Task, check_period, parts
 from hierarchy.tasks.joints.joint_limits import StepLimits
 from hierarchy.tasks.joints.mechanism import MECHANISM, Mechanism, bends
 from hierarchy.words import listed
@@ -77,8 +77,8 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
 
     Move on with `q = robot.integrate(q, step.v * dt)`. With the same objects, tasks among them, as
     one of the last calls of the thread, what that call has set up serves again, which saves most of
-    the time: of the tasks of `hierarchy` only what is written into the array of a target counts
-    from then on. For loops of a fixed rate see docs/loop.md.
+    the time. Of the tasks of `hierarchy` targets that are written into are followed; arrays of
+    gains and other settings are read once. For loops of a fixed rate see docs/loop.md.
 
     q : (nq,) joint positions [rad or m].
     tasks : tasks of `hierarchy.tasks`, plugins or your own, at velocity level.
@@ -209,11 +209,19 @@ class _SetUp:
         for task in (*box, *tasks):
             check_period(task, dt)
         self.tasks = [task.on(robot) for task in tasks]
-        self.sizes = [task.dimension for task in self.tasks]
+        self.read = [value for task in tasks for part in (task, *parts(task))
+                     if type(part).__module__.startswith("hierarchy.")
+                     for value in vars(part).values() if _is_read_once(value)]
+        self.was = self._now()
 
     def fits(self) -> bool:
-        """Whether all tasks still have as many rows; a user's may have more or fewer."""
-        return [task.dimension for task in self.tasks] == self.sizes
+        """Whether tasks have as many rows, which a user's may change, and what was read once."""
+        return self._now() == self.was
+
+    def _now(self) -> list[object]:
+        return [*(task.dimension for task in self.tasks),
+                *(value.tobytes() if isinstance(value, np.ndarray) else repr(value)
+                  for value in self.read)]
 
     def step(self, q: ArrayLike, t: float, memory: Array | None, v: ArrayLike | None) -> Step:
         """Return the answer at q and v; the memory is the resolver's."""
@@ -222,6 +230,12 @@ class _SetUp:
         state.commanded = state.v.copy()
         found = _solved(state, self.stack.hierarchy(state), self.resolver, memory)
         return Step(found.x, found.status, Memory(found.memory, found.x.copy()))
+
+
+def _is_read_once(value: object) -> bool:
+    """Whether a field of a task can be written into where a stack does not follow it."""
+    return isinstance(value, list) or (isinstance(value, np.ndarray) and not (
+        value.dtype == np.float64 and value.flags.carray))
 
 
 class _Kept(local):

@@ -18,6 +18,7 @@ from hierarchy.tasks import (
     FrameLog,
     JointCoupling,
     JointLimits,
+    Orientation,
     Pose,
     Position,
     Posture,
@@ -87,6 +88,13 @@ def test_what_is_kept_serves_one_call_at_a_time_and_tasks_of_its_size():
     np.testing.assert_array_equal(ask(Q).v, plain)
     changing.again, changing.dimension = None, 2
     np.testing.assert_allclose(changing.jacobian(AT) @ ask(Q).v, 2.0 * changing.error(AT))
+    aims = list(Q), np.asfortranarray(AT.rotation(FRAME))
+    tasks[:] = Orientation(FRAME, aims[1]), Posture(aims[0])
+    for aim in aims:
+        ask(Q)
+        aim[:] = np.roll(aim, 1, axis=0)
+        tasks_anew = [Orientation(FRAME, aims[1].copy()), Posture(tuple(aims[0]))]
+        np.testing.assert_array_equal(ask(Q).v, solve_ik(ROBOT, Q, tasks_anew).v)
 
 
 def test_limits_of_the_robot_hold_whatever_is_asked():
