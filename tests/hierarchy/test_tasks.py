@@ -289,5 +289,6 @@ def test_a_task_whose_sides_cross_is_named_with_its_row(monkeypatch):
     monkeypatch.setattr(tasks.JointLimits, "writer", lambda self, state, level, rows: (
         lambda: (rows.upper.fill(3.0), rows.lower.put(2, 4.0))))
     stack = Stack([TASKS["position"], tasks.JointLimits(ROBOT, 5.0, 0.01)], "velocity")
+    assert repr(stack) == "Stack(position > joint limits; velocity level)"
     refused(f"task 'joint limits', {ROBOT.velocity_names[2]}: no value lies between",
             stack.hierarchy, state_at(Q, V))
