@@ -208,7 +208,7 @@ class _SetUp:
         self.stack, self.resolver = stacked(robot, tasks, dt, box, _resolver(resolver), damping)
         for task in (*box, *tasks):
             check_period(task, dt)
-        self.tasks = [task.on(robot) for task in tasks]
+        self.tasks = [self.stack[task.name] for task in tasks]
         self.read = [value for task in tasks for part in (task, *parts(task))
                      if type(part).__module__.startswith("hierarchy.")
                      for value in vars(part).values() if _is_read_once(value)]
