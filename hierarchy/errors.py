@@ -165,7 +165,7 @@ def finite_numbers(what: str, values: object, size: int | None = None) -> NDArra
     count = "" if size is None else f"{size} "
     if (found.dtype.kind not in "iuf" or found.ndim != 1 or not found.size
             or size not in (None, found.size) or not np.isfinite(found).all()
-            or (isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values))):
+            or np.ma.is_masked(values)):
         raise HierarchyError(f"{what}: expected {count}finite numbers, got {brief(values)}")
     return found.astype(float)
 

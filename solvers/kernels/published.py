@@ -55,7 +55,7 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
     """Solve (14) with F of (10); arguments and return codes as in `solve_by_staircase`."""
     m, n = A.shape
     matrices, at = _carve(work, m, n)
-    _, end = carve_staircase(work, at + 4, m, n)
+    _, end = carve_staircase(work, at + 4, m, n)  # 4: the numbers of `_write_least`
     if end > work.size:
         return TOO_SMALL
     settings, u = shared(settings), matrices.u
