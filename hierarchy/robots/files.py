@@ -20,7 +20,7 @@ from hierarchy.errors import RobotError
 from hierarchy.robots import found, mjcf, urdf
 from hierarchy.robots.found import Found, is_floating, neutral_within_limits
 from hierarchy.robots.from_table import ROOT
-from hierarchy.robots.joints import without
+from hierarchy.robots.joints import held, without
 from hierarchy.robots.library import pin
 from hierarchy.robots.shapes import capsules_of
 from hierarchy.robots.table import Base
@@ -199,7 +199,7 @@ def model_of(root: Element, base: Base | None) -> Any:
             raise RobotError(f"joint {ROOT!r} has the name that a floating base is given")
         model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
     elif base == "fixed" and is_floating(model):
-        model = pin.buildReducedModel(model, [1], pin.neutral(model))
+        model = held(model, [1], pin.neutral(model))
     for joint in root.findall("joint"):
         if joint.get("type") == "planar" and joint.get("name") in list(model.names):
             axis = joint.find("axis")

@@ -153,4 +153,20 @@ def without(model: Any, coupled: tuple[Coupled, ...], locked: Mapping[str, Array
     values = values_of(parts, q)
     left = tuple(one if one.other not in locked else Coupled(one.joint, "", (one.at(
         values[model.joints[names.index(one.other)].idx_v]),)) for one in coupled)
-    return pin.buildReducedModel(model, [names.index(name) for name in locked], q), left
+    return held(model, [names.index(name) for name in locked], q), left
+
+
+def held(model: Any, joints: list[int], q: Array) -> Any:
+    """Return a model whose `joints` are held at q (nq,).
+
+    pinocchio refers to frames by name, and a link may have the name of a joint. Meanwhile it has
+    one that no file can give.
+    """
+    names = set(model.names)
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY and frame.name in names:
+            frame.name = f"\n{frame.name}"
+    found = pin.buildReducedModel(model, joints, q)
+    for frame in found.frames:
+        frame.name = frame.name.removeprefix("\n")
+    return found

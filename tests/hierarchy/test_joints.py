@@ -153,12 +153,13 @@ def test_a_mimic_joint_of_pinocchio_is_refused_by_its_kind():
 
 
 def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_path):
-    path = tmp_path / "c.urdf"
+    path = tmp_path / "c.urdf"  # where a link has the name of a joint, as in NAO's
     mimic = '<mimic joint="a" multiplier="-2" offset="0.5"/>'
     path.write_text(urdf(
-        *(link(f"l{i}", "") for i in range(4)), joint("a", "continuous", "l0", "l1", "", "0 0 1"),
-        joint("b", "revolute", "l1", "l2", LIMIT, "0 0 1", placed(".3 0 0")),
-        joint("c", "continuous", "l1", "l3", mimic, "0 0 1")))
+        *(link(name, "") for name in ("l0", "a", "l2", "l3")),
+        joint("a", "continuous", "l0", "a", "", "0 0 1"),
+        joint("b", "revolute", "a", "l2", LIMIT, "0 0 1", placed(".3 0 0")),
+        joint("c", "continuous", "a", "l3", mimic, "0 0 1")))
     free, locked = Robot.load(path), Robot.load(path, locked={"a": 1.2})
     assert locked.joint_names == ("b", "c")
     q, there = locked.configuration({"b": 0.3}), free.configuration({"a": 1.2, "b": 0.3})
