@@ -162,10 +162,9 @@ def held(model: Any, joints: list[int], q: Array) -> Any:
     pinocchio refers to frames by name, and a link may have the name of a joint. Meanwhile it has
     one that no file can give.
     """
-    names = set(model.names)
-    for frame in model.frames:
-        if frame.type == pin.FrameType.BODY and frame.name in names:
-            frame.name = f"\n{frame.name}"
+    links = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
+    for frame in links:
+        frame.name = f"\n{frame.name}"
     found = pin.buildReducedModel(model, joints, q)
     for frame in found.frames:
         frame.name = frame.name.removeprefix("\n")
