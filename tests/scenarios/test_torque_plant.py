@@ -72,6 +72,20 @@ def test_a_joint_without_room_between_its_limits_stays_there(tmp_path):
     assert abs(driven(plant, np.full(1, 1.0), 0.1).q[0]) < 1e-3
 
 
+def test_what_has_no_mass_can_follow_a_joint(tmp_path):
+    limit = '<limit lower="-1" upper="1" velocity="2" effort="0"/>'
+    (tmp_path / "hand.urdf").write_text(urdf(
+        link("palm"), link("one"), *(link(name, "") for name in ("two", "tip")),
+        joint("a", "revolute", "palm", "one"),
+        joint("b", "revolute", "one", "two", f'{limit}<mimic joint="a"/>'),
+        joint("c", "revolute", "two", "tip", f'{limit}<mimic joint="a"/>')))
+    robot = Robot.load(tmp_path / "hand.urdf")
+    plant = TorqueRobot(robot, Contacts(robot, ()), np.zeros(3), section=plant_with())
+    v = driven(plant, np.array([1.0, 0.0, 0.0]), 0.05).v
+    assert abs(v[0]) > 0.01
+    np.testing.assert_allclose(v, v[0])
+
+
 def test_a_joint_of_several_axes_is_named():
     bar = four_bar(rocker=pin.JointModelSpherical())
     refused("joint 'rocker' does not turn", TorqueRobot, bar, Contacts(bar, ()), bar.rest,

@@ -21,7 +21,7 @@ from scenarios.config.sections.plant import JointsSection, ServoSection, TorqueS
 
 _SOFTNESS = 0.02   # [s] time constant of a contact: a few mm of penetration at usual speeds
 _FRICTION = (0.5, 0.005, 0.0001)  # of a contact: sliding, turning [m], rolling [m]
-_LEAST = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
+LEAST = 1e-6, 1e-9  # [kg], [kg m^2] of a body that only joins two joints
 _SKIN = 0.3             # friction of a link on another
 # Of a joint's effort limit, as gears and motors grow with it; plausible, not identified.
 _DRIVE = {"joint_friction": 0.005, "joint_damping": 0.002, "armature": 0.0001}
@@ -187,7 +187,7 @@ def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> lis
     friction, damping, armature = (of_drives(robot, key, getattr(floor, key)) for key in _DRIVE)
     stops = _stops(robot, q) if floor.stops else [{}] * robot.n
     for i, body in enumerate(robot.bodies()):
-        element = add_body(elements[body.parent], body, _LEAST)
+        element = add_body(elements[body.parent], body, LEAST)
         elements.append(element)
         if i == 0 and robot.base == "floating":
             add(element, "joint", type="free", armature=own[0])

@@ -12,7 +12,7 @@ from hierarchy.contacts import Contacts
 from hierarchy.errors import UnknownNameError, naming
 from hierarchy.problem import Array
 from hierarchy.tasks.joints.mechanism import Mechanism
-from scenarios.cell.plants.mjcf import Stops, on_floor
+from scenarios.cell.plants.mjcf import LEAST, Stops, on_floor
 from scenarios.cell.plants.physics import mujoco_module
 from scenarios.cell.plants.plant import whole_periods
 from scenarios.config import ScenarioError
@@ -56,7 +56,7 @@ class TorqueRobot:
         joints = [self.model.joint(name) for name in robot.joint_names[int(self._floating):]]
         self._places = [int(joint.qposadr[0]) for joint in joints]
         self._rates = [*range(robot.actuated), *(int(joint.dofadr[0]) for joint in joints)]
-        self._drives = self.model.dof_armature[self._rates] - robot.model.armature
+        self._drives = self.model.dof_armature[self._rates] - robot.model.armature + LEAST[1]
         self._write()
         mujoco.mj_forward(self.model, self.data)
         delay = whole_periods(section.delay, period, "plant.delay")
