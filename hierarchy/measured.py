@@ -23,6 +23,7 @@ from hierarchy.task import Level, Rows, Task, Writer, derivative
 
 Measure = tuple[Kernel, Any]  # the function, and what it reads; see `Measured.measure`
 _NONE, _EXACT, _DIFFERENCE = 0, 1, 2  # the derivative of the Jacobian
+FAINT = 1e-8  # norm of a row of a task over the largest, below the default rank_tolerance
 
 
 class Motion(NamedTuple):
@@ -206,6 +207,7 @@ def plain(function: Kernel) -> Kernel:
     What it reads may be any objects.
     """
     return _copy_of_rows(function, _measure=function, clear=lambda *_: None,
+                         drop_faint=getattr(drop_faint, "py_func", drop_faint),
                          close=getattr(close, "py_func", close))
 
 
@@ -227,6 +229,7 @@ def _rows(kinematics, reads, asked, J, lower, upper):
     motion = Motion(room[0], room[1], room[2], room[3])
     clear(J, motion)
     _measure(kinematics, reads, goal, J, motion)
+    drop_faint(J, lower)
     if derivative == _DIFFERENCE:
         v, _, dJ, _, supports, previous, placements, period = kinematics
         before = Motion(room[4], room[5], room[6], room[7])
@@ -248,6 +251,25 @@ def clear(J, motion):
             J[i, c] = 0.0
         motion.error[i], motion.rate[i] = 0.0, 0.0
         motion.drift[i], motion.push[i] = 0.0, 0.0
+
+
+@inlined
+def drop_faint(J, square):
+    """Write zeros in rows that are rounding beside the largest: what digits of a file leave.
+
+    A resolver cannot tell: turned, such a row is one that depends on the others but for rounding.
+    square (m,): scratch.
+    """
+    largest = 0.0
+    for i in range(J.shape[0]):
+        square[i] = 0.0
+        for c in range(J.shape[1]):
+            square[i] += J[i, c] * J[i, c]
+        largest = max(largest, square[i])
+    for i in range(J.shape[0]):
+        if square[i] < FAINT * FAINT * largest:
+            for c in range(J.shape[1]):
+                J[i, c] = 0.0
 
 
 @inlined

@@ -10,6 +10,7 @@ import pytest
 from refusals import refused
 from scene import FRAME, PATH, ROBOT, TASKS, compiled_rows, place_of, state_at, states
 from scipy.linalg import expm
+from urdf_text import LIMIT, joint, link, placed, urdf
 
 from hierarchy import Robot, Stack, State, tasks
 from hierarchy.avoidance import Barrier
@@ -39,6 +40,18 @@ def test_jacobian_is_the_derivative_of_what_the_error_measures(name):
         columns = [(task.error(moved(q, e, -STEP, state)) - task.error(moved(q, e, STEP, state)))
                    / (2 * STEP) for e in np.eye(7)]
         np.testing.assert_allclose(np.transpose(columns), task.jacobian(state), atol=1e-9)
+
+
+def test_a_row_that_only_the_decimals_of_a_file_fill_is_zero(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(urdf(
+        *map(link, "abc"), joint("j", "revolute", "a", "b", LIMIT, "0 0 1",
+                                 placed("0 0 0", "1.57079632679 0 0")),
+        joint("k", "fixed", "b", "c", "", "", placed("1 0 0"))))
+    robot = Robot.load(path)
+    state, tip = State.at(robot, [0.0]), robot.frame("c")
+    for task in (tasks.Position(tip, PATH), tasks.Pose(tip, PATH, np.eye(3))):
+        np.testing.assert_array_equal(task.jacobian(state)[:2], 0.0)
 
 
 @pytest.mark.parametrize("rows", [1, 3])
