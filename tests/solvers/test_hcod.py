@@ -165,6 +165,16 @@ def test_a_sign_that_hangs_on_the_rounding_of_a_violated_row_is_left_to_the_leve
     assert (res.status, res.x[0]) == (Status.SOLVED, pytest.approx(0.5))
 
 
+@pytest.mark.parametrize("speed", np.linspace(0.2, 2.0, 10))
+def test_an_arm_that_is_straight_but_for_seven_digits_of_pi_is_solved_above_its_posture(speed):
+    """Sawyer at its start: the first two rows, along an axis of the base, differ by 2e-7 rad."""
+    e = 1.8e-7
+    hand = [[-0.1603, 0.0, -e, 0.0, -e, 0.0, -e, 0.0], [1.0155, 0.0, 0.0, e, 0.0, e, 0.0, 0.0],
+            [0.0, 0.0, -0.9345, -0.0322, -0.5345, 0.1363, -0.1345, 0.0]]
+    solved(HCOD, Hierarchy.from_levels([
+        (np.eye(8), [-20.0] * 8, [20.0] * 8), (hand, [0.0, 0.0, speed]), (np.eye(8), [0.0] * 8)]))
+
+
 def test_rows_whose_sides_cross_are_all_that_is_said():
     h = Hierarchy.from_levels([(np.eye(2), [0.0, 0.0], [1.0, 1.0])], names=["box"])
     h.lower[1] = 2.0

@@ -153,6 +153,7 @@ class Level(NamedTuple):
 def _balances(s, p, reach, factored):
     """Whether (2) and (3) hold for level p, for the rows as cut; no sign hangs on what was cut."""
     last = p == s.multiplier.shape[0] - 1
+    ends = last or p == s.count[WHOLE]
     level = _measured(s, p, last)
     met = not last and level.missed <= BAND * reach
     if met and level.missed == 0.0:
@@ -161,11 +162,11 @@ def _balances(s, p, reach, factored):
     if not last:
         allowed = REMAINDER * level.least * level.least * level.missed
     # Else heavy rows may round off a light one; small pivots enlarge that.
-    clear = SIGN_ROUNDING * source <= allowed * (1.0 if last else s.scalar[PIVOT])
+    clear = SIGN_ROUNDING * source <= allowed * (1.0 if ends else s.scalar[PIVOT])
     if not (clear or factored):
         return met
     outside, rounding, turned, signed = _add_rows(s, level, reach if last else 0.0)
-    if signed or not last:  # rows with small pivots can make good what is left
+    if signed or not ends:  # rows with small pivots can make good what is left
         allowed = min(allowed, KNOWN_MULTIPLIER * source * s.scalar[PIVOT])
     rest = _beyond_rounding(s)
     if factored and not rest <= allowed:
