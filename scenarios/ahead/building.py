@@ -133,6 +133,7 @@ def _arrays(_: Path) -> None:
     from hierarchy import Hierarchy
     from solvers import make
     from solvers.batch import Batch, solve
+    from solvers.resolvers.merged import Merged
 
     r: Any = np.random.default_rng(0)
     A, b, sizes = r.normal(size=(3, 5, 7)), r.normal(size=(3, 5)), np.array([3, 1, 1])
@@ -140,6 +141,7 @@ def _arrays(_: Path) -> None:
     h = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])])
     make("hcod", damping=0.05).solve(h).verified(h)
     make("hqp").solve(h.changed(give=np.array([1.0, 1.0, 0.0])))
+    Merged().below_one_more(h)  # as of robots in which joints follow others
 
 
 def _others(folder: Path) -> None:
