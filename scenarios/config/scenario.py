@@ -125,6 +125,9 @@ class Scenario(Section):
         if self.limits and self.limits.place != "stack" and (
                 (self.limits.torque and not clipped) or self.limits.danger_reach):
             yield 'limits.torque and limits.danger_reach need limits.place = "stack"'
+        if self.limits and self.limits.place == "guard" and clipped:
+            yield ('limits.place = "guard" does not go with control.level = "torque": torques are '
+                   "clipped, and joints are not")
         if self.limits and self.limits.torque and self.control.level == "velocity":
             yield "limits.torque needs control.level = \"acceleration\""
         if self.limits and self.limits.torque_step and not clipped:
