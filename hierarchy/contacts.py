@@ -29,7 +29,7 @@ from hierarchy.errors import (
     finite_numbers,
     refuse,
 )
-from hierarchy.gate import array_of, axes_along
+from hierarchy.gate import array_of, axes_along, shaped
 from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
 from hierarchy.problem import Array
@@ -178,14 +178,20 @@ class Contacts:
 
         Of a contact in its ramp it is that of `before`, of an open one NaN.
         """
-        carried = np.full(len(self.contacts), np.nan)
+        carried, before = np.full(len(self.contacts), np.nan), self.before(before)
         for k, contact in enumerate(self.contacts):
             load = contact.load(t)
             if load == 1.0:
                 carried[k] = (self.forces(x, contact.name) @ contact.axes[2]).sum()
-            elif load > 0.0 and before is not None:
+            elif load > 0.0:
                 carried[k] = before[k]
         return carried
+
+    def before(self, carried: Array | None) -> Array:
+        """Return what a `State.carried` says of each contact (C,) [N], NaN for nothing."""
+        count = len(self.contacts)
+        return np.full(count, np.nan) if carried is None else shaped(
+            "contacts: state.carried", carried, (count,))
 
     def torques(self, state: State, x: ArrayLike) -> Array:
         """Torques M a + h - J_c^T f (n,) [N m or N] of the actuated joints that an x takes."""

@@ -130,6 +130,20 @@ class State:
         v = _checked(robot, "v", v, robot.velocity_names)
         self.move(t, robot.normalised(q), v)
 
+    def __reduce__(self) -> Any:
+        """Copies and pickles have memory of their own."""
+        kept = ("t", "_q", "_v", "measurement", "commanded", "carried", "sound", "_started",
+                "previous_J", "previous_placements")
+        return type(self), (self.robot, self.period or None), {
+            name: getattr(self, name) for name in kept}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        q, v, *before = map(kept.pop, ("_q", "_v", "previous_J", "previous_placements"))
+        if kept["_started"]:
+            self.move(kept["t"], q, v)
+            self.previous_J[:], self.previous_placements[:] = before
+        vars(self).update(kept)
+
     def __repr__(self) -> str:
         return f"State({self.robot!r}, t={self.t:g}, q={numbers(self.q)})"
 

@@ -87,6 +87,12 @@ def rows_after(commanded, task=None):
     return task.rows(state)
 
 
+def ramping(carried):
+    state = State.at(HUMANOID, HUMANOID.rest, t=0.9)
+    state.carried = carried
+    return tasks.Friction(opening()).rows(state)
+
+
 def limits(**settings):
     return tasks.JointLimits(**({"robot": ROBOT, "acceleration": 10.0, "period": 1e-3} | settings))
 
@@ -256,6 +262,8 @@ def limits(**settings):
                           (np.full(7, NAN), "ndarray array([nan"))),
     (lambda: rows_after(np.zeros(6), tasks.TorqueStep(HUMANOID, 1.0, contacts=CONTACTS)),
      "'torque step': state.commanded has shape (6,), expected (30,)"),
+    (lambda: opening().carried(0.9, np.zeros(60), np.zeros(1)), "carried has shape (1,), expected"),
+    (lambda: ramping([3.0]), "contacts: state.carried has shape (1,), expected (2,)"),
     (lambda: LIMITS.limits.box(np.zeros(6), np.zeros(7), "velocity"), "7 finite numbers each"),
     (lambda: LIMITS.limits.clamp(np.zeros(7), np.zeros(7), "velocity", np.zeros(8)),
      "7 positions, 7 velocities and a command of 8 for 7 joints"),
