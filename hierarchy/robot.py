@@ -35,8 +35,10 @@ from hierarchy.robots.found import (
     ambiguous,
     frames_called,
     in_words,
+    inside,
     is_floating,
     points_along_chain,
+    room,
 )
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.joints import coordinates_of, normalise, parts_of, set_joint, values_of
@@ -147,7 +149,11 @@ class Robot:
         leaders = {one.other for one in self.coupled} - {"", *(one.joint for one in self.coupled)}
         if leaders:
             values = self.values(self.rest)
-            self.rest = self.configuration({name: values[name] for name in leaders}, self.rest)
+            ends = {self.joint_names[part.joint - 1]: (self.lower[part.q], self.upper[part.q])
+                    for part in self.parts if part.size == 1}
+            self.rest = self.configuration(
+                {name: inside(float(values[name]), *room(name, ends, self.coupled))
+                 for name in leaders}, self.rest)
         self.loops, self.starts, self.apart = found.loops, found.starts, found.apart
         self.table = found.table
 

@@ -9,7 +9,15 @@ from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, ReadingError, check_name, expect, is_one_of, refuse
+from hierarchy.errors import (
+    HierarchyError,
+    ReadingError,
+    check_name,
+    expect,
+    is_one_of,
+    naming,
+    refuse,
+)
 from hierarchy.gate import Sizes, checked_give, checked_metric
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array, Hierarchy
@@ -190,7 +198,8 @@ class Stack:
         known = self._prepared.get(order)
         h = self._buffers(order, state.n) if known is None else known.kept
         if self._metric is not None:  # M is symmetric, and its transpose is C-contiguous
-            metric = state.dynamics.M.T if isinstance(self._metric, str) else self._metric
+            with naming(f"metric {self._metric!r}"):
+                metric = state.dynamics.M.T if isinstance(self._metric, str) else self._metric
             h = h.changed(metric=metric)
         rows = Rows(h.A, h.lower, h.upper)
         writers = [writer_in_stack(self[name], state, self.level, rows.some(first, count))

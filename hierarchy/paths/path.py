@@ -337,9 +337,9 @@ def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -
                f"{what}: {name}: expected a list, got {brief(given)}")
     refuse(len(times) != len(points) or not len(times), f"{what}: {len(times)} times for "
            f"{len(points)} points")
-    for i, time in enumerate(times):
-        number(f"{what}: times[{i}]", time)
-    for a, b in pairwise(times):
-        refuse(not a < b < inf, f"{what}: times must increase, got {a} and then {b}")
+    for a, b in pairwise([number(f"{what}: times[{i}]", time) for i, time in enumerate(times)]):
+        refuse(not a < b, f"{what}: times must increase, got {a} and then {b}")
+        refuse(not 0.0 < (b - a) * (b - a) < inf, f"{what}: times are too near or too far apart, "
+               f"got {a} and then {b}")
     for i, point in enumerate(points):
         finite_numbers(f"points[{i}] [m]", point, 3)

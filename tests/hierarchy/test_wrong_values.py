@@ -212,6 +212,11 @@ def limits(**settings):
     (lambda: tasks.Avoidance(POINTS, 1).jacobian(STATE), "no measurement"),
     (lambda: tasks.JointDamping(7, 1.0, "momentum"), "weight"),
     (lambda: BARE.momentum, "robot 'so101' has no masses"),
+    (lambda: Stack([tasks.Momentum(name="spin")]).hierarchy(BARE), "task 'spin': robot 'so101' h"),
+    (lambda: Stack([tasks.Posture([0.0] * 5)], metric="mass").hierarchy(BARE),
+     "metric 'mass': robot 'so101' has no masses"),
+    *((lambda span=span: Blended((0.0, span), CORNERS, span), "too near or too far apart, got 0.0")
+      for span in (1e-300, 1e300)),
     (lambda: tasks.Manipulability(BARE.robot.frame("gripper"), 0.1, "pose").error(BARE),
      "robot 'so101' has 5 joints, so the manipulability of 6 rows is 0 everywhere"),
     (lambda: tasks.CentreOfMass(ROBOT, THERE, (1, 0)), "in this order"),
