@@ -317,19 +317,26 @@ def _stop_again(dog: Watchdog, safe_stop: Callable[[], object]) -> None:
         safe_stop()
 
 
+_TURN, _PAUSED = Lock(), list[bool]()  # whether each loop that pauses the collector turned it off
+
+
 @contextmanager
 def _quiet(pause_gc: bool, priority: int | None, notes: list[str]) -> Iterator[None]:
     """Turn the garbage collector off and raise the priority, as far as permitted."""
     before = _raise_priority(priority, notes)
-    collecting = pause_gc and gc.isenabled()
+    with _TURN:
+        collecting = pause_gc and gc.isenabled()
+        if pause_gc:
+            _PAUSED.append(collecting)
+            gc.disable()
     try:
         if collecting:
             gc.collect()
-            gc.disable()
         yield
     finally:
-        if collecting:
-            gc.enable()
+        with _TURN:
+            if pause_gc and _PAUSED.pop():  # the last loop of all threads to end
+                gc.enable()
         if before is not None:
             os.sched_setscheduler(0, *before)
 
