@@ -136,7 +136,8 @@ class Contacts:
                    "this name")
             refuse(contact.frame.joint == 0, f"contact {contact.name!r}: no joint moves frame "
                    f"{contact.frame.name!r}")
-            self.robot.check_joint(f"contact {contact.name!r}", contact.frame.joint)
+            self.robot.check_joint(f"contact {contact.name!r}", contact.frame.joint,
+                                   contact.frame.of)
         set_frozen(self, points=pack_points([
             ControlPoint(contact.name, contact.frame.joint, contact.frame.placed(point))
             for contact in contacts for point in contact.points]))

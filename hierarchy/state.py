@@ -244,8 +244,7 @@ class State:
         if isinstance(frame, str):
             return self.robot.frame(frame)
         expect("frame", frame, Frame, "make one with robot.frame(name)")
-        if frame.joint >= len(self.placements):
-            self.robot.check_joint(f"frame {frame.name!r}", frame.joint)
+        self.robot.check_joint(f"frame {frame.name!r}", frame.joint, frame.of)
         return frame
 
     def _placement(self, joint: int) -> tuple[Array, Array]:

@@ -302,7 +302,7 @@ def _check_robot(task: Task, robot: Robot) -> None:
             robot.check_same(what, own)
         for part in value if isinstance(value, list | tuple) else (value,):
             if isinstance(joint := getattr(part, "joint", None), int):
-                robot.check_joint(what, joint)
+                robot.check_joint(what, joint, getattr(part, "of", ""))
 
 
 def _equal(one: Any, other: Any) -> bool:

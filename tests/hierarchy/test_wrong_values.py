@@ -27,7 +27,9 @@ NAN, INF = float("nan"), float("inf")
 A, B = np.eye(2), np.ones(2)
 FOOT, PALM = (HUMANOID.frame(f"left_{name}") for name in ("foot", "hand"))
 STATE = State.at(ROBOT, [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0])
-BARE = State.at(Robot.load(Path(__file__).parents[2] / "examples/robots/so101.urdf"), [0.0] * 5)
+BARE, PANDA = (State.at(robot, robot.rest) for robot in (
+    Robot.load(Path(__file__).parents[2] / f"examples/robots/{name}.urdf")
+    for name in ("so101", "panda")))
 THERE = Still([0.3, 0.5, 0.1])
 HAND = tasks.Position(FRAME, THERE)
 LIMITS, POINTS = tasks.JointLimits(ROBOT, 10.0, 0.01), ROBOT.control_points
@@ -211,6 +213,9 @@ def limits(**settings):
     (lambda: tasks.Avoidance(POINTS, 2), "rows = 2: expected one of 1, 3"),
     (lambda: tasks.Avoidance(POINTS, 1).jacobian(STATE), "no measurement"),
     (lambda: tasks.JointDamping(7, 1.0, "momentum"), "weight"),
+    *((lambda asked=asked: asked(PANDA), "on joint 'joint_7', which is 'panda_joint7' of robot "
+       "'panda': it is of another robot") for asked in (
+           HAND.error, Stack([HAND]).hierarchy, lambda state: state.position(FRAME))),
     (lambda: BARE.momentum, "robot 'so101' has no masses"),
     (lambda: Stack([tasks.Momentum(name="spin")]).hierarchy(BARE), "task 'spin': robot 'so101' h"),
     (lambda: Stack([tasks.Posture([0.0] * 5)], metric="mass").hierarchy(BARE),
