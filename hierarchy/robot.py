@@ -67,6 +67,7 @@ class Frame:
     def __post_init__(self) -> None:
         what = f"frame {self.name!r}"
         check_rotation(f"{what}: rotation", self.rotation)
+        expect(f"{what}: of", self.of, str, "give the name of a joint")
         set_frozen(self, joint=whole(f"{what}: joint", self.joint),
                    offset=finite_numbers(f"{what}: offset", self.offset, 3),
                    rotation=array_of(f"{what}: rotation", self.rotation))

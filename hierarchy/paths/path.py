@@ -116,6 +116,7 @@ class Shifted(Path):
 
     def __post_init__(self) -> None:
         check_fields(self, "shifted")
+        expect("shifted: path", self.path, Path, "see hierarchy.paths")
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -333,7 +334,8 @@ def _lines(file: str | File) -> list[tuple[int, str]]:
 
 def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -> None:
     for name, given in (("times", times), ("points", points)):
-        refuse(isinstance(given, str) or not isinstance(given, Sequence | np.ndarray),
+        refuse(isinstance(given, str) or not isinstance(given, Sequence | np.ndarray)
+               or getattr(given, "shape", None) == (),
                f"{what}: {name}: expected a list, got {brief(given)}")
     refuse(len(times) != len(points) or not len(times), f"{what}: {len(times)} times for "
            f"{len(points)} points")

@@ -20,7 +20,7 @@ from hierarchy.gate import check_rotation
 from hierarchy.limits import Limits
 from hierarchy.loop import Loop
 from hierarchy.measured import Measured
-from hierarchy.paths import Blended, Jittered, Still, circle, read_bvh
+from hierarchy.paths import Blended, Jittered, Shifted, Still, circle, read_bvh
 from hierarchy.robot import Frame
 
 NAN, INF = float("nan"), float("inf")
@@ -153,6 +153,9 @@ def limits(**settings):
     (lambda: Robot.load("kuka_lwr", base=B), "base must be one of"),
     (lambda: Frame("tcp", 7, [0, 0, 0.1, 1], A), "'tcp': rotation: expected a rotation matrix"),
     (lambda: Frame("tcp", 7, [0, NAN, 0.1], np.eye(3)), "'tcp': offset: expected 3 finite numb"),
+    (lambda: Frame("tcp", 1, [0, 0, 0.1], np.eye(3), 1), "'tcp': of: expected a str, got int 1"),
+    (lambda: Shifted(None, [0, 0, 0.1]), "shifted: path: expected a Path, got NoneType None"),
+    (lambda: Blended(np.array(1.0), CORNERS, 0.1), "times: expected a list, got ndarray array(1.)"),
     (lambda: Frame("tcp", "hand", [0, 0, 0.1], np.eye(3)), "'tcp': joint = 'hand': expected a wh"),
     (lambda: Contact("hand"), "contact: frame: expected a Frame, got str 'hand'"),
     (lambda: Contact(FRAME, "edge"), "points is not an array of numbers: str 'edge'"),
