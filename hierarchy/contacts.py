@@ -29,7 +29,7 @@ from hierarchy.errors import (
     finite_numbers,
     refuse,
 )
-from hierarchy.gate import array_of, axes_along, shaped
+from hierarchy.gate import array_of, axes_along, readable, shaped
 from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
 from hierarchy.problem import Array
@@ -196,20 +196,24 @@ class Contacts:
 
     def torques(self, state: State, x: ArrayLike) -> Array:
         """Torques M a + h - J_c^T f (n,) [N m or N] of the actuated joints that an x takes."""
-        self.robot.check_same("contacts: state", state.robot)
+        self._check(state)
         torques = np.empty(self.robot.n - self.robot.actuated)
         _write_torques(*state.dynamics, state.kinematics, self.points, self._checked(x), torques)
         return torques
 
     def jacobian(self, state: State) -> Array:
         """Jacobian J_c (3 p, n) of all contact points [m], world axes."""
-        self.robot.check_same("contacts: state", state.robot)
+        self._check(state)
         J = np.empty((3 * len(self.points.joints), state.n))
         _write_jacobian(state.kinematics, self.points, J)
         return J
 
+    def _check(self, state: State) -> None:
+        expect("contacts: state", state, State, "make one with State.at(robot, q)")
+        self.robot.check_same("contacts: state", state.robot)
+
     def _checked(self, x: ArrayLike) -> Array:
-        x = np.asarray(x, dtype=float)
+        x = readable("contacts: x", x)
         if x.shape != (self.unknowns,):
             raise HierarchyError(f"x has shape {x.shape}, expected ({self.unknowns},): "
                                  f"{self.robot.n} accelerations and "

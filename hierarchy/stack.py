@@ -159,7 +159,7 @@ class Stack:
         if type(order) is tuple:  # as in a tick, which has no time for checks
             return order
         expect("order of a stack", order, Sequence, "give a list of names of tasks")
-        return tuple(order)
+        return tuple(self[name].name for name in order)
 
     def hierarchy(self, state: State, order: Sequence[str] | None = None) -> Hierarchy:
         """Write the tasks' rows at a state and return them as a Hierarchy.

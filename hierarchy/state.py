@@ -162,7 +162,7 @@ class State:
         """
         try:
             copied = self._copy(q, v, self._q, self._v)
-        except (TypeError, AttributeError, NumbaError):  # no arrays of numbers
+        except (TypeError, ValueError, AttributeError, NumbaError):  # no arrays of numbers
             copied = _MISFIT
         if copied == _MISFIT:
             raise RobotError(f"robot {self.robot.name!r}: State.move: expected arrays q "
