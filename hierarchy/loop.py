@@ -18,7 +18,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import ReadingError, brief, check_name, number, positive, refuse, whole
+from hierarchy.errors import (
+    HierarchyError,
+    ReadingError,
+    brief,
+    check_name,
+    naming,
+    number,
+    positive,
+    refuse,
+    whole,
+)
 from hierarchy.problem import Array
 
 
@@ -111,8 +121,12 @@ class Log:
         """Record one tick."""
         k = self.count
         self._tick[k], self._times[k] = tick, (late, duration)
-        if self._command.shape[1]:
-            self._command[k] = command
+        if width := self._command.shape[1]:
+            try:
+                self._command[k] = command
+            except ValueError as error:
+                raise HierarchyError(f"loop: record = {width}, and the command is "
+                                     f"{brief(command)}") from error
         self.count, self.due = k + 1, tick + 1
 
     @property
@@ -224,7 +238,8 @@ class Loop:
             refuse(not (callable(function) or (name == "send" and function is None)),
                    f"loop: {name}: expected a function, got {brief(function)}")
         ticks = max(1, round(duration / self.period))
-        self.log = log = Log(self.period, ticks, record)
+        with naming(f"loop: a log of {ticks:g} ticks", of=(MemoryError, ValueError)):
+            self.log = log = Log(self.period, ticks, record)
         stop = Once(safe_stop)
         dog = Watchdog(self.watchdog or np.inf, stop, self.clock)
         watched = dog if self.watchdog else nullcontext()

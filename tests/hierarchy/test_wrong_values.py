@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from threading import Event
 from typing import Annotated, Literal
 
 import numpy as np
@@ -254,6 +255,9 @@ def limits(**settings):
     (lambda: Loop(0.1, overrun="skipp"), "did you mean 'skip'"),
     (lambda: Loop(0.25, watchdog=0.1), "watchdog 0.1 s must be longer than the period 0.25 s"),
     (lambda: Loop(0.1).run(print, None, 1.0), "safe_stop: expected a function, got NoneType None"),
+    (lambda: Loop(1e-3).run(lambda t: A[0], Event, 1.0, record=3),
+     "loop: record = 3, and the command is ndarray array([1., 0.])"),
+    (lambda: Loop(1e-3).run(print, Event, 1e15), "loop: a log of 1e+18 ticks: "),
     (lambda: Loop(0.1).run(print, print, 1.0, record=-1), "loop: record = -1: expected a whole"),
     (lambda: Stack(metric="inertia"), "'mass' or None, got 'inertia'"),
     (lambda: ROBOT.limit_base(1.0, 1.0), "its base is fixed"),
