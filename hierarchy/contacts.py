@@ -29,7 +29,7 @@ from hierarchy.errors import (
     finite_numbers,
     refuse,
 )
-from hierarchy.gate import array_of, axes_along
+from hierarchy.gate import array_of, axes_along, readable, shaped
 from hierarchy.jit import compiled, internal
 from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
 from hierarchy.problem import Array
@@ -136,7 +136,8 @@ class Contacts:
                    "this name")
             refuse(contact.frame.joint == 0, f"contact {contact.name!r}: no joint moves frame "
                    f"{contact.frame.name!r}")
-            self.robot.check_joint(f"contact {contact.name!r}", contact.frame.joint)
+            self.robot.check_joint(f"contact {contact.name!r}", contact.frame.joint,
+                                   contact.frame.of)
         set_frozen(self, points=pack_points([
             ControlPoint(contact.name, contact.frame.joint, contact.frame.placed(point))
             for contact in contacts for point in contact.points]))
@@ -178,31 +179,41 @@ class Contacts:
 
         Of a contact in its ramp it is that of `before`, of an open one NaN.
         """
-        carried = np.full(len(self.contacts), np.nan)
+        carried, before = np.full(len(self.contacts), np.nan), self.before(before)
         for k, contact in enumerate(self.contacts):
             load = contact.load(t)
             if load == 1.0:
                 carried[k] = (self.forces(x, contact.name) @ contact.axes[2]).sum()
-            elif load > 0.0 and before is not None:
+            elif load > 0.0:
                 carried[k] = before[k]
         return carried
 
+    def before(self, carried: Array | None) -> Array:
+        """Return what a `State.carried` says of each contact (C,) [N], NaN for nothing."""
+        count = len(self.contacts)
+        return np.full(count, np.nan) if carried is None else shaped(
+            "contacts: state.carried", carried, (count,))
+
     def torques(self, state: State, x: ArrayLike) -> Array:
         """Torques M a + h - J_c^T f (n,) [N m or N] of the actuated joints that an x takes."""
-        self.robot.check_same("contacts: state", state.robot)
+        self._check(state)
         torques = np.empty(self.robot.n - self.robot.actuated)
         _write_torques(*state.dynamics, state.kinematics, self.points, self._checked(x), torques)
         return torques
 
     def jacobian(self, state: State) -> Array:
         """Jacobian J_c (3 p, n) of all contact points [m], world axes."""
-        self.robot.check_same("contacts: state", state.robot)
+        self._check(state)
         J = np.empty((3 * len(self.points.joints), state.n))
         _write_jacobian(state.kinematics, self.points, J)
         return J
 
+    def _check(self, state: State) -> None:
+        expect("contacts: state", state, State, "make one with State.at(robot, q)")
+        self.robot.check_same("contacts: state", state.robot)
+
     def _checked(self, x: ArrayLike) -> Array:
-        x = np.asarray(x, dtype=float)
+        x = readable("contacts: x", x)
         if x.shape != (self.unknowns,):
             raise HierarchyError(f"x has shape {x.shape}, expected ({self.unknowns},): "
                                  f"{self.robot.n} accelerations and "

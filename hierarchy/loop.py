@@ -18,7 +18,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import ReadingError, brief, check_name, number, positive, refuse, whole
+from hierarchy.errors import (
+    HierarchyError,
+    ReadingError,
+    brief,
+    check_name,
+    naming,
+    number,
+    positive,
+    refuse,
+    whole,
+)
 from hierarchy.problem import Array
 
 
@@ -111,8 +121,12 @@ class Log:
         """Record one tick."""
         k = self.count
         self._tick[k], self._times[k] = tick, (late, duration)
-        if self._command.shape[1]:
-            self._command[k] = command
+        if width := self._command.shape[1]:
+            try:
+                self._command[k] = command
+            except ValueError as error:
+                raise HierarchyError(f"loop: record = {width}, and the command is "
+                                     f"{brief(command)}") from error
         self.count, self.due = k + 1, tick + 1
 
     @property
@@ -224,7 +238,8 @@ class Loop:
             refuse(not (callable(function) or (name == "send" and function is None)),
                    f"loop: {name}: expected a function, got {brief(function)}")
         ticks = max(1, round(duration / self.period))
-        self.log = log = Log(self.period, ticks, record)
+        with naming(f"loop: a log of {ticks:g} ticks", of=(MemoryError, ValueError)):
+            self.log = log = Log(self.period, ticks, record)
         stop = Once(safe_stop)
         dog = Watchdog(self.watchdog or np.inf, stop, self.clock)
         watched = dog if self.watchdog else nullcontext()
@@ -317,19 +332,26 @@ def _stop_again(dog: Watchdog, safe_stop: Callable[[], object]) -> None:
         safe_stop()
 
 
+_TURN, _PAUSED = Lock(), list[bool]()  # whether each loop that pauses the collector turned it off
+
+
 @contextmanager
 def _quiet(pause_gc: bool, priority: int | None, notes: list[str]) -> Iterator[None]:
     """Turn the garbage collector off and raise the priority, as far as permitted."""
     before = _raise_priority(priority, notes)
-    collecting = pause_gc and gc.isenabled()
+    with _TURN:
+        collecting = pause_gc and gc.isenabled()
+        if pause_gc:
+            _PAUSED.append(collecting)
+            gc.disable()
     try:
         if collecting:
             gc.collect()
-            gc.disable()
         yield
     finally:
-        if collecting:
-            gc.enable()
+        with _TURN:
+            if pause_gc and _PAUSED.pop():  # the last loop of all threads to end
+                gc.enable()
         if before is not None:
             os.sched_setscheduler(0, *before)
 

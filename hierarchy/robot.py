@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, get_args
@@ -35,8 +35,10 @@ from hierarchy.robots.found import (
     ambiguous,
     frames_called,
     in_words,
+    inside,
     is_floating,
     points_along_chain,
+    room,
 )
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.joints import coordinates_of, normalise, parts_of, set_joint, values_of
@@ -52,17 +54,20 @@ BASE_SPEED = (2.0, 3.0)  # [m/s], [rad/s] of a floating base in inverse kinemati
 class Frame:
     """A frame fixed to the body that `joint` moves; offset (3,) [m] and rotation (3, 3) in it.
 
-    Raises HierarchyError for numbers that are none of these.
+    `of` is the name of that joint, "" if unknown: a robot that calls it otherwise refuses the
+    frame. Raises HierarchyError for numbers that are none of these.
     """
 
     name: str
     joint: int
     offset: Array
     rotation: Array
+    of: str = field(default="", repr=False, compare=False)
 
     def __post_init__(self) -> None:
         what = f"frame {self.name!r}"
         check_rotation(f"{what}: rotation", self.rotation)
+        expect(f"{what}: of", self.of, str, "give the name of a joint")
         set_frozen(self, joint=whole(f"{what}: joint", self.joint),
                    offset=finite_numbers(f"{what}: offset", self.offset, 3),
                    rotation=array_of(f"{what}: rotation", self.rotation))
@@ -147,7 +152,11 @@ class Robot:
         leaders = {one.other for one in self.coupled} - {"", *(one.joint for one in self.coupled)}
         if leaders:
             values = self.values(self.rest)
-            self.rest = self.configuration({name: values[name] for name in leaders}, self.rest)
+            ends = {self.joint_names[part.joint - 1]: (self.lower[part.q], self.upper[part.q])
+                    for part in self.parts if part.size == 1}
+            self.rest = self.configuration(
+                {name: inside(float(values[name]), *room(name, ends, self.coupled))
+                 for name in leaders}, self.rest)
         self.loops, self.starts, self.apart = found.loops, found.starts, found.apart
         self.table = found.table
 
@@ -271,11 +280,14 @@ class Robot:
         check_name("joint", name, self.joint_names)
         return self.joint_names.index(name) + 1
 
-    def check_joint(self, what: str, joint: int) -> None:
-        """Raise a RobotError for the index of a joint that the robot does not have."""
+    def check_joint(self, what: str, joint: int, of: str = "") -> None:
+        """Raise a RobotError for a joint that the robot lacks, or that it does not call `of`."""
         if not 0 <= joint < len(self.parents):
             raise RobotError(f"{what} is on joint {joint}, and robot {self.name!r} has "
                              f"{len(self.parents) - 1} joints: it is of another robot")
+        if of and of != self.joint_names[joint - 1]:
+            raise RobotError(f"{what} is on joint {of!r}, which is {self.joint_names[joint - 1]!r} "
+                             f"of robot {self.name!r}: it is of another robot")
 
     def check_same(self, what: str, robot: Robot) -> None:
         """Raise a RobotError for another robot, which has other joints."""
@@ -308,8 +320,9 @@ class Robot:
             raise RobotError(f"robot {self.name!r}: {len(found)} frames are called {name!r}, "
                              f"{in_words(self.model, found)}; give one another name in the file")
         frame = found[0]
-        return Frame(name, int(frame.parentJoint), frame.placement.translation,
-                     frame.placement.rotation)
+        joint = int(frame.parentJoint)
+        return Frame(name, joint, frame.placement.translation, frame.placement.rotation,
+                     self.joint_names[joint - 1] if joint else "")
 
     def control_point(self, joint: str, offset: ArrayLike) -> ControlPoint:
         """Attach a point to the body that `joint` moves; offset (3,) [m] in that joint's frame."""

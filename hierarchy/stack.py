@@ -9,7 +9,15 @@ from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.measurement import Measurement
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, ReadingError, check_name, expect, is_one_of, refuse
+from hierarchy.errors import (
+    HierarchyError,
+    ReadingError,
+    check_name,
+    expect,
+    is_one_of,
+    naming,
+    refuse,
+)
 from hierarchy.gate import Sizes, checked_give, checked_metric
 from hierarchy.jit import bind, compiled
 from hierarchy.problem import Array, Hierarchy
@@ -151,7 +159,7 @@ class Stack:
         if type(order) is tuple:  # as in a tick, which has no time for checks
             return order
         expect("order of a stack", order, Sequence, "give a list of names of tasks")
-        return tuple(order)
+        return tuple(self[name].name for name in order)
 
     def hierarchy(self, state: State, order: Sequence[str] | None = None) -> Hierarchy:
         """Write the tasks' rows at a state and return them as a Hierarchy.
@@ -190,7 +198,8 @@ class Stack:
         known = self._prepared.get(order)
         h = self._buffers(order, state.n) if known is None else known.kept
         if self._metric is not None:  # M is symmetric, and its transpose is C-contiguous
-            metric = state.dynamics.M.T if isinstance(self._metric, str) else self._metric
+            with naming(f"metric {self._metric!r}"):
+                metric = state.dynamics.M.T if isinstance(self._metric, str) else self._metric
             h = h.changed(metric=metric)
         rows = Rows(h.A, h.lower, h.upper)
         writers = [writer_in_stack(self[name], state, self.level, rows.some(first, count))

@@ -130,6 +130,20 @@ class State:
         v = _checked(robot, "v", v, robot.velocity_names)
         self.move(t, robot.normalised(q), v)
 
+    def __reduce__(self) -> Any:
+        """Copies and pickles have memory of their own."""
+        kept = ("t", "_q", "_v", "measurement", "commanded", "carried", "sound", "_started",
+                "previous_J", "previous_placements")
+        return type(self), (self.robot, self.period or None), {
+            name: getattr(self, name) for name in kept}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        q, v, *before = map(kept.pop, ("_q", "_v", "previous_J", "previous_placements"))
+        if kept["_started"]:
+            self.move(kept["t"], q, v)
+            self.previous_J[:], self.previous_placements[:] = before
+        vars(self).update(kept)
+
     def __repr__(self) -> str:
         return f"State({self.robot!r}, t={self.t:g}, q={numbers(self.q)})"
 
@@ -148,7 +162,7 @@ class State:
         """
         try:
             copied = self._copy(q, v, self._q, self._v)
-        except (TypeError, AttributeError, NumbaError):  # no arrays of numbers
+        except (TypeError, ValueError, AttributeError, NumbaError):  # no arrays of numbers
             copied = _MISFIT
         if copied == _MISFIT:
             raise RobotError(f"robot {self.robot.name!r}: State.move: expected arrays q "
@@ -230,8 +244,7 @@ class State:
         if isinstance(frame, str):
             return self.robot.frame(frame)
         expect("frame", frame, Frame, "make one with robot.frame(name)")
-        if frame.joint >= len(self.placements):
-            self.robot.check_joint(f"frame {frame.name!r}", frame.joint)
+        self.robot.check_joint(f"frame {frame.name!r}", frame.joint, frame.of)
         return frame
 
     def _placement(self, joint: int) -> tuple[Array, Array]:

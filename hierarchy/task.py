@@ -302,7 +302,7 @@ def _check_robot(task: Task, robot: Robot) -> None:
             robot.check_same(what, own)
         for part in value if isinstance(value, list | tuple) else (value,):
             if isinstance(joint := getattr(part, "joint", None), int):
-                robot.check_joint(what, joint)
+                robot.check_joint(what, joint, getattr(part, "of", ""))
 
 
 def _equal(one: Any, other: Any) -> bool:
@@ -337,7 +337,12 @@ def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Write
     check_gains(task, rows.lower.size)
     if level == "torque" and not task.of_forces:
         level, rows = "acceleration", rows._replace(A=rows.A[:, :state.n])
-    return task.writer(state, level, rows)
+    try:
+        return task.writer(state, level, rows)
+    except HierarchyError as error:
+        if repr(task.name) in str(error):
+            raise
+        raise HierarchyError(f"task {task.name!r}: {error}") from error
 
 
 class NamedRows(Task):

@@ -77,8 +77,8 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
 
     Move on with `q = robot.integrate(q, step.v * dt)`. With the same objects, tasks among them, as
     one of the last calls of the thread, what that call has set up serves again, which saves most of
-    the time. Of the tasks of `hierarchy` targets that are written into are followed; arrays of
-    gains and other settings are read once. For loops of a fixed rate see docs/loop.md.
+    the time. Of the tasks of `hierarchy` targets and gains that are written into are followed. For
+    loops of a fixed rate see docs/loop.md.
 
     q : (nq,) joint positions [rad or m].
     tasks : tasks of `hierarchy.tasks`, plugins or your own, at velocity level.
@@ -211,7 +211,7 @@ class _SetUp:
         self.tasks = [self.stack[task.name] for task in tasks]
         self.read = [value for task in tasks for part in (task, *parts(task))
                      if type(part).__module__.startswith("hierarchy.")
-                     for value in vars(part).values() if _is_read_once(value)]
+                     for name, value in vars(part).items() if _is_read_once(name, value)]
         self.was = self._now()
 
     def fits(self) -> bool:
@@ -232,10 +232,11 @@ class _SetUp:
         return Step(found.x, found.status, Memory(found.memory, found.x.copy()))
 
 
-def _is_read_once(value: object) -> bool:
+def _is_read_once(name: str, value: object) -> bool:
     """Whether a field of a task can be written into where a stack does not follow it."""
-    return isinstance(value, list) or (isinstance(value, np.ndarray) and not (
-        value.dtype == np.float64 and value.flags.carray))
+    return isinstance(value, list) or (isinstance(value, np.ndarray) and (
+        name in ("stiffness", "damping", "gain") or value.dtype != np.float64
+        or not value.flags.carray))
 
 
 class _Kept(local):

@@ -131,12 +131,17 @@ class Pairs:
     __slots__ = ("acceleration", "direction", "distance", "radius", "straight", "table", "velocity")
 
     def __init__(self, points: int, obstacles: int) -> None:
-        self.table = np.zeros((points, obstacles, _WIDTH))
-        self.distance, self.direction = self.table[..., _DISTANCE], self.table[..., _DIRECTION]
-        self.velocity = self.table[..., _VELOCITY]
-        self.acceleration = self.table[..., _ACCELERATION]
-        self.radius, self.straight = self.table[..., _RADIUS], self.table[..., _STRAIGHT]
+        self.__setstate__(np.zeros((points, obstacles, _WIDTH)))
         self.distance[:] = self.radius[:] = inf
+
+    def __getstate__(self) -> Array:
+        return self.table
+
+    def __setstate__(self, table: Array) -> None:
+        self.table = table
+        self.distance, self.direction = table[..., _DISTANCE], table[..., _DIRECTION]
+        self.velocity, self.acceleration = table[..., _VELOCITY], table[..., _ACCELERATION]
+        self.radius, self.straight = table[..., _RADIUS], table[..., _STRAIGHT]
 
 
 def measure_pairs(pairs: Pairs, points: Array, obstacles: Obstacles) -> None:

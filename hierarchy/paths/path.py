@@ -116,6 +116,7 @@ class Shifted(Path):
 
     def __post_init__(self) -> None:
         check_fields(self, "shifted")
+        expect("shifted: path", self.path, Path, "see hierarchy.paths")
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
@@ -333,13 +334,14 @@ def _lines(file: str | File) -> list[tuple[int, str]]:
 
 def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -> None:
     for name, given in (("times", times), ("points", points)):
-        refuse(isinstance(given, str) or not isinstance(given, Sequence | np.ndarray),
+        refuse(isinstance(given, str) or not isinstance(given, Sequence | np.ndarray)
+               or getattr(given, "shape", None) == (),
                f"{what}: {name}: expected a list, got {brief(given)}")
     refuse(len(times) != len(points) or not len(times), f"{what}: {len(times)} times for "
            f"{len(points)} points")
-    for i, time in enumerate(times):
-        number(f"{what}: times[{i}]", time)
-    for a, b in pairwise(times):
-        refuse(not a < b < inf, f"{what}: times must increase, got {a} and then {b}")
+    for a, b in pairwise([number(f"{what}: times[{i}]", time) for i, time in enumerate(times)]):
+        refuse(not a < b, f"{what}: times must increase, got {a} and then {b}")
+        refuse(not 0.0 < (b - a) * (b - a) < inf, f"{what}: times are too near or too far apart, "
+               f"got {a} and then {b}")
     for i, point in enumerate(points):
         finite_numbers(f"points[{i}] [m]", point, 3)

@@ -91,17 +91,35 @@ def remarks(model: Any) -> Iterator[str]:
 
 
 def neutral_within_limits(model: Any, neutral: Array) -> Array:
-    """Return `neutral` (nq,) with each coordinate of one-coordinate joints moved inside its limits.
-
-    A coordinate outside finite limits goes to their middle, else to the nearer limit.
-    """
+    """Return `neutral` (nq,) with coordinates of one-coordinate joints moved `inside` limits."""
     q, ends = np.array(neutral), np.array([model.lowerPositionLimit, model.upperPositionLimit])
     for i in (joint.idx_q for joint in model.joints[1:] if joint.nq == joint.nv == 1):
-        lower, upper = ends[:, i]
-        if not lower <= q[i] <= upper:
-            q[i] = (lower + upper) / 2 if np.isfinite(ends[:, i]).all() else (
-                min(max(q[i], lower), upper))
+        q[i] = inside(q[i], *ends[:, i])
     return q
+
+
+def inside(value: float, lower: float, upper: float) -> float:
+    """Return a value between limits: outside finite ones their middle, else the nearer limit."""
+    if lower <= value <= upper:
+        return value
+    return (lower + upper) / 2 if np.isfinite([lower, upper]).all() else (
+        min(max(value, lower), upper))
+
+
+def room(joint: str, ends: Mapping[str, tuple[float, float]], coupled: tuple[Coupled, ...]
+         ) -> tuple[float, float]:
+    """Return the limits of a joint within which those that follow it linearly keep theirs.
+
+    `ends` are limits by joint, if it has any. Where there is no such range, it is the joint's own.
+    """
+    own = low, high = ends.get(joint, (-np.inf, np.inf))
+    for one in coupled:
+        if one.other == joint and len(one.coefficients) == 2 and one.coefficients[1]:
+            first, by = one.coefficients
+            others = tuple(other for other in coupled if other is not one)
+            side, far = sorted((end - first) / by for end in room(one.joint, ends, others))
+            low, high = max(low, side), min(high, far)
+    return (low, high) if low <= high else own
 
 
 _SAME_PLACE = 1e-9

@@ -1,6 +1,6 @@
 """The whole robot: its centre of mass along a path, its linear and angular momentum."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -129,9 +129,15 @@ class Momentum(NamedRows, Measured):
         """The components."""
         return np.arange(*_ROWS[self.part])
 
-    def follow(self, state: State, goal: Array) -> None:
+    def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
         """The target is in the place of a velocity."""
-        goal[1, self.columns] = 0.0 if self.target is None else self.target
+        columns, target = self.columns, 0.0 if self.target is None else self.target
+
+        def move(t: float) -> None:
+            goal[1, columns] = target
+
+        move(0.0)
+        return move if isinstance(target, np.ndarray) else None
 
 
 @measured

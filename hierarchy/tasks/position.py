@@ -100,7 +100,7 @@ class Along(Written):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        three, D = Rows.empty(3, rows.A.shape[1]), np.array(self.directions, dtype=float)
+        three, D = Rows.empty(3, rows.A.shape[1]), np.asarray(self.directions, dtype=float)
         write_three = self.task.writer(state, level, three)
 
         def write() -> None:

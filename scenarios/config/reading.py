@@ -1,6 +1,6 @@
 """Read a scenario by name or file, with what it extends and with changes; groups of scenarios."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -9,8 +9,9 @@ from pydantic import Field
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError, check_name, file_path
-from hierarchy.robots.names import in_package, is_file_name
+from hierarchy.robots.names import in_package
 from scenarios.config.changes import change_all, lay_over, parse_changes
+from scenarios.config.files import LIBRARY, make_absolute
 from scenarios.config.scenario import Scenario
 from scenarios.config.sections import ScenarioError, Section, naming
 from scenarios.config.sections.avoidance import as_table
@@ -18,7 +19,6 @@ from scenarios.config.validation import validated
 from scenarios.files import scenarios_in
 from scenarios.toml_text import read_toml
 
-LIBRARY = Path(__file__).parents[1] / "library"
 GROUPS = LIBRARY / "groups"
 WANTED = "A scenario is a name of `hierarchy list`, or a .toml file."
 _ROBOTS = (".urdf", ".xml", ".mjcf", ".xacro", ".sdf")
@@ -75,39 +75,9 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
         changes = parse_changes(changes, what="--set")
     _list_points_as_tables(data)
     change_all(data, changes, Scenario)
-    _make_files_absolute(data, Path())
+    make_absolute(data, Path())
     _require_plugins(data, what)
     return validated(Scenario, data, what)
-
-
-def files_in(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
-    """Yield the table and the key of each file or folder that the data of a scenario name."""
-    robot = data.get("robot")
-    if isinstance(robot, dict) and not in_package(model := str(robot.get("model", ""))) and (
-            is_file_name(model)):
-        yield robot, "model"
-    sensor = data.get("sensor")
-    folder = sensor.get("folder") if isinstance(sensor, dict) else None
-    if isinstance(folder, str) and not (LIBRARY / "frames" / folder).is_dir():
-        yield data["sensor"], "folder"
-    for path in _recorded(data):
-        yield path, "file"
-
-
-def _recorded(data: Any) -> Iterator[dict[str, Any]]:
-    """Yield the paths of recorded motions, wherever a scenario has them."""
-    inside = data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
-    for one in inside:
-        yield from _recorded(one)
-    if isinstance(data, dict) and data.get("kind") == "recorded" and (
-            isinstance(data.get("file"), str)):
-        yield data
-
-
-def _make_files_absolute(data: dict[str, Any], here: Path) -> None:
-    """Put the folder `here` in front of the files that a scenario names."""
-    for table, key in files_in(data):
-        table[key] = str((here / table[key]).absolute())
 
 
 def _require_plugins(data: dict[str, Any], what: str) -> None:
@@ -145,7 +115,7 @@ def _read(source: Source) -> dict[str, Any]:
             check_name("variant", source.variant, variants)
         data = {"name": f"{source.path.stem}-{source.variant}", "extends": Source(source.path),
                 **variants[source.variant]}
-    _make_files_absolute(data, source.path.parent.resolve())
+    make_absolute(data, source.path.parent.resolve())
     return data
 
 

@@ -6,6 +6,7 @@ import dataclasses
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import tomli_w
@@ -16,6 +17,7 @@ from hierarchy import plugins
 from hierarchy.errors import expect
 from scenarios.config.changes import change_all, parse_changes, without_none
 from scenarios.config.distributions import Parameters
+from scenarios.config.files import make_absolute
 from scenarios.config.sections import Name, Section
 from scenarios.config.sections.avoidance import AvoidanceKind
 from scenarios.config.sections.control import RIVALS, ControlSection, FaultSection, unfit
@@ -125,6 +127,9 @@ class Scenario(Section):
         if self.limits and self.limits.place != "stack" and (
                 (self.limits.torque and not clipped) or self.limits.danger_reach):
             yield 'limits.torque and limits.danger_reach need limits.place = "stack"'
+        if self.limits and self.limits.place == "guard" and clipped:
+            yield ('limits.place = "guard" does not go with control.level = "torque": torques are '
+                   "clipped, and joints are not")
         if self.limits and self.limits.torque and self.control.level == "velocity":
             yield "limits.torque needs control.level = \"acceleration\""
         if self.limits and self.limits.torque_step and not clipped:
@@ -221,10 +226,12 @@ class Scenario(Section):
     def with_changes(self, changes: Mapping[str, Any], what: str = "") -> Scenario:
         """Return this scenario with other values at dotted keys.
 
-        Raises ScenarioError for invalid ones; the message starts with `what`, or the name.
+        Files that they name are relative to the working directory. Raises ScenarioError
+        for invalid ones; the message starts with `what`, or the name.
         """
         data = self.model_dump(mode="json")
         change_all(data, changes, Scenario)
+        make_absolute(data, Path())
         return validated(Scenario, data, what or f"scenario {self.name!r}")
 
     def __repr__(self) -> str:

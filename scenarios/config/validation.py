@@ -52,6 +52,12 @@ def sections_at(root: type[Section], path: Sequence[str]) -> list[type[Section]]
     return [found for part in _annotations(root, path) for found in parts_of(part, Section)]
 
 
+def unit_at(root: type[Section], path: Sequence[str]) -> str:
+    """Return the unit of the key at a path, "" if there is none, or another for each kind."""
+    units = {unit.name for part in _annotations(root, path) for unit in parts_of(part, Unit)}
+    return units.pop() if len(units) == 1 else ""
+
+
 def _said(root: type[Section], data: Any, error: Any) -> str:
     keys = [str(key) for key in error["loc"] if key not in _UNIONS
             and not str(key).startswith("tuple[")]

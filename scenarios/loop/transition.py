@@ -15,6 +15,7 @@ from hierarchy.allocation import AVOIDANCE
 from hierarchy.problem import Array, Hierarchy
 from solvers import Resolution, Resolver, Status
 
+_MOST = 6  # stacks that are solved; of one alone the answer would jump
 _NO_WEIGHT = 1e-6  # stacks with a smaller weight are not solved
 
 
@@ -32,14 +33,13 @@ class Blend:
     The weight of a stack is the integral over its past of the kernel 6 s (1 - s), where s is the
     age over `time`: after a single change the weight of the new stack rises as the smoothstep
     s^2 (3 - 2 s), and overlapping changes add up. Weights have continuous derivatives, are not
-    negative and sum to one. The `most` heaviest stacks are solved; their weights, minus the first
+    negative and sum to one. The `_MOST` heaviest stacks are solved; their weights, minus the first
     one left out, are scaled to sum to one again, also where a former stack has no answer. `weight`
     is that of the present stack in the last answer.
     """
 
-    def __init__(self, time: float, most: int = 6) -> None:
-        self.weight = 1.0
-        self._time, self._most = time, most
+    def __init__(self, time: float) -> None:
+        self.weight, self._time = 1.0, time
         self._visits: list[tuple[Key, float]] = []  # stacks and since when, the oldest first
         self._memories: dict[Key, Any] = {}
 
@@ -92,8 +92,8 @@ class Blend:
             return {present: 1.0}
         ranked = sorted(self.weights(t, present).items(), key=lambda item: -item[1])
         # Minus the first weight left out, so that nothing jumps when two stacks change places.
-        least = ranked[self._most][1] if len(ranked) > self._most else 0.0
-        return {key: weight - least for key, weight in ranked[:self._most]
+        least = ranked[_MOST][1] if len(ranked) > _MOST else 0.0
+        return {key: weight - least for key, weight in ranked[:_MOST]
                 if weight - least > _NO_WEIGHT}
 
     def _solve(self, resolver: Resolver, key: Key, hierarchy: Hierarchy) -> Resolution:

@@ -18,7 +18,7 @@ from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, is_shipped, load
 from scenarios.config import sections as keys
 from scenarios.config.distributions import Parameters
-from scenarios.config.reading import files_in
+from scenarios.config.files import files_in, make_absolute
 from scenarios.config.resolvers import check_names, usable
 from scenarios.config.sampling import changed, drawn
 from scenarios.config.scenario import OWN
@@ -164,13 +164,14 @@ def find(name_or_path: str | Path) -> Path:
 def load_sweep(name_or_path: str | Path) -> Sweep:
     """Read a shipped sweep by name or a sweep file by path.
 
-    Paths of scenario files in it are relative to the file, and absolute in the returned sweep.
+    Paths of files in it are relative to the file, and absolute in the returned sweep.
     Raises ScenarioError, naming the file and the key, and UnknownNameError for an unknown name.
     """
     path = find(name_or_path)
     data = read_toml(path, "sweep file", ScenarioError)
     if not {"scenarios", "samples"} & data.keys() and {"robot", "extends", "control"} & data.keys():
         raise ScenarioError(f"{path} is a scenario, to be run by `hierarchy run {path}`")
+    make_absolute(data, path.parent.resolve())
     sweep = validated(Sweep, data, str(path))
     return sweep.model_copy(update={"scenarios": tuple(
         str(path.parent.resolve() / name) if name.endswith(".toml") or ".toml:" in name else name

@@ -16,7 +16,8 @@ from typing import Any
 
 from hierarchy.errors import HierarchyError
 from scenarios import files
-from scenarios.config.validation import leaves
+from scenarios.config import Scenario
+from scenarios.config.validation import leaves, unit_at
 from scenarios.measure.metrics import Metric
 from scenarios.results.plan import Job, Outcome
 
@@ -96,8 +97,8 @@ class Store:
 def rows(job: Job, outcome: Outcome) -> list[tuple[Any, ...]]:
     """Return the rows of a run; the last one says whether it reached its end, or why not."""
     head = job.key, job.scenario, job.resolver, job.sample
-    sampled = [(name, value, "", name, _SAMPLED, "", "") for key, one in job.values.items()
-               for name, value in leaves(one, key)]
+    sampled = [(name, value, unit_at(Scenario, key.split(".")), name, _SAMPLED, "", "")
+               for key, one in job.values.items() for name, value in leaves(one, key)]
     found = [(m.name, m.value, m.unit, m.label, m.group, _BETTER[m.lower_is_better], m.note)
              for m in outcome.metrics]
     told = [("ticks", outcome.ticks, "", "Ticks", _RUN, "", ""),

@@ -2,7 +2,7 @@
 
 import gc
 import os
-from threading import Event
+from threading import Event, Thread
 from unittest import mock
 
 import numpy as np
@@ -132,6 +132,22 @@ def test_the_collector_of_garbage_rests_while_the_loop_runs_and_only_then():
     assert seen[3:] == [True]
     assert gc.isenabled()
     assert gc.get_freeze_count() == frozen > 0
+
+
+def test_the_collector_rests_while_a_loop_of_any_thread_runs():
+    begun, go_on, clock, seen = Event(), Event(), Clock(), []
+    other = Thread(target=Loop(PERIOD, clock=(slow := Clock()), sleep=slow.sleep).run, args=(
+        lambda t: begun.set() or go_on.wait(10.0), Event, PERIOD))
+    other.start()
+    assert begun.wait(10.0)
+
+    def step(t):
+        go_on.set()
+        other.join(10.0)
+        seen.append(gc.isenabled())
+
+    Loop(PERIOD, clock=clock, sleep=clock.sleep).run(step, Event, PERIOD)
+    assert (seen, gc.isenabled()) == ([False], True)
 
 
 @pytest.mark.parametrize("first", [False, True], ids=["after the last tick", "after Ctrl-C"])

@@ -183,6 +183,26 @@ def test_effort_limits_are_what_actuators_can_do(actuator, joint, effort, writte
     assert "velocity limits: an MJCF has none" in robot.missing
 
 
+@pytest.mark.parametrize(("flag", "effort"), [
+    ("limit", 8.0), ("constraint", 8.0), ("equality", 8.0), ("clampctrl", 9.0),
+    ("actuation", np.inf), ("contact", 8.0)])
+def test_a_robot_is_without_what_the_options_of_its_file_disable(flag, effort, written):
+    path = written(world(
+        link("a", 'range="-9 9"', link("b", 'range="-9 9" actuatorfrcrange="-3 3"')),
+        '<equality><joint joint1="b_joint" joint2="a_joint"/></equality><actuator><motor joint='
+        '"a_joint" gear="4" ctrlrange="-2 2" forcerange="-2.25 2.25"/></actuator>'
+        f'<option><flag {flag}="disable"/></option>'))
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qpos[:], data.ctrl[:] = 1.0, 1e3
+    mujoco.mj_forward(model, data)
+    rows, kind = {*data.efc_type.tolist()}, mujoco.mjtConstraint
+    robot = Robot.load(path)
+    assert np.isfinite(robot.upper).tolist() == [int(kind.mjCNSTR_LIMIT_JOINT) in rows] * 2
+    assert len(robot.coupled) == (int(kind.mjCNSTR_EQUALITY) in rows)
+    assert robot.effort_limit.tolist() == [data.qfrc_actuator[0] or np.inf, 3.0] == [effort, 3.0]
+
+
 @pytest.mark.parametrize(("inside", "said"), [
     (link("a", 'stiffness="0 5"'), "stiffness of joints: not in the equations of motion"),
     (link("a", 'damping="0 5"'), "damping of joints: not in the equations of motion"),

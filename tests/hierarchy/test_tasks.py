@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from urdf_text import LIMIT, joint, link, placed, urdf
 
 from hierarchy import Robot, Stack, State, tasks
-from hierarchy.avoidance import Barrier
+from hierarchy.avoidance import Barrier, Measurement, Pairs
 from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
 from hierarchy.robot import Frame
@@ -238,8 +238,33 @@ def test_an_array_that_is_set_in_the_hierarchy_of_a_stack_stays_in_that_one(arra
             np.testing.assert_array_equal(getattr(h, one), getattr(fresh, one))
 
 
-@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy,
-                                    lambda one: pickle.loads(pickle.dumps(one))])
+COPIES = pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy,
+                                            lambda one: pickle.loads(pickle.dumps(one))])
+
+
+@COPIES
+@pytest.mark.parametrize("differences", [None, 0.01])
+def test_a_copy_of_a_state_goes_on_from_there_with_memory_of_its_own(differences, copied):
+    state = State.at(ROBOT, Q, V, differences=differences)
+    state.move(0.01, Q + 0.01, V)
+    state.measurement, state.commanded = Measurement(1), V
+    state.measurement.pairs = Pairs(1, 1)
+    state.measurement.pairs.distance[0, 0] = 0.7
+    assert state.dynamics.M.any()
+    other = copied(state)
+    other.move(0.02, Q + 0.02, V)
+    assert (state.t, other.commanded.tolist()) == (0.01, V.tolist())
+    assert other.measurement.pairs.table[0, 0, 0] == 0.7
+    other.measurement.pairs.distance[0, 0] = 0.8
+    assert other.measurement.pairs.table[0, 0, 0] == 0.8
+    np.testing.assert_array_equal(state.q, Q + 0.01)
+    state.move(0.02, Q + 0.02, V)
+    for one, own in (*zip(other.kinematics, state.kinematics, strict=True),
+                     (other.dynamics.M, state.dynamics.M)):
+        np.testing.assert_array_equal(one, own)
+
+
+@COPIES
 def test_a_copy_of_a_stack_that_was_used_is_a_stack_of_its_own(copied):
     s, state = stack(), state_at(Q, V)
     h = s.hierarchy(state)

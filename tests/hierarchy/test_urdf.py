@@ -145,12 +145,15 @@ def test_what_the_parser_refuses_and_can_only_mean_one_thing_is_read(load):
     assert not [sentence for sentence in robot.missing if "cannot be read" in sentence]
 
 
-def test_what_follows_a_joint_does_so_at_rest(load):
-    at = "<limit lower='{}' upper='2' velocity='1' effort='1'/><mimic joint='{}' offset='0.7'/>"
-    robot = load(*map(link, "abcd"), joint("third", "revolute", "a", "b", at.format(0, "second")),
-                 joint("second", "revolute", "b", "c", at.format(0, "first")),
-                 joint("first", "revolute", "c", "d", LIMIT.replace("-1", "0")))
-    assert robot.values(robot.rest) == pytest.approx({"first": 0.0, "second": 0.7, "third": 1.4})
+@pytest.mark.parametrize(("most", "rest"), [(2, 0.0), (1, -0.55), (-1, 0.0)])
+def test_what_follows_a_joint_does_so_at_rest_within_its_limits_if_it_can(most, rest, load):
+    at = "<limit lower='{}' upper='{}' velocity='1' effort='1'/><mimic joint='{}' offset='0.7'/>"
+    robot = load(*map(link, "abcd"),
+                 joint("third", "revolute", "a", "b", at.format(-2, most, "second")),
+                 joint("second", "revolute", "b", "c", at.format(0, 2, "first")),
+                 joint("first", "revolute", "c", "d"))
+    assert robot.values(robot.rest) == pytest.approx(
+        {"first": rest, "second": rest + 0.7, "third": rest + 1.4})
     np.testing.assert_allclose(Mechanism(robot).closed(robot.rest), robot.rest)
 
 

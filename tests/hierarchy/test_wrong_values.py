@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from threading import Event
 from typing import Annotated, Literal
 
 import numpy as np
@@ -20,14 +21,16 @@ from hierarchy.gate import check_rotation
 from hierarchy.limits import Limits
 from hierarchy.loop import Loop
 from hierarchy.measured import Measured
-from hierarchy.paths import Blended, Jittered, Still, circle, read_bvh
+from hierarchy.paths import Blended, Jittered, Shifted, Still, circle, read_bvh
 from hierarchy.robot import Frame
 
 NAN, INF = float("nan"), float("inf")
 A, B = np.eye(2), np.ones(2)
 FOOT, PALM = (HUMANOID.frame(f"left_{name}") for name in ("foot", "hand"))
 STATE = State.at(ROBOT, [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0])
-BARE = State.at(Robot.load(Path(__file__).parents[2] / "examples/robots/so101.urdf"), [0.0] * 5)
+BARE, PANDA = (State.at(robot, robot.rest) for robot in (
+    Robot.load(Path(__file__).parents[2] / f"examples/robots/{name}.urdf")
+    for name in ("so101", "panda")))
 THERE = Still([0.3, 0.5, 0.1])
 HAND = tasks.Position(FRAME, THERE)
 LIMITS, POINTS = tasks.JointLimits(ROBOT, 10.0, 0.01), ROBOT.control_points
@@ -85,6 +88,12 @@ def rows_after(commanded, task=None):
     state = State.at(task.robot, task.robot.rest)
     state.commanded = commanded
     return task.rows(state)
+
+
+def ramping(carried):
+    state = State.at(HUMANOID, HUMANOID.rest, t=0.9)
+    state.carried = carried
+    return tasks.Friction(opening()).rows(state)
 
 
 def limits(**settings):
@@ -145,6 +154,9 @@ def limits(**settings):
     (lambda: Robot.load("kuka_lwr", base=B), "base must be one of"),
     (lambda: Frame("tcp", 7, [0, 0, 0.1, 1], A), "'tcp': rotation: expected a rotation matrix"),
     (lambda: Frame("tcp", 7, [0, NAN, 0.1], np.eye(3)), "'tcp': offset: expected 3 finite numb"),
+    (lambda: Frame("tcp", 1, [0, 0, 0.1], np.eye(3), 1), "'tcp': of: expected a str, got int 1"),
+    (lambda: Shifted(None, [0, 0, 0.1]), "shifted: path: expected a Path, got NoneType None"),
+    (lambda: Blended(np.array(1.0), CORNERS, 0.1), "times: expected a list, got ndarray array(1.)"),
     (lambda: Frame("tcp", "hand", [0, 0, 0.1], np.eye(3)), "'tcp': joint = 'hand': expected a wh"),
     (lambda: Contact("hand"), "contact: frame: expected a Frame, got str 'hand'"),
     (lambda: Contact(FRAME, "edge"), "points is not an array of numbers: str 'edge'"),
@@ -205,7 +217,15 @@ def limits(**settings):
     (lambda: tasks.Avoidance(POINTS, 2), "rows = 2: expected one of 1, 3"),
     (lambda: tasks.Avoidance(POINTS, 1).jacobian(STATE), "no measurement"),
     (lambda: tasks.JointDamping(7, 1.0, "momentum"), "weight"),
+    *((lambda asked=asked: asked(PANDA), "on joint 'joint_7', which is 'panda_joint7' of robot "
+       "'panda': it is of another robot") for asked in (
+           HAND.error, Stack([HAND]).hierarchy, lambda state: state.position(FRAME))),
     (lambda: BARE.momentum, "robot 'so101' has no masses"),
+    (lambda: Stack([tasks.Momentum(name="spin")]).hierarchy(BARE), "task 'spin': robot 'so101' h"),
+    (lambda: Stack([tasks.Posture([0.0] * 5)], metric="mass").hierarchy(BARE),
+     "metric 'mass': robot 'so101' has no masses"),
+    *((lambda span=span: Blended((0.0, span), CORNERS, span), "too near or too far apart, got 0.0")
+      for span in (1e-300, 1e300)),
     (lambda: tasks.Manipulability(BARE.robot.frame("gripper"), 0.1, "pose").error(BARE),
      "robot 'so101' has 5 joints, so the manipulability of 6 rows is 0 everywhere"),
     (lambda: tasks.CentreOfMass(ROBOT, THERE, (1, 0)), "in this order"),
@@ -235,6 +255,9 @@ def limits(**settings):
     (lambda: Loop(0.1, overrun="skipp"), "did you mean 'skip'"),
     (lambda: Loop(0.25, watchdog=0.1), "watchdog 0.1 s must be longer than the period 0.25 s"),
     (lambda: Loop(0.1).run(print, None, 1.0), "safe_stop: expected a function, got NoneType None"),
+    (lambda: Loop(1e-3).run(lambda t: A[0], Event, 1.0, record=3),
+     "loop: record = 3, and the command is ndarray array([1., 0.])"),
+    (lambda: Loop(1e-3).run(print, Event, 1e15), "loop: a log of 1e+18 ticks: "),
     (lambda: Loop(0.1).run(print, print, 1.0, record=-1), "loop: record = -1: expected a whole"),
     (lambda: Stack(metric="inertia"), "'mass' or None, got 'inertia'"),
     (lambda: ROBOT.limit_base(1.0, 1.0), "its base is fixed"),
@@ -256,6 +279,12 @@ def limits(**settings):
                           (np.full(7, NAN), "ndarray array([nan"))),
     (lambda: rows_after(np.zeros(6), tasks.TorqueStep(HUMANOID, 1.0, contacts=CONTACTS)),
      "'torque step': state.commanded has shape (6,), expected (30,)"),
+    (lambda: CONTACTS.torques(None, np.zeros(60)), "contacts: state: expected a State, got None"),
+    (lambda: CONTACTS.forces(""), "contacts: x is not an array of numbers: str ''"),
+    (lambda: STATE.move(0.0, [], np.zeros(7)), "State.move: expected arrays q (7,) and v (7,), g"),
+    (lambda: Stack([HAND]).hierarchy(STATE, [HAND]), "unknown task Position"),
+    (lambda: opening().carried(0.9, np.zeros(60), np.zeros(1)), "carried has shape (1,), expected"),
+    (lambda: ramping([3.0]), "contacts: state.carried has shape (1,), expected (2,)"),
     (lambda: LIMITS.limits.box(np.zeros(6), np.zeros(7), "velocity"), "7 finite numbers each"),
     (lambda: LIMITS.limits.clamp(np.zeros(7), np.zeros(7), "velocity", np.zeros(8)),
      "7 positions, 7 velocities and a command of 8 for 7 joints"),

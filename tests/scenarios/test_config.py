@@ -18,6 +18,7 @@ from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
 from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run
+from scenarios.results.plan import load_sweep
 from solvers.qp import backends
 
 
@@ -55,6 +56,14 @@ def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a
         assert [found.robot.model, found.avoidance.obstacles[0].path.file,
                 found.position.path.file] == [f"{tmp_path}/base/{file}" for file in (
                     "arm.urdf", "motion.csv", "path.csv")]
+    varied = '{robot.model = {choice = ["a.urdf", "kuka_lwr"]}, "a.path.file" = {choice = ["b"]}}'
+    (tmp_path / "varied.toml").write_text(f'extends = "ellipse"\nvariation = {varied}\n')
+    (tmp_path / "sweep.toml").write_text(
+        f'name = "sweep"\nscenarios = ["ellipse"]\nsamples = 1\nparameters = {varied}\n')
+    for drawn in (load("../varied.toml").variation, load_sweep("../sweep.toml").parameters):
+        assert drawn["robot.model"].choice == (f"{tmp_path}/a.urdf", "kuka_lwr")
+        assert drawn["a.path.file"].choice == (f"{tmp_path}/b",)
+    assert found.with_changes({"robot.model": "c.urdf"}).robot.model == f"{tmp_path}/base/c.urdf"
 
 
 def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():

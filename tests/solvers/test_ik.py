@@ -1,6 +1,7 @@
 """Inverse kinematics of a bare robot, and whole-body dynamics of a humanoid."""
 
 from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
 from functools import partial
 
 import numpy as np
@@ -18,6 +19,7 @@ from hierarchy.tasks import (
     FrameLog,
     JointCoupling,
     JointLimits,
+    Momentum,
     Orientation,
     Pose,
     Position,
@@ -88,13 +90,14 @@ def test_what_is_kept_serves_one_call_at_a_time_and_tasks_of_its_size():
     np.testing.assert_array_equal(ask(Q).v, plain)
     changing.again, changing.dimension = None, 2
     np.testing.assert_allclose(changing.jacobian(AT) @ ask(Q).v, 2.0 * changing.error(AT))
-    aims = list(Q), np.asfortranarray(AT.rotation(FRAME))
-    tasks[:] = Orientation(FRAME, aims[1]), Posture(aims[0])
+    aims = (list(Q), np.asfortranarray(AT.rotation(FRAME)), np.array([1.0, 2.0, 3.0]),
+            np.eye(3)[:1].copy(), np.array([0.3, 0.0, 0.0]))
+    tasks[:] = (Along(Position(FRAME, Still([0.3, 0.5, 0.1]), gain=aims[2]), aims[3]),
+                Momentum("linear", aims[4]), Orientation(FRAME, aims[1]), Posture(aims[0]))
     for aim in aims:
         ask(Q)
-        aim[:] = np.roll(aim, 1, axis=0)
-        tasks_anew = [Orientation(FRAME, aims[1].copy()), Posture(tuple(aims[0]))]
-        np.testing.assert_array_equal(ask(Q).v, solve_ik(ROBOT, Q, tasks_anew).v)
+        aim[:] = np.roll(aim, 1, axis=-1)
+        np.testing.assert_array_equal(ask(Q).v, solve_ik(ROBOT, Q, deepcopy(tasks)).v)
 
 
 def test_limits_of_the_robot_hold_whatever_is_asked():

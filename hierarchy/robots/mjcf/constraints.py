@@ -18,17 +18,19 @@ _FREE: Array = np.array([-np.inf, np.inf])
 
 def set_limits(built: Built) -> Iterator[str]:
     """Set the ranges of hinges and slides; yield a sentence for each missing limit."""
-    file, model, balls = built.part.compiled, built.model, []
+    file, model = built.part.compiled, built.model
+    balls, off, free = list[str](), list[str](), disabled(file.model, "limit")
     lower, upper = np.full(model.nq, -np.inf), np.full(model.nq, np.inf)
     for j, joint in built.pairs():
-        if file.model.jnt_limited[j] and joint.nq == 1:
+        if file.model.jnt_limited[j] and joint.nq == 1 and not free:
             lower[joint.idx_q], upper[joint.idx_q] = file.model.jnt_range[j]
         elif file.model.jnt_limited[j]:
-            balls.append(file.joints[j])
+            (off if free else balls).append(file.joints[j])
     model.lowerPositionLimit, model.upperPositionLimit = lower, upper
     model.upperVelocityLimit = np.full(model.nv, np.inf)
     yield "velocity limits: an MJCF has none"
-    yield from each(("limits of the angle of ball joints are ignored", balls))
+    yield from each(("limits of the angle of ball joints are ignored", balls),
+                    ("the options of the file disable the position limits", off))
 
 
 def effort_limits(built: Built) -> Iterator[str]:
@@ -39,10 +41,11 @@ def effort_limits(built: Built) -> Iterator[str]:
     """
     file, model = built.part.compiled, built.model
     mj, efforts = file.model, np.full(model.nv, np.inf)
+    acts = not disabled(mj, "actuation")
     ranges: dict[int, list[Array]] = defaultdict(list)
     for i, j, gear in joint_actuators(mj):
         group = int(mj.actuator_group[i])
-        if gear and not (group >= 0 and mj.opt.disableactuator >> group & 1):
+        if gear and acts and not (group >= 0 and mj.opt.disableactuator >> group & 1):
             ranges[j].append(np.sort(gear * _force(mj, i)))
     idle, uneven = [], []
     for j, joint in built.pairs():
@@ -51,7 +54,7 @@ def effort_limits(built: Built) -> Iterator[str]:
         total = sum(ranges[j], np.zeros(2)) if j in ranges else _FREE
         if mj.jnt_actfrclimited[j]:
             total = np.clip(total, *mj.jnt_actfrcrange[j])
-        idle += [] if j in ranges else [file.joints[j]]
+        idle += [] if j in ranges or mj.jnt_actfrclimited[j] else [file.joints[j]]
         least = float(np.abs(total).min()) if total[0] < 0.0 < total[1] else np.inf
         uneven += [] if -total[0] == total[1] else [
             f"{file.joints[j]} ({total[0]:g} to {total[1]:g})"]
@@ -73,7 +76,8 @@ def _force(mj: Any, i: int) -> Array:
     if mj.actuator_gaintype[i] or mj.actuator_biastype[i]:  # no motor: fixed gain, no bias
         return force
     control, k = _FREE, address(mj, "ctrl", i)
-    if mj.actuator_dyntype[i] != _INTEGRATOR and mj.actuator_ctrllimited[k]:
+    clamps = mj.actuator_ctrllimited[k] and not disabled(mj, "clampctrl")
+    if mj.actuator_dyntype[i] != _INTEGRATOR and clamps:
         control = mj.actuator_ctrlrange[k]
     if mj.actuator_actlimited[i]:
         control = np.clip(control, *mj.actuator_actrange[i])

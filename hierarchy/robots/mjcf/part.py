@@ -89,10 +89,12 @@ def _in_one_line(text: str) -> str:
 
 
 def disabled(model: Any, what: str) -> bool:
-    """Return whether the options of a model disable "gravity", "equality" or another part."""
+    """Return whether the options of a model disable "gravity", "limit" or another part."""
     import mujoco
 
-    return bool(model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{what.upper()}"))
+    bit, every = (getattr(mujoco.mjtDisableBit, f"mjDSBL_{one.upper()}")
+                  for one in (what, "constraint"))
+    return bool(model.opt.disableflags & (bit | every * (what in ("equality", "limit"))))
 
 
 def name_of(model: Any, kind: str, index: int) -> str:

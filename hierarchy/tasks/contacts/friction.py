@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from math import cos, inf, isnan, nan, pi, sin
+from math import cos, inf, isnan, pi, sin
 from typing import Literal
 
 import numpy as np
@@ -97,7 +97,7 @@ class Friction(FixedRows):
         share, count = contact.load(state.t), len(contact.points)
         if share == 1.0:
             return
-        robot, before = self.contacts.robot, nan if state.carried is None else state.carried[number]
+        robot, before = self.contacts.robot, self.contacts.before(state.carried)[number]
         weight = robot.masses.sum() * np.linalg.norm(robot.model.gravity.linear)
         allowed = share * (weight if isnan(before) else before)
         each_low, each_up = (side[:count * (self.faces + 1)].reshape(count, -1)

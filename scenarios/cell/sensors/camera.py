@@ -18,7 +18,7 @@ from hierarchy.jit import compiled, internal
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from scenarios.cell.sensors.rendering import draw_scene
-from scenarios.config.reading import LIBRARY
+from scenarios.config.files import LIBRARY
 from scenarios.config.sections.sensor import CameraSection, FramesFile
 from scenarios.config.validation import validated
 from scenarios.toml_text import read_toml

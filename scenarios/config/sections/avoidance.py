@@ -149,6 +149,8 @@ class AvoidanceSection(_Avoiding):
         yield from super()._wrong()
         if self.place == "null-space" and self.jacobian == "published":
             yield 'place = "null-space" goes with jacobian = "exact"'
+        if self.place == "null-space" and self.dimension != 1:
+            yield 'place = "null-space" goes with dimension = 1'
         if self.near > self.far:
             yield f"near = {self.near} m is beyond far = {self.far} m"
 

@@ -121,6 +121,9 @@ def unfit(control: ControlSection, limits: LimitsSection | None,
     apart: dict[str, Any] = {"avoidance": avoidance} if isinstance(
         avoidance, SeparationSection) else {}
     pointing = {key: task for key, task in tasks.items() if isinstance(task, PointingTask)}
+    if control.transition != "none" and control.stack != "switched":
+        yield (f'control.transition = "{control.transition}" goes with control.stack = "switched", '
+               f'got "{control.stack}"')
     if control.stack in RIVALS:
         yield from _unfit_control(control, limits)
     if control.stack == "smooth":
@@ -142,8 +145,8 @@ def _unfit_control(control: ControlSection, limits: LimitsSection | None) -> Ite
                "commands rates that may change at once, which accelerations cannot")
     if limits and limits.place in ("stack", "bounds"):
         yield f'{kind} needs limits.place = "guard", got "{limits.place}"'
-    if control.transition != "none":
-        yield f'control.transition = "{control.transition}" does not go with {kind}'
+    if control.damping not in (0.0, ControlSection.model_fields["damping"].default):
+        yield f"control.damping = {control.damping:g} does not go with {kind}"
     if control.strictness:
         yield f"control.strictness = true does not go with {kind}"
 
@@ -151,9 +154,9 @@ def _unfit_control(control: ControlSection, limits: LimitsSection | None) -> Ite
 def _unused(tasks: Mapping[str, Made], apart: Mapping[str, Any]) -> Iterator[str]:
     """Yield the keys of pushing back that are set: a set-based task is frozen; or what gives."""
     for where, task in tasks.items():
-        if not task.one_sided and (give := getattr(task, "give", 0.0)):
-            yield (f'{where}.give = {give:g} does not go with control.stack = "set-based": an '
-                   "equality that gives has two sides")
+        if give := getattr(task, "give", 0.0):
+            yield (f'{where}.give = {give:g} does not go with control.stack = "set-based": a row '
+                   "that gives has two sides")
     frozen = {key: task for key, task in tasks.items() if task.one_sided}
     for where, one in {**apart, **frozen}.items():
         for key in _PUSHES:

@@ -96,6 +96,8 @@ class ContactSection(keys.Section):
             yield "a sole has x and y, a point neither"
         if self.x is not None and self.slides:
             yield "only a point slides"
+        if self.x is None and self.up != type(self).model_fields["up"].default:
+            yield "only a sole has up"
 
 
 class ForcesSection(keys.Section):

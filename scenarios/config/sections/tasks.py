@@ -216,7 +216,8 @@ class LimitsSection(keys.Section):
     acceleration: Acceleration | tuple[Acceleration, ...]  #: The largest, of all joints or of each.
     place: Literal["stack", "guard", "either", "bounds"] = "stack"
     """"stack": the first level. "guard": each command is clamped joint by joint, regardless of the
-    tasks, with any resolver. "either": in the stack if the resolver handles bounds, else a guard.
+    tasks, with any resolver. "either": in the stack if the resolver handles bounds, else a guard,
+    at level "torque" of torques alone.
     "bounds": in the stack, but without torque limits and [forces]."""
     margin: keys.Arc = 0.0  #: Distance kept from the position limits.
     horizon: Annotated[keys.NotNegative, keys.Unit("s")] | None = None
@@ -239,7 +240,7 @@ class LimitsSection(keys.Section):
 
 
 class DampingSection(keys.Section):
-    """Null-space term a = -D v, eq. (15); not with the null-space [posture]."""
+    """Null-space term a = -D v, eq. (15), at velocity level 0; not with a null-space [posture]."""
 
     value: keys.NotNegative  #: D [1/s], or with weight = "mass" the factor of M(q).
     weight: Literal["identity", "mass"] = "identity"  #: D = value I, or with "mass" D = value M(q).
