@@ -41,7 +41,14 @@ from hierarchy.robots.found import (
     room,
 )
 from hierarchy.robots.from_table import from_table
-from hierarchy.robots.joints import coordinates_of, normalise, parts_of, set_joint, values_of
+from hierarchy.robots.joints import (
+    check_size,
+    coordinates_of,
+    normalise,
+    parts_of,
+    set_joint,
+    values_of,
+)
 from hierarchy.robots.library import pin
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.robots.table import Base, Table
@@ -122,6 +129,7 @@ class Robot:
         if self.n == 0:
             raise RobotError(f"robot {name!r} has no joint that moves; with base = 'floating' it "
                              "moves as a whole")
+        check_size(model, f"robot {name!r}")
         self.base: Base = "floating" if is_floating(model) else "fixed"
         self.actuated = 6 if self.base == "floating" else 0
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]

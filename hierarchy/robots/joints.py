@@ -17,6 +17,7 @@ from hierarchy.problem import Array
 from hierarchy.robots.found import Coupled
 from hierarchy.robots.library import pin
 
+_MOST = 400  # velocities: pinocchio's data grow with their cube, to 2 GB
 _UNIT = 1e-6    # off one to which the length of a quaternion or (cos, sin) may be given
 _EXACT = 1e-14  # off one by rounding, which is left
 
@@ -134,6 +135,12 @@ def normalise(parts: Iterable[Part], q: Array, names: Any) -> None:
                              f"{length:.9g}, not 1")
         if abs(length - 1.0) > _EXACT:
             own /= length
+
+
+def check_size(model: Any, what: str) -> None:
+    """Raise RobotError for a model, such as cloth, whose data would fill the memory."""
+    if model.nv > _MOST:
+        raise RobotError(f"{what} has {model.nv} velocities, of at most {_MOST}")
 
 
 def without(model: Any, coupled: tuple[Coupled, ...], locked: Mapping[str, ArrayLike],

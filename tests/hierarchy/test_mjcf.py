@@ -130,6 +130,12 @@ def test_a_second_body_that_floats_is_refused_by_name(scene, written):
     assert Robot.load(path, base="fixed").base == "fixed"
 
 
+def test_what_would_fill_the_memory_is_no_robot(written):
+    path = written('<mujoco><worldbody><replicate count="401" offset="1 0 0"><body><joint/>'
+                   '<geom size=".1"/></body></replicate></worldbody></mujoco>')
+    refused("has 401 velocities, of at most 400", Robot.load, path, error=RobotError)
+
+
 def test_a_base_floats_where_it_is_asked_to(written):
     path = written(world(link("a")))
     robot, held = Robot.load(path, base="floating"), Robot.load(path)

@@ -14,6 +14,7 @@ import numpy as np
 
 from hierarchy.problem import Array
 from hierarchy.robots.from_table import ROOT
+from hierarchy.robots.joints import check_size
 from hierarchy.robots.library import pin
 from hierarchy.robots.mjcf.part import SIZES, WORLD, Part, disabled, rolled
 
@@ -211,6 +212,7 @@ def compare(built: Built) -> None:
     import mujoco
 
     file, model = built.part.compiled, built.model
+    check_size(model, f"robot file {file.file!r}")
     mj, data, own = file.model, mujoco.MjData(file.model), model.createData()
     for q in _configurations(built):
         data.qpos[:] = to_mujoco(built, q)
