@@ -131,8 +131,8 @@ def test_a_second_body_that_floats_is_refused_by_name(scene, written):
 
 
 def test_what_would_fill_the_memory_is_no_robot(written):
-    path = written('<mujoco><worldbody><replicate count="401" offset="1 0 0"><body><joint/>'
-                   '<geom size=".1"/></body></replicate></worldbody></mujoco>')
+    path = written(world('<replicate count="401" offset="1 0 0"><body><joint/><geom size=".1"/>'
+                         '</body></replicate>'))
     refused("has 401 velocities, of at most 400", Robot.load, path, error=RobotError)
 
 
