@@ -161,7 +161,7 @@ class Measured(Task):
             row[:] = np.asarray(value)
         derivative = (_NONE if level == "velocity" else
                       _EXACT if self.exact or state.period == 0.0 else _DIFFERENCE)
-        goal = np.zeros((3, 1 + int(max(2.0, *settings[4].tolist()))))
+        goal = np.zeros((3, 1 + int(max([2.0, *settings[4].tolist()]))))
         return _Asked(goal, settings, derivative, motion, np.zeros((m, state.n)))
 
     def _measured(self, state: State, kinematics: Kinematics | None = None
