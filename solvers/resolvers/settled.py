@@ -146,6 +146,10 @@ class _Above:
         alpha = half * size
         if not 0.0 < _LEAST * size * size < alpha * out < np.inf:
             return A, b, b
+        free = A - (A @ self.held().T) @ self.held()
+        kept = _directions(A, free)
+        if not len(kept):  # the levels above alone decide A x, and no level below disturbs it
+            return A, b, b
         probe = self._damped(A, b)
         found = first = probe(_LEAST * size * size)
         met = alpha * first.missed <= first.mu
@@ -157,10 +161,9 @@ class _Above:
             self.x = first.x
             return A, b, b
         step = float(np.linalg.norm(found.x - self.x))
-        free = A - (A @ self.held().T) @ self.held()
         self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
         self.calmed, self.x = True, found.x
-        kept, rows = _directions(A, free), np.zeros_like(A)
+        rows = np.zeros_like(A)
         rows[:len(kept)] = kept
         return rows, rows @ found.x, rows @ found.x
 

@@ -131,6 +131,18 @@ def test_levels_below_do_not_move_what_a_level_settled_on(inner):
     assert inner != "hcod" or (both.holds_back == -1).all()
 
 
+def test_a_level_that_those_above_decide_does_not_slow_those_below():
+    """As of two targets for one hand: nothing that a posture does changes the second miss."""
+    rng = np.random.default_rng(7)
+    A = nearly_singular(rng, 0.3)
+    above, posture = (A, rng.normal(size=3)), (np.eye(6), np.ones(6))
+    again = rng.normal(size=(3, 3)) @ A, rng.normal(size=3)
+    stacks = ([above, posture], ["a", "c"]), ([above, again, posture], ["a", "b", "c"])
+    alone, both = (settled("a", "b").solve(Hierarchy.from_levels(levels, names=names)).x
+                   for levels, names in stacks)
+    np.testing.assert_allclose(both, alone, atol=1e-12)
+
+
 def test_a_merged_level_out_of_reach_keeps_its_memory_and_strict_levels_stay_strict():
     rng = np.random.default_rng(6)
     A, b, E = nearly_singular(rng, 1e-4), 3.0 * rng.normal(size=3), np.eye(6)
