@@ -122,6 +122,14 @@ def test_a_joint_that_a_light_row_fixes_among_bounds_is_not_damped(name):
 
 
 @pytest.mark.parametrize("name", ["tpm", "hcod"])
+def test_a_joint_that_is_fixed_is_no_joint_of_a_damped_task_that_leaves_it_there(name):
+    """`tpm` took the damping of the task with that joint: x_1 was 1.14."""
+    bounds = (np.eye(2), [0.0, -9.0], [0.0, 9.0])
+    h = Hierarchy.from_levels([bounds, ([[1.0, 0.0], [0.0, 0.05]], [0.0, 0.1])])
+    np.testing.assert_allclose(make(name, damping=0.05, threshold=0.1).solve(h).x, [0.0, 1.0])
+
+
+@pytest.mark.parametrize("name", ["tpm", "hcod"])
 @pytest.mark.parametrize("damping", [0.0, 0.2])
 def test_a_joint_at_its_bound_is_said_to_be_there(name, damping):
     """With damping levels below found the bound without force: half of the joints were not."""
