@@ -83,7 +83,7 @@ def _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work):
     within = SOLVED == solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[top + 1:], x,
                                           settings, work[2 * x.size:])
     for c in range(x.size):
-        within &= box.low[c] <= x[c] <= box.high[c]
+        within &= box.low[c] < box.high[c] and box.low[c] <= x[c] <= box.high[c]
     inner[inner.size - 3] = 1.0 if within else 0.0
     return SOLVED if within else UNPROVED
 

@@ -20,6 +20,7 @@ from solvers.kernels.linalg.rows import (
     finish,
     finish_unless_missed,
     has_outlier,
+    length_of,
     load_rows,
     make_reflector,
     reflect,
@@ -39,7 +40,7 @@ from solvers.kernels.linalg.space import (
     vector,
 )
 from solvers.kernels.staircase import carve_staircase, climb
-from solvers.kernels.tolerances import BOUND_KEPT, NEGLIGIBLE, TERMS
+from solvers.kernels.tolerances import BOUND_KEPT, NEGLIGIBLE
 from solvers.status import CONTRADICTION, SOLVED, TOO_SMALL
 
 NO_JOINT = -1
@@ -220,7 +221,7 @@ def _level(task, x, space, above):
 
     Returns its scaling, the columns of Q including those of the task alone, and the sets tried.
     """
-    seen, tolerance = space.seen[:task.b.size], space.shared.rank_tolerance
+    seen = space.seen[:task.b.size]
     fill(space.side, 0.0)
     for i in range(task.b.size):
         space.now[i] = inner_product(task.J[i], x)
@@ -241,13 +242,13 @@ def _level(task, x, space, above):
             largest = s
         if space.release and _release(space, at, s if s >= 0.0 else 1.0):
             _see(task, space.basis, seen, above)
-            taken = _hold_again(space, seen, x, above, taken, tolerance)
+            taken = _hold_again(space, seen, x, above, taken)
             continue
         if s == 1.0 or critical == NO_JOINT:
             break
         beyond = space.line[0, critical] + space.line[1, critical] > space.up[critical]
         space.side[critical] = 1.0 if beyond else -1.0
-        taken = _hold(space, seen, critical, x, above, taken, tolerance)
+        taken = _hold(space, seen, critical, x, above, taken)
         if above + taken == begin:  # tasks above and saturated joints already hold it
             break
     if sets > 1:  # back to the columns of the task alone
@@ -383,18 +384,18 @@ def _release(space, at, s):
 
 
 @internal
-def _hold(space, seen, j, x, above, count, least):
+def _hold(space, seen, j, x, above, count):
     """Give joint j, whose side is written, a column of Q, and write its step to that bound into y.
 
     seen: the rows of a task in coordinates of Q, reflected too. Returns the number of held joints:
-    still `count` if the remainder of its unit vector is at most `least`.
+    still `count` if the remainder of its unit vector is at most `rank_tolerance`.
     """
     k, e, basis = above + count, space.E[count], space.basis
     fill(e, 0.0)
     e[j] = 1.0
     reflect(basis, 0, k, space.E, count, count + 1)
     square = inner_product(e[k:], e[k:])
-    if not square > least * least:
+    if not square > space.shared.rank_tolerance**2:
         space.side[j] = 0.0
         return count
     make_reflector(basis, k, e, square)
@@ -407,13 +408,13 @@ def _hold(space, seen, j, x, above, count, least):
 
 
 @internal
-def _hold_again(space, seen, x, above, count, least):
+def _hold_again(space, seen, x, above, count):
     """Give columns of Q to the joints among the first `count` that remain held; see `_hold`."""
     holding = 0
     for t in range(count):
         j = space.joint[t]
         if space.side[j] != 0.0:
-            holding = _hold(space, seen, j, x, above, holding, least)
+            holding = _hold(space, seen, j, x, above, holding)
     return holding
 
 
@@ -437,11 +438,11 @@ def _to_reference(space, x, rank):
         stopped = _step(x, d, space)
         if stopped != NO_JOINT:
             space.side[stopped] = 1.0 if d[stopped] > 0.0 else -1.0
-            count = _hold(space, no_rows, stopped, x, rank, count, TERMS)
+            count = _hold(space, no_rows, stopped, x, rank, count)
             if rank + count == begin:
                 break
         elif release and _drop(space, rank, begin):
-            count = _hold_again(space, no_rows, x, rank, count, TERMS)
+            count = _hold_again(space, no_rows, x, rank, count)
         else:
             break
     return steps
@@ -461,12 +462,14 @@ def _free_way(space, x, target, begin):
 
 @inlined
 def _step(x, d, space):
-    """Move x along d as far as the box allows, at most x + d; return the joint that stops it."""
-    side, size, share, stopped = space.side, 0.0, 1.0, NO_JOINT
+    """Move x along d as far as the box allows, at most x + d; return the joint that stops it.
+
+    One that would not be held, so little of it is left by the tasks, stops nothing.
+    """
+    side, share, stopped = space.side, 1.0, NO_JOINT
+    least = space.shared.rank_tolerance * length_of(d)
     for j in range(x.size):
-        size = max(size, abs(d[j]))
-    for j in range(x.size):
-        if side[j] == 0.0 and abs(d[j]) > TERMS * size:
+        if side[j] == 0.0 and abs(d[j]) > least:
             room = (space.up[j] if d[j] > 0.0 else space.low[j]) - x[j]
             if room / d[j] < share:
                 share, stopped = room / d[j], j

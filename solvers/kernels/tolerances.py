@@ -10,7 +10,6 @@ EPSILON = 2e-15            # miss of a row, relative to its terms
 CANCELLED = 1e-14          # sum relative to the norms of its terms
 NEGLIGIBLE = 1e-13         # norm, entry or multiplier beside the largest: rounding in the other
 FAINT = 1e-12              # of a row's norm: so far its entries are unsure, at most by themselves
-TERMS = 1e-13              # sum of products relative to its terms, in the kernels of sns
 FAR_LIGHTER = 1e-12        # norm of a row over the largest: the staircase hands such rows on
 LEAST_SQUARE = 1e-200      # square of a norm: smaller ones lose digits, as do larger inverses
 

@@ -131,7 +131,7 @@ class Merged(OneLevel):
     step : share of a miss, at most 1, by which the target moves in the next solve; what a miss has
         beyond the cap does not count.
     strict_levels : levels that stay strict; None: the first run of inequalities, and all above.
-    regularisation : weight of |x - reference|, for unknowns that no merged row names alone.
+    regularisation : weight of |x - reference|, for unknowns that no merged equality names alone.
     """
 
     name: ClassVar[str] = "merged"

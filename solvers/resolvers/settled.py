@@ -142,10 +142,16 @@ class _Above:
         if self.behind:
             self.x = self.strict.solve(self.stacked(self.levels, self.x)).x
             self.behind = False
+        asked, whole = (A, b, b), float(np.linalg.norm(A))
+        if not whole * np.linalg.norm(b) < np.inf:
+            return asked
+        free = A - (A @ self.held().T) @ self.held()
+        decided = _decided(A, free)
+        A, b = A - decided @ (decided.T @ A), b - decided @ (decided.T @ b)
         size, out = float(np.linalg.norm(A)), float(np.linalg.norm(b - A @ self.x))
         alpha = half * size
-        if not 0.0 < _LEAST * size * size < alpha * out < np.inf:
-            return A, b, b
+        if not (_FAINT * whole < size and _LEAST * size * size < alpha * out < np.inf):
+            return asked
         probe = self._damped(A, b)
         found = first = probe(_LEAST * size * size)
         met = alpha * first.missed <= first.mu
@@ -155,9 +161,8 @@ class _Above:
             self.status = found.status
         if met:
             self.x = first.x
-            return A, b, b
+            return asked
         step = float(np.linalg.norm(found.x - self.x))
-        free = A - (A @ self.held().T) @ self.held()
         self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
         self.calmed, self.x = True, found.x
         kept, rows = _directions(A, free), np.zeros_like(A)
@@ -217,6 +222,17 @@ def _directions(A: Array, free: Array) -> Array:
     """Return the directions (k, n), but for rounding, of what levels above leave of A."""
     _, values, directions = np.linalg.svd(free, full_matrices=False)
     return np.asarray(directions[values > _FAINT * np.linalg.norm(A)])
+
+
+def _decided(A: Array, free: Array) -> Array:
+    """Return the sums of rows (m, k), orthonormal, whose value the levels above alone decide.
+
+    They leave nothing of these, and joints do move them: what a level misses there is not its own.
+    """
+    U, values, _ = np.linalg.svd(free)
+    rest = U[:, np.count_nonzero(values > _FAINT * np.linalg.norm(A)):]
+    moved, values, _ = np.linalg.svd(rest.T @ A)
+    return np.asarray(rest @ moved[:, :np.count_nonzero(values > _FAINT * np.linalg.norm(A))])
 
 
 def _search(probe: Callable[[float], _Reached], low: _Reached, alpha: float,

@@ -133,8 +133,9 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
         h.refuse_extras("the hierarchy", "the published form of tpm")
     if (h.lower < h.upper).any():  # worded as for the published form, which takes no bounds
         refuse_inequality(Tpm(form="published"), h, int((h.lower < h.upper).argmax()))
-    if resolver.solve(h).status is not Status.SOLVED:
-        raise HierarchyError(f"no task priority matrix of {h}: {Status.NUMERICAL_FAILURE}")
+    status = resolver.solve(h).status
+    if status is not Status.SOLVED:
+        raise HierarchyError(f"no task priority matrix of {h}: {status}")
     targets, zero = np.eye(h.m), np.zeros(h.n)
     G = np.array([_answer(resolver, h, b, zero) for b in targets]).reshape(h.m, h.n).T
     pairs = zip(h.offsets[:-1], h.offsets[1:], strict=True)

@@ -29,8 +29,8 @@ class Weighted(OneLevel):
     weights : weight of each level, in place of `ratio`. Strict levels at the top need none.
     strict_levels : number of top levels that are strict; None for the top level, if it has
         inequalities; -1 for the first run of levels with inequalities and all above.
-    regularisation : mu: adds mu^2 (x_i - reference_i)^2 for unknowns that no row names alone; pink
-        and mink call mu^2 damping, 1e-12 by default.
+    regularisation : mu: adds mu^2 (x_i - reference_i)^2 for unknowns that no equality names alone;
+        pink and mink call mu^2 damping, 1e-12 by default.
     """
 
     name: ClassVar[str] = "weighted"

@@ -9,6 +9,7 @@ from rank_cases import CASES, boxed, build, gap, random_levels, rng
 
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make
+from solvers.problems import bounded, structured
 
 LARGEST = 0.7
 
@@ -167,6 +168,16 @@ def test_the_optimal_form_ends_nearest_to_the_reference():
         if judge.status is Status.SOLVED:
             distance = np.linalg.norm(judge.x - h.reference)
             assert np.linalg.norm(x - h.reference) <= distance + 1e-8 * (1.0 + distance)
+
+
+@pytest.mark.parametrize("resolver", [BASIC, OPTIMAL], ids=lambda r: r.label)
+def test_an_unknown_in_no_row_goes_to_the_reference_beside_rows_of_any_norm(resolver):
+    """Joints that the tasks hold but for rounding stopped the way there in a third of these."""
+    for seed in (3, 7, 21, 22, 26, 40, 44, 53):
+        h = bounded(structured(seed, ("scaled",), True), seed)
+        wide = Hierarchy(np.hstack([np.zeros((h.m, 1)), h.A]), h.lower, h.upper, h.sizes,
+                         [1.0, *h.reference])
+        assert resolver.solve(wide).x[0] == pytest.approx(1.0, abs=1e-7)
 
 
 def test_where_no_bound_acts_x_is_that_of_the_recursion_also_in_a_box_without_zero():

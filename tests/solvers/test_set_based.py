@@ -131,6 +131,19 @@ def test_levels_below_do_not_move_what_a_level_settled_on(inner):
     assert inner != "hcod" or (both.holds_back == -1).all()
 
 
+def test_a_level_that_those_above_decide_does_not_slow_those_below():
+    """As of two targets for one hand: what a posture does changes the second miss by nothing."""
+    rng = np.random.default_rng(7)
+    A = nearly_singular(rng, 0.3)
+    above, posture = (A, rng.normal(size=3)), (np.eye(6), np.ones(6))
+    for one_more in (0, 1):  # row that can be met
+        rows = np.vstack([A, rng.normal(size=(one_more, 6))])
+        again = rng.normal(size=(4, len(rows))) @ rows, rng.normal(size=4)
+        h = Hierarchy.from_levels([above, again, posture], names=["a", "b", "c"])
+        np.testing.assert_allclose(settled("a", "b").solve(h).x, make("hcod").solve(h).x,
+                                   atol=1e-9)
+
+
 def test_a_merged_level_out_of_reach_keeps_its_memory_and_strict_levels_stay_strict():
     rng = np.random.default_rng(6)
     A, b, E = nearly_singular(rng, 1e-4), 3.0 * rng.normal(size=3), np.eye(6)

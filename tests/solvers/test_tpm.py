@@ -39,6 +39,8 @@ def test_the_contributions_in_a_metric_give_the_answer():
     refused("the hierarchy has a metric", task_priority_matrix, h, form="published")
     h = Hierarchy.from_levels([([[1.0, 0.0]], [0.0], [1.0])])
     refused("level 1, row 0: an inequality", task_priority_matrix, h)
+    h = Hierarchy.from_levels([([[1.0, 0.0]], [0.5]), ([[2.56e-18, 1.8e-18]], [-700.0])])
+    refused("not be verified: some rows are nearly parallel", task_priority_matrix, h)
 
 
 def close(x, y):
@@ -119,6 +121,14 @@ def test_a_joint_that_a_light_row_fixes_among_bounds_is_not_damped(name):
     h = Hierarchy.from_levels([bounds, (np.ones((1, 2)), [0.8])])
     x = make(name, damping=0.05, threshold=0.1).solve(h).x
     np.testing.assert_allclose(x, [0.5, 0.3], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["tpm", "hcod"])
+def test_a_joint_that_is_fixed_is_no_joint_of_a_damped_task_that_leaves_it_there(name):
+    """`tpm` took the damping of the task with that joint: x_1 was 1.14."""
+    bounds = (np.eye(2), [0.0, -9.0], [0.0, 9.0])
+    h = Hierarchy.from_levels([bounds, ([[1.0, 0.0], [0.0, 0.05]], [0.0, 0.1])])
+    np.testing.assert_allclose(make(name, damping=0.05, threshold=0.1).solve(h).x, [0.0, 1.0])
 
 
 @pytest.mark.parametrize("name", ["tpm", "hcod"])
