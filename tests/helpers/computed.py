@@ -167,7 +167,9 @@ def adapted():
             ([], [], [(asked(0), asked(1)), posture], Pull(0.1, 0.2 * np.ones(7))),
             ([box], [asked(2, gain=0.01)], [asked(0, lm_damping=0.3), asked(1), asked(2, cost=0.0)],
              Pull(0.0, np.zeros(7))),
-            ([box], [asked(0), asked(2)], [posture], None),
+            ([box], [asked(0), asked(2)], [posture], None), ([], [], [asked(
+                0, frame="arm", compute_error=lambda _: np.ones(6),
+                compute_jacobian=lambda _: eye[:6])], None),
             ([box], [], [asked(0, lm_damping=0.3)], None), ([box], [], [SimpleNamespace()], None),
             ([box, ("Low", -eye[:1], np.array([-0.1]))], [], [posture], None),
             ([box], [], [asked(0, cost=[1.0, 2.0])], None), ([], [asked(0, gain=np.nan)], [], None),
@@ -244,7 +246,8 @@ def solved():
             found.append([step.v, step.status.name, repr(step), repr(step.memory)])
         reached = solve_ik(ROBOT, q, asked[:1], until=1e-6)
         found.append([reached.verdict, reached.met, reached.errors, reached.status.name,
-                      reached.starts, reached.met and reached.iterations])
+                      reached.starts, reached.iterations if reached.met else (
+                          reached.iterations >= reached.starts)])
     state = moving_state(5)
     stack = standing_stack(state, CONTACTS, (0.05, 0.0, 0.0), 0.8, 8)
     h = stack.hierarchy(state)

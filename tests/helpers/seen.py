@@ -28,6 +28,7 @@ import numpy as np
 import typer.main
 from computed import COMPUTED
 from matplotlib.colors import to_hex
+from matplotlib.ticker import ScalarFormatter
 from pinned import FOLDER, robot_facts
 
 from hierarchy import HierarchyError, Robot, jit, plugins, tasks
@@ -264,9 +265,9 @@ def _shown_on(text):
 
 
 def seen_of_problems():
-    """Of four problems of each family that is not simulated: the rows."""
+    """Of five problems of each family that is not simulated: the rows."""
     return {name: [[condensed([*h.rows, h.start()]), h.names]
-                   for h in family(name).half(5, 4).problems]
+                   for h in family(name).half(5, 5).problems]
             for name in FAMILIES if family(name).usual == COUNT and name not in OF_PACKAGES}
 
 
@@ -302,7 +303,9 @@ def figure_facts(fig):
                          else one.get_path().vertices)] for one in (*ax.patches, *ax.collections)],
              condensed([ax.axison, str(ax.get_aspect()), ax.get_xticks(), ax.get_yticks(), *(
                  one.get_major_formatter().format_ticks(one.get_majorticklocs())
-                 for one in (ax.xaxis, ax.yaxis) if one.get_scale() == "log"), [
+                 for one in (ax.xaxis, ax.yaxis)
+                 if not isinstance(one.get_major_formatter(), ScalarFormatter)), [
+                 one.get_visible() for one in ax.spines.values()], [
                  (one.get_clim(), one.get_extent(), one.cmap(np.linspace(0.0, 1.0, 9)),
                   np.ma.filled(one.get_array(), 0.0)) for one in ax.images]]),
              [text.get_text() for one in (*fig.legends, *filter(None, [ax.get_legend()]), fig)

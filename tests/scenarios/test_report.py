@@ -150,6 +150,7 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order(tmp_path):
     speeds = [ax.lines[0].get_ydata()[0] for ax in drawn["figure-4-joint-velocities"].axes]
     assert speeds == [2.0, 1.0]  # the velocity level is (a)
     assert "figure-4a-joint-velocities" in dict(letter.figures([runs[2]]))
+    assert "picture" in dict(letter.figures([recording(t=[0.0, 1.0])]))
     letter.write_all([recording(t=[0.0])], tmp_path)  # a run of one tick has no figure
 
 
