@@ -31,7 +31,7 @@ from matplotlib.colors import to_hex
 from matplotlib.ticker import ScalarFormatter
 from pinned import FOLDER, robot_facts
 
-from hierarchy import HierarchyError, Robot, jit, plugins, tasks
+from hierarchy import HierarchyError, Robot, Task, jit, plugins, tasks
 from scenarios import Scenario, load, load_run, shipped, simulate
 from scenarios import export as mcap
 from scenarios.cell.plants import physics, torque
@@ -111,9 +111,10 @@ def seen_of_keys():
             "looks": {label: [one.colour, str(one.dash)] for label, one in palette.looks([
                 *names(), "tpm-published", "tpm in-order", "own", "own slack", *(
                     f"hqp {of}" for of in (*palette._VARIANTS, "proxqp"))]).items()},
-            "tasks": {name: {one.name: str(one.default) for one in dataclasses.fields(kind)
-                             if one.default is not dataclasses.MISSING}
-                      for name, kind in vars(tasks).items() if dataclasses.is_dataclass(kind)},
+            "tasks": {name: {key: str(value) for key, value in vars(kind).items() if key[0] != "_"
+                             and isinstance(value, (bool, float, int, str, tuple, type(None)))}
+                      for name, kind in [*vars(tasks).items(), ("Task", Task)]
+                      if isinstance(kind, type)},
             "labels": [make("weighted", strict_levels=count).label for count in (-1, 0, 2)] + [
                 make("weighted", weights=(1.0, 0.5)).label],
             "signals": described().splitlines(),
