@@ -252,7 +252,8 @@ def solved():
     stack = standing_stack(state, CONTACTS, (0.05, 0.0, 0.0), 0.8, 8)
     h = stack.hierarchy(state)
     heavy = Stack([TASKS["posture"]], "velocity", metric=np.diag(1.0 + np.arange(7.0)))
-    return [*found, [*h.rows], make("hcod").solve(h).x, repr(state),
+    res = make("hcod").solve(h)
+    return [*found, [*h.rows], res.x, str(explain(h, res)), repr(state),
             heavy.hierarchy(state_at(q, q), ["posture"]).metric]
 
 
