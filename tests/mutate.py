@@ -9,12 +9,12 @@ value. Its module is replaced as it is imported, in the tests and in every progr
 the checkout is not touched, so kernels come from the cache. The tests are those that run the
 changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
 once, and again when tests have changed), or --tests. Processes that tests start count as theirs. A
-line that runs as its module is imported has the tests of its module. Of many tests those of SEEN
-and MOST others are taken: a case of each function first, those first that run few lines, FEW of
-which are asked before all others: four of five mutants end there. A mutant that survives meets the
-WHOLE files with the most of such tests: what a shared fixture runs counts only for the test that
-asked for it first. Prints every survivor with its line, and the share of
-survivors. A mutant whose tests take more CPU time than --limit at once counts as killed.
+line that runs as its module is imported has the tests of its module, or SEEN if no other line of
+it runs. Of many tests those of SEEN and MOST others are taken: a case of each function first, those
+first that run few lines, FEW of which are asked before all others: four of five mutants end there.
+A mutant that survives meets the WHOLE files with the most of such tests: what a shared fixture runs
+counts only for the test that asked for it first. Prints every survivor with its line, and the share
+of survivors. A mutant whose tests take more CPU time than --limit at once counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
 `strict=` of zip (a check that does not fire where shapes have been checked), what only a type
@@ -266,6 +266,8 @@ def tests_of(mutant: Mutant) -> list[tuple[str, ...]]:
     if "frozen=" in line:
         return [(*records, keys[0])]
     lines = lines_of(mutant.module)
+    if not lines[0]:
+        return [(SEEN,)]
     default = not lines.get(mutant.line)
     seen, order = Counter[str](), dict[str, tuple[int, int]]()
     for test in sorted(lines.get(mutant.line) or lines[0]):
@@ -330,8 +332,6 @@ def main() -> None:
     if not (MAP.exists() or options.tests):
         sys.exit(f"{MAP} is missing: python tests/mutate.py --map")
     every = [mutant for module in options.modules or modules() for mutant in mutants(module)]
-    if not options.tests:
-        every = [mutant for mutant in every if lines_of(mutant.module)[0]]
     sample = random.Random(options.seed).sample(every, min(options.count, len(every)))
     with tempfile.TemporaryDirectory() as folder:
         alive = _try(sample, options.tests, Runner(Path(folder), options.limit))

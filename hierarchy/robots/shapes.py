@@ -82,8 +82,6 @@ def _around(points: Array, axis: Array) -> Ends:
     cap = np.sqrt(np.maximum(radius**2 - off_axis**2, 0.0))  # how far a cap reaches there
     along = points @ axis
     low, high = float((along + cap).min()), float((along - cap).max())
-    if low > high:  # one ball is enough
-        low = high = (low + high) / 2
     origin = middle @ across
     return origin + low * axis, origin + high * axis, radius
 

@@ -12,27 +12,30 @@ import numpy as np
 from hand_made import recording
 from mechanisms import four_bar
 from rank_cases import CASES, boxed, build
-from scene import FRAME, PATH, ROBOT, TASKS, state_at, states
+from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, state_at, states
 from standing import CONTACTS, moving_state, opening, standing_stack, written
 from standing import ROBOT as HUMANOID
 
 import hierarchy
 import scenarios
 import solvers
-from hierarchy import Hierarchy, HierarchyError, State, paths, tasks
+from hierarchy import Hierarchy, HierarchyError, Stack, State, paths, tasks
+from hierarchy.avoidance import Barrier
 from hierarchy.tasks.joints.mechanism import Mechanism, model_rows
 from scenarios.measure.goals import goals
 from scenarios.measure.metrics import measure
-from solvers import Resolution, certify, make, solve_ik
+from solvers import Resolution, certify, explain, make, solve_ik
 from solvers.adapters.displacements import Packed, Pull
 from solvers.adapters.drop_in import answer
 from solvers.batch.stacked import Batch, solve
 from solvers.factorization import Factorization
-from solvers.problems import ANY, generate
+from solvers.problems import ANY, generate, structured
 from solvers.proof import prove
 from solvers.qp.programs import level_problem
 from solvers.resolvers.weighted import lexicographic_weights
 
+BARRED = {f"{count} barred": tasks.Separation(SENSOR.points, Barrier(0.05), count)
+          for count in (None, 3)}
 TIMES, POINTS = (0.5, 1.2, 2.0, 3.5), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2), (0.3, 0.5, 0.0),
                                        (0.1, 0.2, 0.4))
 PATHS = (paths.circle((0.1, 0.2, 0.3), 0.2, (0.2, -0.4, 1.0), 1.7, 0.4), PATH,
@@ -49,7 +52,7 @@ def rows():
     moving.t = 1.05  # a foot is coming down
     bent = State.at(bar, bar.integrate(bar.rest, 0.3 + 0.1 * np.arange(bar.n)), np.ones(bar.n))
     for level in ("velocity", "acceleration"):
-        for name, task in TASKS.items():
+        for name, task in (TASKS | BARRED).items():
             found[f"{name}, {level}"] = [
                 written(task, state, level, 7), task.error(state), task.jacobian(state),
                 task.jacobian_derivative(state), task.reference_velocity(state),
@@ -67,7 +70,7 @@ def rows():
             n = contacts.unknowns if task.of_forces else HUMANOID.n
             found[f"{task.name} of {len(contacts.names)}"] = [
                 written(task, moving, "torque" if task.of_forces else "acceleration", n),
-                getattr(task, "row_names", ())]
+                task.error(moving), getattr(task, "row_names", ())]
     return found
 
 
@@ -93,15 +96,17 @@ def certificates():
             x = res.x + off * np.sin(1.0 + np.arange(h.n))
             one = certify(h, x)
             off_by = dataclasses.asdict(one) if off else {}
-            found[f"{seed} {off}"] = [str(one), one.level, one.certified, one.optimal, off_by,
-                                      h.plain and Resolution(x, active=res.active).verified(h)]
+            found[f"{seed} {off}"] = [
+                repr(one), one._repr_html_(), one.level, one.certified, one.optimal, off_by,
+                h.plain and Resolution(x, active=res.active).verified(h)]
         if seed < 9:
             found[f"{seed}"] = [repr(h), h._repr_html_(), repr(res), res._repr_html_()]
-    for name in CASES:
-        h = boxed(build(name, True), -2.0, 1.5)
+    problems = {name: boxed(build(name, True), -2.0, 1.5) for name in CASES}
+    problems |= {f"turned {seed}": structured(seed) for seed in (211, 258, 285)}
+    for name, h in problems.items():
         if h.n < 8 and h.m:
             one = prove(h, [make("hcod").solve(h).x])
-            found[name] = dataclasses.asdict(one) | {"judged": one.judged}
+            found[name] = dataclasses.asdict(one) | {"judged": one.judged, "turned": one.turn > 0.0}
     return found
 
 
@@ -128,7 +133,7 @@ def derived():
         levels = [(A, b - 0.1, b + 0.2) for A, b, _ in h.levels()]
         h = Hierarchy.from_levels(levels, h.reference, give=[0.1 * i for i in range(len(levels))])
         res = make("hcod").solve(h)
-        found[f"{name} gives"] = [res.x, h.giving, *(
+        found[f"{name} gives"] = [res.x, h.giving, str(explain(h, res)), *(
             str(certify(h, x, witnesses=res.witnesses)) for x in (res.x, res.x + 0.01)), *(
             [*h.relaxed(level, res.x).rows] for level in range(len(levels)))]
         heavy = h.changed(metric=np.diag(1.0 + np.arange(h.n)))
@@ -162,7 +167,9 @@ def adapted():
             ([], [], [(asked(0), asked(1)), posture], Pull(0.1, 0.2 * np.ones(7))),
             ([box], [asked(2, gain=0.01)], [asked(0, lm_damping=0.3), asked(1), asked(2, cost=0.0)],
              Pull(0.0, np.zeros(7))),
-            ([box], [asked(0), asked(2)], [posture], None),
+            ([box], [asked(0), asked(2)], [posture], None), ([], [], [asked(
+                0, frame="arm", compute_error=lambda _: np.ones(6),
+                compute_jacobian=lambda _: eye[:6])], None),
             ([box], [], [asked(0, lm_damping=0.3)], None), ([box], [], [SimpleNamespace()], None),
             ([box, ("Low", -eye[:1], np.array([-0.1]))], [], [posture], None),
             ([box], [], [asked(0, cost=[1.0, 2.0])], None), ([], [asked(0, gain=np.nan)], [], None),
@@ -219,7 +226,8 @@ def edited():
         edit(*arguments)
         b = np.cos(np.arange(one.m))
         found.append([one.names, one.sizes, one.ranks, one.n, one.F, one.G, one.rows,
-                      one.solve(b).x, one.solve(b, np.ones(6)).x])
+                      one.coefficients @ one.basis.T, one.solve(b).x,
+                      one.solve(b, np.ones(6)).x])
     return found
 
 
@@ -235,19 +243,24 @@ def solved():
         for settings in ({}, {"limits": False}, {"resolver": "tpm", "damping": 0.0},
                          {"limits": tasks.JointLimits(ROBOT, 9.0, 0.01), "v": 0.1 * np.ones(7)}):
             step = solve_ik(ROBOT, q, asked, **settings)
-            found.append([step.v, step.status.name, repr(step)])
+            found.append([step.v, step.status.name, repr(step), repr(step.memory)])
         reached = solve_ik(ROBOT, q, asked[:1], until=1e-6)
         found.append([reached.verdict, reached.met, reached.errors, reached.status.name,
-                      reached.starts, reached.met and reached.iterations])
+                      reached.starts, reached.iterations if reached.met else (
+                          reached.iterations >= reached.starts)])
     state = moving_state(5)
     stack = standing_stack(state, CONTACTS, (0.05, 0.0, 0.0), 0.8, 8)
     h = stack.hierarchy(state)
-    return [*found, [*h.rows], make("hcod").solve(h).x]
+    heavy = Stack([TASKS["posture"]], "velocity", metric=np.diag(1.0 + np.arange(7.0)))
+    res = make("hcod").solve(h)
+    return [*found, [*h.rows], res.x, str(explain(h, res)), repr(state),
+            heavy.hierarchy(state_at(q, q), ["posture"]).metric]
 
 
 def measured():
     """Metrics and goals of runs whose signals come to each threshold and pass it."""
-    found, steps = {}, np.geomspace(1e-12, 1.0, 25)
+    found, steps = {"no tick": [goals(recording(t=[])), measure(recording(t=[]))]}, np.geomspace(
+        1e-12, 1.0, 25)
     along = np.outer(steps, np.eye(7)[2])
     for name, sign in itertools.product(("ellipse", "ellipse-hqp", "singular"), (1.0, -1.0)):
         near = 0.05 - sign * steps

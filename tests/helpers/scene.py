@@ -16,7 +16,7 @@ OBSTACLES = Obstacles([
     Obstacle("capsule", (-0.1, 0.4, -0.1), (0.02, 0.1))])
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # of an obstacle
 BODY, TIP = Repulsion(0.15, 0.15, 2.0, 3.0), Repulsion(5.0, 0.1, 10.0, 1.5)
-SENSOR = ExactDistances(ROBOT, OBSTACLES, BODY, TIP)
+SENSOR = ExactDistances(ROBOT, OBSTACLES, BODY, TIP, pairs=True)
 
 TASKS = {
     "position": tasks.Position(FRAME, PATH, repulsion_within=0.5),

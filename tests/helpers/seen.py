@@ -28,9 +28,10 @@ import numpy as np
 import typer.main
 from computed import COMPUTED
 from matplotlib.colors import to_hex
+from matplotlib.ticker import ScalarFormatter
 from pinned import FOLDER, robot_facts
 
-from hierarchy import HierarchyError, Robot, jit, tasks
+from hierarchy import HierarchyError, Robot, Task, jit, plugins, tasks
 from scenarios import Scenario, load, load_run, shipped, simulate
 from scenarios import export as mcap
 from scenarios.cell.plants import physics, torque
@@ -39,7 +40,7 @@ from scenarios.cli import doctor, runs
 from scenarios.cli.main import run_command
 from scenarios.config.distributions import Distribution
 from scenarios.draw import replay
-from scenarios.draw.figures import drawing, letter
+from scenarios.draw.figures import drawing, letter, palette
 from scenarios.draw.viewer import live, live_page
 from scenarios.loop import controller, faults
 from scenarios.measure import run_folder, safety
@@ -79,8 +80,10 @@ def seen_of_run(name):
     return {**_told(run), "figures": {key: figure_facts(fig) for key, fig in letter.figures([run])},
             "scene": condensed(dataclasses.asdict(scene(run, 30.0))),
             "exported": condensed([*mcap._entries(run, mcap.grouped(run))]),
-            "layout": condensed(mcap.layout(run)), "plot": figure_facts(run.plot()),
-            "shown": [repr(run), run._repr_html_()],
+            "layout": condensed(mcap.layout(run)),
+            "channels": {topic: {name: str(values.shape) for name, values in group.items()}
+                         for topic, group in mcap.grouped(run).items()},
+            "plot": figure_facts(run.plot()), "shown": [repr(run), run._repr_html_()],
             "columns": [[name, unit] for name, (unit, _) in run.columns().items()]}
 
 
@@ -104,10 +107,16 @@ def seen_of_keys():
     keys = Scenario.model_json_schema()["$defs"]
     return {"keys": {name: condensed(_undescribed(one)) for name, one in keys.items()},
             "resolvers": {name: repr(make(name)) for name in names()},
-            "tasks": {name: {one.name: str(one.default) for one in dataclasses.fields(kind)
-                             if one.default is not dataclasses.MISSING}
-                      for name, kind in vars(tasks).items() if dataclasses.is_dataclass(kind)},
-            "labels": [make("weighted", strict_levels=count).label for count in (-1, 0, 2)],
+            "of plugins": {group: [*plugins.own(group)] for group in plugins.GROUPS},
+            "looks": {label: [one.colour, str(one.dash)] for label, one in palette.looks([
+                *names(), "tpm-published", "tpm in-order", "own", "own slack", *(
+                    f"hqp {of}" for of in (*palette._VARIANTS, "proxqp"))]).items()},
+            "tasks": {name: {key: str(value) for key, value in vars(kind).items() if key[0] != "_"
+                             and isinstance(value, (bool, float, int, str, tuple, type(None)))}
+                      for name, kind in [*vars(tasks).items(), ("Task", Task)]
+                      if isinstance(kind, type)},
+            "labels": [make("weighted", strict_levels=count).label for count in (-1, 0, 2)] + [
+                make("weighted", weights=(1.0, 0.5)).label],
             "signals": described().splitlines(),
             "sampling": [str(Distribution(**given)) for given in (
                 {"uniform": [1, 2]}, {"normal": [1, 2]}, {"choice": [1, 2]}, {"integers": [1, 2]},
@@ -122,7 +131,8 @@ def seen_of_live_page(name, **changed):
         for what, value in (
                 ("resolver", "recursive"), ("pointing.alpha_d", 20.0), ("obstacle 0", [0, 0.5, 0]),
                 ("path", [0.02, 0.6, 0.05]), ("speed", 2.0), ("toggle", None), ("nothing", 1),
-                ("obstacle 9", [0, 0, 0]), ("speed", "fast"), ("avoidance.near", 0.3),
+                ("obstacle 9", [0, 0, 0]), ("obstacle -1", [0, 0, 0]),
+                ("obstacle 0", [9e9, 0, 0]), ("speed", "fast"), ("avoidance.near", 0.3),
                 ("avoidance.nearly", 0.3), ("obstacle 0", "up"), ("resolver", [1]),
                 ("resolver", "hcood"), ("speed", float("nan")), ("restart", None)):
             shown.answer({what: value})
@@ -138,7 +148,7 @@ def seen_of_answers():
     problems = [made(seed) for made in (generate, structured, equal, lambda seed: bounded(
         equal(seed), seed)) for seed in range(12)]
     found = {}
-    for name in sorted({*names()} - {"hqp"}):
+    for name in sorted({*names(), "smooth"} - {"hqp"}):
         for damping in (0.0, 0.05):
             resolver = make(name, damping=damping)
             for k, h in enumerate(problems):
@@ -256,9 +266,9 @@ def _shown_on(text):
 
 
 def seen_of_problems():
-    """Of two problems of each family that is not simulated: the rows."""
+    """Of five problems of each family that is not simulated: the rows."""
     return {name: [[condensed([*h.rows, h.start()]), h.names]
-                   for h in family(name).half(5, 2).problems]
+                   for h in family(name).half(5, 5).problems]
             for name in FAMILIES if family(name).usual == COUNT and name not in OF_PACKAGES}
 
 
@@ -292,7 +302,11 @@ def figure_facts(fig):
                  for colours in (one.get_facecolor(), one.get_edgecolor())),
                condensed([path.vertices for path in one.get_paths()] if hasattr(one, "get_paths")
                          else one.get_path().vertices)] for one in (*ax.patches, *ax.collections)],
-             condensed([ax.axison, str(ax.get_aspect()), ax.get_xticks(), ax.get_yticks(), [
+             condensed([ax.axison, str(ax.get_aspect()), ax.get_xticks(), ax.get_yticks(), *(
+                 one.get_major_formatter().format_ticks(one.get_majorticklocs())
+                 for one in (ax.xaxis, ax.yaxis)
+                 if not isinstance(one.get_major_formatter(), ScalarFormatter)), [
+                 one.get_visible() for one in ax.spines.values()], [
                  (one.get_clim(), one.get_extent(), one.cmap(np.linspace(0.0, 1.0, 9)),
                   np.ma.filled(one.get_array(), 0.0)) for one in ax.images]]),
              [text.get_text() for one in (*fig.legends, *filter(None, [ax.get_legend()]), fig)

@@ -233,6 +233,9 @@ def test_a_safe_stop_that_fails_in_the_watchdog_is_reported():
 def test_a_tick_without_a_command_stops_the_robot_and_sends_nothing(value, said):
     robot, clock = Robot(), Clock()
     log = Loop(PERIOD, clock=clock, sleep=clock.sleep).run(
+        lambda t: "go", lambda: None, PERIOD, lambda message: None)
+    assert log.ended == "all ticks were run", "a message of the robot's own is a command"
+    log = Loop(PERIOD, clock=clock, sleep=clock.sleep).run(
         lambda t: value if t >= 2 * PERIOD else robot.step(t), robot.stop, 5.0, robot.send)
     assert (len(robot.sent), robot.stops, log.count) == (2, 1, 2)
     assert said in log.ended

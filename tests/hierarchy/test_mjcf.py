@@ -63,6 +63,7 @@ KINDS = {
                                    f"{link('b')}</replicate>")),
     "two arms on a table": world(f'<body name="table" pos="0 0 1">{GEOM}{link("a")}{link("b")}'
                                  "</body>"),
+    "not quite XML": world(link("a") + "<!-- a -- b -->"),
     "a table first": world(TABLE + link("a")), "a target first": world(TARGET + link("a")),
     "a loose cube first": world(CUBE + link("a")), "a drone": world(CUBE),
     "a walker": world(WALKER + TABLE),

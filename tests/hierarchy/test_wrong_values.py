@@ -306,6 +306,10 @@ def limits(**settings):
     *((lambda off=off: check_rotation("R", np.eye(3) + off * np.eye(3, k=1)),
        f"is {off:g} from the identity, at most 1e-06 is allowed{mend}; got list")
       for off, mend in ((1e-5, ": write it with 8 digits"), (0.1, ""))),
+    (lambda: check_rotation("R", "turn"), "R: expected a rotation matrix (3, 3), got str 'turn'"),
+    (lambda: tasks.Along(HAND, ((1, 0, 0), (1,))), "'along': directions ((1, 0, 0), (1,)) are not"),
+    (lambda: Stack([tasks.Position(FRAME, THERE, gain=[[1.0], [1.0, 2.0]])]),
+     "gain = [[1.0], [1.0, 2.0]], expected a number >= 0"),
     (lambda: Robot.load("nowhere.SDF"), "does not exist"),
     (lambda: Robot.load("/"), "is a folder")])
 def test_a_wrong_value_is_refused_and_named(make, said):

@@ -169,8 +169,13 @@ def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(command):
     command("export a --plugin doors_of_mine")
 
 
-def test_a_scenario_with_own_kinds_is_copied_and_pickled():
+def test_a_scenario_with_own_kinds_is_copied_and_pickled(folder):
     plugins.allow("doors_of_mine")
+    before = plugins.fingerprint()
+    (folder / "beside.py").touch()
+    assert plugins.fingerprint() == before
+    (folder / "doors_of_mine.py").write_text(MODULE + "#")
+    assert plugins.fingerprint() != before
     scenario = load("own.toml")
     assert pickle.loads(pickle.dumps(scenario)) == copy.deepcopy(scenario) == scenario
     assert Scenario.from_toml(scenario.to_toml()) == scenario

@@ -45,8 +45,11 @@ def test_check_finds_an_answer_that_is_not_proved(command, tmp_path):
     file = export(family("integers"), 5, 2, True, tmp_path)
     found = read(file)
     found.answers[1].least[0] += 1.0
+    found.answers[0].x[0] += 1.0
     save(found, tmp_path)
-    assert "problem 1: level 1: least violation" in command("problems check", file, code=1).out
+    said = command("problems check", file, code=1).out
+    assert "problem 0: x[0] is " in said
+    assert "problem 1: level 1: least violation" in said
 
 
 def test_problems_as_others_make_them_are_what_their_makers_describe():

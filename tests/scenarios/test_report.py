@@ -14,7 +14,7 @@ from hierarchy.avoidance import Measurement, Obstacle
 from hierarchy.avoidance.measurement import measure_exactly
 from scenarios import load, save, simulate
 from scenarios.cell.sensors.sensor import packed_laws
-from scenarios.draw.figures import drawing, letter, palette, picture
+from scenarios.draw.figures import drawing, letter, picture
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
@@ -127,14 +127,6 @@ def test_a_page_in_a_browser_fits_its_window_and_has_no_complaints(tmp_path):
         assert tab.complaints == []
 
 
-def test_a_variant_has_the_colour_of_its_resolver_and_a_line_of_its_own():
-    looks = palette.looks(["tpm-published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"])
-    assert list(looks) == ["tpm-published", "tpm", "hqp osqp", "hqp daqp", "hqp proxqp"]
-    assert looks["tpm"] == (palette.COLOURS["tpm"], palette.SOLID)
-    assert looks["tpm-published"].colour == looks["tpm"].colour
-    assert (looks["hqp proxqp"].dash, len(set(looks.values()))) == (palette.SOLID, 5)
-
-
 def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, monkeypatch):
     run_folder = save(recording(), tmp_path / "run")
     for text in ("old", "new"):
@@ -157,6 +149,8 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order(tmp_path):
     assert headings == ["(a) ", "(b) ", "Body"]
     speeds = [ax.lines[0].get_ydata()[0] for ax in drawn["figure-4-joint-velocities"].axes]
     assert speeds == [2.0, 1.0]  # the velocity level is (a)
+    assert "figure-4a-joint-velocities" in dict(letter.figures([runs[2]]))
+    assert "picture" in dict(letter.figures([recording(t=[0.0, 1.0])]))
     letter.write_all([recording(t=[0.0])], tmp_path)  # a run of one tick has no figure
 
 

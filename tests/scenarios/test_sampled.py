@@ -61,6 +61,7 @@ def table(file):
     ("position.gain = { uniform = [2.0, 1.0] }", {}, "parameters.position.gain.uniform: "),
     ("position.gian = { uniform = [1.0, 2.0] }", {}, "unknown key 'position.gian'; did you"),
     ('control.resolver = { choice = ["hqp", "sns"] }', {}, "control.resolver is drawn, but the"),
+    ("limits.margin = { around = 0.1 }", {}, "limits.margin: scenario 'ellipse': [limits] is mi"),
     ("position.damping = { normal = [-9.0, 0.0] }", {}, "sample 0 of scenario 'ellipse'")])
 def test_a_wrong_file_is_refused_before_anything_is_run(parameters, changed, says, tmp_path,
                                                         command):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from scenarios import load, shipped, simulate
-from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import tick
@@ -16,30 +15,6 @@ pytest.importorskip("mujoco")
 STANDING = load("stand-push")
 SHORT = STANDING.with_changes({"control.duration": 0.02, "plant.pushes.0.at": 0.005,
                                "plant.pushes.0.duration": 0.01})
-
-
-def test_a_run_records_torques_plans_and_what_the_floor_does_and_has_their_metrics():
-    short = simulate(SHORT, certified=True)
-    assert (short.fault, short["certified"].all()) == (None, True)
-    robot, planned = build(SHORT).robot, ("planned_acceleration", "planned_force")
-    assert [short[one].shape for one in ("command", *planned)] == [(20, 30), (20, 36), (20, 8, 3)]
-    np.testing.assert_array_equal(short["torque_limit"], robot.effort_limit[6:])
-    weight = 9.81 * robot.masses.sum()
-    assert short["planned_force"][0, :, 2].sum() == pytest.approx(weight, rel=1e-6)
-    assert short["floor_force"][-1, :, 2].sum() == pytest.approx(weight, rel=0.3)
-    np.testing.assert_array_equal(np.flatnonzero(short["push"].any(axis=1)), np.arange(5, 15))
-    np.testing.assert_allclose(short["push"][5], [120.0, 0.0, 0.0])
-    found = measure(short)
-    assert found["slip_max"].value == short["slip"].max()
-    step = np.abs(np.diff(short["command"], axis=0)).max()
-    assert (found["torque_step_max"].value, found["torque_step_max"].unit) == (step, "N m")
-    assert found["torque_limit_share"].value == 0.0
-    assert 0.0 < found["pressure_margin_min"].value < 0.04
-    assert 0.0 < found["friction_margin_min"].value < 1.0
-    missed = short["level_violation"][:, short.task_names.index("posture")].mean()
-    assert found["miss_posture"].value == missed
-    assert found["miss_limits"].value < 1e-9
-    assert "command_step_max" not in found
 
 
 @pytest.mark.parametrize("resolver", ["hcod", "tpm"])

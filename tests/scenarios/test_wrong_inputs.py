@@ -165,13 +165,14 @@ def test_a_wrong_argument_is_refused_and_named(call, said):
     ("x = 0.001 s", 11, "without unit"), ("x = 1,5", 6, "a decimal point as ."),
     ('file = "C:\\models"', 13, "write / for each"), ("x = {a = 1,}", 12, "the comma before }"),
     ("q = [1,\nhcod]", 1, 'text in quotes: "hcod"'), ("q = [1,\nb = 2", 5, "close this ["),
-    ("a = 1\na = 2", 1, "leave out one"), ("[a]\n[a]", 1, "[[name]]")])
+    (f"x = '{80 * 'x'}' y", 61, "check the quotes"), ("a = 1\na = 2", 1, "leave out one"),
+    ("[a]\n[a]", 1, "[[name]]")])
 def test_a_slip_in_a_file_shows_line_caret_and_mend(line, caret, mend, tmp_path):
     file = tmp_path / "slip.toml"
     file.write_text(f"name = 'x'\n{line}\n", encoding="utf-8")
     head, shown, pointer, told = refused(mend, read_toml, file, "file", HierarchyError).splitlines()
     assert "slip.toml', line " in head
-    assert shown.strip() in line.splitlines()
+    assert any(shown.strip() in one for one in line.splitlines())
     assert pointer.index("^") == caret + 3
     assert mend in told
 

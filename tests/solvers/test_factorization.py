@@ -98,6 +98,7 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
 
 @pytest.mark.parametrize(("mistake", "text"), [
     (lambda f: f.swap("hand", "elbo"), "unknown level 'elbo'; did you mean 'elbow'"),
+    (lambda f: f.delete(2), "index 2 is outside 0 .. 1"),
     (lambda f: f.insert("hand", np.eye(3)), "2 levels are named 'hand'"),
     (lambda f: f.insert("foot", [[1, 2, 3], [0, np.nan, 0]]), "foot, row 1: A[1, 1] is nan"),
     (lambda f: f.solve({"hand": [1.0, 2.0]}), "elbow: no target given"),

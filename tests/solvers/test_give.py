@@ -62,7 +62,7 @@ def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, me
     assert (warm.active.shape, np.array_equal(*cold.witnesses)) == ((h.m,), met)
     short = make("hcod", max_iterations=1).solve(h)
     assert (short.status, short.memory) == (Status.ITERATION_LIMIT, None)
-    for memory in (np.zeros(0), np.full(7, np.nan), hcod.solve(h.changed(give=None)).memory):
+    for memory in (np.zeros(0), np.full(7, 9.0), hcod.solve(h.changed(give=None)).memory):
         np.testing.assert_allclose(hcod.solve(h, memory).x, cold.x, atol=1e-9)
 
 

@@ -78,10 +78,9 @@ def rewritten(path, compression=zipfile.ZIP_STORED, **content):
                 archive.writestr(name, value)
 
 
-def header(shape):
+def header(shape, write=np.lib.format.write_array_header_1_0):
     stream = io.BytesIO()
-    np.lib.format.write_array_header_1_0(
-        stream, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    write(stream, {"descr": "<f8", "fortran_order": False, "shape": shape})
     return stream.getvalue()
 
 
@@ -102,6 +101,7 @@ def small(tmp_path):
     ({"head": lambda head: head.replace(b'"seed": ', b'"seed": -0.')}, "seed is -0"),
     ({"head": lambda head: head.replace(b'"family"', b'"famile"')}, "family is missing"),
     ({"head": b"[]"}, 'does not say "format"'), ({"n": np.array([2, -1])}, "n = -1"),
+    ({"head": b"{"}, "head.json is not JSON"), ({"head": b"[" * 10**6}, "is nested too deep"),
     ({"head": None}, "not a file of problems: head.json is missing"),
     ({"head": lambda head: head.replace(b'"version": 1', b'"version": 9')},
      "version 9 of the format; known is 1"),
@@ -109,6 +109,7 @@ def small(tmp_path):
     ({"A": None}, "not a file of problems: A.npy is missing"),
     ({"A": lambda data: data[:-8] + b"\0\0\0\0\0\0\1\0"}, "SHA-256"),
     ({"A": header((10**15,))}, "A: its header says 8000000000000000 bytes, and 0 follow"),
+    ({"A": header((10**15,), np.lib.format.write_array_header_2_0)}, "A: its header says 8000000"),
     ({"upper": lambda data: data.replace(b"<f8", b"<f4")}, "expected one dimension"),
     ({"sizes": np.array([10**9, 1, 2, 1])}, "problem 0 needs 2000000002 more numbers"),
     ({"levels": np.array([3, 3]), "sizes": np.array([HUGE, HUGE, 5] * 2)}, "A is too short"),

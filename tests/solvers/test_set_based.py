@@ -77,6 +77,8 @@ def test_after_the_most_modes_everything_at_a_bound_is_frozen():
     short = SetBased(inner=make("recursive"), most=5).solve(h)
     np.testing.assert_allclose(short.x, np.zeros(6), atol=1e-12)
     assert short.iterations == 6
+    rounded = Hierarchy.from_levels([([[1.0]], [-INF], [0.0]), ([[1.0]], [1e-12])])
+    assert SET_BASED.solve(rounded).iterations == 1
 
 
 PERIOD = 0.1

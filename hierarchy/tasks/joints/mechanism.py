@@ -183,8 +183,6 @@ class Mechanism:
         With the inertia of `drives` (n,) [kg m^2 or kg] it is nearest in kinetic energy, as forces
         of constraint make it: they do no work.
         """
-        if not self:
-            return v
         J = self._rows(self._robot.normalised(q))[0]
         beside = J @ v
         if np.abs(beside).max() <= _EXACT:
