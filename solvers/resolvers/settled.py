@@ -146,8 +146,11 @@ class _Above:
         if not whole * np.linalg.norm(b) < np.inf:
             return asked
         free = A - (A @ self.held().T) @ self.held()
-        decided = _decided(A, free)
-        A, b = A - decided @ (decided.T @ A), b - decided @ (decided.T @ b)
+        U, values, directions = np.linalg.svd(free, full_matrices=len(A) > len(self.x))
+        rank = np.count_nonzero(values > _FAINT * whole)
+        if rank < len(A):
+            decided = _decided(A, U[:, rank:], _FAINT * whole)
+            A, b = A - decided @ (decided.T @ A), b - decided @ (decided.T @ b)
         size, out = float(np.linalg.norm(A)), float(np.linalg.norm(b - A @ self.x))
         alpha = half * size
         if not (_FAINT * whole < size and _LEAST * size * size < alpha * out < np.inf):
@@ -165,8 +168,8 @@ class _Above:
         step = float(np.linalg.norm(found.x - self.x))
         self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
         self.calmed, self.x = True, found.x
-        kept, rows = _directions(A, free), np.zeros_like(A)
-        rows[:len(kept)] = kept
+        rows = np.zeros_like(A)
+        rows[:rank] = directions[:rank]
         return rows, rows @ found.x, rows @ found.x
 
     def resolve(self, h: Hierarchy) -> Resolution:
@@ -224,15 +227,14 @@ def _directions(A: Array, free: Array) -> Array:
     return np.asarray(directions[values > _FAINT * np.linalg.norm(A)])
 
 
-def _decided(A: Array, free: Array) -> Array:
+def _decided(A: Array, rest: Array, least: float) -> Array:
     """Return the sums of rows (m, k), orthonormal, whose value the levels above alone decide.
 
-    They leave nothing of these, and joints do move them: what a level misses there is not its own.
+    These leave nothing of the sums `rest` of rows of A, and joints do move some of them: what a
+    level misses there is not its own.
     """
-    U, values, _ = np.linalg.svd(free)
-    rest = U[:, np.count_nonzero(values > _FAINT * np.linalg.norm(A)):]
-    moved, values, _ = np.linalg.svd(rest.T @ A)
-    return np.asarray(rest @ moved[:, :np.count_nonzero(values > _FAINT * np.linalg.norm(A))])
+    moved, values, _ = np.linalg.svd(rest.T @ A, full_matrices=False)
+    return np.asarray(rest @ moved[:, :np.count_nonzero(values > least)])
 
 
 def _search(probe: Callable[[float], _Reached], low: _Reached, alpha: float,
