@@ -59,8 +59,11 @@ def test_commands_compile_nothing(tmp_path):
 
 
 def test_no_kind_of_task_compiles_anything(tmp_path):
-    code = ("from hierarchy import Stack\nfrom scene import TASKS, state_at, states\n"
-            "for task in TASKS.values():\n"
+    code = ("from hierarchy import Stack\nfrom hierarchy.avoidance import Barrier\n"
+            "from hierarchy.tasks import SelfSeparation\n"
+            "from scene import ROBOT, TASKS, state_at, states\n"
+            "apart = SelfSeparation(ROBOT.capsules, Barrier(0.01))\n"
+            "for task in [*TASKS.values(), apart]:\n"
             "    for level in 'velocity', 'acceleration':\n"
             "        Stack([task], level).hierarchy(state_at(*states(1)[0]))")
     assert compiled(code, tmp_path, PYTHONPATH=f"{ROOT}:{ROOT / 'tests' / 'helpers'}") == []
