@@ -145,9 +145,15 @@ def _arrays(_: Path) -> None:
 
 
 def _others(folder: Path) -> None:
-    """Run the tasks of no shipped scenario, at both levels."""
+    """Run the tasks of no shipped scenario, at both levels, and measure how far links are apart."""
+    from hierarchy import Robot, State
+    from hierarchy.avoidance import Barrier
+    from hierarchy.tasks import SelfSeparation
+
     for level in ("velocity", "acceleration"):
         _run(str(_OTHERS), folder / level, "--set", f"control.level={level}")
+    robot = Robot.named("kuka_lwr")
+    SelfSeparation(robot.capsules, Barrier(0.01)).distances(State.at(robot, robot.rest))
 
 
 JOBS: dict[str, Callable[[Path], None]] = {

@@ -63,6 +63,7 @@ def test_no_kind_of_task_compiles_anything(tmp_path):
             "from hierarchy.tasks import SelfSeparation\n"
             "from scene import ROBOT, TASKS, state_at, states\n"
             "apart = SelfSeparation(ROBOT.capsules, Barrier(0.01))\n"
+            "apart.distances(state_at(*states(1)[0]))\n"
             "for task in [*TASKS.values(), apart]:\n"
             "    for level in 'velocity', 'acceleration':\n"
             "        Stack([task], level).hierarchy(state_at(*states(1)[0]))")
