@@ -23,7 +23,7 @@ from hierarchy.task import Level, Rows, Task, Writer, derivative
 
 Measure = tuple[Kernel, Any]  # the function, and what it reads; see `Measured.measure`
 _NONE, _EXACT, _DIFFERENCE = 0, 1, 2  # the derivative of the Jacobian
-FAINT = 1e-8  # norm of a row of a task over the largest, below the default rank_tolerance
+FAINT = 1e-8  # norm of a row of a task over its largest: the default rank_tolerance
 
 
 class Motion(NamedTuple):
