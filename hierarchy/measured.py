@@ -207,7 +207,6 @@ def plain(function: Kernel) -> Kernel:
     What it reads may be any objects.
     """
     return _copy_of_rows(function, _measure=function, clear=lambda *_: None,
-                         drop_faint=getattr(drop_faint, "py_func", drop_faint),
                          close=getattr(close, "py_func", close))
 
 
@@ -253,7 +252,7 @@ def clear(J, motion):
         motion.drift[i], motion.push[i] = 0.0, 0.0
 
 
-@inlined
+@compiled
 def drop_faint(J, square):
     """Write zeros in rows that are rounding beside the largest: what digits of a file leave.
 

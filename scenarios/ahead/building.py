@@ -131,6 +131,7 @@ def _read(page: str, _: Path) -> None:
 def _arrays(_: Path) -> None:
     """Solve hierarchies of plain arrays in the ways that no page shows."""
     from hierarchy import Hierarchy
+    from hierarchy.measured import drop_faint
     from solvers import make
     from solvers.batch import Batch, solve
     from solvers.resolvers.merged import Merged
@@ -142,6 +143,7 @@ def _arrays(_: Path) -> None:
     make("hcod", damping=0.05).solve(h).verified(h)
     make("hqp").solve(h.changed(give=np.array([1.0, 1.0, 0.0])))
     Merged().below_one_more(h)  # as of robots in which joints follow others
+    drop_faint(np.ones((3, 7))[:, :6], np.zeros(3))  # of a task without a kernel, beside forces
 
 
 def _others(folder: Path) -> None:
