@@ -63,10 +63,9 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = .
 
 
 @overload
-def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = ...,
-             limits: bool | Task = ..., resolver: str | Resolver = ...,
-             memory: Memory | None = ..., v: ArrayLike | None = ..., t: float = ...,
-             damping: float = ..., until: float) -> Reached: ...
+def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, limits: bool = ...,
+             resolver: str | Resolver = ..., t: float = ..., damping: float = ...,
+             until: float) -> Reached: ...
 
 
 def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0.01,
@@ -94,7 +93,8 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
         reach, which come to rest; 0 for none, above 1 for more than the curvature of the robot
         asks. Elsewhere it changes nothing; see `solvers.resolvers.settled`.
     until : if given, the configuration in which the errors are at most this is looked for instead
-        of a velocity, see `solvers.reaching.reach`; `limits` is then True or False.
+        of a velocity, see `solvers.reaching.reach`, without dt, memory and v; `limits` is then
+        True or False.
 
     Raises HierarchyError: q does not fit the robot, a task is none, dt is not positive or not the
     period of a task, a gain times dt is above 2 or a rate times dt above 1, or the resolver cannot
@@ -111,11 +111,13 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
         expect("solve_ik: resolver", resolver, Resolver, "give a name of solvers.names()")
     damping = number("solve_ik: damping", damping, 0.0)
     if until is not None:
-        if isinstance(limits, Task):
-            raise HierarchyError(f"solve_ik: with until, limits are True or False, not the task "
-                                 f"{limits.name!r}: a configuration has no speed")
-        return reach(robot, q, tasks, until, limits=limits, resolver=_resolver(resolver), t=t,
-                     damping=damping)
+        speeds = {"limits": limits if isinstance(limits, Task) else None, "memory": memory, "v": v}
+        for what, given in speeds.items():
+            if given is not None:
+                raise HierarchyError(f"solve_ik: {what}: not with until, got {brief(given)}: a "
+                                     "configuration has no speed")
+        return reach(robot, q, tasks, until, limits=limits is True, resolver=_resolver(resolver),
+                     t=t, damping=damping)
     before = _before(memory, v, limits)
     kept = _of_thread.kept
     asked = id(robot), *map(id, tasks), id(limits), id(resolver), dt, damping
