@@ -11,7 +11,8 @@ joint j may leave its speed by
 
     |x - x0| (|b0| / |b - A x| - 1) max_i |A_i| / |A_j|, b0 = b - A x0                       (b)
 
-with the columns A_i of what the levels above leave of A.
+with the columns A_i of what the levels above leave of A. At rest the rows above that act hold the
+whole pull A' (b - A x) of the residual: its row depends on theirs, and is left out.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ _FAINT = 1e-10    # of |A|: singular values up to it are rounding
 _CLOSE = 1e-8     # accuracy of alpha at which the search for mu ends
 _MOST = 20        # its steps; 4 in the mean, at most 8 seen
 _NONE = 1e-9      # of the largest column of A: a joint that a level does not use
+_AT_REST = 1e-5   # of the pull of a residual: what bounds and levels above do not hold of it
 _PACE = 1e-5      # [rad/s or m/s] by which levels below may always change the speed of a joint
 
 
@@ -168,8 +170,11 @@ class _Above:
         step = float(np.linalg.norm(found.x - self.x))
         self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
         self.calmed, self.x = True, found.x
-        rows = np.zeros_like(A)
-        rows[:rank] = directions[:rank]
+        rows, directions = np.zeros_like(A), directions[:rank]
+        if found.mu * step < _AT_REST * found.missed * size:
+            missed = (b - A @ found.x) / found.missed
+            directions = _directions(A, free - np.outer(missed, missed @ free))
+        rows[:len(directions)] = directions
         return rows, rows @ found.x, rows @ found.x
 
     def resolve(self, h: Hierarchy) -> Resolution:
