@@ -2,7 +2,7 @@
 
 import numba
 
-_KNOWN = "0.61 to 0.68"
+_KNOWN = "0.62 to 0.68"
 try:
     import llvmlite.binding as llvm
     from numba._dynfunc import make_function

@@ -4,6 +4,7 @@ numba links the code of all callees into a caller and optimises the whole again,
 """
 
 import gc
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -185,14 +186,16 @@ def linked(libraries: Iterable[Any], visible: set[str]) -> Any:
     return whole
 
 
-def merge(module: Any, name: str) -> None:
-    """Make one function of the one with this name and all that it calls in a module."""
-    for one in module.functions:
-        if not one.is_declaration and one.name != name:
-            one.add_function_attribute("alwaysinline")
+def merged(module: Any, name: str) -> Any:
+    """Return a module of one function: that of this name with all that it calls inside."""
+    # As text, since llvmlite below 0.50 puts the attribute on what the functions return.
+    inlined = re.sub(rf'^(define (?!.*@"?{name}"?\().*){{$', r"\1alwaysinline {", str(module),
+                     flags=re.MULTILINE)
+    module = llvm.parse_assembly(inlined)
     manager, builder = _passes()
     manager.run(module, builder)
     hide(module, {name})
+    return module
 
 
 def hide(module: Any, visible: set[str]) -> None:

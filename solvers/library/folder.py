@@ -130,12 +130,11 @@ def _fix(module: Any, sizes: Sequence[int]) -> None:
     from llvmlite import ir
 
     from hierarchy.jit.exporting import lowered
-    from hierarchy.jit.linking import merge
+    from hierarchy.jit.linking import merged
     from solvers.library.entries import OTHER, fixed
 
-    own, name = lowered({"th_fixed": fixed(*sizes)}), "th_solve_hcod"
-    merge(own, "th_fixed")
-    module.link_in(own)
+    name = "th_solve_hcod"
+    module.link_in(merged(lowered({"th_fixed": fixed(*sizes)}), "th_fixed"))
     module.get_function(name).name = "th_any"
     chosen, number = ir.Module("fixed"), ir.IntType(32)
     kind = ir.FunctionType(number, [ir.IntType(64)] * 6)

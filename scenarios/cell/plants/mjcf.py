@@ -96,8 +96,9 @@ def _stops(robot: Robot, q: Array) -> list[dict[str, ArrayLike]]:
     """Return the limits of each velocity (n); where q (nq,) is beyond one, its stop is there."""
     (lower, upper), at = robot.position_limits(), robot.vector(q)
     lower, upper = np.minimum(lower, at), np.maximum(upper, at)
-    # MuJoCo takes no range of one value, as of a joint whose file gives it no room.
-    ranges = np.array([lower, np.maximum(upper, np.nextafter(lower, np.inf))]).T
+    # MuJoCo takes no range of one value, as of a joint whose file gives it no room, nor subnormals.
+    least = np.maximum(np.nextafter(lower, np.inf), lower + 1e-300)
+    ranges = np.array([lower, np.maximum(upper, least)]).T
     return [{"limited": "true", "range": np.nan_to_num(range_, posinf=_FAR, neginf=-_FAR)}
             if np.isfinite(range_).any() else {} for range_ in ranges]
 
