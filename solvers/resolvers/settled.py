@@ -9,10 +9,11 @@ x0 being the x of the levels above: the minimum of |b - A x|^2 + mu |x - x0|^2 w
 is its new right-hand side. To second order the levels below disturb it although they keep A x:
 joint j may leave its speed by
 
-    |x - x0| (|b0| / |b - A x| - 1) max_i |A_i| / |A_j|, b0 = b - A x0                       (b)
+    (|x - x0| (|b0| / |b - A x| - 1) + p) max_i |A_i| / |A_j|, b0 = b - A x0                 (b)
 
-with the columns A_i of what the levels above leave of A. At rest the rows above that act hold the
-whole pull A' (b - A x) of the residual: its row depends on theirs, and is left out.
+with the columns A_i of what the levels above leave of A, and p a pace that is always allowed. At
+rest the rows above that act hold the whole pull A' (b - A x) of the residual: its row depends on
+theirs, and is left out.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ _FAINT = 1e-10    # of |A|: singular values up to it are rounding
 _CLOSE = 1e-8     # accuracy of alpha at which the search for mu ends
 _MOST = 20        # its steps; 4 in the mean, at most 8 seen
 _NONE = 1e-9      # of the largest column of A: a joint that a level does not use
-_AT_REST = 1e-5   # of the pull of a residual: what bounds and levels above do not hold of it
-_PACE = 1e-5      # [rad/s or m/s] by which levels below may always change the speed of a joint
+_AT_REST = 1e-4   # of the pull of a residual: what bounds and levels above do not hold of it
+_PACE = 1e-5      # [rad/s or m/s] p of (b)
 
 
 @final
@@ -172,6 +173,7 @@ class _Above:
         self.calmed, self.x = True, found.x
         rows, directions = np.zeros_like(A), directions[:rank]
         if found.mu * step < _AT_REST * found.missed * size:
+            self._later.append(directions)
             missed = (b - A @ found.x) / found.missed
             directions = _directions(A, free - np.outer(missed, missed @ free))
         rows[:len(directions)] = directions
@@ -189,7 +191,7 @@ class _Above:
         columns = np.linalg.norm(free, axis=0)
         room = np.full(len(x), np.inf)
         used = columns > _NONE * columns.max(initial=0.0)
-        room[used] = _PACE + most * columns.max() / columns[used]
+        room[used] = (_PACE + most) * columns.max() / columns[used]
         self.box = np.maximum(self.box[0], x - room), np.minimum(self.box[1], x + room)
 
     def _damped(self, A: Array, b: Array) -> Callable[[float], _Reached]:

@@ -114,7 +114,7 @@ def test_limits_of_the_robot_hold_whatever_is_asked():
     ([0.0, 0.1, 5.0], [], {"limits": False}),
     ([1.5, 0.0, 0.3], [Posture(tuple(Q), gain=2.0)], {"resolver": "tpm"})])
 def test_an_arm_that_cannot_reach_its_target_comes_to_rest_stretched(goal, below, settings):
-    q, v = follow([Position(FRAME, Still(goal)), *below], 300, **settings)
+    q, v = follow([Position(FRAME, Still(goal)), *below], 500, **settings)
     assert np.abs(np.diff(v[-100:], axis=0)).max() < 1e-3
     missed = np.linalg.norm(goal - State.at(ROBOT, q).position(FRAME))
     for near in q + np.random.default_rng(0).normal(scale=0.03, size=(50, 7)):
