@@ -31,12 +31,12 @@ from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.resolvers.merged import OneLevel
 from solvers.status import Status
 
-_LEAST = 1e-6     # of |A|^2: the least mu
+_LEAST = 1e-10    # of |A|^2: the least mu
 _FAINT = 1e-10    # of |A|: singular values up to it are rounding
 _CLOSE = 1e-8     # accuracy of alpha at which the search for mu ends
 _MOST = 20        # its steps; 4 in the mean, at most 8 seen
 _NONE = 1e-9      # of the largest column of A: a joint that a level does not use
-_AT_REST = 1e-4   # of the pull of a residual: what bounds and levels above do not hold of it
+_AT_REST = 1e-5   # of the pull of a residual: what rows above that act do not hold of it
 _PACE = 1e-5      # [rad/s or m/s] p of (b)
 
 
@@ -172,10 +172,11 @@ class _Above:
         self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
         self.calmed, self.x = True, found.x
         rows, directions = np.zeros_like(A), directions[:rank]
-        if found.mu * step < _AT_REST * found.missed * size:
+        missed = (b - A @ found.x) / found.missed
+        pull = missed @ free
+        if found.mu * step < _AT_REST * found.missed * np.linalg.norm(pull):
             self._later.append(directions)
-            missed = (b - A @ found.x) / found.missed
-            directions = _directions(A, free - np.outer(missed, missed @ free))
+            directions = _directions(A, free - np.outer(missed, pull))
         rows[:len(directions)] = directions
         return rows, rows @ found.x, rows @ found.x
 

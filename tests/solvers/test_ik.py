@@ -121,6 +121,18 @@ def test_an_arm_that_cannot_reach_its_target_comes_to_rest_stretched(goal, below
         assert np.linalg.norm(goal - State.at(ROBOT, near).position(FRAME)) > missed - 1e-6
 
 
+@pytest.mark.parametrize("bend", [1e-3, 1e-4])
+def test_no_demand_moves_a_nearly_stretched_arm_faster_than_its_curvature_allows(bend):
+    """Demands below 1 mm/s were met in full: at 6 rad/s for 0.1 mm/s."""
+    q = np.array([0.0, 0.5, 0.0, bend, 0.0, bend, 0.0])
+    at = State.at(ROBOT, q).position(FRAME)
+    out, sigma, _ = np.linalg.svd(Position(FRAME, Still(at)).jacobian(State.at(ROBOT, q)))
+    for demand in np.geomspace(1e-7, 0.1, 7):
+        hand = Position(FRAME, Still(at + demand * out[:, 2]), gain=1.0)
+        v = solve_ik(ROBOT, q, [hand], limits=False).v
+        assert np.linalg.norm(v) <= 1.01 * sigma[2] / (0.005 * np.linalg.norm(sigma))
+
+
 @pytest.mark.parametrize("goal", [[0.3, 0.5, 0.1], [0.5, 0.3, 0.3]])
 def test_joints_that_are_held_below_the_hand_come_to_rest_where_they_must_move(goal):
     """What the hand leaves of their rows is singular where the arm beyond them is stretched: every
