@@ -183,6 +183,7 @@ class _Search:
 
     def _missed(self, task: Task) -> float:
         error = self._read[task.name]()
+        task.refuse(not np.isfinite(error).all(), f"its error is not finite: {error}")
         return float(np.linalg.norm(np.maximum(error, 0.0) if task.kind == "inequality"
                                     else error))
 
