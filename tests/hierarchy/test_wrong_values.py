@@ -299,6 +299,8 @@ def limits(**settings):
                           ({"J": NAN * np.eye(2, 7)}, "task 'given', row 0: A[0, 0] is nan"),
                           ({"wrong": "a"}, "'given': error is not an array of numbers"),
                           ({"rate": [0.0]}, "'given': desired_velocity has shape (1,)"))),
+    (lambda: Stack([type("Plain", (Given,), {"kind": "Equality", "__init__": lambda _: None})()],
+                   "velocity").hierarchy(STATE), "task 'given': kind"),
     *((lambda given=given: Kernel(given).error(STATE), f"'kernel': measure returned {said}")
       for given, said in ((abs, "builtin"), ((abs, ()), "tuple"), (None, "NoneType"))),
     (lambda: Activation(None, (), {"wall": 0.0}), "task 'wall': buffer = 0: expected"),
