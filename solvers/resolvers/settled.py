@@ -270,7 +270,8 @@ def _less(new: float, old: float) -> float:
 def _without_pace(found: Resolution, n: int, level: bool) -> Resolution:
     """Return a resolution without its first n rows, which are a level of their own or not."""
     if not isinstance(found, ActiveSetResolution):
-        return Resolution(found.x, found.status, found.iterations)
+        active = None if found.active is None else found.active[n:]
+        return Resolution(found.x, found.status, found.iterations, active=active)
     parts = found.memory[:-3].reshape(3, -1)[:, n:].copy()
     parts[1] -= level & (parts[1] >= 0.0)
     last = found.memory[-3:] - [0.0, 0.0, level and found.memory[-1] > 0.0]  # unfinished
