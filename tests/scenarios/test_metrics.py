@@ -149,7 +149,9 @@ def test_frozen_returned_and_jerk_are_counted(spans, frozen, returned):
 
 @pytest.mark.parametrize(("yields", "said"), [
     (lambda *_: [1 / 0], "ZeroDivisionError: division by zero"),
-    (lambda *_: [3], "expected a Metric")])
+    (lambda *_: [3], "expected a Metric"),
+    (lambda *_: [Metric("a", "A", np.nan, "")], "'a': value = nan: expected a finite number"),
+    (lambda *_: [Metric("a", "A", 1.0, None)], "'a': unit: expected a str")])
 def test_a_metric_of_a_plug_in_that_fails_is_left_out_and_said(monkeypatch, yields, said):
     usual = measure(recording())
     monkeypatch.setitem(plugins._registered["metrics"], "mine", yields)
