@@ -92,8 +92,7 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
     t : time [s], for tasks that follow a path.
     damping : of tasks where they cannot be met in time, near singularities and for targets out of
         reach, which come to rest; 0 for none, above 1 for more than the curvature of the robot
-        asks. Elsewhere it changes nothing, unless a joint turns far for little motion, such as a
-        motor before a gear: give 0. See `solvers.resolvers.settled`.
+        asks. Elsewhere it changes nothing; see `solvers.resolvers.settled`.
     until : if given, the configuration in which the errors are at most this is looked for instead
         of a velocity, see `solvers.reaching.reach`; `limits` is then True or False.
 

@@ -14,7 +14,7 @@ from hierarchy.stack import Stack
 from hierarchy.state import State
 from hierarchy.task import Task, curved, parts
 from hierarchy.tasks.joints.joint_limits import StepLimits
-from hierarchy.tasks.joints.mechanism import Mechanism, above, model_rows
+from hierarchy.tasks.joints.mechanism import Mechanism, above, bends, model_rows
 from hierarchy.words import listed
 from solvers.explain import nowhere
 from solvers.resolver import Resolver
@@ -96,7 +96,7 @@ def stacked(robot: Robot, tasks: Sequence[Task], period: float, limits: Sequence
     tasks = [task.on(robot) for task in tasks]
     return Stack([*first, *tasks], "velocity"), Settled(
         inner=resolver, period=period, softness=damping,
-        curved=curved(tasks, robot.n - robot.actuated))
+        curved=curved(tasks, robot.n - robot.actuated), geared=not bends(robot))
 
 
 class _Search:

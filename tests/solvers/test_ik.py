@@ -321,6 +321,21 @@ def test_torques_that_cannot_hold_the_weight_stay_within_limits_and_the_knees_ar
     assert "torque limits left_knee at its" in said
 
 
+def test_an_arm_with_a_motor_before_a_gear_moves_as_one_without(tmp_path):
+    """By the speed of the motor it was damped to a hundredth of its own."""
+    arm = (*map(link, "abc"), joint("only", "revolute", "a", "b"),
+           joint("end", "fixed", "b", "c", "", "", placed("0.5 0 0")))
+    turns = LIMIT.replace("1", "1e3") + '<mimic joint="only" multiplier="100"/>'
+    speeds = []
+    for parts in ((), (link("m"), joint("motor", "revolute", "a", "m", turns))):
+        (tmp_path / "r.urdf").write_text(urdf(*arm, *parts))
+        robot = Robot.load(tmp_path / "r.urdf", "c")
+        task = Position(robot.frame("c"), Still([0.4, 0.0, -0.3]))
+        step = solve_ik(robot, robot.rest, [task], limits=False)
+        speeds.append(step.v[robot.velocity_names.index("only")])
+    assert speeds[1] == pytest.approx(speeds[0], rel=1e-3)
+
+
 @pytest.mark.parametrize(("multiplier", "offset", "most"), [(1.0, 0.5, 0.5), (-1.0, 0.0, 0.0)])
 def test_what_is_unreachable_is_missed_within_limits_and_couplings(tmp_path, multiplier, offset,
                                                                    most):

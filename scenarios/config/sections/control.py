@@ -70,8 +70,8 @@ class ControlSection(keys.Section):
     """Settings of the resolver. A table with a resolver's name, such as `[control.options.tpm]`, is
     for that resolver only; plain settings override it."""
     damping: keys.NotNegative = 1.0
-    """Damping, at velocity level, of tasks near singularities, out of reach or behind large gears;
-    0 for none. A resolver's is in `options`."""
+    """Damping, at velocity level, of tasks that cannot be met, near singularities and out of reach.
+    A resolver's damping is in `options`."""
     metric: Literal["identity", "mass"] = "identity"
     """Metric of the distance to the null-space term: "identity", or "mass", the inertia M(q)."""
     policy: PolicySection = PolicySection()  #: The command in a tick with a problem.
