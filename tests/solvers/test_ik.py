@@ -26,6 +26,7 @@ from hierarchy.tasks import (
     Posture,
     RelativePose,
     Together,
+    model_rows,
 )
 from solvers import Status, certify, explain, make, solve_ik
 from solvers.ik import _of_thread
@@ -334,6 +335,7 @@ def test_an_arm_with_a_motor_before_a_gear_moves_as_one_without(tmp_path):
         step = solve_ik(robot, robot.rest, [task], limits=False)
         speeds.append(step.v[robot.velocity_names.index("only")])
     assert speeds[1] == pytest.approx(speeds[0], rel=1e-3)
+    assert model_rows(robot)[0].straight  # as scenarios ask, whose stack has these rows
 
 
 @pytest.mark.parametrize(("multiplier", "offset", "most"), [(1.0, 0.5, 0.5), (-1.0, 0.0, 0.0)])
