@@ -123,7 +123,7 @@ class Limits:
 
 def _refuse(bad: NDArray[np.bool_], why: str, *values: Array) -> None:
     for (i,) in np.argwhere(bad)[:1]:
-        raise HierarchyError(f"limits, joint {i}: {why}, got "
+        raise HierarchyError(f"limits[{i}]: {why}, got "
                              + ", ".join(str(value[i]) for value in values))
 
 

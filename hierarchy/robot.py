@@ -145,6 +145,11 @@ class Robot:
             self.effort_limit[:6] = np.inf
             self.limit_base(*BASE_SPEED)
         self.parts = parts_of(model)
+        for part in self.parts:
+            if part.size > 1:  # of a cosine, a sine or an entry of a quaternion
+                for limits, none in (self.lower, -np.inf), (self.upper, np.inf):
+                    own = limits[part.q:part.q + part.size]
+                    own[np.abs(own) == _UNIT] = none
         self.coordinates = np.array([part.q for part in self.parts
                                      for _ in range(part.velocities)])
         inertias = list(model.inertias)
@@ -366,21 +371,17 @@ class Robot:
         They are infinite for a continuous joint, whose coordinates are a cosine and a sine. Raises
         RobotError if another joint with more coordinates than velocities has a limit.
         """
-        lower, upper = self.lower[self.coordinates], self.upper[self.coordinates]
-        for name, of, moved in self._unbounded:
-            limits = np.abs([self.lower[of], self.upper[of]])
-            if (np.isfinite(limits) & (limits != _UNIT)).any():
+        for name, of, velocities in self._several:
+            if np.isfinite([self.lower[of], self.upper[of]]).any():
                 raise RobotError(f"robot {self.name!r}: joint {name!r} has {of.stop - of.start} "
-                                 f"coordinates for {moved.stop - moved.start} velocities; limits "
+                                 f"coordinates for {velocities} velocities; limits "
                                  "of its positions are not supported")
-            lower[moved], upper[moved] = -np.inf, np.inf
-        return lower, upper
+        return self.lower[self.coordinates], self.upper[self.coordinates]
 
     @cached_property
-    def _unbounded(self) -> list[tuple[str, slice, slice]]:
-        """The joints with more coordinates than velocities, with their spans in q and v."""
-        return [(name, slice(joint.idx_q, joint.idx_q + joint.nq),
-                 slice(joint.idx_v, joint.idx_v + joint.nv))
+    def _several(self) -> list[tuple[str, slice, int]]:
+        """The joints with more coordinates than velocities: their span in q, and how many."""
+        return [(name, slice(joint.idx_q, joint.idx_q + joint.nq), joint.nv)
                 for name, joint in zip(self.joint_names, self.model.joints[1:], strict=True)
                 if joint.nq != joint.nv]
 

@@ -78,15 +78,15 @@ class Rows(NamedTuple):
 class Task(ABC):
     """m rows over the joints: J v = dp/dt, or J a + dJ/dt v = d2p/dt2. Abstract.
 
-    A new task needs `dimension` (m), `error`, `jacobian` and `jacobian_derivative`. The closed
-    loop is, with the error e = p_d - p (equations (7), (12) and reference [19] of the letter):
+    A new task needs `name`, `dimension` (m), `error`, `jacobian` and `jacobian_derivative`. The
+    closed loop is, with the error e = p_d - p (equations (7), (12) and [19] of the letter):
 
     - velocity level: dp/dt = dp_d/dt + gain e
     - acceleration level: d2p/dt2 = d2p_d/dt2 + damping (dp_d/dt - J v) + stiffness e
 
     With `kind` "equality" the rows require this value, with "inequality" at least this value (for
-    an upper bound, write rows of opposite sign). `name` is used in stacks and messages;
-    stiffness [1/s^2], damping [1/s] and gain [1/s] are the gains.
+    an upper bound, write rows of opposite sign). The gains stiffness [1/s^2], damping [1/s] and
+    gain [1/s] are 0 unless given; a stack reads those of shipped tasks once.
 
     A task with `of_forces` has rows over accelerations and contact forces, see `ForceTask`; all
     others have rows over the joints, and serve in a stack at level "torque" unchanged.
@@ -334,6 +334,7 @@ def in_turn(*functions: Writer) -> Writer:
 
 def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Writer:
     """Return the writer of a task; at level "torque" one of the joints writes their columns."""
+    check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
     check_gains(task, rows.lower.size)
     if level == "torque" and not task.of_forces:
         level, rows = "acceleration", rows._replace(A=rows.A[:, :state.n])

@@ -147,16 +147,20 @@ def held_back_by(h: Hierarchy, resolution: ActiveSetResolution, k: int,
                  rows: Sequence[str]) -> list[str]:
     """Return what holds level k back: rows at a side, by their names, and levels.
 
-    A row that is at its side for another level above stands for that level.
+    A row that is at its side for another level above stands for that level, and an equality for its
+    own, but among inequalities, such as a limit of a joint that is stuck, for itself.
     """
     said, levels = [], set[int]()
     for i in holders(h, resolution, k).tolist():
         level, held = _level_of(h, i), int(resolution.holds_back[i])
-        if held != k:
-            levels.add(level if resolution.active[i] == EQUAL else held)
+        equal = bool(resolution.active[i] == EQUAL)
+        among = slice(h.offsets[level], h.offsets[level + 1])
+        if held != k and not (equal and (h.lower[among] < h.upper[among]).any()):
+            levels.add(level if equal else held)
             continue
         row = f"{h.names[level]} {rows[i]}" if h.sizes[level] > 1 else h.names[level]
-        side = f" at its {'upper' if resolution.active[i] > 0 else 'lower'} side"
+        side = " (fixed)" if equal else (
+            f" at its {'upper' if resolution.active[i] > 0 else 'lower'} side")
         gives = h.give is not None and h.give[i] > 0.0
         said.append(row + (" (gives no more)" if gives else side))
     return said + [h.names[level] for level in sorted(levels)]

@@ -14,7 +14,7 @@ from hierarchy.stack import Stack
 from hierarchy.state import State
 from hierarchy.task import Task, curved, parts
 from hierarchy.tasks.joints.joint_limits import StepLimits
-from hierarchy.tasks.joints.mechanism import Mechanism, above, model_rows
+from hierarchy.tasks.joints.mechanism import Mechanism, above, bends, model_rows
 from hierarchy.words import listed
 from solvers.explain import nowhere
 from solvers.resolver import Resolver
@@ -27,6 +27,7 @@ _STEP = 0.3       # [rad or m] the largest change of a joint in one iteration
 _STILL = 1e-3     # relative decrease of the errors in `_PATIENCE` iterations that goes on
 _AT_REST = 1e-9   # the same at the end
 _PATIENCE = 10
+_MOVING = 1e-4    # [rad or m] step with which the end is not reached, whatever the errors do
 _AT = 1e-6        # [rad or m] from a limit that counts as on it
 _WIDE = np.pi     # [rad or m] range around q from which a joint without limits starts again
 
@@ -95,7 +96,7 @@ def stacked(robot: Robot, tasks: Sequence[Task], period: float, limits: Sequence
     tasks = [task.on(robot) for task in tasks]
     return Stack([*first, *tasks], "velocity"), Settled(
         inner=resolver, period=period, softness=damping,
-        curved=curved(tasks, robot.n - robot.actuated))
+        curved=curved(tasks, robot.n - robot.actuated), geared=not bends(robot))
 
 
 class _Search:
@@ -139,21 +140,23 @@ class _Search:
         A step takes tasks that are met off by its square. Steps that `shrink` by this factor each
         let them recover, who else keep the answer where they were met to begin with.
         """
-        best, memory, history = ([np.inf], q), None, list[float]()
+        best, memory, history, moved = ([np.inf], q), None, list[float](), 0.0
         for k in range(_MOST):
             errors = self._errors(q)
             if errors < best[0]:
                 best = errors, q
             history.append(sum(errors))
             done = max(errors) <= self.until
-            if done or (k >= _PATIENCE and min(history[-_PATIENCE:])
+            if done or (k >= _PATIENCE and (shrink == 1.0 or moved < _MOVING)
+                        and min(history[-_PATIENCE:])
                         > (1.0 - still) * min(history[:-_PATIENCE])):
                 return (errors, q, k) if done else (*best, k)
             found = resolver.solve(self._rows(), memory)
             self.status, memory = found.status, found.memory
-            step = found.x * _PERIOD
+            step, longest = found.x * _PERIOD, _STEP * shrink**k
+            moved = min(longest, abs(step).max())
             q = self.mechanism.closed(self.robot.integrate(
-                q, step * min(1.0, _STEP * shrink**k / max(abs(step).max(), 1e-300))))
+                q, step * min(1.0, longest / max(abs(step).max(), 1e-300))))
         return (*best, _MOST)
 
     def _rows(self) -> Hierarchy:
@@ -183,6 +186,7 @@ class _Search:
 
     def _missed(self, task: Task) -> float:
         error = self._read[task.name]()
+        task.refuse(not np.isfinite(error).all(), f"its error is not finite: {error}")
         return float(np.linalg.norm(np.maximum(error, 0.0) if task.kind == "inequality"
                                     else error))
 

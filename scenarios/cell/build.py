@@ -17,6 +17,7 @@ from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
 from hierarchy.task import curved
 from hierarchy.tasks import Pointing, Separation
+from hierarchy.tasks.joints.mechanism import bends
 from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.tasks.together import TangentCone
 from scenarios.cell.plants import Plant
@@ -169,7 +170,7 @@ def stack_resolver(scenario: Scenario, cell: Cell) -> Resolver:
     if activation is None:  # where x is a velocity, tasks out of reach come to rest
         tasks = [stack[name].on(robot) for name in stack.names]
         return Settled(inner=resolver, period=control.period, softness=control.damping,
-                       curved=curved(tasks, robot.n - robot.actuated))
+                       curved=curved(tasks, robot.n - robot.actuated), geared=not bends(robot))
     if not isinstance(resolver, Smooth):
         raise ScenarioError('control.stack = "smooth" needs control.resolver = "smooth", got '
                             f'"{resolver.name}"')

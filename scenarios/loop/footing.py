@@ -61,7 +61,8 @@ def _unsupported(controller: Controller) -> Iterator[str]:
     cell = controller.cell
     state, robot = cell.state, cell.robot
     closed = [one for one in cell.contacts.contacts if one.load(0.0) > 0.0] if cell.contacts else []
-    if robot.base == "fixed" or any(_LEVEL > one.axes[2, 2] for one in closed):
+    weightless = not np.any(robot.model.gravity.linear)
+    if robot.base == "fixed" or weightless or any(_LEVEL > one.axes[2, 2] for one in closed):
         return
     points = [state.position(one.frame) + np.array(one.points) @ state.rotation(one.frame).T
               for one in closed]

@@ -2,23 +2,28 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hierarchy import plugins
+from hierarchy.errors import expect, number
 from hierarchy.problem import Array
+from hierarchy.records import check_fields
 from scenarios.recording.recording import Recording
 
 # Display units by SI unit: how many of them make one, what it is called, decimals.
-_SHOWN = {"m": (1e3, "mm", 3), "s": (1e6, "µs", 2), "deg": (1.0, "°", 3), "share": (100.0, "%", 2),
+_SHOWN = {"m": (1e3, "mm", 3), "s": (1.0, "s", 3), "deg": (1.0, "°", 3), "share": (100.0, "%", 2),
           "rad": (1.0, "rad", 3), "rad/s": (1.0, "rad/s", 3), "rad/s^2": (1.0, "rad/s²", 2),
           "rad/s^3": (1.0, "rad/s³", 0),
           "N": (1.0, "N", 1), "N m": (1.0, "N m", 2), "N s": (1.0, "N s", 3),
           "N m s": (1.0, "N m s", 3),
           "rows": (1.0, "", 3), "": (1.0, "", 0)}  # "rows": in the units of a level's rows
 
+_COMPUTING = 1e6, "µs", 2  # display unit of a time of the group "Computing"
 NOTHING = 1e-9  # SI units: what differs by less differs by rounding
+_text = partial(expect, kind=str, remedy="give a text")
 
 
 @dataclass(frozen=True)
@@ -27,7 +32,7 @@ class Metric:
 
     `value` is in the SI `unit` ("" for a count, "share" of 1, "deg"), and None when the run has
     no such thing. `lower_is_better` is None where neither direction is. A `detail` is left out of
-    tables that must be short.
+    tables that must be short. Raises HierarchyError for a value that is not finite.
     """
 
     name: str
@@ -39,15 +44,23 @@ class Metric:
     note: str = ""
     detail: bool = False
 
+    def __post_init__(self) -> None:
+        check_fields(self, f"metric {self.name!r}", {float: number, str: _text})
+
+    @property
+    def _display(self) -> tuple[float, str, int]:
+        times = self.group == "Computing" and self.unit == "s"
+        return _COMPUTING if times else _display(self.unit)
+
     @property
     def shown_unit(self) -> str:
         """The unit in which tables show the value."""
-        return _display(self.unit)[1]
+        return self._display[1]
 
     @property
     def scale(self) -> float:
         """How many of `shown_unit` make one SI unit."""
-        return _display(self.unit)[0]
+        return self._display[0]
 
     def shown(self) -> str:
         """Return the value for a table: in `shown_unit`, without the unit.
@@ -56,7 +69,7 @@ class Metric:
         """
         if self.value is None:
             return "–"
-        scale, _, decimals = _display(self.unit)
+        scale, _, decimals = self._display
         value = self.value * scale
         if not decimals and 0.01 <= abs(value) < 10.0:  # the median of counts
             return f"{value:.2g}"

@@ -58,8 +58,9 @@ class Verdict:
 
 def verdict(recording: Recording, label: str = "") -> Verdict:
     """Return what a run came to."""
-    return Verdict(label, recording.seconds, recording.scenario.control.lasts, recording.fault,
-                   recording.facts.robot.base == "floating", goals(recording),
+    scenario, base = recording.scenario, recording.facts.robot.base
+    return Verdict(label, recording.seconds, scenario.control.lasts, recording.fault,
+                   base == "floating" and bool(scenario.contacts), goals(recording),
                    len({event.tick for event in recording.events}))
 
 

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.met import plainly_met
@@ -36,6 +37,7 @@ _FAINT = 1e-10    # of |A|: singular values up to it are rounding
 _CLOSE = 1e-8     # accuracy of alpha at which the search for mu ends
 _MOST = 20        # its steps; 4 in the mean, at most 8 seen
 _NONE = 1e-9      # of the largest column of A: a joint that a level does not use
+_TURNING = 1e-3   # weight in |x - x0| of a joint that bends nothing, such as a motor before a gear
 _AT_REST = 1e-5   # of the pull of a residual: what rows above that act do not hold of it
 _PACE = 1e-5      # [rad/s or m/s] p of (b)
 
@@ -49,6 +51,8 @@ class Settled(Around):
     softness : factor of the estimate of the curvature; 0 leaves every level as it is.
     curved : names of levels of equalities whose rows, or what levels above leave of them, change
         with the configuration.
+    geared : whether joints that only other equalities use, such as motors before gears, bend
+        nothing; not beside closed chains.
 
     Theory: the module's docstring.
     """
@@ -56,6 +60,7 @@ class Settled(Around):
     period: float = number(open_below=True)
     softness: float = number(1.0)
     curved: frozenset[str] = frozenset()
+    geared: bool = False
     name: ClassVar[str] = "settled"
     handles: ClassVar[Handles] = "inequalities"
 
@@ -84,6 +89,10 @@ class Settled(Around):
             return None
         above = _Above(self.inner, h)
         for k, (A, lower, upper) in enumerate(h.levels()):
+            if least[k] > 0.0:
+                above.bending |= _used(A)
+            elif self.geared and (lower == upper).all():
+                above.turning |= _used(A)
             calm = least[k] > 0.0 and len(lower) and (lower == upper).all()
             if calm:
                 A, lower, upper = above.calm(A, lower, half)
@@ -110,6 +119,7 @@ class _Above:
 
     def __init__(self, inner: Resolver, h: Hierarchy) -> None:
         n = h.n
+        self.bending, self.turning = np.zeros((2, n), dtype=bool)  # joints of curved levels, others
         self.strict = self.inner = inner
         if isinstance(inner, OneLevel):
             self.strict, self.inner = inner.strictly(), inner.below_one_more(h)
@@ -168,7 +178,7 @@ class _Above:
         if met:
             self.x = first.x
             return asked
-        step = float(np.linalg.norm(found.x - self.x))
+        step = float(np.linalg.norm(self._counted() * (found.x - self.x)))
         self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
         self.calmed, self.x = True, found.x
         rows, directions = np.zeros_like(A), directions[:rank]
@@ -189,11 +199,14 @@ class _Above:
 
     def _pace(self, free: Array, x: Array, most: float) -> None:
         """Let levels below change the speeds x by (b) and no more."""
-        columns = np.linalg.norm(free, axis=0)
+        columns, used = np.linalg.norm(free, axis=0), _used(free)
         room = np.full(len(x), np.inf)
-        used = columns > _NONE * columns.max(initial=0.0)
         room[used] = (_PACE + most) * columns.max() / columns[used]
         self.box = np.maximum(self.box[0], x - room), np.minimum(self.box[1], x + room)
+
+    def _counted(self) -> Array:
+        """Return the weight (n,) of each joint in |x - x0|."""
+        return np.where(self.turning & ~self.bending, _TURNING, 1.0)
 
     def _damped(self, A: Array, b: Array) -> Callable[[float], _Reached]:
         """Return, by mu, the x within the levels above of least |A x - b|^2 + mu |x - x0|^2."""
@@ -202,11 +215,11 @@ class _Above:
         h = self.stacked([*self.levels, (np.vstack([A, np.eye(n)]), side, side)],
                           np.zeros_like(x0))
         rows, lower, upper, _ = h.rows
-        weights, memory = rows[-n:].reshape(-1)[::n + 1], None
+        weights, counted, memory = rows[-n:].reshape(-1)[::n + 1], self._counted(), None
 
         def probe(mu: float) -> _Reached:
             nonlocal memory
-            weights[:] = np.sqrt(mu)
+            weights[:] = np.sqrt(mu) * counted
             lower[-n:] = upper[-n:] = weights * x0
             found = self.strict.solve(h, memory)
             memory = found.memory
@@ -227,6 +240,12 @@ class _Above:
         sizes = np.array([len(lower) for _, lower, _ in levels], dtype=np.int64)
         A, lower, upper = (np.concatenate(parts) for parts in zip(*levels, strict=True))
         return Hierarchy.trusted(A, lower, upper, sizes, reference, names)
+
+
+def _used(A: Array) -> NDArray[np.bool_]:
+    """Return which joints A moves (n,)."""
+    columns = np.linalg.norm(A, axis=0)
+    return np.asarray(columns > _NONE * columns.max(initial=0.0))
 
 
 def _directions(A: Array, free: Array) -> Array:
@@ -278,7 +297,8 @@ def _less(new: float, old: float) -> float:
 def _without_pace(found: Resolution, n: int, level: bool) -> Resolution:
     """Return a resolution without its first n rows, which are a level of their own or not."""
     if not isinstance(found, ActiveSetResolution):
-        return Resolution(found.x, found.status, found.iterations)
+        active = None if found.active is None else found.active[n:]
+        return Resolution(found.x, found.status, found.iterations, active=active)
     parts = found.memory[:-3].reshape(3, -1)[:, n:].copy()
     parts[1] -= level & (parts[1] >= 0.0)
     last = found.memory[-3:] - [0.0, 0.0, level and found.memory[-1] > 0.0]  # unfinished

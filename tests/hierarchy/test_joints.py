@@ -52,6 +52,11 @@ def test_values_of_joints_are_set_and_read_by_name():
     np.testing.assert_allclose(ROBOT.configuration(ROBOT.vector(q)), q, atol=1e-15)
 
 
+def test_no_joint_is_limited_where_the_model_limits_none():
+    """pinocchio limits cosines to 1.01: a run said "joint limits, in 1: kept" of a free wrist."""
+    assert np.isinf([ROBOT.lower, ROBOT.upper]).all()
+
+
 @pytest.mark.parametrize(("values", "said"), [
     ({"neck": (0, 0, 0, 2)}, "joint 'neck': its quaternion (x, y, z, w)"),
     ({"wheel": (1.0, 1.0)}, "joint 'wheel': its (cos, sin) [1.0, 1.0] has length 1.414"),

@@ -23,6 +23,7 @@ from hierarchy.loop import Loop
 from hierarchy.measured import Measured
 from hierarchy.paths import Blended, Jittered, Shifted, Still, circle, read_bvh
 from hierarchy.robot import Frame
+from hierarchy.tasks.joints.joint_limits import StepLimits
 
 NAN, INF = float("nan"), float("inf")
 A, B = np.eye(2), np.ones(2)
@@ -94,6 +95,12 @@ def ramping(carried):
     state = State.at(HUMANOID, HUMANOID.rest, t=0.9)
     state.carried = carried
     return tasks.Friction(opening()).rows(state)
+
+
+def slow(speed):
+    robot = Robot.named("kuka_lwr")
+    robot.velocity_limit[0] = speed
+    return robot
 
 
 def limits(**settings):
@@ -232,11 +239,11 @@ def limits(**settings):
     (lambda: tasks.CentreOfMass(ROBOT, THERE, (0, 3)), "must be some of 0, 1, 2"),
     (lambda: tasks.JointCoupling(ROBOT, {"joint_1": 0.0}), "no factor other than zero"),
     (lambda: tasks.Manipulability(FRAME, -0.1), "least = -0.1"),
-    (lambda: limits(acceleration=0.0), "joint 0: acceleration must be positive and finite, got 0"),
+    (lambda: limits(acceleration=0.0), "limits[0]: acceleration must be positive and finite, got"),
     (lambda: limits(acceleration=[1.0, 2.0]), "has shape (2,), expected a number or (7,)"),
     (lambda: limits(margin=2.2), "margin 2.2 leaves joint_2 no room between -2.094 and 2.094"),
-    (lambda: Limits([0], [NAN], [1], [1], 1e-3), "joint 0: no position lies between lower and upp"),
-    (lambda: Limits([0], [1], [0], [1], 1e-3), "joint 0: velocity must be positive, got 0.0"),
+    (lambda: Limits([0], [NAN], [1], [1], 1e-3), "limits[0]: no position lies between lower and u"),
+    (lambda: Limits([0], [1], [0], [1], 1e-3), "limits[0]: velocity must be positive, got 0.0"),
     (lambda: Stack([tasks.TorqueLimits(ROBOT)], "velocity").hierarchy(STATE),
      "'torque limits': its rows are for the level acceleration or torque, not 'velocity'"),
     *((lambda fraction=fraction: tasks.TorqueLimits(ROBOT, fraction),
@@ -299,6 +306,8 @@ def limits(**settings):
                           ({"J": NAN * np.eye(2, 7)}, "task 'given', row 0: A[0, 0] is nan"),
                           ({"wrong": "a"}, "'given': error is not an array of numbers"),
                           ({"rate": [0.0]}, "'given': desired_velocity has shape (1,)"))),
+    (lambda: Stack([type("Plain", (Given,), {"kind": "Equality", "__init__": lambda _: None})()],
+                   "velocity").hierarchy(STATE), "task 'given': kind"),
     *((lambda given=given: Kernel(given).error(STATE), f"'kernel': measure returned {said}")
       for given, said in ((abs, "builtin"), ((abs, ()), "tuple"), (None, "NoneType"))),
     (lambda: Activation(None, (), {"wall": 0.0}), "task 'wall': buffer = 0: expected"),
@@ -310,6 +319,8 @@ def limits(**settings):
     (lambda: tasks.Along(HAND, ((1, 0, 0), (1,))), "'along': directions ((1, 0, 0), (1,)) are not"),
     (lambda: Stack([tasks.Position(FRAME, THERE, gain=[[1.0], [1.0, 2.0]])]),
      "gain = [[1.0], [1.0, 2.0]], expected a number >= 0"),
+    *((lambda wrong=wrong: StepLimits(slow(wrong), 0.01), f"velocity_limit[0] is {wrong:g}")
+      for wrong in (-1.0, NAN)),
     (lambda: Robot.load("nowhere.SDF"), "does not exist"),
     (lambda: Robot.load("/"), "is a folder")])
 def test_a_wrong_value_is_refused_and_named(make, said):

@@ -58,6 +58,12 @@ def test_what_may_make_a_run_fall_or_prove_nothing_is_said(case):
     assert words in " ".join(said(scenario, change or (lambda robot: None)))
 
 
+def test_without_gravity_nothing_has_to_stand():
+    scenario = load("stand-push").with_changes({"contacts": [LEFT]})
+    assert "stand" not in " ".join(said(
+        scenario, lambda robot: setattr(robot.model.gravity, "linear", np.zeros(3))))
+
+
 def a_biped(folder):
     """Keys of a scenario with two legs of five joints, bent."""
     file = folder / "biped.xml"

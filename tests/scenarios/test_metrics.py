@@ -62,7 +62,7 @@ def test_a_signal_has_its_largest_value_step_or_count(name, signals, value):
 
 @pytest.mark.parametrize(("value", "unit", "shown"), [
     *((12.3456789, unit, shown) for unit, shown in (
-        ("m", "12346"), ("s", "1.2e+07"), ("deg", "12.346"), ("share", "1235"), ("rad", "12.346"),
+        ("m", "12346"), ("s", "12.346"), ("deg", "12.346"), ("share", "1235"), ("rad", "12.346"),
         ("rad/s", "12.346"), ("rad/s^2", "12.35"), ("rad/s^3", "12"), ("N", "12.3"), ("", "12"))),
     (0.0123, "rad", "0.012"), (0.00649, "rad", "0.0065"), (0.0004, "rad", "4.0e-04"),
     (0.0, "", "0"), (0.25, "", "0.25"), (1.5, "", "1.5"), (3.0, "", "3"), (12.5, "", "12"),
@@ -149,7 +149,9 @@ def test_frozen_returned_and_jerk_are_counted(spans, frozen, returned):
 
 @pytest.mark.parametrize(("yields", "said"), [
     (lambda *_: [1 / 0], "ZeroDivisionError: division by zero"),
-    (lambda *_: [3], "expected a Metric")])
+    (lambda *_: [3], "expected a Metric"),
+    (lambda *_: [Metric("a", "A", np.nan, "")], "'a': value = nan: expected a finite number"),
+    (lambda *_: [Metric("a", "A", 1.0, None)], "'a': unit: expected a str")])
 def test_a_metric_of_a_plug_in_that_fails_is_left_out_and_said(monkeypatch, yields, said):
     usual = measure(recording())
     monkeypatch.setitem(plugins._registered["metrics"], "mine", yields)

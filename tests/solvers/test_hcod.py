@@ -95,6 +95,10 @@ EXPLAINED = {
     "a box": ([(np.eye(2), [-1.0] * 2, [1.0] * 2), ([[1.0, 0.5]], [3.0])],
               ["level 1 is met.", "level 2 is missed by 1.5: held back by level 1 row 0 at its "
                "upper side and row 1 at its upper side."]),
+    "a box in which a thruster is stuck": (
+        [(np.eye(2), [-1.0, 0.5], [1.0, 0.5]), ([[1.0, 0.5]], [3.0])],
+        ["level 1 is met.", "level 2 is missed by 1.75: held back by level 1 row 0 at its upper "
+         "side and row 1 (fixed)."]),
     "equalities, and rows that disagree": (
         [([[1.0, 0.0]], [1.0]), ([[1.0, 0.0]], [2.0]), (np.zeros((0, 2)), []),
          ([[0.0, 1.0], [0.0, 1.0]], [0.0, 1.0])],

@@ -26,6 +26,7 @@ from hierarchy.tasks import (
     Posture,
     RelativePose,
     Together,
+    model_rows,
 )
 from solvers import Status, certify, explain, make, solve_ik
 from solvers.ik import _of_thread
@@ -246,6 +247,28 @@ def test_joints_that_do_not_help_stay_though_a_target_is_out_of_reach():
     np.testing.assert_allclose(found.q[:3], Q[:3], atol=1e-9)
 
 
+class InBall(Task):
+    """A hand within 0.1 m of a point."""
+
+    name, dimension, kind, gain, centre = "in ball", 1, "inequality", 5.0, np.array([0.4, 0.2, 0.4])
+
+    def error(self, state):
+        return np.array([np.sum((state.position(FRAME) - self.centre)**2) - 0.01])
+
+    def jacobian(self, state):
+        to_hand = state.position(FRAME) - self.centre
+        return -2.0 * to_hand[None] @ Position(FRAME, Still([0.0] * 3)).jacobian(state)
+
+    jacobian_derivative = jacobian
+
+
+def test_beyond_a_curved_bound_the_nearest_point_on_it_is_found():
+    """Whole steps overshot by the bound's curvature, and ended 22 mm beside it."""
+    found = solve_ik(ROBOT, Q, [InBall(), Position(FRAME, Still([0.7, 0.2, 0.4]))], until=1e-6)
+    assert found.errors["position"] == pytest.approx(0.2, abs=1e-4)
+    assert found.verdict.endswith("held back by in ball")
+
+
 def test_what_holds_a_target_out_of_reach_back_is_said():
     found = solve_ik(ROBOT, Q, [Position(FRAME, Still([0.0, 0.0, 3.0]))], until=1e-6)
     assert not found.met
@@ -258,6 +281,9 @@ def test_what_holds_a_target_out_of_reach_back_is_said():
              Position(FRAME, Still(here)), Position(FRAME, Still(here + 0.1), name="other")]
     assert "other is missed by 0.173, held back by position" in solve_ik(
         ROBOT, Q, tasks, until=1e-6).verdict
+    here[0] = np.nan  # it raised StopIteration
+    with pytest.raises(HierarchyError, match=r"task 'position': its error is not finite: \[nan"):
+        solve_ik(ROBOT, Q, tasks[1:2], until=1e-6)
 
 
 CONTACTS = feet()
@@ -313,6 +339,22 @@ def test_torques_that_cannot_hold_the_weight_stay_within_limits_and_the_knees_ar
     said = explain(h, res, rows=stack.row_names()).splitlines()[2]
     assert said.startswith("centre of mass is missed by")
     assert "torque limits left_knee at its" in said
+
+
+def test_an_arm_with_a_motor_before_a_gear_moves_as_one_without(tmp_path):
+    """By the speed of the motor it was damped to a hundredth of its own."""
+    arm = (*map(link, "abc"), joint("only", "revolute", "a", "b"),
+           joint("end", "fixed", "b", "c", "", "", placed("0.5 0 0")))
+    turns = LIMIT.replace("1", "1e3") + '<mimic joint="only" multiplier="100"/>'
+    speeds = []
+    for parts in ((), (link("m"), joint("motor", "revolute", "a", "m", turns))):
+        (tmp_path / "r.urdf").write_text(urdf(*arm, *parts))
+        robot = Robot.load(tmp_path / "r.urdf", "c")
+        task = Position(robot.frame("c"), Still([0.4, 0.0, -0.3]))
+        step = solve_ik(robot, robot.rest, [task], limits=False)
+        speeds.append(step.v[robot.velocity_names.index("only")])
+    assert speeds[1] == pytest.approx(speeds[0], rel=1e-3)
+    assert model_rows(robot)[0].straight  # as scenarios ask, whose stack has these rows
 
 
 @pytest.mark.parametrize(("multiplier", "offset", "most"), [(1.0, 0.5, 0.5), (-1.0, 0.0, 0.0)])

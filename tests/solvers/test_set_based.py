@@ -159,6 +159,8 @@ def test_a_merged_level_out_of_reach_keeps_its_memory_and_strict_levels_stay_str
         assert h.violations(found.x)[:2].max() < 1e-9
         y = np.clip(y + 0.1 * np.clip(b - A @ found.x, -1.0, 1.0), -1.0, 1.0)
         np.testing.assert_allclose(found.memory[:h.m], [*np.zeros(7), *y, *np.zeros(6)])
+        sides = 1 * (found.x > 0.4 - 1e-9) - (found.x < 0.1 + 1e-9)
+        np.testing.assert_array_equal(found.active[1:7], sides)
         memory = found.memory
     assert make("merged").solve(h, memory).status is found.status is Status.SOLVED
 

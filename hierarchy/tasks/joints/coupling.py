@@ -111,6 +111,11 @@ class FollowedJoints(_Coupling):
         set_frozen(self, terms=_terms(self.robot, len(self.coupled), terms))
 
     @property
+    def straight(self) -> bool:  # type: ignore[override]
+        """Whether no coupling is a polynomial that is no line."""
+        return all(len(one.coefficients) <= 2 for one in self.coupled)
+
+    @property
     def row_names(self) -> tuple[str, ...]:
         """The couplings."""
         return tuple(str(one) for one in self.coupled)

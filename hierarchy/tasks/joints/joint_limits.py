@@ -188,6 +188,9 @@ class StepLimits(JointRows):
         number(f"task {self.name!r}: gain [1/s]", gain, 0.0, 1.0 / self.period)
         set_frozen(self, gain=gain)
         super().__post_init__()
+        fastest = self.robot.velocity_limit
+        for (i,) in np.argwhere(~(fastest >= 0.0))[:1]:
+            self.refuse(True, f"velocity_limit[{i}] is {fastest[i]:g}, expected a number >= 0")
 
     def box(self, state: State) -> tuple[Array, Array]:
         """Least and largest velocity of each joint (n,), (n,) [rad/s or m/s]."""
