@@ -59,6 +59,16 @@ def test_slices_of_a_budget_end_with_the_answer_of_one_solve(kind, seed, budget)
     np.testing.assert_allclose(res.x, HCOD.solve(h).x, atol=1e-9)
 
 
+def test_the_rounding_of_a_heavy_row_is_not_held_against_a_light_one():
+    """The last row is met; its residual of 2e-16 times 1024 alone pulls the second unknown."""
+    A = [[96.0, 0.0], [3 / 256, 0.0], [384.0, 0.0], [2048.0, -1024.0]]
+    lower, upper = [-64.0, -np.inf, 128.0, -3072.0], [0.0, -1 / 256, 128.0, -3072.0]
+    h = Hierarchy.from_levels([(A, lower, upper)])
+    res = HCOD.solve(h)
+    assert res.status is Status.SOLVED
+    assert res.verified(h)
+
+
 @pytest.mark.parametrize("seed", [5, 9])
 def test_the_levels_are_passed_from_a_memory_that_violates_nothing(seed):
     """Some 40 rows act, of which two leave; from nothing it takes 58 and 86 steps."""
