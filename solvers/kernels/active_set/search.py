@@ -42,8 +42,16 @@ from solvers.kernels.active_set.working_set import (
 )
 from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import View, assign, fill
-from solvers.kernels.tolerances import MET, RECURRENCES, RESTORED, SHADOW, VIOLATED
-from solvers.status import FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
+from solvers.kernels.tolerances import (
+    EPSILON,
+    MET,
+    NEGLIGIBLE,
+    RECURRENCES,
+    RESTORED,
+    SHADOW,
+    VIOLATED,
+)
+from solvers.status import EQUAL, FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
 LEAVES = 5    # change of a row that acts; else the side at which it is to act, or 0
 SLICE = 1.0 / 128.0  # added to the level for each search that ended in it
@@ -190,6 +198,8 @@ def pivot_one_by_one(s, current, saved, limit, level):
         found = judge(s, last, newest)
         if not np.isfinite(length_of(s.x)):
             return NUMERICAL_FAILURE, tries, last - 1.0
+        if found.wrong > 0:
+            _drop_rounding(s)
         if found.wrong > 0 and slices >= SLICED:
             _change_first(s)
         elif found.leaving > 0 and fresh:
@@ -244,6 +254,20 @@ def _next_level(s, last):
     while last < levels and s.index[FIRST, last] == s.index[FIRST, last - 1]:
         last += 1
     return last
+
+
+@inlined
+def _drop_rounding(s):
+    """Make violations zero that decide no sign: else rounding begins the series of a row."""
+    reach = length_of(s.x) + SHADOW * s.scalar[SIZE]
+    for k in range(s.multiplier.shape[0] - 1):
+        most, mu = 0.0, s.multiplier[k]
+        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
+            most = max(most, abs(mu[i]))
+        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
+            if (s.index[STATE, i] != EQUAL
+                    and abs(mu[i]) <= NEGLIGIBLE * most + EPSILON * s.number[NORM, i] * reach):
+                mu[i] = 0.0
 
 
 @inlined
