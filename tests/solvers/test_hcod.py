@@ -10,7 +10,7 @@ from refusals import refused
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, explain, make
 from solvers.explain import holders, is_missed
-from solvers.problems import structured
+from solvers.problems import generate, structured
 from solvers.status import EQUAL
 
 HCOD = make("hcod")
@@ -46,15 +46,32 @@ def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
     assert make("hcod", max_iterations=1).solve(apart).unfinished == 0
 
 
-@pytest.mark.parametrize(("kind", "seed"), [
-    ("tiny_rows", 1), ("tiny_rows", 138), ("contacts", 7), ("sixty_unknowns", 2)])
-def test_slices_of_a_budget_end_with_the_answer_of_one_solve(kind, seed):
-    h, five, slices = structured(460_000_000 + seed, (kind,)), make("hcod", max_iterations=5), 1
-    res = five.solve(h)
-    while res.status is Status.ITERATION_LIMIT and slices < 60:
-        res, slices = five.solve(h, res.memory), slices + 1
+@pytest.mark.parametrize(("kind", "seed", "budget"), [
+    ("tiny_rows", 1, 5), ("tiny_rows", 138, 5), ("contacts", 7, 5), ("sixty_unknowns", 2, 5),
+    ("sixty_unknowns", 6, 1), ("opposed", 10, 3), ("opposed", 40, 5)])
+def test_slices_of_a_budget_end_with_the_answer_of_one_solve(kind, seed, budget):
+    """One iteration is less than a step; `opposed` has sides that cancel, up to rounding."""
+    h, part = structured(460_000_000 + seed, (kind,)), make("hcod", max_iterations=budget)
+    res, slices = part.solve(h), 1
+    while res.status is Status.ITERATION_LIMIT and slices < 400:
+        res, slices = part.solve(h, res.memory), slices + 1
     assert (res.status, slices > 1) == (Status.SOLVED, True)
     np.testing.assert_allclose(res.x, HCOD.solve(h).x, atol=1e-9)
+
+
+def test_the_rounding_of_a_heavy_row_is_not_held_against_a_light_one():
+    """The last row is met; its residual of 2e-16 times 1024 alone pulls the second unknown."""
+    A = [[96.0, 0.0], [3 / 256, 0.0], [384.0, 0.0], [2048.0, -1024.0]]
+    lower, upper = [-64.0, -np.inf, 128.0, -3072.0], [0.0, -1 / 256, 128.0, -3072.0]
+    h = Hierarchy.from_levels([(A, lower, upper)])
+    res = HCOD.solve(h)
+    assert res.status is Status.SOLVED
+    assert res.verified(h)
+
+
+def test_rounding_does_not_begin_the_series_that_the_search_compares():
+    """Rows that are met in a level that others miss: their residuals of 1e-17 were compared."""
+    assert HCOD.solve(generate(961_000_691)).status is Status.SOLVED
 
 
 @pytest.mark.parametrize("seed", [5, 9])

@@ -201,14 +201,14 @@ def answer(s, record, settings, work):
     saved, at = vector(work, at, n)
     most, code, steps, blocks = np.int64(settings[MOST]), UNPROVED, 0, 0
     limit = min(most, SOLVE_STEPS * max(m, 1))
-    warm, level = record[3 * m] + record[3 * m + 1] > 0.0, -1
+    warm, level = record[3 * m] + record[3 * m + 1] > 0.0, -1.0
     s.count[FINISHED], s.count[SOUND] = 0, 0
     if warm:
         level = _resumed_at(record[3 * m + 2], levels)
-    if warm and level < 0:
+    if warm and level < 0.0:
         code, blocks = pivot_in_blocks(s, limit, 0)
         steps = blocks
-    for seeded in range(s.count[SOUND] if level < 0 else -1, -1, -1):
+    for seeded in range(s.count[SOUND] if level < 0.0 else -1, -1, -1):
         if code in (UNPROVED, INACCURATE) and steps < limit:
             code, level, more = _pass(s, saved, settings, 1.0, seeded == 1, limit - steps,
                                       work[at:])
@@ -257,7 +257,7 @@ def _pass(s, saved, settings, share, seeded, most, work):
     s.scalar[RANK] = declared
     save(s, saved, s.multiplier.shape[0] - 1 if code == SOLVED else level)
     code = INACCURATE if code == SOLVED and not verify(s, False) else code
-    return code, level, t.count[STEPS]
+    return code, 0.0 + level, t.count[STEPS]
 
 
 @internal
@@ -269,7 +269,7 @@ def _second_pass(s, current, saved, settings, most, level, work):
     """
     assign(current[0], s.index[STATE])
     code, blocks = pivot_in_blocks(s, 1, 0)
-    if code == SOLVED or level >= 0 or blocks >= most:
+    if code == SOLVED or level >= 0.0 or blocks >= most:
         return code, level, 0, blocks
     code, level, steps = _pass(s, saved, settings, INDEPENDENT, s.count[SOUND] == 1, most - blocks,
                                work)
@@ -337,7 +337,7 @@ def _solve_with_light_rows(s, current, saved, limit):
     code, tries = pivot_in_blocks(s, limit, PATIENCE)
     if code != SOLVED and tries < limit:
         restore(s)
-        code, steps, _ = pivot_one_by_one(s, current, saved, limit - tries, 0)
+        code, steps, _ = pivot_one_by_one(s, current, saved, limit - tries, 0.0)
     if code == SOLVED and length_of(s.x) <= largest:
         return code, tries, steps
     assign(s.x, saved)
@@ -392,7 +392,7 @@ def _resume(s, level):
     """Return where a later solve resumes, see `_resumed_at`."""
     last = s.multiplier.shape[0] - 2
     if s.count[FINISHED] == 0:
-        return -2.0 - (level if level > 0 else 0)
+        return -2.0 - max(level, 0.0)
     return 0.0 + (s.count[FINISHED] if s.count[FINISHED] < last else last)
 
 
@@ -400,7 +400,7 @@ def _resume(s, level):
 def _resumed_at(number, levels):
     """Return the level at which an earlier search ended, -1 for none."""
     at = -2.0 - number if number <= -2.0 else number
-    return np.int64(at) if 0.0 <= at < levels else -1
+    return at if 0.0 <= at < levels else -1.0
 
 
 @inlined

@@ -161,10 +161,11 @@ def _add(s, f, unsure, q, begin, end):
 def refine(s, p):
     """Correct the multipliers of level p by what remains of its gradient, by unknown in GRADIENT.
 
-    Large multipliers of nearly dependent rows leave rounding in unknowns that no such row touches.
+    Large multipliers of nearly dependent rows leave rounding in unknowns that no such row touches,
+    and so do those of heavy rows, whose violations are corrected too: a shift of their sides.
     """
-    n, picked = s.x.size, s.count[PICKED]
-    last = min(p, s.count[WHOLE]) if s.count[WHOLE] >= 0 else p
+    n, picked, whole = s.x.size, s.count[PICKED], s.count[WHOLE]
+    last = min(p + 1, whole if whole >= 0 else s.multiplier.shape[0] - 1)
     for t in range(n):
         s.number[SCRATCH, t] = s.number[GRADIENT, s.index[ORDER, t]]
     reflect(s.basis, picked, s.index[RANK, last], s.number, SCRATCH, SCRATCH + 1)

@@ -42,10 +42,20 @@ from solvers.kernels.active_set.working_set import (
 )
 from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import View, assign, fill
-from solvers.kernels.tolerances import MET, RECURRENCES, RESTORED, SHADOW, VIOLATED
-from solvers.status import FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
+from solvers.kernels.tolerances import (
+    EPSILON,
+    MET,
+    NEGLIGIBLE,
+    RECURRENCES,
+    RESTORED,
+    SHADOW,
+    VIOLATED,
+)
+from solvers.status import EQUAL, FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
 LEAVES = 5    # change of a row that acts; else the side at which it is to act, or 0
+SLICE = 1.0 / 128.0  # added to the level for each search that ended in it
+SLICED = 0.5         # after so many, the first wrong row changes
 
 
 class Found(NamedTuple):
@@ -171,11 +181,13 @@ def pivot_one_by_one(s, current, saved, limit, level):
 
     SOLVED is verified; INACCURATE: nothing is wrong, but that is not verified.
     current (L + 1, m): scratch, the multipliers on the way. saved (n,): the x that met most levels.
-    level: where an earlier search ended.
+    level: where earlier searches ended; its fraction counts those that did in this level. Where
+    their limits are shorter than a step, single changes of the first wrong row come to an end all
+    the same (Murty 1974), if slowly.
     """
     levels, last, newest, fresh = (
-        s.multiplier.shape[0] - 1, _next_level(s, max(level, 0)), -1, True)
-    clean, accepted, tries, recurred = 0, 0, 0, 0
+        s.multiplier.shape[0] - 1, _next_level(s, np.int64(max(level, 0.0))), -1, True)
+    clean, accepted, tries, recurred, slices = 0, 0, 0, 0, level - np.floor(level)
     while tries < limit:
         tries += 1
         recurred = _count_recurrences(s, last, tries, recurred)
@@ -185,8 +197,12 @@ def pivot_one_by_one(s, current, saved, limit, level):
         write_multipliers(s, MET)
         found = judge(s, last, newest)
         if not np.isfinite(length_of(s.x)):
-            return NUMERICAL_FAILURE, tries, last - 1
-        if found.leaving > 0 and fresh:
+            return NUMERICAL_FAILURE, tries, last - 1.0
+        if found.wrong > 0:
+            _drop_rounding(s)
+        if found.wrong > 0 and slices >= SLICED:
+            _change_first(s)
+        elif found.leaving > 0 and fresh:
             _release_all(s)
         elif found.leaving > 0:
             _release_first(s, current)
@@ -196,17 +212,17 @@ def pivot_one_by_one(s, current, saved, limit, level):
             newest, fresh, accepted = found.most, False, accepted + 1
         elif last < levels:
             save(s, saved, last)
-            last, newest, fresh = _next_level(s, last), -1, True
+            last, newest, fresh, slices = _next_level(s, last), -1, True, 0.0
         elif verify(s, True):
-            return SOLVED, tries, last - 1
-        elif s.count[DIRTY] == 1 and clean < RESTORED:  # free of what other working sets cut
+            return SOLVED, tries, last - 1.0
+        elif s.count[DIRTY] == 1 and 1 < tries and clean < RESTORED:  # by other working sets too
             restore(s)
             newest, fresh, clean, recurred = -1, True, clean + 1, 0
         else:
-            return INACCURATE, tries, last - 1
+            return INACCURATE, tries, last - 1.0
     if accepted > 1:  # go on later from the last accepted set; if this step is long, from within
         assign(s.index[STATE], s.index[SEED])
-    return UNPROVED, tries, last - 1
+    return UNPROVED, tries, last - 1.0 + min(slices + SLICE, SLICED)
 
 
 @inlined
@@ -238,6 +254,29 @@ def _next_level(s, last):
     while last < levels and s.index[FIRST, last] == s.index[FIRST, last - 1]:
         last += 1
     return last
+
+
+@inlined
+def _drop_rounding(s):
+    """Make violations zero that decide no sign: else rounding begins the series of a row."""
+    reach = length_of(s.x) + SHADOW * s.scalar[SIZE]
+    for k in range(s.multiplier.shape[0] - 1):
+        most, mu = 0.0, s.multiplier[k]
+        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
+            most = max(most, abs(mu[i]))
+        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
+            if (s.index[STATE, i] != EQUAL
+                    and abs(mu[i]) <= NEGLIGIBLE * most + EPSILON * s.number[NORM, i] * reach):
+                mu[i] = 0.0
+
+
+@inlined
+def _change_first(s):
+    """Change the first row that is wrong."""
+    i = 0
+    while s.index[CHANGE, i] == 0:
+        i += 1
+    s.index[STATE, i] = FREE if s.index[CHANGE, i] == LEAVES else s.index[CHANGE, i]
 
 
 @inlined

@@ -9,9 +9,10 @@ and the nearest to the reference, if
     x - reference + sum_i mu_Li a_i = 0;                                                        (2)
     the first multiplier of each acting inequality that is not zero points outward.             (3)
 
-What is left of (1) is a shift of sides, what is left of (2) a turn of the rows of level p, and both
-are held against the row of least norm, so a heavy row excuses no light one. So SOLVED says: x is
-exactly optimal for a problem this close to the data.
+What is left of (1) is a shift of sides, held against its own row. What is left of (2) is made one
+where rounding exceeds a turn of the rows of level p, which is held against the row of least norm: a
+heavy row excuses no light one. So SOLVED says: x is exactly optimal for a problem this close to the
+data.
 """
 
 from typing import NamedTuple
@@ -106,21 +107,28 @@ def _rows_hold(s, reach):
     for i in range(s.index[FIRST, whole + 1] if whole >= 0 else s.A.shape[0]):
         while i >= s.index[FIRST, k + 1]:
             k += 1
-        norm, state = s.number[NORM, i], s.index[STATE, i]
+        norm = s.number[NORM, i]
         if norm <= 0.0:
             continue
-        value, low, up = row_times_x(s, i), s.number[LOWER, i], s.number[UPPER, i]
-        side = low if state < 0 else up
-        if state == FREE:
-            beyond, terms = max(value - up, low - value) * FREE_ROWS, abs(value)
-        else:
-            beyond, terms = abs(value - side - s.multiplier[k, i]), abs(value) + abs(side)
-        if not beyond <= (BAND * norm + max(s.number[CUT, i], 0.0)) * reach + EPSILON * terms:
+        if not _row_holds(s, k, i, reach):
             return False
         cut = max(cut, s.number[CUT, i] / norm)
-        if state in (EQUAL, FREE):
+        if s.index[STATE, i] in (EQUAL, FREE):
             s.index[CHANGE, i] = DECIDED
     return _ranks_are_clear(s, cut)
+
+
+@inlined
+def _row_holds(s, k, i, reach):
+    """Whether (1) holds for row i of level k."""
+    value, low, up = row_times_x(s, i), s.number[LOWER, i], s.number[UPPER, i]
+    side, state = low if s.index[STATE, i] < 0 else up, s.index[STATE, i]
+    if state == FREE:
+        beyond, terms = max(value - up, low - value) * FREE_ROWS, abs(value)
+    else:
+        beyond, terms = abs(value - side - s.multiplier[k, i]), abs(value) + abs(side)
+    shift = BAND * s.number[NORM, i] + max(s.number[CUT, i], 0.0)
+    return beyond <= shift * reach + EPSILON * terms
 
 
 @inlined
@@ -173,6 +181,8 @@ def _balances(s, p, reach, factored):
         refine(s, p)
         outside, rounding, turned, signed = _add_rows(s, level, reach if last else 0.0)
         rest = _beyond_rounding(s)
+        for i in range(level.begin, level.end):
+            outside = outside or (s.number[NORM, i] > 0.0 and not _row_holds(s, p, i, reach))
     holds = (not outside and rest <= allowed and (clear or _is_clear(s, level, reach))
              and turned <= CUT_BALANCE * source
              and rounding <= (ROUNDING_BALANCE if signed else KNOWN_MULTIPLIER) * source)

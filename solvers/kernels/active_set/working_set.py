@@ -449,7 +449,7 @@ def _cut(s, q, rank):
 @inlined
 def _solve(s, begin, end, above, rank, short):
     """Write y of the columns above .. rank - 1, and the residuals of a level."""
-    y, miss = s.number[Y], s.number[MISS]
+    y, miss, most, norm = s.number[Y], s.number[MISS], 0.0, 0.0
     if short:
         fill(y[above:s.x.size], 0.0)
         _write_x(s, above)
@@ -460,7 +460,7 @@ def _solve(s, begin, end, above, rank, short):
             rest -= value_at(s, i)
         for t in range(0 if short else above):
             rest -= w[t] * y[t]
-        miss[q] = rest
+        miss[q], most, norm = rest, max(most, abs(rest)), max(norm, s.number[NORM, i])
     if end - begin == rank - above:
         for t in range(above, rank):
             rest = miss[begin + t - above]
@@ -469,6 +469,7 @@ def _solve(s, begin, end, above, rank, short):
             y[t], miss[begin + t - above] = rest / s.W[begin + t - above, t], 0.0
     elif rank > above:
         T, _ = _triangle(s, begin, end, above, rank)
+        s.scalar[SIZE] = max(s.scalar[SIZE], most / norm)  # sides may cancel to their rounding
         turn(T, miss[begin:], False)
         for t in range(above, rank):
             y[t] = s.number[DIAGONAL, t]
