@@ -7,22 +7,10 @@ import pytest
 from hand_made import asked, recording
 
 from hierarchy import plugins
-from hierarchy.paths import Jittered, Still
 from scenarios import load
 from scenarios.measure.metrics import Metric, as_plain_data, measure
 from scenarios.recording import listed
 from solvers import Status
-
-
-def test_position_error_is_the_norm_over_axes_and_the_start_can_be_left_out():
-    error = np.zeros((5, 3))
-    error[0] = (3e-3, 4e-3, 0.0)  # 5 mm at t = 0
-    error[4] = (0.0, 0.0, 1e-3)  # 1 mm at t = 4 s; [2, 4] s has three ticks
-    found = measure(recording(position_error=error))
-    expected = {"max": 5e-3, "rms": np.sqrt(26e-6 / 5), "max_settled": 1e-3,
-                "rms_settled": np.sqrt(1e-6 / 3)}
-    assert {of: found[f"position_error_{of}"].value for of in expected} == pytest.approx(expected)
-    assert found["position_error_median_settled"].value == 0.0
 
 
 def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch):
@@ -72,16 +60,6 @@ def test_each_unit_has_its_decimals_and_a_small_number_a_digit_more(value, unit,
     assert Metric("some", "Some", value, unit).shown() == shown
 
 
-def test_times_are_given_by_median_and_tails_for_each_part():
-    found = measure(recording(t=np.arange(1001.0), time_resolve=np.arange(1001) * 1e-6))
-    times = [found[f"time_resolve_{of}"].value for of in ("median", "p95", "p999")]
-    assert times == pytest.approx([500e-6, 950e-6, 999e-6])
-    assert found["time_kinematics_median"].shown() == "1.00"
-    assert found["time_kinematics_median"].shown_unit == "µs"
-    shared = {f"time_{part}_{tail}" for part in ("kinematics", "rows") for tail in ("p95", "p999")}
-    assert {name for name in found if name.startswith("time_") and found[name].detail} == shared
-
-
 def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_as_one():
     data = as_plain_data(recording(a=np.full((5, 2), np.nan), fault="diverged at tick 5"))
     assert data["metrics"]["acceleration_max"]["value"] is None
@@ -116,18 +94,6 @@ def test_steps_of_the_command_and_of_the_joints_are_told_apart():
     command = np.array([[1.0], [1.5], [1.25], [1.25], [1.25]])
     assert measure(recording(slow, q=command, command=command))["command_step_max"].value == 0.5
     assert len({one.label for one in steps}) == 3
-
-
-def jittered(seed=3):
-    return Jittered(Still((1.0, 2.0, 3.0)), amplitude=0.002, rate=4.0, seed=seed)
-
-
-def test_jitter_is_bounded_moves_in_every_axis_and_depends_on_its_seed_alone():
-    offsets = np.array([jittered()(t)[0] for t in np.arange(0.0, 5.0, 0.01)]) - [1.0, 2.0, 3.0]
-    assert np.abs(offsets).max() <= 0.002
-    assert (np.abs(offsets).max(axis=0) > 0.0005).all()
-    assert np.array_equal(jittered()(0.7), jittered()(0.7))
-    assert not np.allclose(jittered()(0.7)[0], jittered(seed=4)(0.7)[0])
 
 
 @pytest.mark.parametrize(("spans", "frozen", "returned"), [

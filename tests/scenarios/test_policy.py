@@ -1,6 +1,5 @@
 """What is sent in a tick with trouble, and from one stack to the next."""
 
-import json
 from functools import partial
 
 import numpy as np
@@ -10,13 +9,12 @@ import scene
 from benchmark.solve import oracle
 from hierarchy import Hierarchy, Stack
 from hierarchy.tasks import JointLimits
-from scenarios import load, load_run, save, simulate
+from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.config.sections.control import PolicySection
 from scenarios.loop.controller import Controller
 from scenarios.loop.policy import Policy
 from scenarios.loop.transition import Blend, Key
-from scenarios.measure.metrics import measure
 from solvers import Status, make
 
 PERIOD = 0.001
@@ -268,14 +266,3 @@ def test_every_fault_under_every_policy(fault, policy, name, limited):
     assert len(held) == (10 if policy == "hold" else 0)
     assert (run["status"][AT + LASTS:] == Status.SOLVED).all()
     assert np.abs(run["v"][-1]).max() > 1e-2  # it moves again
-
-
-def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
-    run = simulate(faulty("ellipse", "nan_position", "", kind="not_finite", policy="hold"))
-    found = measure(run)
-    assert (found["ticks_hold"].value, found["ticks_brake"].value) == (10, LASTS - 10)
-    assert load_run(save(run, tmp_path / "run")).events == run.events
-    assert json.loads((tmp_path / "run" / "metrics.json").read_text())["events"] == [
-        {"kind": "not_finite", "action": action, "ticks": ticks, "first_tick": first,
-         "first_time": pytest.approx(first * 1e-3)}
-        for action, ticks, first in (("hold", 10, AT), ("brake", LASTS - 10, AT + 10))]

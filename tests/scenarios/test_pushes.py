@@ -98,8 +98,8 @@ NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "
 
 
 @pytest.fixture(scope="module")
-def runs():
-    return {name: simulate(load(name, ["control.duration=1.5"])) for name in NAMES}
+def recording():
+    return simulate(load("ellipse", ["control.duration=1.5"]))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -122,8 +122,7 @@ def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
             assert (fate == Fate.MISSED) == (violation > 1e-5) or 1e-9 < violation < 1e-3
 
 
-def test_distances_that_are_not_those_recorded_leave_levels_unknown(runs):
-    recording = runs["ellipse"]
+def test_distances_that_are_not_those_recorded_leave_levels_unknown(recording):
     moved = recording["control_point_distance"] + 1e-3
     other = replace(recording, signals=recording.signals | {"control_point_distance": moved})
     judge(other, build(recording.scenario))
@@ -132,8 +131,7 @@ def test_distances_that_are_not_those_recorded_leave_levels_unknown(runs):
     assert np.isnan(levels.violation).all()
 
 
-def test_no_peak_between_two_frames_is_lost(runs):
-    recording = runs["ellipse"]
+def test_no_peak_between_two_frames_is_lost(recording):
     for curve, values in zip(scene(recording, rate=4.0).series, scene(recording, 5000.0).series,
                              strict=True):
         assert np.allclose(curve.low.min(axis=0), values.value.min(axis=0))
