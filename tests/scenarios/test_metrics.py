@@ -10,7 +10,6 @@ from hierarchy import plugins
 from scenarios import load
 from scenarios.measure.metrics import Metric, as_plain_data, measure
 from scenarios.recording import listed
-from solvers import Status
 
 
 def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch):
@@ -24,28 +23,6 @@ def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch)
     for key in ("rms", "max_settled", "end"):
         assert found[f"task_hand_{key}"].value == 0.0
         assert found[f"task_elbow_{key}"].value > 0.0
-
-
-SPEEDS = np.array([[0, 0], [1, 0], [1, -3], [1, -2], [1, -2]], float)
-PULSES = np.zeros((5, 7))
-PULSES[1:, 0], PULSES[3:, 1] = 60.0, 49.0
-SOLVED, FAILED = int(Status.SOLVED), int(Status.NUMERICAL_FAILURE)
-
-
-@pytest.mark.parametrize(("name", "signals", "value"), [
-    ("speed_max", {"v": SPEEDS, "a": np.zeros((5, 2))}, 3.0),  # of either sign
-    ("velocity_step_max", {"v": SPEEDS, "a": np.zeros((5, 2))}, 3.0),
-    ("acceleration_max", {"a": -7.0 * np.eye(5, 2)}, 7.0),
-    ("acceleration_step_max", {"a": PULSES}, 60.0),
-    ("acceleration_step_ticks", {"a": PULSES}, 1.0),  # above 50 rad/s²
-    ("velocity_step_ticks", {"a": PULSES}, 0.0),
-    ("acceleration_step_ticks", {"a": PULSES * (50.0 + 1e-14) / 60.0}, 0.0),  # but for rounding
-    ("joint_limit_excess", {"q": np.outer(np.eye(5)[1], (2.125, -2.25))}, 0.25),  # beyond 2
-    ("ticks_not_solved", {"status": [SOLVED, FAILED, FAILED, SOLVED, SOLVED]}, 2),
-    ("active_set_changes", {"active_set": [0, 0, 1, 1, 0]}, 2),
-    ("active_set_changes", {"active_set": [2, -1, 2, -1, 0]}, 1)])  # where it is known
-def test_a_signal_has_its_largest_value_step_or_count(name, signals, value):
-    assert measure(recording(**signals))[name].value == value
 
 
 @pytest.mark.parametrize(("value", "unit", "shown"), [
@@ -81,19 +58,6 @@ def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
     assert found["body_below_share"].value == pytest.approx(2 / 5)  # 0.05 mm is rounding
     assert found["ee_below_share"].value == pytest.approx(1 / 4)    # of the ticks in which known
     assert found["ee_below_share"].note == "nearer than 0.2 m"
-
-
-def test_steps_of_the_command_and_of_the_joints_are_told_apart():
-    v, seen, a = np.zeros((5, 2)), np.zeros((5, 2)), np.zeros((5, 2))
-    v[2, 1], seen[2, 1], a[1, 0] = 0.3, 0.5, -40.0  # the period is 1 ms
-    found = measure(recording(q=v, v=seen, true_v=v, command=a))
-    steps = [found[name] for name in ("velocity_step_max", "velocity_step_max_measured",
-                                      "command_step_max")]
-    assert [one.value for one in steps] == pytest.approx([0.3, 0.5, 0.04])
-    slow = load("ellipse-velocity")
-    command = np.array([[1.0], [1.5], [1.25], [1.25], [1.25]])
-    assert measure(recording(slow, q=command, command=command))["command_step_max"].value == 0.5
-    assert len({one.label for one in steps}) == 3
 
 
 @pytest.mark.parametrize(("spans", "frozen", "returned"), [

@@ -1,6 +1,7 @@
 """What is sent in a tick with trouble, and from one stack to the next."""
 
 from functools import partial
+from itertools import islice, permutations
 
 import numpy as np
 import pytest
@@ -183,6 +184,19 @@ def test_one_task_that_enters_or_leaves_has_its_intermediate_desired_value(
     asked = Hierarchy.from_levels([(level[0], level[1]) for level in levels],
                                   stack.hierarchy(state, with_it).reference)
     np.testing.assert_allclose(x, oracle.solve(asked), rtol=0, atol=1e-8 * (1 + np.abs(x).max()))
+
+
+def test_stacks_that_agree_have_their_answer_however_many_are_blended():
+    """More than are resolved, so that the weights of those that are do not sum to one."""
+    tasks, blend = [HAND, AXIS, ELBOW, scene.TASKS["coupling"]], Blend(TIME)
+    stack = Stack(tasks, "acceleration", scene.TASKS["damping"])
+    q, v = scene.states(1, seed=4)[0]
+    for k, order in enumerate(islice(permutations(stack.names), 12)):
+        state = scene.state_at(q, v, 0.008 * k)
+        h = stack.hierarchy(state, order)
+        own, x = blend.resolve(make("tpm"), stack, state, order, h)
+        np.testing.assert_allclose(x, oracle.solve(h), rtol=0, atol=1e-8 * np.abs(x).max())
+        assert (blend.weight == 1.0) == (x is own.x) == (k == 0)
 
 
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
