@@ -14,6 +14,7 @@ from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.config.sections.control import PolicySection
 from scenarios.loop.controller import Controller
+from scenarios.loop.faults import Faults
 from scenarios.loop.policy import Policy
 from scenarios.loop.transition import Blend, Key
 from solvers import Status, make
@@ -227,6 +228,17 @@ FAULTS = {
     "obstacle": ("obstacle", "place={joint='joint_4', offset=[0.0, 0.0, 0.0]}, radius=0.05",
                  "inside", 0),
     "obstacle at a frame": ("obstacle", "place={frame='end_effector'}, radius=0.05", "inside", 0)}
+
+
+@pytest.mark.parametrize(("name", "fault", "joint", "spoiled"), [
+    ("ellipse", "nan_position", 3, 2), ("ellipse", "nan_velocity", 7, 6),
+    ("humanoid", "nan_position", 2, 8), ("humanoid", "nan_velocity", 2, 7)])
+def test_a_fault_of_a_joint_spoils_its_number_alone(name, fault, joint, spoiled):
+    scenario = load(name, [f"faults=[{{kind='{fault}', at=0.0, duration=0.1, joint={joint}}}]"])
+    faults = Faults(scenario)
+    faults.around(build(scenario), make("tpm"))
+    measured = faults.measure(0.0)[fault == "nan_velocity"]
+    assert np.flatnonzero(np.isnan(measured)).tolist() == [spoiled]
 
 
 def faulty(name, put, settings, *changes, kind, policy):
