@@ -208,7 +208,7 @@ def defaults():
                 continue
             module = vars(importlib.import_module(name))
             found |= {f"{name} {key}": [repr(one)] for key, one in module.items() if key.isupper()
-                      and isinstance(one, (int, float, tuple, dict, np.ndarray))
+                      and isinstance(one, (int, float, tuple, np.ndarray))
                       and not re.search(r"^\D*$|<|Table\(", repr(one)) and ".jit." not in name}
             public = [(f"{name} {key}", one) for key, one in module.items()
                       if key[0] != "_" and getattr(one, "__module__", "") == name
