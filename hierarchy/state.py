@@ -170,13 +170,13 @@ class State:
         self.sound = bool(copied)
         if not copied:
             return False
-        if self.period > 0.0 and self._started:
+        if self.period and self._started:
             self._keep_kinematics()
         self.t = t
         self._compute()
         for compute in self._further:
             compute()
-        if self.period > 0.0 and not self._started:  # no previous tick: differences are zero
+        if self.period and not self._started:  # no previous tick: differences are zero
             self._keep_kinematics()
         self._started = True
         return True

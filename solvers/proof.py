@@ -303,8 +303,6 @@ class _Span:
 
     def outside(self, rows: Exact) -> Exact:
         """Return the part of rows (m, n) outside the span."""
-        if not len(self.Q) or not len(rows):
-            return rows.copy()
         return np.asarray(rows - (rows @ self.Q.T) @ self.Q)
 
     def add(self, rows: Exact, norm: Exact, zero: Decimal) -> list[tuple[int, Exact | None]]:

@@ -25,7 +25,7 @@ class Motion(NamedTuple):
 
 class _Joint(NamedTuple):
     name: str
-    parent: int
+    parent: int | None
     offset: tuple[float, ...]
     channels: tuple[str, ...]
 
@@ -53,9 +53,9 @@ def _skeleton(words: Iterator[str]) -> list[_Joint]:
     open_: list[int] = []
     for word in words:
         if word in ("ROOT", "JOINT", "End"):
-            name, parent = next(words), open_[-1] if open_ else -1
+            name, parent = next(words), open_[-1] if open_ else None
             if word == "End":
-                name = f"{joints[parent].name} end"
+                name = f"{joints[open_[-1]].name} end"
             joints.append(_Joint(name, parent, (0.0, 0.0, 0.0), ()))
         elif word == "{":
             open_.append(len(joints) - 1)
@@ -89,7 +89,7 @@ def _positions(joints: list[_Joint], values: Array) -> dict[str, Array]:
                 about = Rotation.from_euler(channel[0], value[:, None], degrees=True)
                 turn = turn @ about.as_matrix()
             first += 1
-        if joint.parent >= 0:
+        if joint.parent is not None:
             place = places[joint.parent] + np.einsum("fij,fj->fi", turns[joint.parent], place)
             turn = turns[joint.parent] @ turn
         turns.append(turn)

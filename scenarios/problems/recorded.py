@@ -1,7 +1,7 @@
 """Reference problems, stored and fresh, and problems of closed loops: windows of consecutive ticks.
 
-DYN60 is recorded from `stand-push` (extra `sim`): `hierarchy problems export DYN60 --seed 60
---count 100` makes the stored set again, with another seed a fresh one.
+DYN60 is recorded from `stand-push` (extra `sim`): the stored set with seed 60, before the plant and
+the stack became what they are; `hierarchy problems export DYN60 --seed 61` makes a fresh one.
 """
 
 from collections.abc import Iterator

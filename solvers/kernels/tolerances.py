@@ -55,5 +55,7 @@ SOLVE_STEPS = 4
 SPARED = 3           # rows over columns that are left to them: fewer are reflected one by one
 PATIENCE = 2         # block pivots that may not reduce the number of wrong rows
 RECURRENCES = 1      # of a working set in one search: after more it goes in circles
+SLICE = 1.0 / 128.0  # of a search that ends in a level, for the next one there
+SLICED = 0.5         # sum of these from which the first wrong row changes
 RESTORED = 3         # times that a final working set is solved anew from uncut rows
 SWEEPS = 40          # of Jacobi rotations, which need 6 to 10

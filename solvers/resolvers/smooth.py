@@ -23,6 +23,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
+from solvers.qp.refinement import below_largest
 from solvers.resolver import (
     Around,
     Handles,
@@ -82,7 +83,7 @@ class Smooth(Resolver):
         """
         _check(h, activation)
         acting = activation > 0.0
-        if not (np.isfinite(h.A).all() and np.isfinite(h.lower[acting]).all()):
+        if not below_largest(h.A, h.lower[acting], h.reference):  # squares would overflow
             return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
         rho, Q, identity = np.zeros(h.n), np.eye(h.n), np.eye(h.n)
         for first, last in zip(h.offsets[:-1], h.offsets[1:], strict=True):

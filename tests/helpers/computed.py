@@ -6,11 +6,13 @@ import importlib
 import inspect
 import itertools
 import pkgutil
+import re
 from types import SimpleNamespace
 
 import numpy as np
 from hand_made import recording
 from mechanisms import four_bar
+from pinned import FOLDER
 from rank_cases import CASES, boxed, build
 from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, state_at, states
 from standing import CONTACTS, moving_state, opening, standing_stack, written
@@ -19,11 +21,15 @@ from standing import ROBOT as HUMANOID
 import hierarchy
 import scenarios
 import solvers
-from hierarchy import Hierarchy, HierarchyError, Stack, State, paths, tasks
+from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State, paths, tasks
 from hierarchy.avoidance import Barrier
+from hierarchy.tasks.joints.joint_limits import StepLimits
 from hierarchy.tasks.joints.mechanism import Mechanism, model_rows
+from scenarios.cell.published import PublishedAvoidance
 from scenarios.measure.goals import goals
 from scenarios.measure.metrics import measure
+from scenarios.measure.runs import Run
+from scenarios.measure.verdict import Comparison, goal_table, lines, verdicts
 from solvers import Resolution, certify, explain, make, solve_ik
 from solvers.adapters.displacements import Packed, Pull
 from solvers.adapters.drop_in import answer
@@ -32,6 +38,7 @@ from solvers.factorization import Factorization
 from solvers.problems import ANY, generate, structured
 from solvers.proof import prove
 from solvers.qp.programs import level_problem
+from solvers.resolvers.set_based import SetBased
 from solvers.resolvers.weighted import lexicographic_weights
 
 BARRED = {f"{count} barred": tasks.Separation(SENSOR.points, Barrier(0.05), count)
@@ -133,10 +140,14 @@ def derived():
         levels = [(A, b - 0.1, b + 0.2) for A, b, _ in h.levels()]
         h = Hierarchy.from_levels(levels, h.reference, give=[0.1 * i for i in range(len(levels))])
         res = make("hcod").solve(h)
+        again = [make("hcod").solve(h, res.memory[:count]) for count in (None, -1)]
         found[f"{name} gives"] = [res.x, h.giving, str(explain(h, res)), *(
+            [one.x, one.status.name, one.memory.size] for one in again), *(
             str(certify(h, x, witnesses=res.witnesses)) for x in (res.x, res.x + 0.01)), *(
             [*h.relaxed(level, res.x).rows] for level in range(len(levels)))]
-        heavy = h.changed(metric=np.diag(1.0 + np.arange(h.n)))
+        heavy, equal = h.changed(metric=np.diag(1.0 + np.arange(h.n))), build(name, True)
+        found[f"{name} verified"] = [Resolution(make("hcod").solve(equal).x + off).verified(equal)
+                                     for off in (0.0, 0.01)]
         found[f"{name} weighs"] = [make("hcod", damping=damping).solve(one).x
                                    for damping in (0.0, 0.05) for one in (h, heavy)]
     for name in ("generic", "middle_level_dependent_on_the_first", "levels_without_rows"):
@@ -189,15 +200,19 @@ def adapted():
 
 
 def defaults():
-    """Defaults of what each module calls public, and settings of resolvers that are refused."""
+    """Numbers and defaults of what each module calls public, and settings that are refused."""
     found, plain = {}, (int, float, str, tuple)
     for package in (hierarchy, solvers, scenarios):
         for _, name, _ in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             if name.endswith(("__main__", "on_jax")):  # which ends here, and needs jax
                 continue
-            public = [(f"{name} {key}", one) for key, one in vars(
-                importlib.import_module(name)).items() if key[0] != "_" and getattr(
-                    one, "__module__", "") == name and not hasattr(one, "__members__")]
+            module = vars(importlib.import_module(name))
+            found |= {f"{name} {key}": [repr(one)] for key, one in module.items() if key.isupper()
+                      and isinstance(one, (int, float, tuple, np.ndarray))
+                      and not re.search(r"^\D*$|<|Table\(", repr(one)) and ".jit." not in name}
+            public = [(f"{name} {key}", one) for key, one in module.items()
+                      if key[0] != "_" and getattr(one, "__module__", "") == name
+                      and not hasattr(one, "__members__")]
             methods = [(f"{key} {part}", getattr(what, "__func__", what)) for key, one in public
                        if isinstance(one, type) for part, what in vars(one).items()
                        if part[0] != "_"]
@@ -257,6 +272,36 @@ def solved():
             heavy.hierarchy(state_at(q, q), ["posture"]).metric]
 
 
+def odd():
+    """What is said of, or done with, what is seldom given."""
+    levels, found = CASES["generic"], {}
+    for name, (of, bad) in itertools.product((*solvers.names(), "smooth"), (
+            ("A", np.nan), ("A", 1e200), ("lower", np.inf), ("reference", np.nan))):
+        h = Hierarchy.from_levels(levels)
+        getattr(h, of).flat[0] = bad
+        h.upper[0] = h.lower[0]
+        res = make(name).solve(h)
+        found[f"{name} {of} {bad}"] = [res.status.name, res.x]
+    (q, v), ball = states(1)[0], Robot.load(FOLDER.parent / "robots" / "odd.xml")
+    lagging, alone = state_at(q, v, differences=1e-3), make("tpm")
+    wrong = PublishedAvoidance(ROBOT.control_points, 1)
+    steps = StepLimits(ROBOT, 0.1)
+    ellipse = scenarios.load("ellipse")
+    runs = (Run(ellipse, "tpm", "tpm"), Run(ellipse, "sns", "sns", None, "broken"))
+    for k, ask in enumerate((
+            lambda: wrong.jacobian_derivative(lagging),
+            lambda: wrong.jacobian_derivative(state_at(q, v)),
+            lambda: [*steps.box(lagging), steps.error(lagging)], lambda: CONTACTS.forces(v),
+            lambda: [SetBased(inner=alone).label],
+            lambda: str(Comparison(runs, "compare", {})), lambda: repr(ellipse),
+            lambda: [*ball.position_limits(), ball.missing])):
+        try:
+            found[f"asked {k}"] = [ask()]
+        except HierarchyError as error:
+            found[f"asked {k}"] = [str(error)]
+    return found
+
+
 def measured():
     """Metrics and goals of runs whose signals come to each threshold and pass it."""
     found, steps = {"no tick": [goals(recording(t=[])), measure(recording(t=[]))]}, np.geomspace(
@@ -273,10 +318,13 @@ def measured():
             active_control_point=np.arange(25) % 4)
         found[f"{name} {sign}"] = [*map(str, goals(run)), *(
             [key, one.value, one.note] for key, one in measure(run).items())]
+        judged = verdicts([Run(run.scenario, of, of, one, None if one else "no")
+                           for of, one in (("a", run), ("b", None))])
+        found[f"{name} {sign} judged"] = [*map(str, [*goal_table(judged), *lines(judged)])]
     return found
 
 
 COMPUTED = {"rows": rows, "derived": derived, "adapted": adapted, "defaults": defaults,
             "mechanism": mechanism, "certificates": certificates, "programs": programs,
-            "edited": edited, "solved": solved, "measured": measured,
+            "edited": edited, "odd": odd, "solved": solved, "measured": measured,
             "paths": lambda: [[path(t) for t in np.linspace(-0.2, 4.4, 24)] for path in PATHS]}

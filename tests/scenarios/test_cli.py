@@ -237,14 +237,16 @@ def test_the_doctor_finds_all_well_here(command):
         assert line in out
 
 
-def test_what_does_not_work_is_named_and_ends_with_1(monkeypatch, command):
-    broken = mock.Mock(side_effect=RuntimeError("no such kernel"))
-    monkeypatch.setattr(doctor, "_resolvers_agree", broken)
+@pytest.mark.parametrize(("name", "instead", "found"), [
+    ("_resolvers_agree", mock.Mock(side_effect=RuntimeError("no such kernel")), "RuntimeError: no"),
+    ("_MET", 0.0, "20 of 20 answers")])
+def test_what_does_not_work_is_named_and_ends_with_1(name, instead, found, monkeypatch, command):
+    monkeypatch.setattr(doctor, name, instead)
     said = json.loads(command("doctor --json", code=1).out)
     assert said["well"] is False
     bad = [one for one in said["findings"] if one["well"] is False]
     assert [one["what"] for one in bad] == ["resolvers agree"]
-    assert "RuntimeError: no such kernel" in bad[0]["found"]
+    assert found in bad[0]["found"]
 
 
 def test_a_run_that_cannot_be_saved_where_it_should_is_saved_elsewhere(tmp_path, monkeypatch):

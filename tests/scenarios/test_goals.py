@@ -10,12 +10,12 @@ from scipy.stats import PermutationMethod, wilcoxon
 from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.measure.causes import Tick, causes
-from scenarios.measure.goals import goals, percent
+from scenarios.measure.goals import goals
 from scenarios.measure.happenings import given_up, happened, jumps
 from scenarios.measure.metrics import measure
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import EXACT, best, paired, wilson
-from scenarios.measure.verdict import Verdict, goal_table, lines, verdicts
+from scenarios.measure.verdict import verdicts
 from solvers import make
 
 
@@ -61,25 +61,6 @@ def test_median_worst_and_share_count_from_when_the_target_was_first_reached():
 def test_a_goal_has_a_flag_and_its_worst_distance(signals, name, flag, worst, unit):
     one = goal(name, **signals)
     assert (one.flag, one.worst, one.unit) == (flag, pytest.approx(worst), unit)
-
-
-def run(label, **signals):
-    made = recording(**signals)
-    return Run(made.scenario, label, label, made)
-
-
-def test_the_table_has_a_row_for_each_goal_and_a_cell_for_each_run():
-    broken = Run(recording().scenario, "c", "c", None, "HierarchyError: no")
-    found = verdicts([run("a", **at([2, 0, 1204, 4, 4])), run("b"), broken])
-    rows = dict(goal_table(found))
-    assert rows["position, at its target"] == ("4 mm off, worst 1204 mm, out 75 %",
-                                               "0 mm off, worst 0 mm", "–")
-    assert rows["joint limits"] == ("kept", "kept", "–")
-    assert lines(found)[0] == ("2 of 3 ran to the end; c stopped at 0.00 s of 4 s: "
-                               "HierarchyError: no.")
-    assert found[0].as_plain_data()["goals"][0]["flag"] == "left"
-    assert Verdict("a", 4.0, 4.0, None, False, ()).end == "ran the whole 4 s"
-    assert [*map(percent, (0.0123, 0.994, 0.996))] == ["1.2 %", "99 %", "100 %"]
 
 
 def test_limits_of_joints_that_turn_and_of_those_that_slide_are_two_goals():

@@ -7,22 +7,9 @@ import pytest
 from hand_made import asked, recording
 
 from hierarchy import plugins
-from hierarchy.paths import Jittered, Still
 from scenarios import load
 from scenarios.measure.metrics import Metric, as_plain_data, measure
 from scenarios.recording import listed
-from solvers import Status
-
-
-def test_position_error_is_the_norm_over_axes_and_the_start_can_be_left_out():
-    error = np.zeros((5, 3))
-    error[0] = (3e-3, 4e-3, 0.0)  # 5 mm at t = 0
-    error[4] = (0.0, 0.0, 1e-3)  # 1 mm at t = 4 s; [2, 4] s has three ticks
-    found = measure(recording(position_error=error))
-    expected = {"max": 5e-3, "rms": np.sqrt(26e-6 / 5), "max_settled": 1e-3,
-                "rms_settled": np.sqrt(1e-6 / 3)}
-    assert {of: found[f"position_error_{of}"].value for of in expected} == pytest.approx(expected)
-    assert found["position_error_median_settled"].value == 0.0
 
 
 def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch):
@@ -38,28 +25,6 @@ def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch)
         assert found[f"task_elbow_{key}"].value > 0.0
 
 
-SPEEDS = np.array([[0, 0], [1, 0], [1, -3], [1, -2], [1, -2]], float)
-PULSES = np.zeros((5, 7))
-PULSES[1:, 0], PULSES[3:, 1] = 60.0, 49.0
-SOLVED, FAILED = int(Status.SOLVED), int(Status.NUMERICAL_FAILURE)
-
-
-@pytest.mark.parametrize(("name", "signals", "value"), [
-    ("speed_max", {"v": SPEEDS, "a": np.zeros((5, 2))}, 3.0),  # of either sign
-    ("velocity_step_max", {"v": SPEEDS, "a": np.zeros((5, 2))}, 3.0),
-    ("acceleration_max", {"a": -7.0 * np.eye(5, 2)}, 7.0),
-    ("acceleration_step_max", {"a": PULSES}, 60.0),
-    ("acceleration_step_ticks", {"a": PULSES}, 1.0),  # above 50 rad/s²
-    ("velocity_step_ticks", {"a": PULSES}, 0.0),
-    ("acceleration_step_ticks", {"a": PULSES * (50.0 + 1e-14) / 60.0}, 0.0),  # but for rounding
-    ("joint_limit_excess", {"q": np.outer(np.eye(5)[1], (2.125, -2.25))}, 0.25),  # beyond 2
-    ("ticks_not_solved", {"status": [SOLVED, FAILED, FAILED, SOLVED, SOLVED]}, 2),
-    ("active_set_changes", {"active_set": [0, 0, 1, 1, 0]}, 2),
-    ("active_set_changes", {"active_set": [2, -1, 2, -1, 0]}, 1)])  # where it is known
-def test_a_signal_has_its_largest_value_step_or_count(name, signals, value):
-    assert measure(recording(**signals))[name].value == value
-
-
 @pytest.mark.parametrize(("value", "unit", "shown"), [
     *((12.3456789, unit, shown) for unit, shown in (
         ("m", "12346"), ("s", "12.346"), ("deg", "12.346"), ("share", "1235"), ("rad", "12.346"),
@@ -70,16 +35,6 @@ def test_a_signal_has_its_largest_value_step_or_count(name, signals, value):
     (1e5, "rad", "1.0e+05")])
 def test_each_unit_has_its_decimals_and_a_small_number_a_digit_more(value, unit, shown):
     assert Metric("some", "Some", value, unit).shown() == shown
-
-
-def test_times_are_given_by_median_and_tails_for_each_part():
-    found = measure(recording(t=np.arange(1001.0), time_resolve=np.arange(1001) * 1e-6))
-    times = [found[f"time_resolve_{of}"].value for of in ("median", "p95", "p999")]
-    assert times == pytest.approx([500e-6, 950e-6, 999e-6])
-    assert found["time_kinematics_median"].shown() == "1.00"
-    assert found["time_kinematics_median"].shown_unit == "µs"
-    shared = {f"time_{part}_{tail}" for part in ("kinematics", "rows") for tail in ("p95", "p999")}
-    assert {name for name in found if name.startswith("time_") and found[name].detail} == shared
 
 
 def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_as_one():
@@ -103,31 +58,6 @@ def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
     assert found["body_below_share"].value == pytest.approx(2 / 5)  # 0.05 mm is rounding
     assert found["ee_below_share"].value == pytest.approx(1 / 4)    # of the ticks in which known
     assert found["ee_below_share"].note == "nearer than 0.2 m"
-
-
-def test_steps_of_the_command_and_of_the_joints_are_told_apart():
-    v, seen, a = np.zeros((5, 2)), np.zeros((5, 2)), np.zeros((5, 2))
-    v[2, 1], seen[2, 1], a[1, 0] = 0.3, 0.5, -40.0  # the period is 1 ms
-    found = measure(recording(q=v, v=seen, true_v=v, command=a))
-    steps = [found[name] for name in ("velocity_step_max", "velocity_step_max_measured",
-                                      "command_step_max")]
-    assert [one.value for one in steps] == pytest.approx([0.3, 0.5, 0.04])
-    slow = load("ellipse-velocity")
-    command = np.array([[1.0], [1.5], [1.25], [1.25], [1.25]])
-    assert measure(recording(slow, q=command, command=command))["command_step_max"].value == 0.5
-    assert len({one.label for one in steps}) == 3
-
-
-def jittered(seed=3):
-    return Jittered(Still((1.0, 2.0, 3.0)), amplitude=0.002, rate=4.0, seed=seed)
-
-
-def test_jitter_is_bounded_moves_in_every_axis_and_depends_on_its_seed_alone():
-    offsets = np.array([jittered()(t)[0] for t in np.arange(0.0, 5.0, 0.01)]) - [1.0, 2.0, 3.0]
-    assert np.abs(offsets).max() <= 0.002
-    assert (np.abs(offsets).max(axis=0) > 0.0005).all()
-    assert np.array_equal(jittered()(0.7), jittered()(0.7))
-    assert not np.allclose(jittered()(0.7)[0], jittered(seed=4)(0.7)[0])
 
 
 @pytest.mark.parametrize(("spans", "frozen", "returned"), [

@@ -1,7 +1,7 @@
 """What is sent in a tick with trouble, and from one stack to the next."""
 
-import json
 from functools import partial
+from itertools import islice, permutations
 
 import numpy as np
 import pytest
@@ -10,13 +10,13 @@ import scene
 from benchmark.solve import oracle
 from hierarchy import Hierarchy, Stack
 from hierarchy.tasks import JointLimits
-from scenarios import load, load_run, save, simulate
+from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.config.sections.control import PolicySection
 from scenarios.loop.controller import Controller
+from scenarios.loop.faults import Faults
 from scenarios.loop.policy import Policy
 from scenarios.loop.transition import Blend, Key
-from scenarios.measure.metrics import measure
 from solvers import Status, make
 
 PERIOD = 0.001
@@ -187,6 +187,19 @@ def test_one_task_that_enters_or_leaves_has_its_intermediate_desired_value(
     np.testing.assert_allclose(x, oracle.solve(asked), rtol=0, atol=1e-8 * (1 + np.abs(x).max()))
 
 
+def test_stacks_that_agree_have_their_answer_however_many_are_blended():
+    """More than are resolved, so that the weights of those that are do not sum to one."""
+    tasks, blend = [HAND, AXIS, ELBOW, scene.TASKS["coupling"]], Blend(TIME)
+    stack = Stack(tasks, "acceleration", scene.TASKS["damping"])
+    q, v = scene.states(1, seed=4)[0]
+    for k, order in enumerate(islice(permutations(stack.names), 12)):
+        state = scene.state_at(q, v, 0.008 * k)
+        h = stack.hierarchy(state, order)
+        own, x = blend.resolve(make("tpm"), stack, state, order, h)
+        np.testing.assert_allclose(x, oracle.solve(h), rtol=0, atol=1e-8 * np.abs(x).max())
+        assert (blend.weight == 1.0) == (x is own.x) == (k == 0)
+
+
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
 def test_bounds_that_both_stacks_have_on_top_are_kept(level):
     limits = JointLimits(scene.ROBOT, 10.0, TICK)
@@ -215,6 +228,17 @@ FAULTS = {
     "obstacle": ("obstacle", "place={joint='joint_4', offset=[0.0, 0.0, 0.0]}, radius=0.05",
                  "inside", 0),
     "obstacle at a frame": ("obstacle", "place={frame='end_effector'}, radius=0.05", "inside", 0)}
+
+
+@pytest.mark.parametrize(("name", "fault", "joint", "spoiled"), [
+    ("ellipse", "nan_position", 3, 2), ("ellipse", "nan_velocity", 7, 6),
+    ("humanoid", "nan_position", 2, 8), ("humanoid", "nan_velocity", 2, 7)])
+def test_a_fault_of_a_joint_spoils_its_number_alone(name, fault, joint, spoiled):
+    scenario = load(name, [f"faults=[{{kind='{fault}', at=0.0, duration=0.1, joint={joint}}}]"])
+    faults = Faults(scenario)
+    faults.around(build(scenario), make("tpm"))
+    measured = faults.measure(0.0)[fault == "nan_velocity"]
+    assert np.flatnonzero(np.isnan(measured)).tolist() == [spoiled]
 
 
 def faulty(name, put, settings, *changes, kind, policy):
@@ -268,14 +292,3 @@ def test_every_fault_under_every_policy(fault, policy, name, limited):
     assert len(held) == (10 if policy == "hold" else 0)
     assert (run["status"][AT + LASTS:] == Status.SOLVED).all()
     assert np.abs(run["v"][-1]).max() > 1e-2  # it moves again
-
-
-def test_what_happened_is_saved_counted_and_loaded_again(tmp_path):
-    run = simulate(faulty("ellipse", "nan_position", "", kind="not_finite", policy="hold"))
-    found = measure(run)
-    assert (found["ticks_hold"].value, found["ticks_brake"].value) == (10, LASTS - 10)
-    assert load_run(save(run, tmp_path / "run")).events == run.events
-    assert json.loads((tmp_path / "run" / "metrics.json").read_text())["events"] == [
-        {"kind": "not_finite", "action": action, "ticks": ticks, "first_tick": first,
-         "first_time": pytest.approx(first * 1e-3)}
-        for action, ticks, first in (("hold", 10, AT), ("brake", LASTS - 10, AT + 10))]

@@ -1,10 +1,10 @@
 """`hierarchy problems`, and whether fresh problems are like the stored ones of their family."""
 
-
 import numpy as np
 import pytest
 from rank_cases import solved
 
+from hierarchy import Hierarchy
 from scenarios.problems import recorded
 from scenarios.problems.families import FAMILIES, available, export, family, save
 from scenarios.problems.made import posed
@@ -31,6 +31,29 @@ def test_halves_are_reproducible_and_never_the_same(name):
     one = family(name)
     assert one.half(26112907, 2).digest == one.half(26112907, 2).digest
     assert len({one.half(seed, 2).digest for seed in (0, 1, 2)}) == 3
+
+
+def test_ticks_of_the_humanoid_are_ten_in_a_row_after_its_push_of_runs_that_last(monkeypatch):
+    asked = []
+
+    def window(scenario, first, count):
+        asked.append((scenario.control.period * first, scenario.plant, scenario.limits.horizon))
+        return [Hierarchy.from_levels(
+            [(np.eye(3)[:1], [k]), (np.eye(3)[:2], [7.0, 7.0]), (np.eye(3)[2:], [1.0])],
+            names=("a", recorded.LEFT_OUT, "b")) for k in range(count - (len(asked) == 2))]
+
+    monkeypatch.setattr(recorded, "window", window)
+    found = recorded.fresh("DYN60", 60, 12)
+    assert [one.h.names for one in found] == [("a", "b")] * 12
+    assert [[*one.proof.x.round(9), one.proof.complete] for one in found] == [
+        [k % 10, 0.0, 1.0, True] for k in range(12)]
+    assert [one.before is found[k - 1].h for k, one in enumerate(found)] == [
+        k not in (0, 10) for k in range(12)]
+    assert len({at for at, *_ in asked}) == len(asked) == 3
+    for at, plant, horizon in asked:
+        assert 0.3 <= at < 1.0
+        assert not any((plant.stops, horizon, plant.joint_friction, plant.joint_damping,
+                        plant.armature))
 
 
 def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):

@@ -6,73 +6,14 @@ import numpy as np
 import pytest
 from hand_made import recording as hand_made
 
-from hierarchy import Robot
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.draw.replay import html
 from scenarios.draw.viewer.live import Live
 from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
-from scenarios.recording.facts import ContactPoint, facts_of
 from scenarios.recording.fate import Fate, levels_at
 from scenarios.scene.drawn import scene
-from scenarios.scene.pushes import Pushes, pushes
-
-STANDING = load("stand-push")
-FACTS = facts_of(STANDING, Robot.named("humanoid"))
-
-
-def drawn(contacts, forces):
-    """What is drawn of points of contacts, by name, of a base at the origin."""
-    points = tuple(ContactPoint(name, 0, tuple(map(float, p)), (0.0, 0.0, 1.0), 0.5)
-                   for name, of in contacts.items() for p in of)
-    origin = np.r_[np.eye(3).ravel(), np.zeros(3)][None, None]
-    found = pushes(replace(FACTS, contacts=points), load("step"), np.zeros(1), origin,
-                   np.asarray(forces, dtype=float))
-    return at(found, 0)
-
-
-def at(found, frame):
-    """The segments of a frame that exist."""
-    return Pushes(*(part[frame][np.isfinite(part[frame]).all(axis=(1, 2))] for part in found))
-
-
-def test_the_support_is_the_hull_of_the_contacts_that_carry_something():
-    """All of a sole supports, also while its load is at the toes."""
-    corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]
-    contacts = {"sole": corners, "inside": [(0.4, 0.5, 0.0)], "in the air": [(5.0, 5.0, 0.0)]}
-    forces = np.tile([0.0, 0.0, 10.0], (1, 6, 1))
-    forces[0, [0, 3, 5]] = 0.0
-    found = drawn(contacts, forces)
-    assert sorted(map(tuple, found.support[:, 0])) == sorted(corners)
-    np.testing.assert_array_equal(found.support[:, 1], np.roll(found.support[:, 0], -1, axis=0))
-    assert (len(found.force), len(found.cone)) == (6, 3 * 16)  # a cone where there is load
-    forces[0, 1] = np.nan
-    assert len(drawn(contacts, forces).force) == 5
-    for x, y, places in ((0.0, 1.0, (2, 1, 3)), (1.0, 0.0, (3, 1))):  # along a line its ends
-        toes = {"toes": [(x * k, y * k, 0.0) for k in places]}
-        edge = drawn(toes, forces[:, 2:2 + len(places)]).support
-        np.testing.assert_array_equal(edge[:, 0], [(x, y, 0.0), (3 * x, 3 * y, 0.0)])
-
-
-def test_an_arrow_goes_to_the_middle_of_a_pushed_body_while_it_is_pushed():
-    scenario = STANDING.with_changes({"plant.pushes.0": {
-        "joint": "trunk_pitch", "force": 100.0, "direction": 90.0, "at": 0.2, "duration": 0.1}})
-    t = np.array([0.199, 0.2, 0.299, 0.3])
-    rest = FACTS.robot.placements(np.array(FACTS.robot.rest))
-    bare = replace(FACTS, robot=replace(FACTS.robot, capsules=()))  # to the joint, without bodies
-    found, to_joint = (pushes(facts, scenario, t, np.tile(rest, (4, 1, 1)), np.zeros((4, 8, 3)))
-                       for facts in (FACTS, bare))
-    trunk = FACTS.robot.joint_names.index("trunk_pitch") + 1
-    np.testing.assert_array_equal(at(to_joint, 1).push[0, 1], rest[trunk, 9:])
-    assert [len(at(found, f).push) for f in range(4)] == [0, 5, 5, 0]
-    shaft, *head = at(found, 1).push
-    np.testing.assert_allclose(shaft[1] - shaft[0], [0.0, 0.2, 0.0], atol=1e-12)
-    assert all((barb[1] == shaft[1]).all() and barb[0, 1] < shaft[1, 1] for barb in head)
-    sideways = np.linalg.norm(np.subtract(*np.swapaxes(head, 0, 1))[:, ::2], axis=1)
-    np.testing.assert_allclose(sideways, 0.4 * (shaft[1, 1] - np.array(head)[:, 0, 1]))
-    assert abs(shaft[1, 1]) < 1e-9
-    assert shaft[1, 2] > rest[:, 11].mean()  # in the trunk
 
 
 @pytest.mark.parametrize("name", ["reach-torque", "stand-momentum", "wipe", "step", "crawl"])
@@ -98,8 +39,8 @@ NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "
 
 
 @pytest.fixture(scope="module")
-def runs():
-    return {name: simulate(load(name, ["control.duration=1.5"])) for name in NAMES}
+def recording():
+    return simulate(load("ellipse", ["control.duration=1.5"]))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -122,8 +63,7 @@ def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
             assert (fate == Fate.MISSED) == (violation > 1e-5) or 1e-9 < violation < 1e-3
 
 
-def test_distances_that_are_not_those_recorded_leave_levels_unknown(runs):
-    recording = runs["ellipse"]
+def test_distances_that_are_not_those_recorded_leave_levels_unknown(recording):
     moved = recording["control_point_distance"] + 1e-3
     other = replace(recording, signals=recording.signals | {"control_point_distance": moved})
     judge(other, build(recording.scenario))
@@ -132,8 +72,7 @@ def test_distances_that_are_not_those_recorded_leave_levels_unknown(runs):
     assert np.isnan(levels.violation).all()
 
 
-def test_no_peak_between_two_frames_is_lost(runs):
-    recording = runs["ellipse"]
+def test_no_peak_between_two_frames_is_lost(recording):
     for curve, values in zip(scene(recording, rate=4.0).series, scene(recording, 5000.0).series,
                              strict=True):
         assert np.allclose(curve.low.min(axis=0), values.value.min(axis=0))

@@ -14,7 +14,7 @@ from hierarchy.avoidance import Measurement, Obstacle
 from hierarchy.avoidance.measurement import measure_exactly
 from scenarios import load, save, simulate
 from scenarios.cell.sensors.sensor import packed_laws
-from scenarios.draw.figures import drawing, letter, picture
+from scenarios.draw.figures import drawing, letter, picture, timeline
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
@@ -152,6 +152,7 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order(tmp_path):
     assert "figure-4a-joint-velocities" in dict(letter.figures([runs[2]]))
     assert "picture" in dict(letter.figures([recording(t=[0.0, 1.0])]))
     letter.write_all([recording(t=[0.0])], tmp_path)  # a run of one tick has no figure
+    assert timeline.timeline(recording(t=[2.0])).axes[0].get_xlim() == (2.0, 3.0)
 
 
 @pytest.mark.parametrize("obstacle", [

@@ -17,38 +17,6 @@ from scenarios.recording.fate import Fate
 SHORT = ["control.duration=3.0"]
 
 
-@pytest.fixture(scope="module")
-def run():
-    return simulate(load("ellipse"))
-
-
-def test_every_answer_is_certified_where_asked_and_nothing_is_where_not(run):
-    judged = simulate(load("ellipse", ["control.options.damping=0.0", "control.duration=0.4"]),
-                      certified=True)
-    assert judged["certified"].tolist() == [True] * 400
-    assert "certified" not in run
-
-
-def test_row_0_is_the_start_and_the_stack_is_recorded_as_the_measurements_ask(run):
-    np.testing.assert_array_equal(run["q"][0], load("ellipse").start.q)
-    assert not run["v"][0].any()
-    assert run.ticks == 18850
-    T, q, v, a = 1e-3, run["q"], run["v"], run["command"]
-    np.testing.assert_allclose(np.diff(run["t"]), T)
-    np.testing.assert_allclose(v[1:], v[:-1] + a[:-1] * T, atol=1e-15)
-    np.testing.assert_allclose(q[1:], q[:-1] + v[:-1] * T + a[:-1] * T * T / 2, atol=1e-14)
-    velocity_run = simulate(load("ellipse-velocity", SHORT))
-    np.testing.assert_array_equal(velocity_run["v"][1:], velocity_run["command"][:-1])
-    np.testing.assert_allclose(velocity_run["a"][:-1], np.diff(velocity_run["v"], axis=0) / T,
-                               atol=1e-9)
-    np.testing.assert_array_equal(run["pointing_active"], run["pointing_error"] > 0)
-    assert 0 < run["pointing_active"].mean() < 1
-    in_order = np.array(["pointing" in order for order in run.orders])[run["order"]]
-    np.testing.assert_array_equal(run["pointing_active"], in_order)
-    np.testing.assert_array_equal(run["repulsion_active"], run["ee_distance"] <= 0.1)
-    assert run["repulsion_active"].any()
-
-
 def test_progress_is_told_and_an_interrupted_run_keeps_what_was_run():
     def interrupt(done, total):
         if done == 1000:

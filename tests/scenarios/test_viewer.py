@@ -5,7 +5,7 @@ import itertools
 import json
 import re
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from http.client import HTTPConnection
 from unittest import mock
 from urllib.parse import urlsplit
@@ -136,6 +136,12 @@ def test_the_server_of_a_page_rejects_them():
         for others in ({"Host": "rebound.example"}, {"Origin": "http://elsewhere.example"}):
             assert status("GET", **others) == status("POST", "/now", '{"b": 2}', **others) == 403
         assert status("POST", "/now", "x" * 200_000) == 403
+        with closing(HTTPConnection(urlsplit(address).netloc, timeout=9.0)) as connection:
+            connection.request("POST", "/now", "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n",
+                               {"Host": "rebound.example"})
+            connection.getresponse().read()
+            with suppress(ConnectionResetError):  # what was refused is not read as a request
+                assert connection.sock.recv(1) == b""
         with pytest.raises(HierarchyError, match="--port"), served(urlsplit(address).port, str):
             pass
     assert asked == [{"a": 1}]

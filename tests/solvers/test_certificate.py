@@ -1,5 +1,7 @@
 """The certificate accepts the answer and nothing else, and a proof in 120 digits is one."""
 
+from decimal import Decimal, localcontext
+
 import numpy as np
 import pytest
 from rank_cases import build, family, rng
@@ -7,7 +9,7 @@ from refusals import refused
 
 from hierarchy import Hierarchy
 from scenarios.problems import recorded
-from solvers import certificate, certify, make, problems
+from solvers import certificate, certify, make, problems, proof
 from solvers.proof import prove
 
 # Not DEGEN7: some of its rows are at an angle of 2e-9, whose answer is 1e8 away or not.
@@ -30,14 +32,14 @@ def test_the_stored_solutions_are_certified_far_below_the_tolerance(name):
 def test_only_the_answer_that_is_proved_is_certified(seed):
     """The least violation of a level is one vector, not only one norm."""
     h, r = problems.generate(seed, TINY), rng(seed)
-    proof = prove(h, [make("hcod").solve(h).x])
-    assert proof.complete
-    assert certify(h, proof.x).certified
-    for x in candidates(h, proof.x, r):
-        verdict, worse = certify(h, x), np.abs(h.slacks(x) - h.slacks(proof.x)).max()
+    proved = prove(h, [make("hcod").solve(h).x])
+    assert proved.complete
+    assert certify(h, proved.x).certified
+    for x in candidates(h, proved.x, r):
+        verdict, worse = certify(h, x), np.abs(h.slacks(x) - h.slacks(proved.x)).max()
         if worse < 1e-9 or worse > 1e-5:
             assert verdict.optimal == (worse < 1e-9), worse
-        if verdict.optimal and np.linalg.norm(x - proof.x) > 1e-5:
+        if verdict.optimal and np.linalg.norm(x - proved.x) > 1e-5:
             assert not verdict.is_nearest
 
 
@@ -119,6 +121,9 @@ def test_its_search_for_multipliers_finds_the_least_that_scipys_finds():
         C, b = rng.random((9, 8)) + 0.2 * rng.normal(size=(9, 8)), rng.random(9)
         own, scipys = (certificate._non_negative(C, b, 0.0, by_scipy) for by_scipy in (False, True))
         np.testing.assert_allclose(own, scipys, atol=1e-9)
+        with localcontext(prec=120):
+            left = proof._pushed_back(*map(np.vectorize(Decimal, [object]), (C.T, b)))
+        np.testing.assert_allclose(left.astype(float), b - C @ own, atol=1e-9)
 
 
 def test_an_answer_for_rows_turned_until_they_depend_is_certified():

@@ -49,13 +49,13 @@ from solvers.kernels.tolerances import (
     RECURRENCES,
     RESTORED,
     SHADOW,
+    SLICE,
+    SLICED,
     VIOLATED,
 )
 from solvers.status import EQUAL, FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
 LEAVES = 5    # change of a row that acts; else the side at which it is to act, or 0
-SLICE = 1.0 / 128.0  # added to the level for each search that ended in it
-SLICED = 0.5         # after so many, the first wrong row changes
 
 
 class Found(NamedTuple):
