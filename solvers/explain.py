@@ -102,8 +102,8 @@ def _giving(h: Hierarchy, resolution: ActiveSetResolution, k: int, witness: Arra
         return f"{h.names[k]} is met."
     rows, whom = np.arange(h.offsets[k], h.offsets[k + 1]), (*h.names, "the reference")
     w, least = h.slacks(resolution.x)[rows], h.slacks(witness)[rows]
-    size, needed = _least_miss(h, resolution.x, k, tolerance), float(np.linalg.norm(least))
-    given = []
+    needed, given = float(np.linalg.norm(least)), []
+    size = max(_least_miss(h, resolution.x, k, tolerance), tolerance * needed)
     for i, more in zip(rows.tolist(), (np.abs(w) - np.abs(least)).tolist(), strict=True):
         if more > size:
             unit, level = units[i] and f" {units[i]}", int(resolution.holds_back[i])

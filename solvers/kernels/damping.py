@@ -141,10 +141,12 @@ def _factor_equalities(d, A, sizes, settings, work, whole):
     (basis, rows, _, _, of_block), _ = carve_staircase(work, 0, m, n)
     settings, rank, first, begin = shared(settings), 0, 0, 0
     for k in range(sizes.size):
-        end, last = begin + d.ends[k], first + sizes[k]
-        for e in range(begin, end):
-            assign(rows.W[e], d.E[e])
-            rows.zero[e] = (settings.rank_tolerance * length_of(d.E[e])) ** 2
+        end, last, e = begin + d.ends[k], first + sizes[k], begin
+        for i in range(first, last):
+            if d.lower[i] == d.upper[i]:
+                assign(rows.W[e], d.E[e])
+                rows.zero[e] = (settings.rank_tolerance * length_of(A[i])) ** 2
+                e += 1
         reflect(basis, 0, rank, rows.W, begin, end)
         above, rank = rank, factor_level(rows, basis, begin, end, rank)
         if whole:

@@ -29,8 +29,8 @@ from solvers.kernels.linalg.rows import (
     swap_rows,
 )
 from solvers.kernels.linalg.space import Block, View, assign, fill, matrix, shared, vector
-from solvers.kernels.tolerances import NEGLIGIBLE
-from solvers.status import SOLVED, TOO_SMALL
+from solvers.kernels.tolerances import NEGLIGIBLE, REMAINDER, SIGN_ROUNDING
+from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 LEVEL, NAKAMURA, CHIAVERINI, SELECTIVE = 0.0, 1.0, 2.0, 3.0  # methods of `Recursive`, in order
 SHRUNK = 0.01  # squared norm of a remainder: smaller ones are projected a second time
@@ -77,7 +77,8 @@ def recursion(A, lower, upper, sizes, x, settings, work):
     """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
     settings: those of `Recursive`. Other arguments and the codes are those of `solve_by_staircase`,
-    but INACCURATE if a level is missed whose rows are rounding beside others.
+    but INACCURATE if a level is missed whose rows are rounding beside others, or which has light
+    rows that its heavy ones round off.
     """
     m, n = A.shape
     rows, at = _carve(work, 0, m, n)
@@ -93,7 +94,7 @@ def recursion(A, lower, upper, sizes, x, settings, work):
         return finish(x, code)
     _begin(rows, q)
 
-    rank = first = 0
+    rank, first, doubtful = 0, 0, False
     for level in range(sizes.size):
         last, above = first + sizes[level], rank
         _see(rows, A, lower, q, first, last, above)
@@ -101,6 +102,7 @@ def recursion(A, lower, upper, sizes, x, settings, work):
         block = Block(first, last, above, rank)
         if inverse.method == LEVEL:
             solve_level(rows.C, rows.miss, y, block, settings, of_block)
+            doubtful |= _rounds_off(rows, y, block, settings.rank_tolerance)
         else:
             invert(rows, y, block, inverse, of_block)
         for k in range(above, rank):
@@ -110,7 +112,23 @@ def recursion(A, lower, upper, sizes, x, settings, work):
         add_multiple(q, x[i], rows.P[i])  # (14): I - J^# J = P_l
     assign(x, q)
     light = has_outlier(rows.zero, NEGLIGIBLE * NEGLIGIBLE) and inverse.method == LEVEL
-    return finish_unless_missed(light, A, lower, sizes, x, settings.damping)
+    code = finish_unless_missed(light, A, lower, sizes, x, settings.damping)
+    return INACCURATE if code == SOLVED and doubtful and settings.damping == 0.0 else code
+
+
+@inlined
+def _rounds_off(rows, y, at, rank_tolerance):
+    """Whether rounding in the violation of a heavy row may turn a light one of its level."""
+    if at.i1 - at.i0 == at.k1 - at.k0:
+        return False
+    source, pivot, reach = 0.0, np.inf, 1.0
+    for k in range(at.k0, at.k1):
+        pivot, reach = min(pivot, abs(rows.C[at.i0 + k - at.k0, k])), reach + abs(y[k])
+    for i in range(at.i0, at.i1):
+        off = abs(rows.miss[i] - inner_product(y[at.k0:at.k1], rows.C[i, at.k0:]))
+        norm = np.sqrt(rows.zero[i])  # times rank_tolerance
+        source = max(source, off * norm if norm < np.inf else 0.0)
+    return SIGN_ROUNDING * source > REMAINDER * rank_tolerance * pivot * pivot * reach
 
 
 @inlined

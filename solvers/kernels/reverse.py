@@ -9,11 +9,14 @@ hierarchy of two levels: the rows of k with their residual, and all rows below w
 staircase finds it at any rank, and no pseudoinverse is formed.
 """
 
+import numpy as np
+
 from hierarchy.jit import compiled, inlined, inner_product
-from solvers.kernels.linalg.rows import finish
+from solvers.kernels.linalg.rows import finish, finish_unless_missed, length_of
 from solvers.kernels.linalg.space import assign, fill, integers, vector
 from solvers.kernels.staircase import carve_staircase, climb
-from solvers.status import NUMERICAL_FAILURE, SOLVED, TOO_SMALL
+from solvers.kernels.tolerances import NEGLIGIBLE, UNCLEAR_PIVOT
+from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 
 @compiled
@@ -21,9 +24,10 @@ def reverse(A, lower, upper, sizes, x, settings, work):
     """Solve; x (n,) is the reference on entry and the answer on return, zero on failure.
 
     settings: damping, threshold, rank_tolerance, and whether the rows below are changed least level
-    by level, upper ones first, rather than all alike. Otherwise like `solve_by_staircase`.
+    by level, upper ones first, rather than all alike, which does not make rows that are nearly
+    parallel INACCURATE. Otherwise like `solve_by_staircase`.
     """
-    m, n = A.shape
+    (m, n), in_order, most, least = A.shape, settings[3] > 0.0, 0.0, np.inf
     asked, at = vector(work, 0, m)
     d, at = vector(work, at, n)
     reference, at = vector(work, at, n)
@@ -34,7 +38,7 @@ def reverse(A, lower, upper, sizes, x, settings, work):
     for i in range(m):
         if lower[i] != upper[i]:
             return finish(x, -(i + 1) if lower[i] < upper[i] else NUMERICAL_FAILURE)
-        asked[i] = 0.0
+        asked[i], most = 0.0, max(most, length_of(A[i]))
     for c in range(n):
         reference[c], x[c] = x[c], 0.0
     first = m
@@ -43,17 +47,21 @@ def reverse(A, lower, upper, sizes, x, settings, work):
         for c in range(n):
             d[c] = 0.0 if k > 0 else reference[c]  # in the null space of all levels
         for i in range(first, last):
-            asked[i] = lower[i] - inner_product(A[i], x)  # b_k - J_k x_{k+1}
-        two = parts[k:_end_of_parts(sizes, parts, k, m - last, settings[3] > 0.0)]
-        code, _ = climb(A[first:], asked[first:], asked[first:], two, d, settings, work[at:])
+            if length_of(A[i]) >= NEGLIGIBLE * most:
+                asked[i] = lower[i] - inner_product(A[i], x)  # b_k - J_k x_{k+1}
+        two = parts[k:_end_of_parts(sizes, parts, k, m - last, in_order)]
+        code, pivot = climb(A[first:], asked[first:], asked[first:], two, d, settings, work[at:])
         if code != SOLVED:
             return finish(x, code)
+        least = min(least, pivot)
         for c in range(n):
             x[c] += d[c]
         fill(asked[first:last], 0.0)
     if sizes.size == 0:
         assign(x, reference)
-    return finish(x, SOLVED)
+    code = finish_unless_missed(least == 0.0, A, lower, sizes, x, settings[0])
+    unclear = in_order and least < UNCLEAR_PIVOT and settings[0] == 0.0
+    return INACCURATE if code == SOLVED and unclear else code
 
 
 @inlined

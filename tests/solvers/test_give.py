@@ -165,6 +165,15 @@ def test_explain_says_what_gives_how_much_and_for_whom():
     refused("explain: 1 units for 14 rows", lambda: explain(h, make("hcod").solve(h), units=["m"]))
 
 
+def test_explain_does_not_say_that_rows_give_by_rounding():
+    """At x = 0 rows gave 1e-16 of 0."""
+    turn = np.arange(4) * np.pi / 2.0
+    opposite = np.column_stack([np.cos(turn), np.sin(turn)]), [-np.inf] * 4, [-0.5] * 4
+    h = Hierarchy.from_levels([opposite, (np.eye(2), [1.0, 0.0])], give=[[0.0, 0.2, 0.0, 0.0], 0.0])
+    said = explain(h, make("hcod").solve(h)).splitlines()[0]
+    assert said == "level 1 is missed by 1, of which 1 cannot be avoided."
+
+
 EVERY_STRICT = [make(name) for name in names() if make(name).strict]
 INEQUALITIES = [r for r in EVERY_STRICT if r.handles == "inequalities"]
 BOUNDS = [r for r in EVERY_STRICT if r.handles == "bounds"]

@@ -224,6 +224,14 @@ def test_damped_x_is_continuous_where_a_bound_begins_to_act(name):
         assert np.abs(x[2] - x[1]).max() <= 1e-6
 
 
+def test_damped_x_does_not_hang_on_rounding_where_a_task_lies_along_an_exceeded_row():
+    """What was left of the task, 1e-16, counted as a row; x moved by 1e-3."""
+    a, b = np.random.default_rng(10).normal(size=(2, 1, 3))
+    x = [solved(make("hcod", damping=0.1, threshold=3.0), Hierarchy.from_levels([
+        (a, [-np.inf], [0.2]), (a * (1.0 + 1e-12 * k), [1.0]), (b, [1.0])])).x for k in range(9)]
+    np.testing.assert_allclose(x, [x[0]] * 9, rtol=0.0, atol=1e-9)
+
+
 @pytest.mark.filterwarnings("ignore:overflow")
 @pytest.mark.parametrize("below", [0, 1])
 def test_rows_of_any_size_are_solved_and_numbers_that_overflow_are_a_failure(below):

@@ -103,6 +103,18 @@ def test_it_is_the_published_recursion_at_every_rank(case):
     assert gap(make("reverse").solve(h).x, by_pseudoinverses(h) if h.m else h.reference) < 1e-9
 
 
+@pytest.mark.parametrize("resolver", [make("recursive"), make("reverse", form="in-order")])
+@pytest.mark.parametrize(("scale", "status"), [(1, Status.SOLVED), (1e4, Status.INACCURATE)])
+def test_heavy_rows_that_contradict_each_other_may_round_off_a_light_one(resolver, scale, status):
+    """x was off by 5, SOLVED."""
+    A = np.array([[0.3, 0.7, 0.2], [0.33, 0.77, 0.22], [0.9, 2.1, 0.6], [0.5, -0.1, 0.3]])
+    by = np.array([scale, scale, scale, 1.0 / scale])
+    h = Hierarchy.from_levels([(A * by[:, None], [1.0, -1.0, 1.0, 1.0] * by)])
+    found = resolver.solve(h)
+    assert found.status is status
+    assert (gap(found.x, make("hcod").solve(h).x) < 1e-9) == (status is Status.SOLVED)
+
+
 BASIC, OPTIMAL = make("sns"), make("sns", form="optimal")
 JIT = os.environ.get("NUMBA_DISABLE_JIT") != "1"
 
