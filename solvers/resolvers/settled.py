@@ -90,9 +90,9 @@ class Settled(Around):
         above = _Above(self.inner, h)
         for k, (A, lower, upper) in enumerate(h.levels()):
             if least[k] > 0.0:
-                above.bending |= _used(A)
+                above.bending.append(A)
             elif self.geared and (lower == upper).all():
-                above.turning |= _used(A)
+                above.turning.append(A)
             calm = least[k] > 0.0 and len(lower) and (lower == upper).all()
             if calm:
                 A, lower, upper = above.calm(A, lower, half)
@@ -119,7 +119,7 @@ class _Above:
 
     def __init__(self, inner: Resolver, h: Hierarchy) -> None:
         n = h.n
-        self.bending, self.turning = np.zeros((2, n), dtype=bool)  # joints of curved levels, others
+        self.bending, self.turning = list[Array](), list[Array]()  # rows of curved levels, others
         self.strict = self.inner = inner
         if isinstance(inner, OneLevel):
             self.strict, self.inner = inner.strictly(), inner.below_one_more(h)
@@ -182,11 +182,12 @@ class _Above:
         self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
         self.calmed, self.x = True, found.x
         rows, directions = np.zeros_like(A), directions[:rank]
-        missed = (b - A @ found.x) / found.missed
-        pull = missed @ free
-        if found.mu * step < _AT_REST * found.missed * np.linalg.norm(pull):
-            self._later.append(directions)
-            directions = _directions(A, free - np.outer(missed, pull))
+        if found.mu * step < _AT_REST * found.missed * size:  # or it is not worth a closer look
+            missed = (b - A @ found.x) / found.missed
+            pull = missed @ free
+            if found.mu * step < _AT_REST * found.missed * np.linalg.norm(pull):
+                self._later.append(directions)
+                directions = _directions(A, free - np.outer(missed, pull))
         rows[:len(directions)] = directions
         return rows, rows @ found.x, rows @ found.x
 
@@ -204,9 +205,13 @@ class _Above:
         room[used] = (_PACE + most) * columns.max() / columns[used]
         self.box = np.maximum(self.box[0], x - room), np.minimum(self.box[1], x + room)
 
-    def _counted(self) -> Array:
-        """Return the weight (n,) of each joint in |x - x0|."""
-        return np.where(self.turning & ~self.bending, _TURNING, 1.0)
+    def _counted(self) -> Array | float:
+        """Return the weight (n,) of each joint in |x - x0|, or that of all."""
+        if not self.turning:
+            return 1.0
+        turning, bending = (np.any([*map(_used, rows)], axis=0)
+                            for rows in (self.turning, self.bending))
+        return np.where(turning & ~bending, _TURNING, 1.0)
 
     def _damped(self, A: Array, b: Array) -> Callable[[float], _Reached]:
         """Return, by mu, the x within the levels above of least |A x - b|^2 + mu |x - x0|^2."""
