@@ -39,6 +39,8 @@ def reverse(A, lower, upper, sizes, x, settings, work):
         if lower[i] != upper[i]:
             return finish(x, -(i + 1) if lower[i] < upper[i] else NUMERICAL_FAILURE)
         asked[i], most = 0.0, max(most, length_of(A[i]))
+    if not np.isfinite(most):
+        return finish(x, NUMERICAL_FAILURE)
     for c in range(n):
         reference[c], x[c] = x[c], 0.0
     first = m
