@@ -94,9 +94,17 @@ def stacked(robot: Robot, tasks: Sequence[Task], period: float, limits: Sequence
     """
     first = above(model_rows(robot, period), limits, resolver.can_resolve("inequalities"))
     tasks = [task.on(robot) for task in tasks]
-    return Stack([*first, *tasks], "velocity"), Settled(
-        inner=resolver, period=period, softness=damping,
-        curved=curved(tasks, robot.n - robot.actuated), geared=not bends(robot))
+    return Stack([*first, *tasks], "velocity"), settled(robot, tasks, period, resolver, damping)
+
+
+def settled(robot: Robot, tasks: Sequence[Task], period: float, resolver: Resolver,
+            damping: float) -> Settled:
+    """Return what resolves levels of tasks, as a robot has them, with those out of reach at rest.
+
+    period [s], for which a velocity will be held; damping as in `solve_ik`.
+    """
+    return Settled(inner=resolver, period=period, softness=damping,
+                   curved=curved(tasks, robot.n - robot.actuated), geared=not bends(robot))
 
 
 class _Search:

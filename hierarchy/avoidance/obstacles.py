@@ -51,7 +51,7 @@ class Obstacle:
 
     def packed(self) -> Array:
         """The obstacle as one row (16,) of the table for the kernels."""
-        size = np.pad(np.array(self.size, dtype=float), (0, 3 - len(self.size)))
+        size = (*self.size, 0.0, 0.0, 0.0)[:3]
         return np.array([SHAPES[self.shape], *size, *self.centre,
                          *np.asarray(self.rotation, dtype=float).ravel()])
 

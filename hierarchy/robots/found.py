@@ -29,6 +29,11 @@ class Coupled:
     other: str
     coefficients: tuple[float, ...]
 
+    @property
+    def straight(self) -> bool:
+        """Whether the polynomial is a line."""
+        return len(self.coefficients) <= 2
+
     def at(self, value: ArrayLike) -> float:
         """Return the position of the joint where the other has this value [rad or m]."""
         powers = np.asarray(value, dtype=float) ** np.arange(len(self.coefficients))

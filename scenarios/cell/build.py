@@ -15,9 +15,7 @@ from hierarchy.avoidance import Measurement, Obstacles
 from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
-from hierarchy.task import curved
 from hierarchy.tasks import Pointing, Separation
-from hierarchy.tasks.joints.mechanism import bends
 from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.tasks.together import TangentCone
 from scenarios.cell.plants import Plant
@@ -31,9 +29,9 @@ from scenarios.config import Scenario, ScenarioError
 from scenarios.config.sections.avoidance import AvoidanceSection
 from scenarios.config.sections.references import References
 from solvers import Resolver
+from solvers.reaching import settled
 from solvers.resolvers.merged import Merged
 from solvers.resolvers.set_based import SetBased
-from solvers.resolvers.settled import Settled
 from solvers.resolvers.smooth import Activated, Smooth
 
 Order = Callable[[Measurement | None, float], Allocation]
@@ -169,8 +167,7 @@ def stack_resolver(scenario: Scenario, cell: Cell) -> Resolver:
         return resolver
     if activation is None:  # where x is a velocity, tasks out of reach come to rest
         tasks = [stack[name].on(robot) for name in stack.names]
-        return Settled(inner=resolver, period=control.period, softness=control.damping,
-                       curved=curved(tasks, robot.n - robot.actuated), geared=not bends(robot))
+        return settled(robot, tasks, control.period, resolver, control.damping)
     if not isinstance(resolver, Smooth):
         raise ScenarioError('control.stack = "smooth" needs control.resolver = "smooth", got '
                             f'"{resolver.name}"')

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.met import plainly_met
@@ -168,7 +167,8 @@ class _Above:
         alpha = half * size
         if not (_FAINT * whole < size and _LEAST * size * size < alpha * out < np.inf):
             return asked
-        probe = self._damped(A, b)
+        counted = self._counted()
+        probe = self._damped(A, b, counted)
         found = first = probe(_LEAST * size * size)
         met = alpha * first.missed <= first.mu
         if not met:
@@ -178,7 +178,7 @@ class _Above:
         if met:
             self.x = first.x
             return asked
-        step = float(np.linalg.norm(self._counted() * (found.x - self.x)))
+        step = float(np.linalg.norm(counted * (found.x - self.x)))
         self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
         self.calmed, self.x = True, found.x
         rows, directions = np.zeros_like(A), directions[:rank]
@@ -200,8 +200,8 @@ class _Above:
 
     def _pace(self, free: Array, x: Array, most: float) -> None:
         """Let levels below change the speeds x by (b) and no more."""
-        columns, used = np.linalg.norm(free, axis=0), _used(free)
-        room = np.full(len(x), np.inf)
+        columns, room = _columns(free), np.full(len(x), np.inf)
+        used = columns > 0.0
         room[used] = (_PACE + most) * columns.max() / columns[used]
         self.box = np.maximum(self.box[0], x - room), np.minimum(self.box[1], x + room)
 
@@ -209,18 +209,18 @@ class _Above:
         """Return the weight (n,) of each joint in |x - x0|, or that of all."""
         if not self.turning:
             return 1.0
-        turning, bending = (np.any([*map(_used, rows)], axis=0)
+        turning, bending = (np.any([*map(_columns, rows)], axis=0)
                             for rows in (self.turning, self.bending))
         return np.where(turning & ~bending, _TURNING, 1.0)
 
-    def _damped(self, A: Array, b: Array) -> Callable[[float], _Reached]:
+    def _damped(self, A: Array, b: Array, counted: Array | float) -> Callable[[float], _Reached]:
         """Return, by mu, the x within the levels above of least |A x - b|^2 + mu |x - x0|^2."""
         n, x0 = len(self.x), self.x
         side = np.concatenate([b, x0])
         h = self.stacked([*self.levels, (np.vstack([A, np.eye(n)]), side, side)],
                           np.zeros_like(x0))
         rows, lower, upper, _ = h.rows
-        weights, counted, memory = rows[-n:].reshape(-1)[::n + 1], self._counted(), None
+        weights, memory = rows[-n:].reshape(-1)[::n + 1], None
 
         def probe(mu: float) -> _Reached:
             nonlocal memory
@@ -247,10 +247,10 @@ class _Above:
         return Hierarchy.trusted(A, lower, upper, sizes, reference, names)
 
 
-def _used(A: Array) -> NDArray[np.bool_]:
-    """Return which joints A moves (n,)."""
+def _columns(A: Array) -> Array:
+    """Return the norms of the columns (n,), 0 for a joint that A does not use."""
     columns = np.linalg.norm(A, axis=0)
-    return np.asarray(columns > _NONE * columns.max(initial=0.0))
+    return np.asarray(np.where(columns > _NONE * columns.max(initial=0.0), columns, 0.0))
 
 
 def _directions(A: Array, free: Array) -> Array:

@@ -113,7 +113,7 @@ class FollowedJoints(_Coupling):
     @property
     def straight(self) -> bool:  # type: ignore[override]
         """Whether no coupling is a polynomial that is no line."""
-        return all(len(one.coefficients) <= 2 for one in self.coupled)
+        return all(one.straight for one in self.coupled)
 
     @property
     def row_names(self) -> tuple[str, ...]:

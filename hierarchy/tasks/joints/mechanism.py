@@ -56,7 +56,7 @@ def model_rows(robot: Robot, period: float = 0.001) -> list[Task]:
 
 def bends(robot: Robot) -> bool:
     """Whether a mechanism leaves its tangent: it has a loop, or a polynomial that is no line."""
-    return bool(robot.loops) or any(len(one.coefficients) > 2 for one in robot.coupled)
+    return bool(robot.loops) or not all(one.straight for one in robot.coupled)
 
 
 def above(rows: Sequence[Task], limits: Sequence[Task], anywhere: bool) -> list[Task]:
