@@ -9,15 +9,17 @@ x0 being the x of the levels above: the minimum of |b - A x|^2 + mu |x - x0|^2 w
 is its new right-hand side. To second order the levels below disturb it although they keep A x:
 joint j may leave its speed by
 
-    (|x - x0| (|b0| / |b - A x| - 1) + p) max_i |A_i| / |A_j|, b0 = b - A x0                 (b)
+    (|x - x0| (|r0| - |r|) + p |r|) / |r'| max_i |A_i| / |A_j|, r = b - A x, r0 = b - A x0    (b)
 
-with the columns A_i of what the levels above leave of A, and p a pace that is always allowed. At
-rest the rows above that act hold the whole pull A' (b - A x) of the residual: its row depends on
-theirs, and is left out.
+with the columns A_i of what the levels above leave of A, r' what they do not decide of r, and p a
+pace that is always allowed. Likewise, a direction of what is left of A whose singular value s is
+rounding beside p may change its speed by p max_i |A_i| / s. At rest the rows above that act hold
+the whole pull A' r of the residual: its row depends on theirs, and is left out.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, final
@@ -38,6 +40,7 @@ _MOST = 20        # its steps; 4 in the mean, at most 8 seen
 _NONE = 1e-9      # of the largest column of A: a joint that a level does not use
 _TURNING = 1e-3   # weight in |x - x0| of a joint that bends nothing, such as a motor before a gear
 _AT_REST = 1e-5   # of the pull of a residual: what rows above that act do not hold of it
+_WEAK = 1e-5      # of |A|: singular values up to it hold their directions loosely
 _PACE = 1e-5      # [rad/s or m/s] p of (b)
 
 
@@ -78,7 +81,7 @@ class Settled(Around):
     def asked(self, h: Hierarchy) -> Hierarchy:
         """Return what the answer to h, a plain one, solves: the levels that were calmed as such."""
         above = self._calmed(h)
-        return h if above is None else above.stacked(above.levels, h.reference)
+        return h if above is None else above.written(h)
 
     def _calmed(self, h: Hierarchy) -> _Above | None:
         """Return the levels of h with those out of reach calmed, or None if there are none."""
@@ -109,6 +112,10 @@ class _Reached(NamedTuple):
     missed: float
     status: Status
 
+    def over(self, alpha: float) -> float:
+        """Return mu / |b - A x| - alpha, which grows with mu."""
+        return self.mu / self.missed - alpha if self.missed > 0.0 else np.inf
+
 
 class _Above:
     """The levels written so far, x down to them, and by how much levels below may change it.
@@ -124,7 +131,8 @@ class _Above:
             self.strict, self.inner = inner.strictly(), inner.below_one_more(h)
         self.calmed, self.status, self.names = False, Status.SOLVED, h.names
         self.levels: list[tuple[Array, Array, Array]] = []
-        self.x, self._held, self._later = np.zeros(n), np.empty((0, n)), list[Array]()
+        self.x, self._held, self._later = h.reference, np.empty((0, n)), list[Array]()
+        self.loose = False  # whether a level holds a direction loosely
         self.behind = False  # whether x misses a level
         self.box = np.full(n, -np.inf), np.full(n, np.inf)
         self.paced = inner.can_resolve("bounds")
@@ -143,7 +151,7 @@ class _Above:
         while self._later:
             A = self._later.pop(0)
             free = A - (A @ self._held.T) @ self._held
-            self._held = np.vstack([self._held, _directions(A, free)])
+            self._held = np.vstack([self._held, _parts(A, free)[1]])
         return self._held
 
     def calm(self, A: Array, b: Array, half: float) -> tuple[Array, Array, Array]:
@@ -160,64 +168,94 @@ class _Above:
         free = A - (A @ self.held().T) @ self.held()
         U, values, directions = np.linalg.svd(free, full_matrices=len(A) > len(self.x))
         rank = np.count_nonzero(values > _FAINT * whole)
-        if rank < len(A):
-            decided = _decided(A, U[:, rank:], _FAINT * whole)
-            A, b = A - decided @ (decided.T @ A), b - decided @ (decided.T @ b)
-        size, out = float(np.linalg.norm(A)), float(np.linalg.norm(b - A @ self.x))
-        alpha = half * size
-        if not (_FAINT * whole < size and _LEAST * size * size < alpha * out < np.inf):
+        values, directions = values[:rank], directions[:rank]
+        own, aim, missed = A, b, b - A @ self.x
+        if rank < len(A):  # the rest of the residual counts, but nothing that is left changes it
+            own, aim, free = (U[:, :rank].T @ part for part in (A, b, free))
+        size, out, alpha = float(np.linalg.norm(own)), float(np.linalg.norm(missed)), half * whole
+        least = _LEAST * size * size
+        if not (_FAINT * whole < size and least < alpha * out < np.inf):
             return asked
-        counted = self._counted()
-        probe = self._damped(A, b, counted)
-        found = first = probe(_LEAST * size * size)
-        met = alpha * first.missed <= first.mu
-        if not met:
-            found = _search(probe, first, alpha, alpha * out)
+        counted = self._counted(free)
+        found = _settled(self._damped(own, aim, (A, b), counted),
+                         self._unlimited(values, missed @ U), least, alpha, alpha * out)
+        step, self.x = float(np.linalg.norm(counted * (found.x - self.x))), found.x
+        if found.mu == least:
+            return asked
         if found.status is not Status.SOLVED:
             self.status = found.status
-        if met:
-            self.x = first.x
-            return asked
-        step = float(np.linalg.norm(counted * (found.x - self.x)))
-        self._pace(free, found.x, step * max(out / found.missed - 1.0, 0.0))
-        self.calmed, self.x = True, found.x
-        rows, directions = np.zeros_like(A), directions[:rank]
+        self.calmed = True
+        missed = aim - own @ found.x
+        self._pace(free, float(np.linalg.norm(missed)),
+                   step * max(out - found.missed, 0.0) + _PACE * found.missed)
         if found.mu * step < _AT_REST * found.missed * size:  # or it is not worth a closer look
-            missed = (b - A @ found.x) / found.missed
             pull = missed @ free
-            if found.mu * step < _AT_REST * found.missed * np.linalg.norm(pull):
+            if found.mu * step < _AT_REST * np.linalg.norm(pull):
                 self._later.append(directions)
-                directions = _directions(A, free - np.outer(missed, pull))
-        rows[:len(directions)] = directions
-        return rows, rows @ found.x, rows @ found.x
+                values, directions = _parts(A, free - np.outer(missed, pull) / (missed @ missed))
+        rows, room = np.zeros_like(A), np.zeros(len(A))
+        rows[:len(values)] = directions
+        if self.inner.can_resolve("inequalities"):
+            weak = np.maximum(1.0 - (values / (_WEAK * whole)) ** 2, 0.0)
+            room[:len(values)] = weak * _PACE * _columns(free).max() / values
+            if weak.any():
+                self.loose = True
+                self._later.append(directions[weak == 0.0])
+        return rows, rows @ found.x - room, rows @ found.x + room
 
     def resolve(self, h: Hierarchy) -> Resolution:
-        """Resolve all levels, those that were calmed in their new form."""
-        found = self.inner.solve(self.stacked(self.levels, h.reference))
+        """Resolve `written`."""
+        found = self.inner.solve(self.written(h))
         if found.status is Status.SOLVED:
             found.status = self.status
         return _without_pace(found, h.n, not self.joined) if self.paced else found
 
-    def _pace(self, free: Array, x: Array, most: float) -> None:
-        """Let levels below change the speeds x by (b) and no more."""
-        columns, room = _columns(free), np.full(len(x), np.inf)
-        used = columns > 0.0
-        room[used] = (_PACE + most) * columns.max() / columns[used]
-        self.box = np.maximum(self.box[0], x - room), np.minimum(self.box[1], x + room)
+    def written(self, h: Hierarchy) -> Hierarchy:
+        """Return all levels of h, those that were calmed in their new form.
 
-    def _counted(self) -> Array | float:
+        Directions that are held loosely keep the speed that their level found, if none below uses
+        them.
+        """
+        return self.stacked(self.levels, self.x if self.loose else h.reference)
+
+    def _pace(self, free: Array, missed: float, most: float) -> None:
+        """Let levels below change the speeds x by (b), `most` over |r'|, and no more."""
+        columns = _columns(free)
+        room = np.full(len(columns), np.inf)
+        np.divide(most * columns.max(), missed * columns, out=room, where=missed * columns > 0.0)
+        self.box = np.maximum(self.box[0], self.x - room), np.minimum(self.box[1], self.x + room)
+
+    def _counted(self, free: Array) -> Array | float:
         """Return the weight (n,) of each joint in |x - x0|, or that of all."""
         if not self.turning:
             return 1.0
         turning, bending = (np.any([*map(_columns, rows)], axis=0)
                             for rows in (self.turning, self.bending))
-        return np.where(turning & ~bending, _TURNING, 1.0)
+        return np.where(turning & ~bending & (_columns(free) > 0.0), _TURNING, 1.0)
 
-    def _damped(self, A: Array, b: Array, counted: Array | float) -> Callable[[float], _Reached]:
-        """Return, by mu, the x within the levels above of least |A x - b|^2 + mu |x - x0|^2."""
-        n, x0 = len(self.x), self.x
-        side = np.concatenate([b, x0])
-        h = self.stacked([*self.levels, (np.vstack([A, np.eye(n)]), side, side)],
+    def _unlimited(self, values: Array, missed: Array) -> Callable[[float], _Reached]:
+        """Return, by mu, the residual if only equalities were above, with x0 as x.
+
+        missed : b - A x0 (m,) along the left singular vectors of what these leave of A.
+        """
+        squares, x0 = (values * values).tolist(), self.x
+        parts, rest = missed[:len(values)].tolist(), float(np.linalg.norm(missed[len(values):]))
+
+        def probe(mu: float) -> _Reached:
+            left = [part * mu / (square + mu) for part, square in zip(parts, squares, strict=True)]
+            return _Reached(mu, x0, math.hypot(rest, *left), Status.SOLVED)
+
+        return probe
+
+    def _damped(self, own: Array, aim: Array, whole: tuple[Array, Array],
+                counted: Array | float) -> Callable[[float], _Reached]:
+        """Return, by mu, the x within the levels above of least |own x - aim|^2 + mu |x - x0|^2.
+
+        whole : A and b of the level, whose residual counts.
+        """
+        n, x0, (A, b) = len(self.x), self.x, whole
+        side = np.concatenate([aim, x0])
+        h = self.stacked([*self.levels, (np.vstack([own, np.eye(n)]), side, side)],
                           np.zeros_like(x0))
         rows, lower, upper, _ = h.rows
         weights, memory = rows[-n:].reshape(-1)[::n + 1], None
@@ -253,39 +291,42 @@ def _columns(A: Array) -> Array:
     return np.asarray(np.where(columns > _NONE * columns.max(initial=0.0), columns, 0.0))
 
 
-def _directions(A: Array, free: Array) -> Array:
-    """Return the directions (k, n), but for rounding, of what levels above leave of A."""
+def _parts(A: Array, free: Array) -> tuple[Array, Array]:
+    """Return the singular values (k,) and directions (k, n) of what levels above leave of A."""
     _, values, directions = np.linalg.svd(free, full_matrices=False)
-    return np.asarray(directions[values > _FAINT * np.linalg.norm(A)])
+    clear = values > _FAINT * np.linalg.norm(A)
+    return values[clear], directions[clear]
 
 
-def _decided(A: Array, rest: Array, least: float) -> Array:
-    """Return the sums of rows (m, k), orthonormal, whose value the levels above alone decide.
+def _settled(probe: Callable[[float], _Reached], unlimited: Callable[[float], _Reached],
+             least: float, alpha: float, most: float) -> _Reached:
+    """Return what is reached for mu = alpha |b - A x|, or for `least` where that leaves less.
 
-    These leave nothing of the sums `rest` of rows of A, and joints do move some of them: what a
-    level misses there is not its own.
+    The search starts from the mu that it would be if nothing but equalities were above.
     """
-    moved, values, _ = np.linalg.svd(rest.T @ A, full_matrices=False)
-    return np.asarray(rest @ moved[:, :np.count_nonzero(values > least)])
+    found = probe(_search(unlimited, unlimited(least), alpha, most).mu)
+    if found.mu > least and found.over(alpha) > _CLOSE * alpha:
+        found = probe(least)
+    return _search(probe, found, alpha, most)
 
 
 def _search(probe: Callable[[float], _Reached], low: _Reached, alpha: float,
             most: float) -> _Reached:
-    """Return what is reached for mu = alpha |b - A x|, between `low` and mu = `most`.
+    """Return what is reached for mu = alpha |b - A x|, between `low` and mu = `most`, or `low`.
 
     By regula falsi on mu / |b - A x|, which grows with mu, nearly linearly. The end that stays
     counts less, as in Anderson and Bjorck, BIT 13, 1973.
     """
-    def over(one: _Reached) -> float:
-        return one.mu / one.missed - alpha if one.missed > 0.0 else np.inf
-
+    low_over = low.over(alpha)
+    if not low_over < -_CLOSE * alpha:
+        return low
     high = best = probe(most)
-    low_over, high_over = over(low), over(high)
+    high_over = high.over(alpha)
     for _ in range(_MOST):
-        if not _CLOSE * alpha < abs(over(best)) or not 0.0 < high_over < np.inf:
+        if not _CLOSE * alpha < abs(best.over(alpha)) or not 0.0 < high_over < np.inf:
             break
         last, best = best, probe(high.mu - high_over * (high.mu - low.mu) / (high_over - low_over))
-        new = over(best)
+        new = best.over(alpha)
         if new > 0.0:
             low_over *= _less(new, high_over) if last is high else 1.0
             high, high_over = best, new

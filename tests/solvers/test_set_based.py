@@ -138,9 +138,10 @@ def test_a_level_that_those_above_decide_does_not_slow_those_below():
     rng = np.random.default_rng(7)
     A = nearly_singular(rng, 0.3)
     above, posture = (A, rng.normal(size=3)), (np.eye(6), np.ones(6))
-    for one_more in (0, 1):  # row that can be met
-        rows = np.vstack([A, rng.normal(size=(one_more, 6))])
-        again = rng.normal(size=(4, len(rows))) @ rows, rng.normal(size=4)
+    x0 = make("hcod").solve(Hierarchy.from_levels([above])).x
+    for one_more in (0, 1):  # row that is met
+        row = rng.normal(size=(one_more, 6))
+        again = (np.vstack([rng.normal(size=(4, 3)) @ A, row]), [*rng.normal(size=4), *row @ x0])
         h = Hierarchy.from_levels([above, again, posture], names=["a", "b", "c"])
         np.testing.assert_allclose(settled("a", "b").solve(h).x, make("hcod").solve(h).x,
                                    atol=1e-9)
