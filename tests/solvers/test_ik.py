@@ -136,15 +136,15 @@ def test_no_demand_moves_a_nearly_stretched_arm_faster_than_its_curvature_allows
 
 
 @pytest.mark.parametrize("tasks", [
-    [Orientation(FRAME, np.array([[-1.0, -2.0, 2.0], [2.0, 1.0, 2.0], [-2.0, 2.0, 1.0]]) / 3.0, gain=5.0),
+    [Orientation(FRAME, np.array([[-1, -2, 2], [2, 1, 2], [-2, 2, 1]]) / 3.0, gain=5.0),
      Position(FRAME, Still([1.32, 1.26, 0.04]), gain=5.0),
      Position(ELBOW, Still([-0.06, -0.69, -0.03]), gain=2.0, name="elbow")],
     [Position(FRAME, Still([0.84, -0.66, 1.09]), gain=2.0),
      Position(ELBOW, Still([-0.11, 0.53, 0.57]), gain=5.0, name="elbow"),
      Posture((0.96, 0.66, -1.7, -1.2, -1.5, 0.27, 0.3), gain=1.0)]], ids=["turned", "stretched"])
 def test_levels_out_of_reach_that_disturb_each_other_come_to_rest(tasks):
-    """Joints reversed 1 rad/s in each tick, with status SOLVED: the elbow did where the levels above
-    decide its residual, and the posture about the axis of an arm that is almost straight."""
+    """Joints reversed 1 rad/s in each tick, with status SOLVED: below levels that decide a part of
+    the residual, and about the axis of an arm that is almost straight."""
     _, v = follow(tasks, 1000)
     assert np.abs(np.diff(v[-100:], axis=0)).max() < 1e-3
 

@@ -149,7 +149,7 @@ def test_a_level_that_those_above_decide_does_not_slow_those_below():
 
 
 def test_joints_that_no_task_moves_do_not_hide_the_answer_behind_light_rows():
-    """As of fingers that a coupling joins: every second tick of a Panda out of reach was INACCURATE."""
+    """As of a Panda's fingers, which a coupling joins: up to 9 of 10 ticks were INACCURATE."""
     E, pair = np.eye(9), np.array([[0.0] * 7 + [1.0, -1.0]])
     for seed in range(64, 128):
         rng = np.random.default_rng(seed)
