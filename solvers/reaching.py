@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, positive
+from hierarchy.measured import Measured
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Robot
 from hierarchy.stack import Stack
@@ -29,6 +30,9 @@ _AT_REST = 1e-9   # the same at the end
 _PATIENCE = 10
 _MOVING = 1e-4    # [rad or m] step with which the end is not reached, whatever the errors do
 _AT = 1e-6        # [rad or m] from a limit that counts as on it
+_DRAWN, _POWER = 8, 3  # configurations at which rows of tasks are turned, and directions of each
+_TURN = 1e-6      # [rad or m] how far
+_MARGIN = 3.0     # for they may turn faster elsewhere, and all of twice that comes to rest at once
 _WIDE = np.pi     # [rad or m] range around q from which a joint without limits starts again
 
 
@@ -103,8 +107,38 @@ def settled(robot: Robot, tasks: Sequence[Task], period: float, resolver: Resolv
 
     period [s], for which a velocity will be held; damping as in `solve_ik`.
     """
-    return Settled(inner=resolver, period=period, softness=damping,
-                   curved=curved(tasks, robot.n - robot.actuated), geared=not bends(robot))
+    names = curved(tasks, robot.n - robot.actuated)
+    return Settled(inner=resolver, period=period, softness=damping, curved=names,
+                   bends={task.name: _bend(task, robot) for task in tasks
+                          if task.name in names and _may_vanish(task)}, geared=not bends(robot))
+
+
+def _may_vanish(task: Task) -> bool:
+    """Whether all rows of a task that count may vanish together."""
+    return isinstance(task, Measured) if task.kind == "inequality" else task.dimension == 1
+
+
+def _bend(task: Task, robot: Robot) -> float:
+    """Return how fast the rows of a task turn at some configurations, by the power method.
+
+    In units of the rows per rad or m, times `_MARGIN`.
+    """
+    rng, state, still = np.random.default_rng(0), State.at(robot, robot.rest), np.zeros(robot.n)
+    found = list[float]()
+
+    def rows(q: Array) -> Array:
+        state.move(0.0, q, still)
+        return task.jacobian(state)
+
+    for _ in range(_DRAWN):
+        q = _drawn(robot, robot.rest, rng)
+        here, direction, turns = rows(q), rng.normal(size=robot.n), np.zeros(1)
+        for _ in range(_POWER):
+            turn = rows(robot.integrate(q, _TURN / np.linalg.norm(direction) * direction)) - here
+            if np.isfinite(turn).all():
+                _, turns, (direction, *_) = np.linalg.svd(turn, full_matrices=False)
+        found.append(float(turns[0]))
+    return _MARGIN / _TURN * max(found)
 
 
 class _Search:

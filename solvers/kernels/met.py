@@ -17,18 +17,18 @@ _PIVOT = 1e-6  # of the norm of a row: a smaller one depends on others
 
 
 @compiled
-def plainly_met(A, lower, upper, offsets, least):
+def plainly_met(A, lower, upper, offsets, half, bends):
     """Whether each curved level is met by the shortest step, with a multiplier |mu| <= 1 / alpha.
 
-    least (L,) : alpha / |A| of a curved level of equalities, -1 for any other level. The step is
+    bends (L,) : alpha = half max(|A|, bends) of a curved level; -1 for any other. The step is
     the shortest from the x of the levels above, all of them being equalities or inequalities that
     hold there; so it is that of the problem with inequalities. In coordinates of Q the rows of a
     level end in a triangle L: its step is L^-1 (b - A x), its multiplier L^-T of that. False where
     this is not so.
     """
     (m, n), last, rank = A.shape, 0, 0
-    for k in range(len(least)):
-        if least[k] >= 0.0:
+    for k in range(len(bends)):
+        if bends[k] >= 0.0:
             last = k + 1
     x, y, mu, basis = np.zeros((1, n)), np.zeros(n), np.empty(m), np.empty((n, n))
     rows = Rows(A.copy(), np.arange(m), np.empty(m), lower.copy())
@@ -46,7 +46,7 @@ def plainly_met(A, lower, upper, offsets, least):
             for i in range(first, end):
                 t = above + i - first
                 y[t] = mu[i] = (rows.miss[i] - inner_product(y[:t], rows.W[i])) / rows.W[i, t]
-            if least[k] >= 0.0 and not _is_short(rows, mu, first, end, above, least[k]):
+            if bends[k] >= 0.0 and not _is_short(rows, mu, first, end, above, half, bends[k]):
                 return False
             assign(x[0], y)
             reflect_back(basis, 0, rank, x, 0, 1)
@@ -56,7 +56,7 @@ def plainly_met(A, lower, upper, offsets, least):
 
 
 @inlined
-def _is_short(rows, mu, first, end, above, least):
+def _is_short(rows, mu, first, end, above, half, bends):
     """Whether the multiplier of the step mu of a level is small enough."""
     square, of_multiplier = 0.0, 0.0
     for i in range(end - 1, first - 1, -1):
@@ -65,4 +65,4 @@ def _is_short(rows, mu, first, end, above, least):
         mu[i] /= rows.W[i, above + i - first]
         of_multiplier += mu[i] ** 2
         square += inner_product(rows.W[i], rows.W[i])
-    return least * np.sqrt(square) * np.sqrt(of_multiplier) <= 1.0
+    return half * max(np.sqrt(square), bends) * np.sqrt(of_multiplier) <= 1.0

@@ -20,8 +20,8 @@ the whole pull A' r of the residual: its row depends on theirs, and is left out.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple, final
 
 import numpy as np
@@ -53,6 +53,8 @@ class Settled(Around):
     softness : factor of the estimate of the curvature; 0 leaves every level as it is.
     curved : names of levels of equalities whose rows, or what levels above leave of them, change
         with the configuration.
+    bends : by level, the least |A| that counts in alpha, for rows that vanish together, as that of
+        a height does. Inequalities come to rest where it names them.
     geared : whether joints that only other equalities use, such as motors before gears, bend
         nothing; not beside closed chains.
 
@@ -62,6 +64,7 @@ class Settled(Around):
     period: float = number(open_below=True)
     softness: float = number(1.0)
     curved: frozenset[str] = frozenset()
+    bends: Mapping[str, float] = field(default_factory=dict)
     geared: bool = False
     name: ClassVar[str] = "settled"
     handles: ClassVar[Handles] = "inequalities"
@@ -86,18 +89,20 @@ class Settled(Around):
     def _calmed(self, h: Hierarchy) -> _Above | None:
         """Return the levels of h with those out of reach calmed, or None if there are none."""
         half = 0.5 * self.softness * self.period
-        least = np.array([half if name in self.curved else -1.0 for name in h.names])
-        if half == 0.0 or plainly_met(h.A, h.lower, h.upper, h.offsets, least):
+        bends = np.array([self.bends.get(name, -1.0 + (name in self.curved)) for name in h.names])
+        if half == 0.0 or plainly_met(h.A, h.lower, h.upper, h.offsets, half, bends):
             return None
         above = _Above(self.inner, h)
-        for k, (A, lower, upper) in enumerate(h.levels()):
-            if least[k] > 0.0:
+        for (A, lower, upper), name, bend in zip(h.levels(), h.names, bends, strict=True):
+            equal = bool((lower == upper).all())
+            if name in self.curved:
                 above.bending.append(A)
-            elif self.geared and (lower == upper).all():
+            elif self.geared and equal:
                 above.turning.append(A)
-            calm = least[k] > 0.0 and len(lower) and (lower == upper).all()
-            if calm:
-                A, lower, upper = above.calm(A, lower, half)
+            if bend >= 0.0 and len(lower) and equal:
+                A, lower, upper = above.calm(A, lower, half, bend)
+            elif bend > 0.0:
+                lower, upper = above.eased(A, lower, upper, half, bend)
             else:
                 above.behind |= bool(((A @ above.x < lower) | (A @ above.x > upper)).any())
             above.add(A, lower, upper)
@@ -154,14 +159,50 @@ class _Above:
             self._held = np.vstack([self._held, _parts(A, free)[1]])
         return self._held
 
-    def calm(self, A: Array, b: Array, half: float) -> tuple[Array, Array, Array]:
-        """Return the rows of a level A x = b that minimises (a), unchanged where it is met.
-
-        half : alpha / |A| [s].
-        """
+    def _catch_up(self) -> None:
+        """Bring x down to the last level."""
         if self.behind:
             self.x = self.strict.solve(self.stacked(self.levels, self.x)).x
             self.behind = False
+
+    def eased(self, A: Array, lower: Array, upper: Array, half: float, bend: float
+              ) -> tuple[Array, Array]:
+        """Return the sides of a level of inequalities that minimises (a), as far as it gets.
+
+        half, bend : alpha = half max(|A|, bend), A being the rows that x0 violates.
+        """
+        self._catch_up()
+
+        def beyond(x: Array) -> Array:
+            return np.maximum(lower - A @ x, 0.0) - np.maximum(A @ x - upper, 0.0)
+
+        missed = beyond(self.x)
+        broken = A[missed != 0.0]
+        size, out = float(np.linalg.norm(broken)), float(np.linalg.norm(missed))
+        alpha, least = half * max(size, bend), _LEAST * size * size
+        if not least < alpha * out < np.inf:
+            return lower, upper
+        probe = self._damped(A, lower, upper, lambda x: float(np.linalg.norm(beyond(x))), 1.0)
+        found = _search(probe, probe(least), alpha, alpha * out)
+        step, self.x = float(np.linalg.norm(found.x - self.x)), found.x
+        if found.mu == least:
+            return lower, upper
+        self._calmed(found)
+        self._pace(broken, found.missed, step * max(out - found.missed, 0.0) + _PACE * found.missed)
+        return np.minimum(lower, A @ found.x), np.maximum(upper, A @ found.x)
+
+    def _calmed(self, found: _Reached) -> None:
+        """Note that a level does not reach what it asks for."""
+        self.calmed = True
+        if found.status is not Status.SOLVED:
+            self.status = found.status
+
+    def calm(self, A: Array, b: Array, half: float, bend: float) -> tuple[Array, Array, Array]:
+        """Return the rows of a level A x = b that minimises (a), unchanged where it is met.
+
+        half, bend : alpha = half max(|A|, bend).
+        """
+        self._catch_up()
         asked, whole = (A, b, b), float(np.linalg.norm(A))
         if not whole * np.linalg.norm(b) < np.inf:
             return asked
@@ -172,19 +213,17 @@ class _Above:
         own, aim, missed = A, b, b - A @ self.x
         if rank < len(A):  # the rest of the residual counts, but nothing that is left changes it
             own, aim, free = (U[:, :rank].T @ part for part in (A, b, free))
-        size, out, alpha = float(np.linalg.norm(own)), float(np.linalg.norm(missed)), half * whole
-        least = _LEAST * size * size
+        size, out = float(np.linalg.norm(own)), float(np.linalg.norm(missed))
+        alpha, least = half * max(whole, bend), _LEAST * size * size
         if not (_FAINT * whole < size and least < alpha * out < np.inf):
             return asked
         counted = self._counted(free)
-        found = _settled(self._damped(own, aim, (A, b), counted),
-                         self._unlimited(values, missed @ U), least, alpha, alpha * out)
+        probe = self._damped(own, aim, aim, lambda x: float(np.linalg.norm(b - A @ x)), counted)
+        found = _settled(probe, self._unlimited(values, missed @ U), least, alpha, alpha * out)
         step, self.x = float(np.linalg.norm(counted * (found.x - self.x))), found.x
         if found.mu == least:
             return asked
-        if found.status is not Status.SOLVED:
-            self.status = found.status
-        self.calmed = True
+        self._calmed(found)
         missed = aim - own @ found.x
         self._pace(free, float(np.linalg.norm(missed)),
                    step * max(out - found.missed, 0.0) + _PACE * found.missed)
@@ -247,16 +286,15 @@ class _Above:
 
         return probe
 
-    def _damped(self, own: Array, aim: Array, whole: tuple[Array, Array],
+    def _damped(self, A: Array, lower: Array, upper: Array, missed: Callable[[Array], float],
                 counted: Array | float) -> Callable[[float], _Reached]:
-        """Return, by mu, the x within the levels above of least |own x - aim|^2 + mu |x - x0|^2.
+        """Return, by mu, the x within the levels above of least |A x - sides|^2 + mu |x - x0|^2.
 
-        whole : A and b of the level, whose residual counts.
+        missed : the residual that counts, of x.
         """
-        n, x0, (A, b) = len(self.x), self.x, whole
-        side = np.concatenate([aim, x0])
-        h = self.stacked([*self.levels, (np.vstack([own, np.eye(n)]), side, side)],
-                          np.zeros_like(x0))
+        n, x0 = len(self.x), self.x
+        h = self.stacked([*self.levels, (np.vstack([A, np.eye(n)]), np.concatenate([lower, x0]),
+                                         np.concatenate([upper, x0]))], np.zeros_like(x0))
         rows, lower, upper, _ = h.rows
         weights, memory = rows[-n:].reshape(-1)[::n + 1], None
 
@@ -266,7 +304,7 @@ class _Above:
             lower[-n:] = upper[-n:] = weights * x0
             found = self.strict.solve(h, memory)
             memory = found.memory
-            return _Reached(mu, found.x, float(np.linalg.norm(b - A @ found.x)), found.status)
+            return _Reached(mu, found.x, missed(found.x), found.status)
 
         return probe
 
