@@ -189,7 +189,10 @@ class _Above:
             return lower, upper
         self._calmed(found)
         self._pace(broken, found.missed, step * max(out - found.missed, 0.0) + _PACE * found.missed)
-        return np.minimum(lower, A @ found.x), np.maximum(upper, A @ found.x)
+        reached, missed = A @ found.x, beyond(found.x)
+        if found.mu * step < _AT_REST * np.linalg.norm(missed @ A):
+            return np.where(missed > 0.0, -np.inf, lower), np.where(missed < 0.0, np.inf, upper)
+        return np.minimum(lower, reached), np.maximum(upper, reached)
 
     def _calmed(self, found: _Reached) -> None:
         """Note that a level does not reach what it asks for."""
