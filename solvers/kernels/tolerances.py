@@ -31,7 +31,6 @@ KNOWN_MULTIPLIER = 1e-4  # what may remain of it over its terms and the smallest
 CUT_BALANCE = 2e-7   # what cut rows, or rounding, may add to a gradient, relative to its terms
 ROUNDING_BALANCE = 5e-9  # rounding of it, from which on that may decide no sign
 HEAVIER = 1e1        # norm of a row over that of another of its level, which it may round off
-CUT_OVER_PIVOT = 2e-4  # cut of a row over the smallest pivot: larger ones turn the answer
 RANK_MARGIN = 1.004  # between a pivot or a cut and rank_tolerance, as a factor
 CLEAR_MISS = 1e2     # violation of a level over what cuts of rows may add: its multipliers decide
 PIVOT_PRODUCT = 1e-15  # of the two smallest pivots: less, and the second is rounding of the first

@@ -212,6 +212,17 @@ def test_rows_nearly_parallel_leave_the_signs_of_others_known(seed):
     np.testing.assert_allclose(res.x, proof.x, rtol=0.0, atol=1e-7 * (1.0 + np.abs(proof.x).max()))
 
 
+@pytest.mark.parametrize("seed", [1010000010, 1010000106, 1010000358, 1010000425])
+def test_a_dependent_row_is_cut_however_small_the_pivots_of_others_are(seed):
+    """Rows at 2e-9 to 9e-9 rad were INACCURATE where others were at less than 5,000 times that."""
+    h = structured(seed, ("nearly_parallel",))
+    res = HCOD.solve(h)
+    proof = prove(h, [res.x])
+    assert (res.status, proof.complete, proof.turn > 1e-9) == (Status.SOLVED, True, True)
+    for x in (res.x, HCOD.solve(h, res.memory).x):
+        np.testing.assert_allclose(x, proof.x, rtol=0.0, atol=1e-7)
+
+
 @pytest.mark.parametrize("seed", [1006200299, 1008024437, 1009027092])
 def test_signs_that_rounding_of_large_multipliers_may_decide_are_inaccurate(seed):
     """Without that x was SOLVED, and the last level, or the reference, missed by 1e-5 and more."""

@@ -57,7 +57,6 @@ from solvers.kernels.tolerances import (
     CANCELLED,
     CLEAR_MISS,
     CUT_BALANCE,
-    CUT_OVER_PIVOT,
     EPSILON,
     FAINT,
     FREE_ROWS,
@@ -142,8 +141,7 @@ def _row_holds(s, k, i, reach):
 @inlined
 def _ranks_are_clear(s, cut):
     """Whether no row would be dependent or not by an angle near the tolerance."""
-    return (RANK_MARGIN * cut <= s.scalar[TOLERANCE] and cut <= CUT_OVER_PIVOT * s.scalar[PIVOT]
-            and RANK_MARGIN * s.scalar[TOLERANCE] <= s.scalar[PIVOT]
+    return (RANK_MARGIN * cut <= s.scalar[TOLERANCE] <= s.scalar[PIVOT] / RANK_MARGIN
             and s.scalar[PIVOT] * s.scalar[SECOND] >= PIVOT_PRODUCT)
 
 
