@@ -13,6 +13,11 @@ What is left of (1) is a shift of sides, held against its own row. What is left 
 where rounding exceeds a turn of the rows of level p, which is held against the row of least norm: a
 heavy row excuses no light one. So SOLVED says: x is exactly optimal for a problem this close to the
 data.
+
+The large multipliers of nearly parallel rows may round off by more than such a turn. Multipliers
+that balance exactly exist all the same, where the rows are independent, and are this close: then no
+sign may hang on the difference, and no row be off its side by more than rounding and forgiven, as
+the large multipliers say by how far that moves x.
 """
 
 from typing import NamedTuple
@@ -35,7 +40,9 @@ from solvers.kernels.active_set.working_set import (
     PIVOT,
     RANK,
     REFERENCE,
+    SCRATCH,
     SECOND,
+    SHORT,
     STATE,
     TOLERANCE,
     UNIT,
@@ -50,12 +57,12 @@ from solvers.kernels.tolerances import (
     CANCELLED,
     CLEAR_MISS,
     CUT_BALANCE,
-    CUT_OVER_PIVOT,
     EPSILON,
     FAINT,
     FREE_ROWS,
     HEAVIER,
     KNOWN_MULTIPLIER,
+    MET,
     NEGLIGIBLE,
     PIVOT_PRODUCT,
     RANK_MARGIN,
@@ -134,8 +141,7 @@ def _row_holds(s, k, i, reach):
 @inlined
 def _ranks_are_clear(s, cut):
     """Whether no row would be dependent or not by an angle near the tolerance."""
-    return (RANK_MARGIN * cut <= s.scalar[TOLERANCE] and cut <= CUT_OVER_PIVOT * s.scalar[PIVOT]
-            and RANK_MARGIN * s.scalar[TOLERANCE] <= s.scalar[PIVOT]
+    return (RANK_MARGIN * cut <= s.scalar[TOLERANCE] <= s.scalar[PIVOT] / RANK_MARGIN
             and s.scalar[PIVOT] * s.scalar[SECOND] >= PIVOT_PRODUCT)
 
 
@@ -161,8 +167,7 @@ class Level(NamedTuple):
 def _balances(s, p, reach, factored):
     """Whether (2) and (3) hold for level p, for the rows as cut; no sign hangs on what was cut."""
     last = p == s.multiplier.shape[0] - 1
-    ends = last or p == s.count[WHOLE]
-    level = _measured(s, p, last)
+    level, ends = _measured(s, p, last), last or p == s.count[WHOLE]
     met = not last and level.missed <= BAND * reach
     if met and level.missed == 0.0:
         return True
@@ -183,19 +188,32 @@ def _balances(s, p, reach, factored):
         rest = _beyond_rounding(s)
         for i in range(level.begin, level.end):
             outside = outside or (s.number[NORM, i] > 0.0 and not _row_holds(s, p, i, reach))
+    exact = not signed or rounding <= ROUNDING_BALANCE * source
     holds = (not outside and rest <= allowed and (clear or _is_clear(s, level, reach))
              and turned <= CUT_BALANCE * source
-             and rounding <= (ROUNDING_BALANCE if signed else KNOWN_MULTIPLIER) * source)
+             and rounding <= (CUT_BALANCE if signed else KNOWN_MULTIPLIER) * source
+             and (exact or (factored and _sides_are_clear(s, reach))))
     left = length_of(s.number[GRADIENT, :s.x.size])
     error = (SIGN_MARGIN * (left + rounding) + level.unsure) / s.scalar[PIVOT]
     cut = SIGN_MARGIN * turned / s.scalar[PIVOT]
-    if holds and _signs_hold(s, level, error + cut, reach, allowed, met):
+    if holds and _signs_hold(s, level, error + cut if exact else 0.0, reach, allowed, met):
         if level.missed > CLEAR_MISS * s.scalar[TOLERANCE] * reach:
             # What is cut from a row lies beyond the columns of those that act: no pivot there
             # makes it larger.
             cut = min(cut, SIGN_MARGIN * turned)
-        return _decide(s, level, error, cut, reach) or met
+        return _decide(s, level, error, cut, reach, exact) or met
     return met
+
+
+@inlined
+def _sides_are_clear(s, reach):
+    """Whether no row is off its side by more than rounding, but so little that it is forgiven."""
+    clear = True
+    for i in range(s.A.shape[0]):
+        value, low, up = row_times_x(s, i), s.number[LOWER, i], s.number[UPPER, i]
+        beyond, scale = max(value - up, low - value), s.number[NORM, i] * reach
+        clear = clear and not MET * scale < beyond <= BAND * scale
+    return clear
 
 
 @inlined
@@ -288,18 +306,45 @@ def _signs_hold(s, level, unsure, reach, allowed, met):
 
 
 @inlined
-def _decide(s, level, error, cut, reach):
-    """Note for each row how far level p decides its sign; False if what is cut may decide one."""
+def _decide(s, level, error, cut, reach, exact):
+    """Note for each row how far level p decides its sign; False if what is cut may decide one.
+
+    Or, unless the balance is `exact`, rounding.
+    """
     clear = True
     for i in range(level.end):
         if s.index[CHANGE, i] != DECIDED and not _is_rounding(s, level, i, reach):
-            mu = abs(s.multiplier[level.p, i])
+            mu, own, unsure = abs(s.multiplier[level.p, i]), i >= level.begin, error
             force = mu * s.number[NORM, i]
+            if not (exact or own) and force <= error:
+                unsure *= s.scalar[PIVOT] * _leverage(s, i, level.p)
+            weak = force <= unsure + cut
+            clear = clear and not (weak and (force > unsure or not (exact or own)))
             # Entries of rows are unsure, and with them the least of the violations.
-            faint = i >= level.begin and mu <= FAINT * level.far
-            s.index[CHANGE, i] = WEAKLY if force <= error + cut or faint else DECIDED
-            clear = clear and not (error < force <= error + cut)
+            faint = own and mu <= FAINT * level.far
+            s.index[CHANGE, i] = WEAKLY if weak or faint else DECIDED
     return clear
+
+
+@inlined
+def _leverage(s, i, last):
+    """Return the force of row i that balances a gradient of 1, at most; inf if not known.
+
+    It is one over the sine of the angle of row i to the other rows of the levels before `last`:
+    the smallest pivot may be that of others.
+    """
+    y, square = s.number[SCRATCH], 0.0
+    for k in range(last):
+        first, above, rank = s.index[BEGIN, k], s.index[RANK, k], s.index[RANK, k + 1]
+        spare = s.index[BEGIN, k + 1] - first > rank - above
+        for t in range(above, rank):
+            q, here = first + t - above, s.index[LIST, first + t - above] == i
+            y[t] = s.number[NORM, i] if here else 0.0
+            for c in range(t):
+                y[t] -= s.W[q, c] * y[c]
+            y[t] /= s.W[q, t]
+            square += np.inf if s.index[SHORT, k] == 1 or (here and spare) else y[t] ** 2
+    return np.sqrt(square) if square > 0.0 else np.inf
 
 
 @inlined
