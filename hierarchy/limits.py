@@ -27,8 +27,8 @@ rounding:
 - A state is viable if it is within `lower`, `upper` and `velocity` and can come to rest at the end
   of a tick with `acceleration` before a position limit. From a viable state no limit is exceeded,
   nor between ticks, and the next state is viable. The box is the largest for which that holds.
-- Acceleration level: a joint that can keep its position limit only by reversing within a tick (it
-  is up to A T^2 / 8 from viable) keeps it as well, unless that breaks another limit.
+- Acceleration level: a joint that could keep its position limit only by reversing within a tick
+  passes it by less than A T^2 / 8. To keep it would take the full A at any distance from it.
 - The acceleration limit holds from every initial state, always.
 - Faster than `velocity`: the speed falls by A T per tick until it is within the limit, with a
   horizon H by T/H of what it is beyond it, if that is less. A slower joint never gets faster than
@@ -170,7 +170,7 @@ def box(q, v, limits, i, acceleration):
         least, most = next_velocities(q, L + c, U - c, V, A, H)                        # (c)
         return clipped(least, low, up), clipped(most, low, up)
     least, most = approach(q, v, (L, U, V, A), c, H)
-    h = T + time_left(U - q if v > 0.0 else q - L, abs(v), A)
+    h = 2.0 * T + time_left(U - q if v > 0.0 else q - L, abs(v), A)
     if h < H:                                                                          # (d)
         soon, late = approach(q, v, (L, U, V, A), c * (h / H) ** 2, h)
         if v > 0.0:
@@ -206,13 +206,7 @@ def widest(q, v, limits, acceleration):
     low, up = next_velocities(r, L, U, V, A, T)                                        # (b)
     if not acceleration:
         return clipped(low, v - A * T, v + A * T), clipped(up, v - A * T, v + A * T)
-    low, up = clipped((low - v) / T, -A, A), clipped((up - v) / T, -A, A)
-    # If it cannot rest in time, it reverses within the tick, at most v^2 / (2 |a|) from here.
-    if v > 0.0 and r > U:
-        return low, max(low, min(up, -v * v / (2 * max(U - q, ROUNDING * (1 + abs(U))))))
-    if v < 0.0 and r < L:
-        return min(up, max(low, v * v / (2 * max(q - L, ROUNDING * (1 + abs(L)))))), up
-    return low, up
+    return clipped((low - v) / T, -A, A), clipped((up - v) / T, -A, A)
 
 
 @inlined

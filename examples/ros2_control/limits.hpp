@@ -40,13 +40,7 @@ inline std::array<double, 2> velocities(const Joint &j, double q, double v) {
 inline std::array<double, 2> accelerations(const Joint &j, double q, double v) {
   const double A = j.acceleration, T = j.period, r = q + v * T / 2;
   const auto [slow, fast] = next(j, r);
-  const double low = std::clamp((slow - v) / T, -A, A), up = std::clamp((fast - v) / T, -A, A);
-  const double above = std::max(j.upper - q, 1e-12 * (1 + std::fabs(j.upper)));
-  const double below = std::max(q - j.lower, 1e-12 * (1 + std::fabs(j.lower)));
-  // If it cannot rest in time, it reverses within the tick.
-  if (v > 0 && r > j.upper) return {low, std::max(low, std::min(up, -v * v / (2 * above)))};
-  if (v < 0 && r < j.lower) return {std::min(up, std::max(low, v * v / (2 * below))), up};
-  return {low, up};
+  return {std::clamp((slow - v) / T, -A, A), std::clamp((fast - v) / T, -A, A)};
 }
 
 }  // namespace limits
