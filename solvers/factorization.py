@@ -191,7 +191,7 @@ class Factorization:
         if not isinstance(place, Integral) or not 0 <= place <= len(self._levels):
             raise HierarchyError(f"{level}: index {at} is outside 0 .. {len(self._levels)}")
         block = self._checked(level, A)
-        if len(self._Q) + len(block) > 2 * (self.m + len(block)) + _FEWEST:
+        if len(self._Q) > 2 * self.m + _FEWEST:  # most of it of deleted levels
             self._factor_afresh([(held.name, held.A) for held in self._levels])
         new = _Held(level, block.copy(), self._projected(block))
         self._levels = [*self._levels[:place], new, *self._levels[place:]]

@@ -71,6 +71,15 @@ def test_after_random_edits_the_answers_are_those_of_tpm():
     assert np.percentile(gaps, 99.9) < 1e-12
 
 
+def test_directions_of_deleted_levels_are_dropped_once_they_are_most():
+    factored, sizes = Factorization([np.eye(40)[:2]]), []
+    for row in np.eye(40)[2:]:
+        factored.insert("own", [row])
+        sizes.append(factored.basis.shape[1])
+        factored.delete("own")
+    assert (sizes[0], max(sizes), sizes.count(3)) == (3, 13, 4)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_f_and_g_are_those_of_the_matrix_made_from_the_rows(case):
     factored = Factorization.of(build(case, True))
