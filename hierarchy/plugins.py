@@ -163,8 +163,6 @@ def _points(group: Group) -> tuple[EntryPoint, ...]:
 def _import(module: str, what: str) -> None:
     try:
         import_module(module)
-    except HierarchyError as error:
-        raise HierarchyError(f"{what}: {error}") from error
     except (Exception, SystemExit) as error:  # a user's code, which may fail in any way
         raise HierarchyError(f"{what} cannot be imported: {type(error).__name__}: "
                              f"{error}") from error

@@ -292,15 +292,13 @@ class Factorization:
 
     def _packed(self, targets: Targets) -> Array:
         """Return b (m,) in the current order."""
-        if isinstance(targets, np.ndarray) and targets.ndim < 2:
+        if isinstance(targets, np.ndarray):
             m = len(self._ordered[0])
             if targets.shape != (m,):
                 raise HierarchyError(f"targets have shape {targets.shape}, expected ({m},)")
             return readable("targets", targets)
         if isinstance(targets, Mapping):
             targets = self._in_order(targets)
-        elif isinstance(targets, np.ndarray):
-            targets = [*targets]
         expect("targets", targets, Sequence, "give b (m,), or b_k (m_k,) of each level")
         if len(targets) != len(self._levels):
             raise HierarchyError(f"{len(targets)} targets for {len(self._levels)} levels")

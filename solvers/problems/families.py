@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import check_name
 from hierarchy.problem import Array, Hierarchy
 from solvers.problems.kinds import Level, Random, equal, stacked
 
@@ -23,11 +23,9 @@ _PARALLEL = 1e-9  # angle [rad] of the nearly parallel rows of DEGEN7
 def family(name: str, seed: int) -> Hierarchy:
     """Return one fresh problem of a reference family, reproducible from its seed.
 
-    Raises HierarchyError: a name not in FAMILIES.
+    Raises UnknownNameError: a name not in FAMILIES.
     """
-    if name not in _MAKERS:
-        raise HierarchyError(f"no family of problems is called {name!r}; there are "
-                             f"{', '.join(_MAKERS)}")
+    check_name("family of problems", name, FAMILIES)
     rng = np.random.default_rng([seed, FAMILIES.index(name)])
     return Hierarchy.from_levels(_MAKERS[name](rng))
 
