@@ -145,8 +145,7 @@ def fingerprint() -> str:
 
 def _load(point: EntryPoint, group: Group) -> None:
     what = f"entry point {point.name!r} of {_PREFIX}.{group}"
-    if point.name not in _registered[group]:
-        _import(point.module, what)
+    _import(point.module, what)
     if point.name not in _registered[group]:  # unless the module registers it itself
         with naming(what, of=AttributeError):
             register(group, point.name)(point.load())

@@ -47,6 +47,20 @@ def test_a_setting_that_makes_no_sense_is_named_with_its_value(name, settings):
         make("hqp", form="slak")
 
 
+@pytest.mark.parametrize("form", ["null-space", "slack"])
+def test_the_programs_of_hqp_begin_at_a_memory_of_their_levels(form, monkeypatch):
+    qpsolvers, begun = pytest.importorskip("qpsolvers"), []
+    solve = qpsolvers.solve_problem
+    monkeypatch.setattr(qpsolvers, "solve_problem", lambda *given, initvals, **more: begun.append(
+        initvals) or solve(*given, initvals=initvals, **more))
+    h = Hierarchy.from_levels([(np.eye(2)[:1], [-1.0], [1.0]), ([[1.0, 1.0]], [3.0])])
+    memory = make("hqp", form=form).solve(h).memory
+    for given, begins in ((None, False), (memory, True), (memory[:1], False)):
+        begun.clear()
+        make("hqp", form=form).solve(h, given)
+        assert {one is not None for one in begun} == {begins}
+
+
 def test_settings_of_parts_are_named():
     for scales, said in (({"hand": 0.0}, ": 'hand'"), (("hand",), " = ('hand',), expected")):
         refused(f"merged: scales{said}", make, "merged", scales=scales)
