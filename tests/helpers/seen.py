@@ -111,6 +111,8 @@ def seen_of_keys():
             "looks": {label: [one.colour, str(one.dash)] for label, one in palette.looks([
                 *names(), "tpm-published", "tpm in-order", "own", "own slack", *(
                     f"hqp {of}" for of in (*palette._VARIANTS, "proxqp"))]).items()},
+            "lines": {of: str(palette.looks([f"hqp {of}"])[f"hqp {of}"].dash)
+                      for of in palette._VARIANTS},
             "tasks": {name: {key: str(value) for key, value in vars(kind).items() if key[0] != "_"
                              and isinstance(value, (bool, float, int, str, tuple, type(None)))}
                       for name, kind in [*vars(tasks).items(), ("Task", Task)]

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ def test_a_resolver_that_has_solved_can_be_pickled(name):
 @pytest.mark.parametrize("name", [*names(), "smooth"])
 def test_settings_of_every_resolver_are_checked_by_name(name):
     assert isinstance(make(name, damping=1).damping, float)
+    assert all(field.kw_only for field in fields(make(name)))
     refused("did you mean 'damping'", make, name, dampnig=0.1)
     refused("unknown setting", make, name, _settings=1)
     for setting, value in [("damping", float("nan")), ("threshold", float("inf")),
