@@ -79,10 +79,13 @@ class Together(NamedRows, Written):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        ends = np.cumsum([task.dimension for task in self.tasks]).tolist()
-        return in_turn(*(
-            writer_in_stack(task, state, level, rows.some(end - task.dimension, task.dimension))
-            for task, end in zip(self.tasks, ends, strict=True)))
+        return in_turn(*(writer_in_stack(task, state, level, part)
+                         for task, part in zip(self.tasks, self.parts(rows), strict=True)))
+
+    def parts(self, rows: Rows) -> list[Rows]:
+        """Return the rows of each task, as views."""
+        sizes = [task.dimension for task in self.tasks]
+        return [rows.some(sum(sizes[:k]), size) for k, size in enumerate(sizes)]
 
 
 @dataclass(frozen=True)
