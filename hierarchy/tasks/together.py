@@ -79,13 +79,9 @@ class Together(NamedRows, Written):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
+        parts = rows.split([task.dimension for task in self.tasks])
         return in_turn(*(writer_in_stack(task, state, level, part)
-                         for task, part in zip(self.tasks, self.parts(rows), strict=True)))
-
-    def parts(self, rows: Rows) -> list[Rows]:
-        """Return the rows of each task, as views."""
-        sizes = [task.dimension for task in self.tasks]
-        return [rows.some(sum(sizes[:k]), size) for k, size in enumerate(sizes)]
+                         for task, part in zip(self.tasks, parts, strict=True)))
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,8 @@ class ContactMotion(NamedRows, Written):
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         tasks = self._tasks
-        return zero_while_open(tasks.writer(state, level, rows), state, self.of, tasks.parts(rows))
+        parts = rows.split([task.dimension for task in tasks.tasks])
+        return zero_while_open(tasks.writer(state, level, rows), state, self.of, parts)
 
     @property
     def _tasks(self) -> Together:
