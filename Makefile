@@ -105,7 +105,11 @@ $(SMALL): $(ARRAYS)
 	@touch $@
 
 $(ARRAYS): pyproject.toml constraints.txt
-	@python=; \
+	@if [ -L .venv ]; then \
+	  echo ".venv is a link, and what it points to would be emptied; remove the link: rm .venv" >&2; \
+	  exit 1; \
+	fi; \
+	python=; \
 	for candidate in $(CANDIDATES); do \
 	  if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; \
 	  then python=$$candidate; break; fi; \

@@ -145,8 +145,7 @@ def fingerprint() -> str:
 
 def _load(point: EntryPoint, group: Group) -> None:
     what = f"entry point {point.name!r} of {_PREFIX}.{group}"
-    if point.name not in _registered[group]:
-        _import(point.module, what)
+    _import(point.module, what)
     if point.name not in _registered[group]:  # unless the module registers it itself
         with naming(what, of=AttributeError):
             register(group, point.name)(point.load())
@@ -163,8 +162,6 @@ def _points(group: Group) -> tuple[EntryPoint, ...]:
 def _import(module: str, what: str) -> None:
     try:
         import_module(module)
-    except HierarchyError as error:
-        raise HierarchyError(f"{what}: {error}") from error
     except (Exception, SystemExit) as error:  # a user's code, which may fail in any way
         raise HierarchyError(f"{what} cannot be imported: {type(error).__name__}: "
                              f"{error}") from error

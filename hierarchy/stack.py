@@ -202,8 +202,8 @@ class Stack:
                 metric = state.dynamics.M.T if isinstance(self._metric, str) else self._metric
             h = h.changed(metric=metric)
         rows = Rows(h.A, h.lower, h.upper)
-        writers = [writer_in_stack(self[name], state, self.level, rows.some(first, count))
-                   for name, first, count in zip(order, h.offsets, h.sizes, strict=False)]
+        writers = [writer_in_stack(self[name], state, self.level, own)
+                   for name, own in zip(order, rows.split(h.sizes.tolist()), strict=True)]
         if self.reference is not None:
             writers.append(self._reference_writer(self.reference, h, state))
         writers.append(self._sides_checked(h, order))

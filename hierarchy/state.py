@@ -139,9 +139,8 @@ class State:
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
         q, v, *before = map(kept.pop, ("_q", "_v", "previous_J", "previous_placements"))
-        if kept["_started"]:
-            self.move(kept["t"], q, v)
-            self.previous_J[:], self.previous_placements[:] = before
+        self.move(kept["t"], q, v)
+        self.previous_J[:], self.previous_placements[:] = before
         vars(self).update(kept)
 
     def __repr__(self) -> str:

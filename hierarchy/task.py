@@ -70,9 +70,10 @@ class Rows(NamedTuple):
         """Return rows of their own, of zeros."""
         return cls(np.zeros((m, n)), np.zeros(m), np.zeros(m))
 
-    def some(self, first: int, count: int) -> Rows:
-        """Return `count` of the rows, as views."""
-        return Rows(*(part[first:first + count] for part in self))
+    def split(self, sizes: Sequence[int]) -> list[Rows]:
+        """Return parts of so many rows each, as views."""
+        return [Rows(*(part[end - size:end] for part in self))
+                for size, end in zip(sizes, np.cumsum(sizes).tolist(), strict=True)]
 
 
 class Task(ABC):

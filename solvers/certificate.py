@@ -402,8 +402,8 @@ def _least_turn(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: 
     It is measured as if all rows had the norm of the smallest: a heavy row excuses no light one.
     """
     force = np.where(judged, size**2 * level.t, 0.0)
-    own, own_size, _ = _on_sides(level, size)
-    C = np.hstack([(cone.rows @ (cone.Z.T @ Z)).T, ((own @ Z) * own_size[:, None]**2).T])
+    own, _, _ = _on_sides(level, size)
+    C = np.hstack([(cone.rows @ (cone.Z.T @ Z)).T, (own @ Z).T])
     f = Z.T @ (level.unit.T @ force)
     left = min((C @ _non_negative(C, -f, 0.0, by_scipy) + f for by_scipy in (False, True)),
                key=_length)

@@ -191,7 +191,7 @@ class Factorization:
         if not isinstance(place, Integral) or not 0 <= place <= len(self._levels):
             raise HierarchyError(f"{level}: index {at} is outside 0 .. {len(self._levels)}")
         block = self._checked(level, A)
-        if len(self._Q) + len(block) > 2 * (self.m + len(block)) + _FEWEST:
+        if len(self._Q) > 2 * self.m + _FEWEST:  # most of it of deleted levels
             self._factor_afresh([(held.name, held.A) for held in self._levels])
         new = _Held(level, block.copy(), self._projected(block))
         self._levels = [*self._levels[:place], new, *self._levels[place:]]
@@ -292,15 +292,13 @@ class Factorization:
 
     def _packed(self, targets: Targets) -> Array:
         """Return b (m,) in the current order."""
-        if isinstance(targets, np.ndarray) and targets.ndim < 2:
+        if isinstance(targets, np.ndarray):
             m = len(self._ordered[0])
             if targets.shape != (m,):
                 raise HierarchyError(f"targets have shape {targets.shape}, expected ({m},)")
             return readable("targets", targets)
         if isinstance(targets, Mapping):
             targets = self._in_order(targets)
-        elif isinstance(targets, np.ndarray):
-            targets = [*targets]
         expect("targets", targets, Sequence, "give b (m,), or b_k (m_k,) of each level")
         if len(targets) != len(self._levels):
             raise HierarchyError(f"{len(targets)} targets for {len(self._levels)} levels")

@@ -232,7 +232,7 @@ def _with_checks(solve: Solve) -> Solve:
     return checked
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@dataclasses.dataclass(frozen=True)
 class Direct(Resolver):
     """A resolver of equalities by one kernel, which needs no memory."""
 

@@ -12,9 +12,10 @@ once, and again when tests have changed), or --tests. Processes that tests start
 line that runs as its module is imported has the tests of its module, or SEEN if no other line of
 it runs. Of many tests those of SEEN and MOST others are taken: a case of each function first, those
 first that run few lines, FEW of which are asked before all others: four of five mutants end there.
-A mutant that survives meets the WHOLE files with the most of such tests: what a shared fixture runs
-counts only for the test that asked for it first. Prints every survivor with its line, and the share
-of survivors. A mutant whose tests take more CPU time than --limit at once counts as killed.
+A mutant that survives meets REFUSALS, each of whose cases is another check, and the WHOLE files
+with the most of such tests: what a shared fixture runs counts only for the test that asked for it
+first. Prints every survivor with its line, and the share of survivors. A mutant whose tests take
+more CPU time than --limit at once counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
 `strict=` of zip (a check that does not fire where shapes have been checked), what only a type
@@ -54,6 +55,7 @@ FILES = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.p
 MAP = ROOT / "build" / "tests-of-lines"
 FEW, MOST, WHOLE = 8, 40, 6  # tests of a mutant, beside those of SEEN, and then files of tests
 SEEN = "tests/scenarios/test_seen.py"
+REFUSALS = "tests/hierarchy/test_wrong_values.py", "tests/scenarios/test_wrong_inputs.py"
 COMPILED = ("compiled", "unlocked", "internal", "inlined", "measured")
 # The folder of kernels, the integer codes that kernels read, and the LLVM code that they contain.
 OF_KERNELS = ("solvers/kernels/", "solvers/status.py", "hierarchy/jit/intrinsics.py")
@@ -277,9 +279,11 @@ def tests_of(mutant: Mutant) -> list[tuple[str, ...]]:
     first = [test for test in order if test.startswith(SEEN)]  # much in little time
     others = sorted(order.keys() - {*first}, key=order.__getitem__)[:MOST]
     files = Counter(test.partition("::")[0] for test in order.keys() - {*first})
+    whole = [file for file in REFUSALS if file in files] + [
+        file for file, _ in files.most_common(WHOLE) if file not in REFUSALS]
     groups = (tuple(others[:FEW]),
               ("field(" in line) * records + default * keys + (*first, *others[FEW:]),
-              *((file,) for file, _ in files.most_common(WHOLE)))
+              *((file,) for file in whole))
     return [group for group in groups if group]
 
 

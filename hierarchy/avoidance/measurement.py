@@ -110,11 +110,6 @@ def measure_exactly(placements, joints, offsets, obstacles, laws, mean_within, s
     chosen[0] = active
 
 
-# Columns of the table.
-_DISTANCE, _DIRECTION, _VELOCITY, _ACCELERATION = 0, slice(1, 4), slice(4, 7), slice(7, 10)
-_STRAIGHT, _RADIUS, _WIDTH = slice(10, 13), 13, 14
-
-
 class Pairs:
     """P points of the robot against H obstacles.
 
@@ -131,7 +126,7 @@ class Pairs:
     __slots__ = ("acceleration", "direction", "distance", "radius", "straight", "table", "velocity")
 
     def __init__(self, points: int, obstacles: int) -> None:
-        self.__setstate__(np.zeros((points, obstacles, _WIDTH)))
+        self.__setstate__(np.zeros((points, obstacles, 14)))
         self.distance[:] = self.radius[:] = inf
 
     def __getstate__(self) -> Array:
@@ -139,9 +134,9 @@ class Pairs:
 
     def __setstate__(self, table: Array) -> None:
         self.table = table
-        self.distance, self.direction = table[..., _DISTANCE], table[..., _DIRECTION]
-        self.velocity, self.acceleration = table[..., _VELOCITY], table[..., _ACCELERATION]
-        self.radius, self.straight = table[..., _RADIUS], table[..., _STRAIGHT]
+        self.distance, self.radius = table[..., 0], table[..., 13]
+        self.direction, self.velocity = table[..., 1:4], table[..., 4:7]
+        self.acceleration, self.straight = table[..., 7:10], table[..., 10:13]
 
 
 def measure_pairs(pairs: Pairs, points: Array, obstacles: Obstacles) -> None:

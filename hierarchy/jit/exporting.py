@@ -63,11 +63,6 @@ class Entry:
     failed: int
 
 
-def compiles() -> bool:
-    """Whether kernels are compiled at all; not with NUMBA_DISABLE_JIT."""
-    return not numba.config.DISABLE_JIT
-
-
 @global_compiler_lock  # type: ignore[untyped-decorator]
 def lowered(entries: Mapping[str, Entry]) -> Any:
     """Return one optimised LLVM module in which only the entries are visible, under their names."""

@@ -202,11 +202,9 @@ class Waypoints(Path):
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
-        i = _interval(self.times, self.points, t, out)
-        if i is None:
+        i, span, s = _interval(self.times, self.points, t, out)
+        if i == 0:
             return
-        span = self.times[i] - self.times[i - 1]
-        s = (t - self.times[i - 1]) / span
         start = np.asarray(self.points[i - 1], dtype=float)
         step = np.asarray(self.points[i], dtype=float) - start
         out[0] = start + step * (s**3 * (10 - 15 * s + 6 * s * s))
@@ -301,11 +299,9 @@ class Recorded(Path):
 
     def write(self, t: float, out: Array) -> None:
         """See `Path.write`."""
-        i = _interval(self.times, self.points, t, out)
-        if i is None:
+        i, h, s = _interval(self.times, self.points, t, out)
+        if i == 0:
             return
-        h = self.times[i] - self.times[i - 1]
-        s = (t - self.times[i - 1]) / h
         p0, p1 = np.asarray(self.points[i - 1]), np.asarray(self.points[i])
         m0, m1 = h * self._slopes[i - 1], h * self._slopes[i]
         c2, c3 = 3 * (p1 - p0) - 2 * m0 - m1, 2 * (p0 - p1) + m0 + m1
@@ -315,13 +311,14 @@ class Recorded(Path):
 
 
 def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: Array
-              ) -> int | None:
-    """Return the point at which the interval around t ends; outside, write the rest and None."""
+              ) -> tuple[int, float, float]:
+    """Return where the interval around t ends, its length, and t's share; outside, write and 0."""
     i = bisect_right(times, t)
     if 0 < i < len(times):
-        return i
+        span = times[i] - times[i - 1]
+        return i, span, (t - times[i - 1]) / span
     out[0], out[1:] = points[min(i, len(times) - 1)], 0.0
-    return None
+    return 0, 0.0, 0.0
 
 
 def _lines(file: str | File) -> list[tuple[int, str]]:

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from hierarchy import plugins
-from hierarchy.errors import RobotError, UnknownNameError, check_name, nearest
+from hierarchy.errors import RobotError, UnknownNameError, nearest
 
-PACKAGES = ("example_robot_data", "robot_descriptions")
 _SUFFIXES = (".urdf", ".xml", ".mjcf",  # and those that are refused with what to give instead
              ".xacro", ".sdf", ".world", ".toml", ".dae", ".stl", ".obj", ".mjb", ".usd", ".usda")
 _NEAR = 0.7  # similarity of two names, 0 to 1, from which one is meant
@@ -20,7 +19,7 @@ _REMEDY = "pip install 'task-hierarchy[descriptions]'"
 
 def in_package(model: str) -> bool:
     """Whether `model` is "package:name" with a known package."""
-    return model.partition(":")[0] in PACKAGES and ":" in model
+    return model.partition(":")[0] in _NAMES and ":" in model
 
 
 def is_file_name(model: str) -> bool:
@@ -56,8 +55,8 @@ def _descriptions() -> dict[str, Any]:
     return known
 
 
-_NAMES: dict[str, Callable[[], dict[str, Any]]] = dict(
-    zip(PACKAGES, (_example_files, _descriptions), strict=True))
+_NAMES: dict[str, Callable[[], dict[str, Any]]] = {
+    "example_robot_data": _example_files, "robot_descriptions": _descriptions}
 
 
 def file_of(model: str) -> Path:
@@ -68,7 +67,6 @@ def file_of(model: str) -> Path:
     not installed or its file is not available, and UnknownNameError for an unknown name.
     """
     package, _, name = model.partition(":")
-    check_name("package of robots", package, PACKAGES)
     of_files = package == "example_robot_data"
     try:
         known = _NAMES[package]()

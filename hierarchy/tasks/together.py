@@ -79,10 +79,9 @@ class Together(NamedRows, Written):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        ends = np.cumsum([task.dimension for task in self.tasks]).tolist()
-        return in_turn(*(
-            writer_in_stack(task, state, level, rows.some(end - task.dimension, task.dimension))
-            for task, end in zip(self.tasks, ends, strict=True)))
+        parts = rows.split([task.dimension for task in self.tasks])
+        return in_turn(*(writer_in_stack(task, state, level, part)
+                         for task, part in zip(self.tasks, parts, strict=True)))
 
 
 @dataclass(frozen=True)

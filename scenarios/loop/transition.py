@@ -73,8 +73,6 @@ class Blend:
     def weights(self, t: float, present: Key) -> dict[Key, float]:
         """Return the weight of each stack at time t [s], with `present` active from now on."""
         visits = self._visits
-        if visits and t < visits[-1][1]:  # another run
-            visits.clear()
         if not visits or visits[-1][0] != present:
             visits.append((present, t))
         while len(visits) > 1 and t - visits[1][1] >= self._time:

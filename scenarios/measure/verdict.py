@@ -203,8 +203,9 @@ class Comparison:
 
         Those are the runs of one scenario; or, with one resolver, the runs of all scenarios.
         """
-        if len(self.runs) > 1 and len({run.spec for run in self.runs}) == 1:
-            return {self.runs[0].spec: list(self.runs)}
+        specs = {run.spec for run in self.runs}
+        if len(specs) == 1 < len(self.runs):
+            return {specs.pop(): list(self.runs)}
         return {name: [run for run in self.runs if run.scenario.name == name]
                 for name in self._names}
 

@@ -150,7 +150,7 @@ def _write_table(folder: Path, found: Comparison) -> None:
 def _row(run: Run) -> tuple[Job, Outcome]:
     """Return a run as the table has it."""
     job, ticks = _job(run), run.recording.ticks if run.recording else 0
-    return job, Outcome(job.key, ticks, run.fault, float("nan"), tuple(run.metrics.values()))
+    return job, Outcome(job.key, ticks, run.fault, None, tuple(run.metrics.values()))
 
 
 def _job(run: Run) -> Job:

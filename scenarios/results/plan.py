@@ -64,12 +64,15 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run; `reason` says why it did not reach its end, otherwise None."""
+    """What came of a run; `reason` says why it did not reach its end, otherwise None.
+
+    wall_seconds : how long it took [s], None if that is not known.
+    """
 
     key: str
     ticks: int
     reason: str | None
-    wall_seconds: float
+    wall_seconds: float | None
     metrics: tuple[Metric, ...] = ()
 
 

@@ -132,7 +132,7 @@ def complete(jobs: Sequence[Job], store: Store, workers: Workers, name: str,
              cluster.ended(work, missing, workers.scheduler))
     for done, (job, found) in enumerate(ended, begun + 1):
         store.add(job, found or Outcome(job.key, 0, "Killed: every process that started this run "
-                                        "died", float("nan")))
+                                        "died", None))
         told(done, len(jobs))
     return len(missing)
 

@@ -131,14 +131,15 @@ def read(file: Path) -> dict[str, Outcome]:
         for row in csv.DictReader(io.StringIO(_ended(file.read_bytes()), newline="")):
             if None in row.values() or row["group"] == _SAMPLED:
                 continue
-            key, name, value = row["key"], row["metric"], row["value"]
+            key, name = row["key"], row["metric"]
+            value = None if row["value"] in ("", "nan") else float(row["value"])
             of = metrics.setdefault(key, {})
-            of[name] = Metric(name, row["label"], float(value) if value else None, row["unit"],
-                              _LOWER[row["better"]], row["group"], row["note"])
+            of[name] = Metric(name, row["label"], value, row["unit"], _LOWER[row["better"]],
+                              row["group"], row["note"])
             if name == _END:
                 measured = tuple(one for one in of.values() if one.group != _RUN)
                 found[key] = Outcome(key, int(of["ticks"].value or 0), row["note"] or None,
-                                     of["wall_seconds"].value or 0.0, measured)
+                                     of["wall_seconds"].value, measured)
     except (OSError, ValueError, KeyError, csv.Error) as error:
         raise StoreError(f"{file} cannot be read ({error}); remove it to repeat its "
                          "runs") from error

@@ -59,12 +59,12 @@ def emitted(resolvers: Sequence[str], target: str, fix: Sequence[int] = ()) -> E
     """
     check(resolvers, target, fix)
     import llvmlite.binding as llvm
+    import numba
 
-    from hierarchy.jit.exporting import compiles
     from hierarchy.jit.linking import hide, object_code
     from solvers.library.entries import FUNCTIONS
 
-    if not compiles():
+    if numba.config.DISABLE_JIT:
         raise HierarchyError("kernels are not compiled: NUMBA_DISABLE_JIT is set")
     others = {f"th_solve_{name}" for name in set(RESOLVERS).difference(resolvers)}
     functions = {name: FUNCTIONS[name] for name in FUNCTIONS if name not in others}

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import check_name
 from hierarchy.problem import Array, Hierarchy
 from solvers.problems.kinds import Level, Random, equal, stacked
 
@@ -23,11 +23,9 @@ _PARALLEL = 1e-9  # angle [rad] of the nearly parallel rows of DEGEN7
 def family(name: str, seed: int) -> Hierarchy:
     """Return one fresh problem of a reference family, reproducible from its seed.
 
-    Raises HierarchyError: a name not in FAMILIES.
+    Raises UnknownNameError: a name not in FAMILIES.
     """
-    if name not in _MAKERS:
-        raise HierarchyError(f"no family of problems is called {name!r}; there are "
-                             f"{', '.join(_MAKERS)}")
+    check_name("family of problems", name, FAMILIES)
     rng = np.random.default_rng([seed, FAMILIES.index(name)])
     return Hierarchy.from_levels(_MAKERS[name](rng))
 
@@ -65,9 +63,9 @@ def _arm(rng: Random, hard: float = _HARD) -> list[Level]:
     side = avoidance @ inside - (rng.uniform(0.0, 8.0, 3) if tough else rng.uniform(4.0, 17.0, 3))
     position = rng.uniform(0.4, 1.2) * _unit(rng, 3, n)
     cone = _unit(rng, 1, n)
-    return [(np.eye(n), lower, upper), _one_sided(rng, avoidance, side, last=1),
+    return [(np.eye(n), lower, upper), _one_sided(rng, avoidance, side),
             equal(position, position @ (reach * rng.uniform(-8.0, 8.0, n))),
-            _one_sided(rng, cone, rng.normal(0.0, 1.8 * reach, 1), last=1),
+            _one_sided(rng, cone, rng.normal(0.0, 1.8 * reach, 1)),
             equal(np.eye(n), reach * rng.uniform(-8.0, 8.0, n))]
 
 
@@ -121,13 +119,12 @@ def _unit(rng: Random, size: int, n: int) -> Array:
     return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
 
 
-def _one_sided(rng: Random, A: Array, side: Array, last: int) -> Level:
-    """Return rows A x >= side; each of the last ones is reversed with an even chance."""
+def _one_sided(rng: Random, A: Array, side: Array) -> Level:
+    """Return rows A x >= side; the last one is reversed with an even chance."""
     level = (A.copy(), side.copy(), np.full(len(A), np.inf))
-    for i in range(len(A) - last, len(A)):
-        if rng.random() < 0.5:
-            level[1][i], level[2][i] = -np.inf, -side[i]
-            level[0][i] *= -1.0
+    if rng.random() < 0.5:
+        level[0][-1] *= -1.0
+        level[1][-1], level[2][-1] = -np.inf, -side[-1]
     return level
 
 

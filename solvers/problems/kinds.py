@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import check_name
 from hierarchy.problem import Array, Hierarchy
 
 Random = np.random.Generator
@@ -23,12 +23,10 @@ def structured(seed: int, kinds: Sequence[str] = (), equalities_only: bool = Fal
     kinds : names from KINDS to draw from; all of them if empty.
     equalities_only : whether each row keeps only one side, as an equality.
 
-    Raises HierarchyError: a name not in KINDS.
+    Raises UnknownNameError: a name not in KINDS.
     """
     for kind in kinds:
-        if kind not in _MAKERS:
-            raise HierarchyError(f"no kind of problem is called {kind!r}; there are "
-                                 f"{', '.join(_MAKERS)}")
+        check_name("kind of problem", kind, _MAKERS)
     rng = np.random.default_rng([seed, 1])
     chosen = str(rng.choice(list(kinds or _MAKERS)))
     levels = _MAKERS[chosen](rng)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.linalg import norm
 from numpy.typing import NDArray
 
+from hierarchy.gate import sound_rows
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.kernels.tolerances import NEGLIGIBLE
@@ -80,8 +81,7 @@ def _in_range(h: Hierarchy) -> bool:
 
     Sides are measured relative to the largest entry of their level.
     """
-    sides = (h.lower <= h.upper) & (h.lower < np.inf) & (h.upper > -np.inf)
-    if not sides.all() or not below_largest(h.A, h.reference):
+    if not sound_rows(*h.rows[:3]) or not below_largest(h.A, h.reference):
         return False
     with np.errstate(over="ignore"):
         for A, lower, upper in h.levels():

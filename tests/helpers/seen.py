@@ -111,6 +111,8 @@ def seen_of_keys():
             "looks": {label: [one.colour, str(one.dash)] for label, one in palette.looks([
                 *names(), "tpm-published", "tpm in-order", "own", "own slack", *(
                     f"hqp {of}" for of in (*palette._VARIANTS, "proxqp"))]).items()},
+            "lines": {of: str(palette.looks([f"hqp {of}"])[f"hqp {of}"].dash)
+                      for of in palette._VARIANTS},
             "tasks": {name: {key: str(value) for key, value in vars(kind).items() if key[0] != "_"
                              and isinstance(value, (bool, float, int, str, tuple, type(None)))}
                       for name, kind in [*vars(tasks).items(), ("Task", Task)]
@@ -130,7 +132,8 @@ def seen_of_live_page(name, **changed):
         found = [condensed(shown.data())]
         for what, value in (
                 ("resolver", "recursive"), ("pointing.alpha_d", 20.0), ("obstacle 0", [0, 0.5, 0]),
-                ("path", [0.02, 0.6, 0.05]), ("speed", 2.0), ("toggle", None), ("nothing", 1),
+                ("path", [0.02, 0.6, 0.05]), ("speed", 2.0), ("path", [1, 2, float("inf")]),
+                ("path", None), ("toggle", None), ("nothing", 1),
                 ("obstacle 9", [0, 0, 0]), ("obstacle -1", [0, 0, 0]),
                 ("obstacle 0", [9e9, 0, 0]), ("speed", "fast"), ("avoidance.near", 0.3),
                 ("avoidance.nearly", 0.3), ("obstacle 0", "up"), ("resolver", [1]),

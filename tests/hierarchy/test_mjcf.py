@@ -293,6 +293,7 @@ def test_closed_chains_join_the_frames_that_mujoco_joins(equality, rigid, writte
     robot = Robot.load(path)
     loop, = robot.loops
     assert (loop.name, loop.rigid) == ("close", rigid)
+    assert Robot.load(path, root="a").loops == robot.loops
     assert robot.end_effector not in loop.frames or "site" in equality
     for q in np.random.default_rng(2).uniform(-1.0, 1.0, (3, 3)):
         state, expected = State.at(robot, q), residual(path, q)

@@ -47,6 +47,8 @@ def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
         np.testing.assert_allclose(found[same], second[same], atol=3e-5)
         checked += same.sum()
     assert checked >= 54 * len(STATES) - 2
+    parts = seen.distance, seen.direction, seen.velocity, seen.acceleration, seen.straight
+    np.testing.assert_array_equal(seen.table, np.dstack([*parts, seen.radius]))
 
 
 @pytest.mark.parametrize(("pairs", "obstacles", "said"), [

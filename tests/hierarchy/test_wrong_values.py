@@ -218,6 +218,7 @@ def limits(**settings):
     (lambda: tasks.Separation((), KEPT), "'separation': points: expected at least one control"),
     (lambda: tasks.CumulatedRepulsion(7, (), 0.1), "at least one control point"),
     (lambda: tasks.CumulatedRepulsion(7, POINTS, 0.1, lever=0.0), "lever [m] = 0: ex"),
+    (lambda: tasks.CumulatedRepulsion(7, POINTS, 0.1, tasks.Posture(B)), "has 2 rows, expected 7"),
     (lambda: tasks.CumulatedRepulsion(7, POINTS, 0.1).reference_velocity(STATE), "no measurement"),
     (lambda: tasks.DangerBounds(LIMITS, POINTS, reach=0.0), "reach [m] = 0: expected a number"),
     (lambda: tasks.Pointing(FRAME, (0.0, 0.0, 0.0), 0.1), "axis"),

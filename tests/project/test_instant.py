@@ -1,5 +1,6 @@
 """With the object files of kernels, the documented commands compile nothing."""
 
+import json
 import os
 import re
 import shlex
@@ -31,8 +32,9 @@ def compiled(code, folder, **settings):
     """
     done = subprocess.run(
         [sys.executable, "-c", code], text=True, capture_output=True, cwd=folder, check=False,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(folder / "cache"),
-             "NUMBA_CACHE_DIR": "", **settings})
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (
+            os.environ.get("PYTHONPATH"), str(ROOT)))), "NUMBA_CACHE_DIR": "",
+             "XDG_CACHE_HOME": str(folder / "cache"), **settings})
     assert done.returncode == 0, done.stderr
     kept = folder / "cache" / "task-hierarchy"
     return sorted(path.name for path in kept.rglob("*") if path.is_file() and path.suffix != ".o")
@@ -85,6 +87,50 @@ def test_another_processor_makes_code_once_and_compiles_nothing(tmp_path):
 def test_the_llvm_code_has_no_instruction_of_x86(part):
     module = llvm.parse_bitcode(read_code(FOLDER / f"{part}.bc")[1])
     assert not [one.name for one in module.functions if one.name.startswith("llvm.x86.")]
+
+
+def test_what_jobs_call_is_listed(tmp_path):
+    code = ("from scenarios.ahead.building import CALLS, record\n"
+            "found = [record(job) for job in ('arrays', 'others', 'batch.md')]\n"
+            "assert 0 < len(found[0]) < len(found[1]) <= len(found[2])\n"
+            "assert {*found[-1]} <= {*CALLS.read_text().splitlines()}")
+    assert compiled(code, tmp_path) == []
+
+
+FEW = """
+import sys
+from pathlib import Path
+from hierarchy.jit import caching
+from solvers.library import entries
+from scenarios.ahead import building
+caching.FOLDER, building.CALLS = Path("objects").absolute(), Path("calls.txt")
+building.ended = lambda work, jobs: [(job, work(job)) for job in jobs]
+entries.FUNCTIONS = {"th_record_size": entries.FUNCTIONS["th_record_size"]}
+"""
+MAKE = """
+building.JOBS = {"arrays": lambda _: None}
+building.main()
+assert building.is_current("solvers")
+"""
+ASK = """
+from solvers.kernels.merged import record_size
+assert record_size(7, 2) > 0
+"""
+
+
+def test_calls_that_are_listed_are_compiled_ahead_for_any_processor(tmp_path):
+    call = "solvers.kernels.merged.record_size(int64, int64)"
+    (tmp_path / "calls.txt").write_text(f"{call}\n")
+    (tmp_path / "cache" / "task-hierarchy").mkdir(parents=True)
+    compiled(f"{FEW}sys.argv[1:] = ['solvers']{MAKE}", tmp_path)
+    made = (tmp_path / "objects" / "solvers.o").stat().st_mtime_ns
+    index = json.loads((tmp_path / "objects" / "solvers.json").read_text())
+    assert list(index["entries"]) == [call]
+    for settings in ({}, {"TASK_HIERARCHY_NATIVE": "1"}):
+        assert compiled(f"{FEW}{ASK}", tmp_path, **settings) == []
+    compiled(f"{FEW}sys.argv[1:] = ['record']{MAKE}", tmp_path)
+    assert (tmp_path / "objects" / "solvers.o").stat().st_mtime_ns > made
+    assert not (tmp_path / "calls.txt").read_text()
 
 
 def test_a_call_with_other_types_is_compiled_and_right(tmp_path):

@@ -51,7 +51,7 @@ def test_every_dependency_has_a_pinned_version_and_the_version_is_one():
 
 
 @pytest.mark.parametrize(("interpreter", "said"), [
-    ("#!/bin/sh\nexit 1\n", "needs Python 3.11 or newer"),
+    ("", ".venv is a link"), ("#!/bin/sh\nexit 1\n", "needs Python 3.11 or newer"),
     ('#!/bin/sh\ncase "$2" in\n  *ensurepip*) exit 1;;\n  *print*) echo 3.11;;\nesac\n',
      "apt install python3.11-venv")])
 def test_make_says_what_is_missing_where_python_does_not_serve(interpreter, said, tmp_path):
@@ -60,10 +60,13 @@ def test_make_says_what_is_missing_where_python_does_not_serve(interpreter, said
     python = tmp_path / "python"
     python.write_text(interpreter)
     python.chmod(0o755)
+    if not interpreter:
+        (tmp_path / ".venv").symlink_to(tmp_path)
     done = subprocess.run(["make", "set-up", f"PYTHON={python}"], cwd=tmp_path, text=True,
                           capture_output=True, check=False)
     assert done.returncode != 0
     assert said in done.stderr
+    assert python.exists()
 
 
 # One after the other in one process, and what is not loaded after each.

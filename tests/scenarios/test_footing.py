@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from urdf_text import LIMIT, joint, link, placed, urdf
+from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape, urdf
 
 from scenarios import load
 from scenarios.cell.build import build
@@ -114,7 +114,9 @@ def test_a_robot_stands_on_the_ends_of_its_legs_not_on_its_knees(tmp_path):
 
 
 def test_a_base_that_is_lower_than_what_it_carries_stands_itself(tmp_path):
-    (tmp_path / "arm.urdf").write_text(urdf(link("base"), link("arm"), joint(
+    ball = INERTIAL + shape('<sphere radius="0.1"/>')
+    (tmp_path / "arm.urdf").write_text(urdf(link("base", ball), link("arm", ball), joint(
         "turn", "revolute", "base", "arm", origin=placed("0 0 1"))))
     found, _ = checked(str(tmp_path / "arm.urdf"), ["robot.base=floating"])
     assert found["lowest_frames"] == ["base"]
+    assert [one["joint"] for one in found["capsules"]] == [None, "turn"]

@@ -221,3 +221,5 @@ def test_two_things_of_one_name_are_refused():
     plugins.register("tasks", "thing")(type("One", (), {}))
     refused("tasks: 'thing' is already", plugins.register("tasks", "thing"), type("Two", (), {}))
     refused("unknown group 'task'; did you mean 'tasks'", plugins.register, "task", "thing")
+    plugins.register("resolvers", "whole")(int)
+    refused("unknown resolver 'whole'", make, "whole")

@@ -19,7 +19,7 @@ from scenarios.measure import metrics
 from scenarios.results import pool, sampled_page
 from scenarios.results.columns import Results, verdict
 from scenarios.results.plan import Job, Outcome, load_sweep, outcome, plan, shipped_sweeps
-from scenarios.results.sampled import Workers, compare_starts
+from scenarios.results.sampled import Workers, compare_starts, complete
 from scenarios.results.store import FullError, Store
 
 BODY = {"name": '"small"', "scenarios": '["ellipse"]', "resolvers": '["tpm", "recursive"]',
@@ -163,10 +163,14 @@ def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path, 
     assert ("tpm", "2", "start.q.6") in first
 
 
-def test_a_run_that_kills_its_process_costs_only_itself():
+def test_a_run_that_kills_its_process_costs_only_itself(tmp_path):
     jobs = [Job(str(i), "", "deadly" if i == 2 else "tpm") for i in range(6)]
-    found = {job.key: one for job, one in pool.ended(dies_of_one, jobs, 2)}
-    assert (len(found), [key for key, one in found.items() if one is None]) == (6, ["2"])
+    store = Store(tmp_path / "out")
+    with store.opened():
+        assert complete(jobs, store, Workers(2), "deadly", work=dies_of_one) == 6
+    said = {key: one.reason for key, one in store.outcomes().items()}
+    killed = "Killed: every process that started this run died"
+    assert said == {str(i): killed if i == 2 else None for i in range(6)}
 
 
 def test_what_has_ended_at_ctrl_c_is_given_up_unless_it_is_asked_for(monkeypatch):

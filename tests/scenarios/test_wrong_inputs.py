@@ -129,6 +129,7 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: simulate(load("ellipse-smooth").with_resolver("tpm")),
      'needs control.resolver = "smooth", got "tpm"'),
     (lambda: simulate(SHORT, progress=3), "simulate: progress: expected a function, got int 3"),
+    (lambda: simulate(SHORT, audits=3), "simulate: audits: expected an Iterable, got int 3"),
     (lambda: simulate("elipse"), "unknown scenario 'elipse'; did you mean 'ellipse'?"),
     (lambda: compare(3), "compare: expected names, files, or what `load` returns, got int 3"),
     (lambda: compare("ellipse", "hcod"), "resolvers: expected a list of names, got str 'hcod'"),

@@ -71,6 +71,15 @@ def test_after_random_edits_the_answers_are_those_of_tpm():
     assert np.percentile(gaps, 99.9) < 1e-12
 
 
+def test_directions_of_deleted_levels_are_dropped_once_they_are_most():
+    factored, sizes = Factorization([np.eye(40)[:2]]), []
+    for row in np.eye(40)[2:]:
+        factored.insert("own", [row])
+        sizes.append(factored.basis.shape[1])
+        factored.delete("own")
+    assert (sizes[0], max(sizes), sizes.count(3)) == (3, 13, 4)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_f_and_g_are_those_of_the_matrix_made_from_the_rows(case):
     factored = Factorization.of(build(case, True))
@@ -101,10 +110,15 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     (lambda f: f.delete(2), "index 2 is outside 0 .. 1"),
     (lambda f: f.insert("hand", np.eye(3)), "2 levels are named 'hand'"),
     (lambda f: f.insert("foot", [[1, 2, 3], [0, np.nan, 0]]), "foot, row 1: A[1, 1] is nan"),
+    (lambda f: f.insert("foot", np.eye(3), 3), "foot: index 3 is outside 0 .. 2"),
+    (lambda f: f.reorder(["hand", "hand"]), "reorder needs each of ['hand', 'elbow'] once"),
     (lambda f: f.solve({"hand": [1.0, 2.0]}), "elbow: no target given"),
+    (lambda f: f.solve([[1.0, 2.0]]), "1 targets for 2 levels"),
+    (lambda f: f.solve(np.ones((3, 1))), "targets have shape (3, 1), expected (3,)"),
     (lambda f: f.solve([[1.0, 2.0], [1.0, 2.0]]), "elbow: b has shape (2,), expected (1,)"),
     (lambda f: f.solve([[1.0, np.inf], [1.0]]), "hand, row 1: target is inf"),
     (lambda f: Factorization([]), "no levels and no n"),
+    (lambda f: Factorization([], n=0), "n = 0, expected a whole number >= 1"),
     (lambda f: Factorization([np.eye(2), np.eye(3)]), "level 2: A has shape (3, 3)"),
     (lambda f: Factorization([np.ones((1, 0))]), "level 1: A has shape (1, 0), expected (rows, n)"),
     (lambda f: Factorization([], n=2, settings=make("tpm-published")), "staircase form"),

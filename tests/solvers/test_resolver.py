@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ def test_a_resolver_that_has_solved_can_be_pickled(name):
 @pytest.mark.parametrize("name", [*names(), "smooth"])
 def test_settings_of_every_resolver_are_checked_by_name(name):
     assert isinstance(make(name, damping=1).damping, float)
+    assert all(field.kw_only for field in fields(make(name)))
     refused("did you mean 'damping'", make, name, dampnig=0.1)
     refused("unknown setting", make, name, _settings=1)
     for setting, value in [("damping", float("nan")), ("threshold", float("inf")),
@@ -45,6 +47,20 @@ def test_a_setting_that_makes_no_sense_is_named_with_its_value(name, settings):
     refused(f"{name}: {setting} = {value!r}", make, name, **settings)
     with pytest.raises(UnknownNameError, match="unknown form of hqp 'slak'; did you mean 'slack'"):
         make("hqp", form="slak")
+
+
+@pytest.mark.parametrize("form", ["null-space", "slack"])
+def test_the_programs_of_hqp_begin_at_a_memory_of_their_levels(form, monkeypatch):
+    qpsolvers, begun = pytest.importorskip("qpsolvers"), []
+    solve = qpsolvers.solve_problem
+    monkeypatch.setattr(qpsolvers, "solve_problem", lambda *given, initvals, **more: begun.append(
+        initvals) or solve(*given, initvals=initvals, **more))
+    h = Hierarchy.from_levels([(np.eye(2)[:1], [-1.0], [1.0]), ([[1.0, 1.0]], [3.0])])
+    memory = make("hqp", form=form).solve(h).memory
+    for given, begins in ((None, False), (memory, True), (memory[:1], False)):
+        begun.clear()
+        make("hqp", form=form).solve(h, given)
+        assert {one is not None for one in begun} == {begins}
 
 
 def test_settings_of_parts_are_named():

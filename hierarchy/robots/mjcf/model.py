@@ -140,9 +140,8 @@ def add_frame(model: Any, name: str, joint: int, place: Any, kind: str) -> str:
         same = model.frames[model.getFrameId(name)]
         if same.parentJoint == joint and same.placement.isApprox(place, 1e-12):
             return name
-        numbers = ("", *(f" {i}" for i in range(2, model.nframes + 3)))
-        name = next(other for other in (f"{name} ({kind}{number})" for number in numbers)
-                    if not model.existFrame(other))
+    while model.existFrame(name):
+        name += f" ({kind})"
     model.addFrame(pin.Frame(name, joint, place, pin.FrameType.OP_FRAME))
     return name
 

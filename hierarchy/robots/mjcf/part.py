@@ -153,7 +153,7 @@ def part_of(file: Compiled, base: Base | None, locked: Mapping[str, ArrayLike],
         moving = sorted({file.bodies[model.jnt_bodyid[j]] for j in range(model.njnt)})
         raise file.error("it has no joint that moves"
                          + (f" from {', '.join(root)} on; there are some on the bodies "
-                            f"{', '.join(moving)}" if root and moving else ""))
+                            f"{', '.join(moving)}" if moving else ""))
     for name, value in locked.items():
         joints.remove(_lock(file, joints, held, name, value))
     if base == "fixed":

@@ -71,7 +71,7 @@ class ContactMotion(NamedRows, Written):
         axes = [f"{kind} {axis}" for kind in ("along", "about") for axis in "xyz"]
         return tuple(f"{contact.name} {axis}" for contact in self.of.contacts
                      for axis in (("along its normal",) if contact.slides else
-                                  axes[:_rows(contact)]))
+                                  axes if contact.is_surface else axes[:3]))
 
     def error(self, state: State) -> Array:
         """Distance of each contact from its anchor (m,) [m, rad]; zero without anchors."""
@@ -79,9 +79,9 @@ class ContactMotion(NamedRows, Written):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        counts = [_rows(contact) for contact in self.of.contacts]
-        parts = [rows.some(sum(counts[:k]), count) for k, count in enumerate(counts)]
-        return zero_while_open(self._tasks.writer(state, level, rows), state, self.of, parts)
+        tasks = self._tasks
+        parts = rows.split([task.dimension for task in tasks.tasks])
+        return zero_while_open(tasks.writer(state, level, rows), state, self.of, parts)
 
     @property
     def _tasks(self) -> Together:
@@ -95,10 +95,6 @@ class ContactMotion(NamedRows, Written):
             return Pose(frame, path, anchor[1:], *gains, name)
         point = Position(frame, path, *gains, name=name)
         return Along(point, contact.axes[2:].tolist(), name) if contact.slides else point
-
-
-def _rows(contact: Contact) -> int:
-    return 1 if contact.slides else 6 if contact.is_surface else 3
 
 
 def _held(contact: Contact) -> Frame:

@@ -80,10 +80,9 @@ class Friction(FixedRows):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        writers, first = [super().writer(state, level, rows)], 0
-        for k, contact in enumerate(self.contacts.contacts):
-            own = rows.some(first, count := len(self._of(contact)))
-            first += count
+        contacts, writers = self.contacts.contacts, [super().writer(state, level, rows)]
+        parts = rows.split([len(self._of(contact)) for contact in contacts])
+        for k, (contact, own) in enumerate(zip(contacts, parts, strict=True)):
             if contact.open:
                 writers.append(partial(self._ramp, k, state, own.lower, own.upper))
             if contact.slides:

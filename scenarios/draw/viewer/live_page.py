@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, check_name, number
+from hierarchy.errors import HierarchyError, check_name, finite_numbers, number
 from hierarchy.problem import Array
 from hierarchy.tasks import Position
 from hierarchy.tasks.pose import Pose
@@ -163,7 +163,7 @@ class LivePage:
             elif what == "speed":
                 self.speed = min(max(number("speed", value), 0.01), 100.0)
             elif what == "path" and self.live.scenario.position is not None:
-                self._path_wanted = np.asarray(value, dtype=float).reshape(3) - self.middle
+                self._path_wanted = finite_numbers("path", value, 3) - self.middle
             elif what.startswith("obstacle ") and (obstacles := self.live.obstacles) is not None:
                 h = int(what.removeprefix("obstacle "))
                 kept = obstacles.centres[h] - obstacles.offset[h]
@@ -189,8 +189,6 @@ class LivePage:
         if length > 0.0:
             step = min(1.0, _HAND * seconds / length)
             self._do(_OFFSET, (here + step * way).tolist())
-            if (here == self._path_offset()).all():  # the change was rejected
-                self._path_wanted = here
 
     def _path_offset(self) -> Array:
         position = self.live.scenario.position
