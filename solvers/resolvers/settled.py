@@ -177,18 +177,20 @@ class _Above:
             return np.maximum(lower - A @ x, 0.0) - np.maximum(A @ x - upper, 0.0)
 
         missed = beyond(self.x)
-        broken = A[missed != 0.0]
+        broken, missed = A[missed != 0.0], missed[missed != 0.0]
         size, out = float(np.linalg.norm(broken)), float(np.linalg.norm(missed))
         alpha, least = half * max(size, bend), _LEAST * size * size
         if not least < alpha * out < np.inf:
             return lower, upper
         probe = self._damped(A, lower, upper, lambda x: float(np.linalg.norm(beyond(x))), 1.0)
-        found = _search(probe, probe(least), alpha, alpha * out)
+        free = broken - (broken @ self.held().T) @ self.held()
+        U, values, _ = np.linalg.svd(free, full_matrices=len(free) > len(self.x))
+        found = _settled(probe, self._unlimited(values, missed @ U), least, alpha, alpha * out)
         step, self.x = float(np.linalg.norm(found.x - self.x)), found.x
         if found.mu == least:
             return lower, upper
         self._calmed(found)
-        self._pace(broken, found.missed, step * max(out - found.missed, 0.0) + _PACE * found.missed)
+        self._pace(free, found.missed, step * max(out - found.missed, 0.0) + _PACE * found.missed)
         reached, missed = A @ found.x, beyond(found.x)
         if found.mu * step < _AT_REST * np.linalg.norm(missed @ A):
             return np.where(missed > 0.0, -np.inf, lower), np.where(missed < 0.0, np.inf, upper)
@@ -230,6 +232,8 @@ class _Above:
         missed = aim - own @ found.x
         self._pace(free, float(np.linalg.norm(missed)),
                    step * max(out - found.missed, 0.0) + _PACE * found.missed)
+        if isinstance(self.inner, OneLevel):  # its weights count the rows as they are
+            return A, A @ found.x, A @ found.x
         if found.mu * step < _AT_REST * found.missed * size:  # or it is not worth a closer look
             pull = missed @ free
             if found.mu * step < _AT_REST * np.linalg.norm(pull):
@@ -238,12 +242,16 @@ class _Above:
         rows, room = np.zeros_like(A), np.zeros(len(A))
         rows[:len(values)] = directions
         if self.inner.can_resolve("inequalities"):
-            weak = np.maximum(1.0 - (values / (_WEAK * whole)) ** 2, 0.0)
-            room[:len(values)] = weak * _PACE * _columns(free).max() / values
-            if weak.any():
-                self.loose = True
-                self._later.append(directions[weak == 0.0])
+            room[:len(values)] = self._room(whole, values, directions, free)
         return rows, rows @ found.x - room, rows @ found.x + room
+
+    def _room(self, whole: float, values: Array, directions: Array, free: Array) -> Array:
+        """Return how far levels below may change the speed in directions (k, n) of faint values."""
+        weak = np.maximum(1.0 - (values / (_WEAK * whole)) ** 2, 0.0)
+        if weak.any():
+            self.loose = True
+            self._later.append(directions[weak == 0.0])
+        return np.asarray(weak * _PACE * _columns(free).max() / values)
 
     def resolve(self, h: Hierarchy) -> Resolution:
         """Resolve `written`."""

@@ -19,6 +19,7 @@ from hierarchy.tasks import (
     FrameLog,
     JointCoupling,
     JointLimits,
+    Manipulability,
     Momentum,
     Orientation,
     Pose,
@@ -36,13 +37,13 @@ AT = State.at(ROBOT, Q)
 ELBOW = ROBOT.frame("joint_4")
 
 
-def follow(tasks, ticks, **settings):
+def follow(tasks, ticks, dt=0.01, **settings):
     """Return q and velocities (ticks, n) of a robot that obeys at once."""
     q, memory, v = Q, None, []
     for _ in range(ticks):
-        step = solve_ik(ROBOT, q, tasks, memory=memory, **settings)
+        step = solve_ik(ROBOT, q, tasks, dt=dt, memory=memory, **settings)
         assert step.status is Status.SOLVED
-        memory, q = step.memory, ROBOT.integrate(q, step.v * 0.01)
+        memory, q = step.memory, ROBOT.integrate(q, step.v * dt)
         v.append(step.v)
     return q, np.array(v)
 
@@ -147,6 +148,20 @@ def test_levels_out_of_reach_that_disturb_each_other_come_to_rest(tasks):
     the residual, and about the axis of an arm that is almost straight."""
     _, v = follow(tasks, 1000)
     assert np.abs(np.diff(v[-100:], axis=0)).max() < 1e-3
+
+
+@pytest.mark.parametrize("tasks", [
+    [Along(Position(FRAME, Still([0.3, 0.5, 2.0]), gain=2.0), [(0.0, 0.0, 1.0)])],
+    [Along(Position(ELBOW, Still([-0.3, 1.5, 2.0]), gain=2.0), [(0.6, 0.8, 0.0)])],
+    [Manipulability(FRAME, least=0.5)]],
+    ids=["height", "direction", "inequality"])
+def test_rows_that_vanish_where_they_reach_the_most_come_to_rest_there(tasks):
+    """All joints reversed their full speed in each tick, with status SOLVED."""
+    q, v = follow([*tasks, Posture((0.5,) * 7)], 600, dt=0.04)
+    assert np.abs(np.diff(v[-100:], axis=0)).max() < 0.05
+    missed = np.linalg.norm(tasks[0].error(State.at(ROBOT, q)))
+    for near in q + np.random.default_rng(0).normal(scale=0.03, size=(50, 7)):
+        assert np.linalg.norm(tasks[0].error(State.at(ROBOT, near))) > missed - 1e-4
 
 
 @pytest.mark.parametrize("goal", [[0.3, 0.5, 0.1], [0.5, 0.3, 0.3]])
