@@ -14,19 +14,20 @@ from solvers.kernels.linalg.rows import (
 from solvers.kernels.linalg.space import Rows, assign
 
 _PIVOT = 1e-6  # of the norm of a row: a smaller one depends on others
+ABOVE = 2.0    # times what a level bends: the most that curved levels above it add
 
 
 @compiled
 def plainly_met(A, lower, upper, offsets, half, bends):
     """Whether each curved level is met by the shortest step, with a multiplier |mu| <= 1 / alpha.
 
-    bends (L,) : alpha = half max(|A|, bends) of a curved level; -1 for any other. The step is
-    the shortest from the x of the levels above, all of them being equalities or inequalities that
-    hold there; so it is that of the problem with inequalities. In coordinates of Q the rows of a
-    level end in a triangle L: its step is L^-1 (b - A x), its multiplier L^-T of that. False where
-    this is not so.
+    bends (L,) : alpha = half max(|A|, bends) of a curved level, and `ABOVE` times that more below
+    another; -1 for any other level. The step is the shortest from the x of the levels above, all of
+    them being equalities or inequalities that hold there; so it is that of the problem with
+    inequalities. In coordinates of Q the rows of a level end in a triangle L: its step is
+    L^-1 (b - A x), its multiplier L^-T of that. False where this is not so.
     """
-    (m, n), last, rank = A.shape, 0, 0
+    (m, n), last, rank, most = A.shape, 0, 0, (1.0 + ABOVE) * half
     for k in range(len(bends)):
         if bends[k] >= 0.0:
             last = k + 1
@@ -46,8 +47,10 @@ def plainly_met(A, lower, upper, offsets, half, bends):
             for i in range(first, end):
                 t = above + i - first
                 y[t] = mu[i] = (rows.miss[i] - inner_product(y[:t], rows.W[i])) / rows.W[i, t]
-            if bends[k] >= 0.0 and not _is_short(rows, mu, first, end, above, half, bends[k]):
-                return False
+            if bends[k] >= 0.0:
+                if not _is_short(rows, mu, first, end, above, half, bends[k]):
+                    return False
+                half = most
             assign(x[0], y)
             reflect_back(basis, 0, rank, x, 0, 1)
         if not inequalities_hold(A[:end], lower[:end], upper[:end], x[0]):

@@ -4,10 +4,10 @@ A level A x = b of a task takes the x that, within the levels above, minimises
 
     |b - A x| + alpha |x - x0|^2 / 2,    alpha = softness T |A| / 2                         (a)
 
-x0 being the x of the levels above: the minimum of |b - A x|^2 + mu |x - x0|^2 with mu = alpha
-|b - A x|, or A x = b where mu would be smaller. See docs/theory/settled.md. What the level reaches
-is its new right-hand side. To second order the levels below disturb it although they keep A x:
-joint j may leave its speed by
+x0 being the x of the levels above, and |A| counting more where these bear the pull of the residual
+and turn too: the minimum of |b - A x|^2 + mu |x - x0|^2 with mu = alpha |b - A x|, or A x = b where
+mu would be smaller. See docs/theory/settled.md. What the level reaches is its new right-hand side.
+To second order the levels below disturb it although they keep A x: joint j may leave its speed by
 
     (|x - x0| (|r0| - |r|) + p |r|) / |r'| max_i |A_i| / |A_j|, r = b - A x, r0 = b - A x0    (b)
 
@@ -27,7 +27,7 @@ from typing import ClassVar, NamedTuple, final
 import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.met import plainly_met
+from solvers.kernels.met import ABOVE, plainly_met
 from solvers.resolver import Around, Handles, Resolution, Resolver, number
 from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.resolvers.merged import OneLevel
@@ -35,6 +35,7 @@ from solvers.status import Status
 
 _LEAST = 1e-10    # of |A|^2: the least mu
 _FAINT = 1e-10    # of |A|: singular values up to it are rounding
+_RANK = 1e-6      # of the largest singular value: a lower one bears no pull
 _CLOSE = 1e-8     # accuracy of alpha at which the search for mu ends
 _MOST = 20        # its steps; 4 in the mean, at most 8 seen
 _NONE = 1e-9      # of the largest column of A: a joint that a level does not use
@@ -94,7 +95,7 @@ class Settled(Around):
             return None
         above = _Above(self.inner, h)
         for (A, lower, upper), name, bend in zip(h.levels(), h.names, bends, strict=True):
-            equal = bool((lower == upper).all())
+            rows, equal = A, bool((lower == upper).all())
             if name in self.curved:
                 above.bending.append(A)
             elif self.geared and equal:
@@ -106,6 +107,8 @@ class Settled(Around):
             else:
                 above.behind |= bool(((A @ above.x < lower) | (A @ above.x > upper)).any())
             above.add(A, lower, upper)
+            if bend >= 0.0 and equal:
+                above.curved.append((rows, max(float(np.linalg.norm(rows)), bend)))
         return above if above.calmed else None
 
 
@@ -131,6 +134,7 @@ class _Above:
     def __init__(self, inner: Resolver, h: Hierarchy) -> None:
         n = h.n
         self.bending, self.turning = list[Array](), list[Array]()  # rows of curved levels, others
+        self.curved = list[tuple[Array, float]]()  # those of equalities, and how fast they turn
         self.strict = self.inner = inner
         if isinstance(inner, OneLevel):
             self.strict, self.inner = inner.strictly(), inner.below_one_more(h)
@@ -179,11 +183,12 @@ class _Above:
         missed = beyond(self.x)
         broken, missed = A[missed != 0.0], missed[missed != 0.0]
         size, out = float(np.linalg.norm(broken)), float(np.linalg.norm(missed))
-        alpha, least = half * max(size, bend), _LEAST * size * size
+        free = broken - (broken @ self.held().T) @ self.held()
+        alpha = half * self._bent(max(size, bend), missed, broken - free)
+        least = _LEAST * size * size
         if not least < alpha * out < np.inf:
             return lower, upper
         probe = self._damped(A, lower, upper, lambda x: float(np.linalg.norm(beyond(x))), 1.0)
-        free = broken - (broken @ self.held().T) @ self.held()
         U, values, _ = np.linalg.svd(free, full_matrices=len(free) > len(self.x))
         found = _settled(probe, self._unlimited(values, missed @ U), least, alpha, alpha * out)
         step, self.x = float(np.linalg.norm(found.x - self.x)), found.x
@@ -195,6 +200,21 @@ class _Above:
         if found.mu * step < _AT_REST * np.linalg.norm(missed @ A):
             return np.where(missed > 0.0, -np.inf, lower), np.where(missed < 0.0, np.inf, upper)
         return np.minimum(lower, reached), np.maximum(upper, reached)
+
+    def _bent(self, bend: float, missed: Array, taken: Array) -> float:
+        """Return `bend` of a level and, per residual, that of the levels above that bear its pull.
+
+        missed : b - A x0 (m,). taken : what the levels above take of its rows (m, n).
+        """
+        out = float(np.linalg.norm(missed))
+        if not self.curved or out == 0.0:
+            return bend
+        rows = np.vstack([rows for rows, _ in self.curved])
+        forces = np.linalg.lstsq(rows.T, missed @ taken, rcond=_RANK)[0]
+        starts = np.cumsum([0, *(len(rows) for rows, _ in self.curved)])
+        borne = sum(float(np.linalg.norm(forces[begin:begin + len(rows)])) * above
+                    for begin, (rows, above) in zip(starts[:-1], self.curved, strict=True))
+        return bend + min(borne / out, ABOVE * bend)
 
     def _calmed(self, found: _Reached) -> None:
         """Note that a level does not reach what it asks for."""
@@ -215,11 +235,12 @@ class _Above:
         U, values, directions = np.linalg.svd(free, full_matrices=len(A) > len(self.x))
         rank = np.count_nonzero(values > _FAINT * whole)
         values, directions = values[:rank], directions[:rank]
-        own, aim, missed = A, b, b - A @ self.x
+        own, aim, missed, taken = A, b, b - A @ self.x, A - free
         if rank < len(A):  # the rest of the residual counts, but nothing that is left changes it
             own, aim, free = (U[:, :rank].T @ part for part in (A, b, free))
         size, out = float(np.linalg.norm(own)), float(np.linalg.norm(missed))
-        alpha, least = half * max(whole, bend), _LEAST * size * size
+        alpha = half * self._bent(max(whole, bend), missed, taken)
+        least = _LEAST * size * size
         if not (_FAINT * whole < size and least < alpha * out < np.inf):
             return asked
         counted = self._counted(free)

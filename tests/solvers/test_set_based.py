@@ -116,8 +116,11 @@ def test_one_level_takes_the_minimum_that_scipy_finds(smallest, box):
 def test_a_level_is_damped_about_the_answer_of_the_levels_above():
     row = np.array([[1.0, 0.01]])
     h = Hierarchy.from_levels([(np.eye(2)[:1], [2.0]), (row, [0.0])], names=["joint", "hand"])
+    bend = np.linalg.norm(row)
     x = settled("hand").solve(h).x  # exactly, the second joint would go at -200 rad/s
-    np.testing.assert_allclose(x, [2.0, -0.01 / (PERIOD * np.linalg.norm(row) / 2)], rtol=1e-8)
+    np.testing.assert_allclose(x, [2.0, -0.01 / (PERIOD * bend / 2)], rtol=1e-8)
+    x = settled("joint", "hand").solve(h).x  # the joint bears the whole pull and bends by 1
+    np.testing.assert_allclose(x, [2.0, -0.01 / (PERIOD * (bend + 1.0) / 2)], rtol=1e-8)
 
 
 @pytest.mark.parametrize("inner", ["hcod", "tpm", "hqp"])
