@@ -25,6 +25,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.met import ABOVE, plainly_met
@@ -108,7 +109,7 @@ class Settled(Around):
                 above.behind |= bool(((A @ above.x < lower) | (A @ above.x > upper)).any())
             above.add(A, lower, upper)
             if bend >= 0.0 and equal:
-                above.curved.append((rows, max(float(np.linalg.norm(rows)), bend)))
+                above.curved.append((rows, max(_norm(rows), bend)))
         return above if above.calmed else None
 
 
@@ -182,22 +183,22 @@ class _Above:
 
         missed = beyond(self.x)
         broken, missed = A[missed != 0.0], missed[missed != 0.0]
-        size, out = float(np.linalg.norm(broken)), float(np.linalg.norm(missed))
+        size, out = _norm(broken), _norm(missed)
         free = broken - (broken @ self.held().T) @ self.held()
         alpha = half * self._bent(max(size, bend), missed, broken - free)
         least = _LEAST * size * size
         if not least < alpha * out < np.inf:
             return lower, upper
-        probe = self._damped(A, lower, upper, lambda x: float(np.linalg.norm(beyond(x))), 1.0)
+        probe = self._damped(A, lower, upper, lambda x: _norm(beyond(x)), 1.0)
         U, values, _ = np.linalg.svd(free, full_matrices=len(free) > len(self.x))
         found = _settled(probe, self._unlimited(values, missed @ U), least, alpha, alpha * out)
-        step, self.x = float(np.linalg.norm(found.x - self.x)), found.x
+        step, self.x = _norm(found.x - self.x), found.x
         if found.mu == least:
             return lower, upper
         self._calmed(found)
         self._pace(free, found.missed, step * max(out - found.missed, 0.0) + _PACE * found.missed)
         reached, missed = A @ found.x, beyond(found.x)
-        if found.mu * step < _AT_REST * np.linalg.norm(missed @ A):
+        if found.mu * step < _AT_REST * _norm(missed @ A):
             return np.where(missed > 0.0, -np.inf, lower), np.where(missed < 0.0, np.inf, upper)
         return np.minimum(lower, reached), np.maximum(upper, reached)
 
@@ -206,13 +207,13 @@ class _Above:
 
         missed : b - A x0 (m,). taken : what the levels above take of its rows (m, n).
         """
-        out = float(np.linalg.norm(missed))
+        out = _norm(missed)
         if not self.curved or out == 0.0:
             return bend
         rows = np.vstack([rows for rows, _ in self.curved])
         forces = np.linalg.lstsq(rows.T, missed @ taken, rcond=_RANK)[0]
         starts = np.cumsum([0, *(len(rows) for rows, _ in self.curved)])
-        borne = sum(float(np.linalg.norm(forces[begin:begin + len(rows)])) * above
+        borne = sum(_norm(forces[begin:begin + len(rows)]) * above
                     for begin, (rows, above) in zip(starts[:-1], self.curved, strict=True))
         return bend + min(borne / out, ABOVE * bend)
 
@@ -228,8 +229,8 @@ class _Above:
         half, bend : alpha = half max(|A|, bend).
         """
         self._catch_up()
-        asked, whole = (A, b, b), float(np.linalg.norm(A))
-        if not whole * np.linalg.norm(b) < np.inf:
+        asked, whole = (A, b, b), _norm(A)
+        if not whole * _norm(b) < np.inf:
             return asked
         free = A - (A @ self.held().T) @ self.held()
         U, values, directions = np.linalg.svd(free, full_matrices=len(A) > len(self.x))
@@ -238,26 +239,26 @@ class _Above:
         own, aim, missed, taken = A, b, b - A @ self.x, A - free
         if rank < len(A):  # the rest of the residual counts, but nothing that is left changes it
             own, aim, free = (U[:, :rank].T @ part for part in (A, b, free))
-        size, out = float(np.linalg.norm(own)), float(np.linalg.norm(missed))
+        size, out = _norm(own), _norm(missed)
         alpha = half * self._bent(max(whole, bend), missed, taken)
         least = _LEAST * size * size
         if not (_FAINT * whole < size and least < alpha * out < np.inf):
             return asked
         counted = self._counted(free)
-        probe = self._damped(own, aim, aim, lambda x: float(np.linalg.norm(b - A @ x)), counted)
+        probe = self._damped(own, aim, aim, lambda x: _norm(b - A @ x), counted)
         found = _settled(probe, self._unlimited(values, missed @ U), least, alpha, alpha * out)
-        step, self.x = float(np.linalg.norm(counted * (found.x - self.x))), found.x
+        step, self.x = _norm(counted * (found.x - self.x)), found.x
         if found.mu == least:
             return asked
         self._calmed(found)
         missed = aim - own @ found.x
-        self._pace(free, float(np.linalg.norm(missed)),
+        self._pace(free, _norm(missed),
                    step * max(out - found.missed, 0.0) + _PACE * found.missed)
         if isinstance(self.inner, OneLevel):  # its weights count the rows as they are
             return A, A @ found.x, A @ found.x
         if found.mu * step < _AT_REST * found.missed * size:  # or it is not worth a closer look
             pull = missed @ free
-            if found.mu * step < _AT_REST * np.linalg.norm(pull):
+            if found.mu * step < _AT_REST * _norm(pull):
                 self._later.append(directions)
                 values, directions = _parts(A, free - np.outer(missed, pull) / (missed @ missed))
         rows, room = np.zeros_like(A), np.zeros(len(A))
@@ -310,7 +311,7 @@ class _Above:
         missed : b - A x0 (m,) along the left singular vectors of what these leave of A.
         """
         squares, x0 = (values * values).tolist(), self.x
-        parts, rest = missed[:len(values)].tolist(), float(np.linalg.norm(missed[len(values):]))
+        parts, rest = missed[:len(values)].tolist(), _norm(missed[len(values):])
 
         def probe(mu: float) -> _Reached:
             left = [part * mu / (square + mu) for part, square in zip(parts, squares, strict=True)]
@@ -355,6 +356,11 @@ class _Above:
         return Hierarchy.trusted(A, lower, upper, sizes, reference, names)
 
 
+def _norm(x: ArrayLike) -> float:
+    """Return the root of the sum of squares, without the detours of np.linalg.norm."""
+    return math.sqrt(np.vdot(x, x))
+
+
 def _columns(A: Array) -> Array:
     """Return the norms of the columns (n,), 0 for a joint that A does not use."""
     columns = np.linalg.norm(A, axis=0)
@@ -364,7 +370,7 @@ def _columns(A: Array) -> Array:
 def _parts(A: Array, free: Array) -> tuple[Array, Array]:
     """Return the singular values (k,) and directions (k, n) of what levels above leave of A."""
     _, values, directions = np.linalg.svd(free, full_matrices=False)
-    clear = values > _FAINT * np.linalg.norm(A)
+    clear = values > _FAINT * _norm(A)
     return values[clear], directions[clear]
 
 
