@@ -25,7 +25,6 @@ from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple, final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.met import ABOVE, plainly_met
@@ -211,7 +210,7 @@ class _Above:
         if not self.curved or out == 0.0:
             return bend
         rows = np.vstack([rows for rows, _ in self.curved])
-        forces = np.linalg.lstsq(rows.T, missed @ taken, rcond=_RANK)[0]
+        forces = np.asarray(np.linalg.lstsq(rows.T, missed @ taken, rcond=_RANK)[0], dtype=float)
         starts = np.cumsum([0, *(len(rows) for rows, _ in self.curved)])
         borne = sum(_norm(forces[begin:begin + len(rows)]) * above
                     for begin, (rows, above) in zip(starts[:-1], self.curved, strict=True))
@@ -356,7 +355,7 @@ class _Above:
         return Hierarchy.trusted(A, lower, upper, sizes, reference, names)
 
 
-def _norm(x: ArrayLike) -> float:
+def _norm(x: Array) -> float:
     """Return the root of the sum of squares, without the detours of np.linalg.norm."""
     return math.sqrt(np.vdot(x, x))
 
