@@ -1,6 +1,7 @@
 """The configuration that serves tasks best, with restarts, and a verdict where none meets them."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import final
 
@@ -13,7 +14,7 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.robot import Robot
 from hierarchy.stack import Stack
 from hierarchy.state import State
-from hierarchy.task import Task, curved, parts
+from hierarchy.task import Rows, Task, curved, parts, writer_in_stack
 from hierarchy.tasks.joints.joint_limits import StepLimits
 from hierarchy.tasks.joints.mechanism import Mechanism, above, bends, model_rows
 from hierarchy.words import listed
@@ -124,20 +125,23 @@ def _bend(task: Task, robot: Robot) -> float:
     In units of the rows per rad or m, times `_MARGIN`.
     """
     rng, state, still = np.random.default_rng(0), State.at(robot, robot.rest), np.zeros(robot.n)
-    found = list[float]()
+    rows, found = Rows.empty(task.dimension, robot.n), [0.0]
 
-    def rows(q: Array) -> Array:
+    def turned(q: Array) -> Array:
         state.move(0.0, q, still)
-        return task.jacobian(state)
+        write()
+        return rows.A.copy()
 
     for _ in range(_DRAWN):
-        q = _drawn(robot, robot.rest, rng)
-        here, direction, turns = rows(q), rng.normal(size=robot.n), np.zeros(1)
-        for _ in range(_POWER):
-            turn = rows(robot.integrate(q, _TURN / np.linalg.norm(direction) * direction)) - here
-            if np.isfinite(turn).all():
-                _, turns, (direction, *_) = np.linalg.svd(turn, full_matrices=False)
-        found.append(float(turns[0]))
+        q, direction = _drawn(robot, robot.rest, rng), rng.normal(size=robot.n)
+        with suppress(Exception):  # a user's may have no rows there, and some need a measurement
+            write = writer_in_stack(task, state, "velocity", rows)
+            here = turned(q)
+            for _ in range(_POWER):
+                step = _TURN / np.linalg.norm(direction) * direction
+                turn = turned(robot.integrate(q, step)) - here
+                _, (most, *_), (direction, *_) = np.linalg.svd(turn, full_matrices=False)
+            found.append(float(most))
     return _MARGIN / _TURN * max(found)
 
 

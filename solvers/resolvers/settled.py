@@ -199,7 +199,9 @@ class _Above:
         reached, missed = A @ found.x, beyond(found.x)
         if found.mu * step < _AT_REST * _norm(missed @ A):
             return np.where(missed > 0.0, -np.inf, lower), np.where(missed < 0.0, np.inf, upper)
-        return np.minimum(lower, reached), np.maximum(upper, reached)
+        room = _PACE * np.linalg.norm(A, axis=1)  # else the pace may leave one point
+        return (np.where(missed > 0.0, reached - room, lower),
+                np.where(missed < 0.0, reached + room, upper))
 
     def _bent(self, bend: float, missed: Array, taken: Array) -> float:
         """Return `bend` of a level and, per residual, that of the levels above that bear its pull.

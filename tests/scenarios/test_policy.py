@@ -86,7 +86,7 @@ def controller(*changes, name="ellipse"):
 @pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity"])
 def test_without_a_measurement_the_last_state_is_carried_on_by_the_commands_sent(name):
     """Otherwise a robot that brakes blind would brake from a speed it has no more."""
-    c, _, _ = controller(name=name)
+    c, _, _ = controller("control.damping=1.0", name=name)
     plant, nothing, speed = c.cell.plant, np.full(7, np.nan), 0.0
     for k in range(400):
         known = plant.q.copy(), plant.v.copy()

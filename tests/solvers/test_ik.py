@@ -164,6 +164,21 @@ def test_rows_that_vanish_where_they_reach_the_most_come_to_rest_there(tasks):
         assert np.linalg.norm(tasks[0].error(State.at(ROBOT, near))) > missed - 1e-4
 
 
+class Near(Along):
+    """A height that a user's task knows about Q only."""
+
+    def jacobian(self, state):
+        if np.abs(state.q - Q).max() > 0.1:
+            raise ValueError("far away")
+        return super().jacobian(state).tolist()
+
+
+def test_a_row_that_is_known_at_q_only_is_resolved_there():
+    height = Position(FRAME, Still([0.3, 0.5, 0.7]), gain=2.0), [(0.0, 0.0, 1.0)]
+    np.testing.assert_allclose(solve_ik(ROBOT, Q, [Near(*height)]).v,
+                               solve_ik(ROBOT, Q, [Along(*height)]).v, atol=1e-9)
+
+
 @pytest.mark.parametrize("goal", [[0.3, 0.5, 0.1], [0.5, 0.3, 0.3]])
 def test_joints_that_are_held_below_the_hand_come_to_rest_where_they_must_move(goal):
     """What the hand leaves of their rows is singular where the arm beyond them is stretched: every
