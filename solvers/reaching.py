@@ -111,7 +111,8 @@ def settled(robot: Robot, tasks: Sequence[Task], period: float, resolver: Resolv
     names = curved(tasks, robot.n - robot.actuated)
     return Settled(inner=resolver, period=period, softness=damping, curved=names,
                    bends={task.name: _bend(task, robot) for task in tasks
-                          if damping and task.name in names and _may_vanish(task)}, geared=not bends(robot))
+                          if damping and task.name in names and _may_vanish(task)},
+                   geared=not bends(robot))
 
 
 def _may_vanish(task: Task) -> bool:
