@@ -87,6 +87,7 @@ class Settled(Around):
         above = self._calmed(h)
         return h if above is None else above.written(h)
 
+    @np.errstate(over="ignore", invalid="ignore")  # what is not finite is asked for as it is
     def _calmed(self, h: Hierarchy) -> _Above | None:
         """Return the levels of h with those out of reach calmed, or None if there are none."""
         half = 0.5 * self.softness * self.period
@@ -186,7 +187,7 @@ class _Above:
         free = broken - (broken @ self.held().T) @ self.held()
         alpha = half * self._bent(max(size, bend), missed, broken - free)
         least = _LEAST * size * size
-        if not least < alpha * out < np.inf:
+        if not 0.0 < least < alpha * out < np.inf:
             return lower, upper
         probe = self._damped(A, lower, upper, lambda x: _norm(beyond(x)), 1.0)
         U, values, _ = np.linalg.svd(free, full_matrices=len(free) > len(self.x))
@@ -243,7 +244,7 @@ class _Above:
         size, out = _norm(own), _norm(missed)
         alpha = half * self._bent(max(whole, bend), missed, taken)
         least = _LEAST * size * size
-        if not (_FAINT * whole < size and least < alpha * out < np.inf):
+        if not (_FAINT * whole < size and 0.0 < least < alpha * out < np.inf):
             return asked
         counted = self._counted(free)
         probe = self._damped(own, aim, aim, lambda x: _norm(b - A @ x), counted)
@@ -257,11 +258,13 @@ class _Above:
                    step * max(out - found.missed, 0.0) + _PACE * found.missed)
         if isinstance(self.inner, OneLevel):  # its weights count the rows as they are
             return A, A @ found.x, A @ found.x
-        if found.mu * step < _AT_REST * found.missed * size:  # or it is not worth a closer look
-            pull = missed @ free
-            if found.mu * step < _AT_REST * _norm(pull):
-                self._later.append(directions)
-                values, directions = _parts(A, free - np.outer(missed, pull) / (missed @ missed))
+        # The first: whether it is worth a closer look.
+        if (found.mu * step < _AT_REST * found.missed * size
+                and found.mu * step < _AT_REST * _norm(missed @ free)):
+            self._later.append(directions)
+            unit = missed / np.abs(missed).max()
+            unit /= _norm(unit)
+            values, directions = _parts(A, free - np.outer(unit, unit @ free))
         rows, room = np.zeros_like(A), np.zeros(len(A))
         rows[:len(values)] = directions
         if self.inner.can_resolve("inequalities"):

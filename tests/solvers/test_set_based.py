@@ -180,6 +180,20 @@ def test_joints_that_no_task_moves_do_not_hide_the_answer_behind_light_rows():
         assert replace(settled("hand", "elbow"), geared=True).solve(h).status is Status.SOLVED
 
 
+@pytest.mark.parametrize("inner", ["hcod", "hqp"])
+def test_rows_of_any_size_end_in_a_status(inner):
+    """Divisions of 0 by 0 and overflow in a direction of length 1 ended the loop."""
+    sizes = [1.0, 1e-12, 1e-160, 1e8, 1e150, 1e200]
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        levels = [(rng.normal(size=(2, 4)) * rng.choice(sizes, size=(2, 1)),
+                   rng.normal(size=2) * rng.choice([1.0, 1e-8, 1e150])) for _ in range(3)]
+        levels[1] = (*levels[1], np.full(2, INF))
+        h = Hierarchy.from_levels(levels, names=["a", "b", "c"])
+        resolver = replace(settled("a", "b", "c", inner=inner), bends={"b": 1.0, "c": 0.5})
+        assert np.isfinite(resolver.solve(h).x).all()
+
+
 def test_a_merged_level_out_of_reach_keeps_its_memory_and_strict_levels_stay_strict():
     rng = np.random.default_rng(6)
     A, b, E = nearly_singular(rng, 1e-4), 3.0 * rng.normal(size=3), np.eye(6)
