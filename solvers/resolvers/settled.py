@@ -160,8 +160,7 @@ class _Above:
         """Return the directions (k, n), orthonormal, that levels of equalities have taken."""
         while self._later:
             A = self._later.pop(0)
-            free = A - (A @ self._held.T) @ self._held
-            self._held = np.vstack([self._held, _parts(A, free)[1]])
+            self._held = np.vstack([self._held, _parts(A, _beside(A, self._held))[1]])
         return self._held
 
     def _catch_up(self) -> None:
@@ -184,7 +183,7 @@ class _Above:
         missed = beyond(self.x)
         broken, missed = A[missed != 0.0], missed[missed != 0.0]
         size, out = _norm(broken), _norm(missed)
-        free = broken - (broken @ self.held().T) @ self.held()
+        free = _beside(broken, self.held())
         alpha = half * self._bent(max(size, bend), missed, broken - free)
         least = _LEAST * size * size
         if not 0.0 < least < alpha * out < np.inf:
@@ -195,7 +194,7 @@ class _Above:
         step, self.x = _norm(found.x - self.x), found.x
         if found.mu == least:
             return lower, upper
-        self._calmed(found)
+        self._note(found)
         self._pace(free, found.missed, step * max(out - found.missed, 0.0) + _PACE * found.missed)
         reached, missed = A @ found.x, beyond(found.x)
         if found.mu * step < _AT_REST * _norm(missed @ A):
@@ -219,7 +218,7 @@ class _Above:
                     for begin, (rows, above) in zip(starts[:-1], self.curved, strict=True))
         return bend + min(borne / out, ABOVE * bend)
 
-    def _calmed(self, found: _Reached) -> None:
+    def _note(self, found: _Reached) -> None:
         """Note that a level does not reach what it asks for."""
         self.calmed = True
         if found.status is not Status.SOLVED:
@@ -234,7 +233,7 @@ class _Above:
         asked, whole = (A, b, b), _norm(A)
         if not whole * _norm(b) < np.inf:
             return asked
-        free = A - (A @ self.held().T) @ self.held()
+        free = _beside(A, self.held())
         U, values, directions = np.linalg.svd(free, full_matrices=len(A) > len(self.x))
         rank = np.count_nonzero(values > _FAINT * whole)
         values, directions = values[:rank], directions[:rank]
@@ -252,7 +251,7 @@ class _Above:
         step, self.x = _norm(counted * (found.x - self.x)), found.x
         if found.mu == least:
             return asked
-        self._calmed(found)
+        self._note(found)
         missed = aim - own @ found.x
         self._pace(free, _norm(missed),
                    step * max(out - found.missed, 0.0) + _PACE * found.missed)
@@ -363,6 +362,11 @@ class _Above:
 def _norm(x: Array) -> float:
     """Return the root of the sum of squares, without the detours of np.linalg.norm."""
     return math.sqrt(np.vdot(x, x))
+
+
+def _beside(A: Array, held: Array) -> Array:
+    """Return what directions (k, n), orthonormal, leave of the rows of A."""
+    return A - (A @ held.T) @ held
 
 
 def _columns(A: Array) -> Array:
