@@ -30,8 +30,10 @@ import sys
 import numpy as np
 from hierarchy import Hierarchy
 from solvers import make
-h = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])])
-sys.exit(not make(sys.argv[1]).solve(h).verified(h))"""
+name, *sides = sys.argv[1:]
+upper = [[3.0, 3.0]] * len(sides)
+h = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0], *upper)])
+sys.exit(not make(name).solve(h).verified(h))"""
 _PEERS = {  # first answers of other packages, for those that are installed
     "daqp": """\
 import daqp, numpy as np
@@ -154,12 +156,15 @@ def _cases(folder: Path) -> Iterator[Case]:
         yield Case("first answer of hcod, verified, from a wheel", 0.5,
                    ["-P", "-c", _SOLVE, "hcod"], packed)
         yield Case("run of ellipse, from a wheel", 1.5, ["-P", "-c", _COMMAND, *_SHORT], packed)
-    yield Case("first answer of hcod, another processor", 12.0, ["-c", _SOLVE, "hcod"],
-               {"TASK_HIERARCHY_NATIVE": "1", "NUMBA_CACHE_DIR": str(folder / "native")}, 0)
     for name in ("hierarchy", "solvers", "scenarios"):
         copytree(_ROOT / name, folder / "bare" / name, ignore=ignore_patterns("objects"))
-    for what, code in (("first answer of hcod", _SOLVE), ("ellipse", _COMPILE)):
-        yield Case(f"{what}, empty cache", None, ["-P", "-c", code, "hcod"],
+    first = (("first answer of hcod", 12.0, _SOLVE, "hcod"),
+             ("the same of inequalities", None, _SOLVE, "hcod", "upper"))
+    for what, ceiling, *arguments in first:
+        yield Case(f"{what}, another processor", ceiling, ["-c", *arguments],
+                   {"TASK_HIERARCHY_NATIVE": "1", "NUMBA_CACHE_DIR": str(folder / "to" / what)}, 0)
+    for what, ceiling, *arguments in (*first, ("ellipse", None, _COMPILE)):
+        yield Case(f"{what}, empty cache", ceiling, ["-P", "-c", *arguments],
                    {"PYTHONPATH": str(folder / "bare"), "NUMBA_CACHE_DIR": str(folder / what)}, 0)
     yield Case("the C library, empty cache", 10.0,
                ["-m", "scenarios.cli.start", "library", "--out", str(folder / "library")],

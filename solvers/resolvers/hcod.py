@@ -1,5 +1,6 @@
 """The exact resolver: lexicographic least squares with inequalities at every level."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isnan
 from typing import Any, ClassVar, final
@@ -8,10 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.active_set.exact import DAMPING, solve_damped, solve_hierarchy
+from solvers.kernels.active_set.exact import (
+    DAMPING,
+    solve_damped,
+    solve_equalities,
+    solve_hierarchy,
+)
 from solvers.kernels.give import solve_giving
 from solvers.resolver import Handles, Resolution, Resolver, number, register, whole_number
-from solvers.status import SOLVED, TOO_SMALL, Status
+from solvers.status import SOLVED, TOO_SMALL, UNPROVED, Status
 from solvers.workspace import WORKSPACE, entry, run
 
 
@@ -136,12 +142,16 @@ def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array) -> int
     x (n,) is the reference on entry and the answer on return.
     """
     A, lower, upper, sizes = h.rows  # `*h.rows` takes 60 ns more
-    solve = entry(solve_damped if settings[DAMPING] > 0.0 else solve_hierarchy)
-    code = solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)
-    while code == TOO_SMALL:
-        WORKSPACE.double()
-        code = solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)
+    damped = settings.item(DAMPING) > 0.0
+    solve = _kernels.get(damped) or _kernels.setdefault(damped, entry(solve_equalities))
+    while (code := solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)) in _AGAIN:
+        if code == TOO_SMALL:
+            WORKSPACE.double()
+        else:
+            solve = _kernels[damped] = entry(solve_damped if damped else solve_hierarchy)
     return code
 
 
+_AGAIN = TOO_SMALL, UNPROVED
+_kernels: dict[bool, Callable[..., int]] = {}  # by whether damped: of equalities, until more came
 _SOLVED = Status.SOLVED

@@ -10,9 +10,12 @@ from refusals import refused
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, explain, make
 from solvers.explain import holders, is_missed
+from solvers.kernels.active_set.exact import solve_damped, solve_equalities, solve_hierarchy
 from solvers.problems import generate, structured
 from solvers.proof import prove
+from solvers.resolvers import hcod
 from solvers.status import EQUAL
+from solvers.workspace import entry
 
 HCOD = make("hcod")
 
@@ -27,6 +30,22 @@ def test_an_answer_found_by_hand():
     assert res.multipliers[:2] == pytest.approx([1.5, 0.75])
     h = Hierarchy.from_levels([([[1.0, 0.5]], [3.0]), (np.eye(2), [-9.0, 2.0], [9.0, 9.0])])
     assert make("hcod", damping=0.1).solve(h).multipliers[1] == 0.0, "of a row that does not act"
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+def test_equalities_that_come_first_have_the_same_answer_from_a_smaller_kernel(monkeypatch,
+                                                                               damping):
+    one, other = make("hcod", damping=damping), Hierarchy.from_levels([(np.eye(2), [1, 0], [2, 3])])
+    problems, clear = [structured(seed, equalities_only=True) for seed in range(40)], 0
+    for h in problems:
+        monkeypatch.setattr(hcod, "_kernels", {})
+        first = one.solve(h)
+        clear += hcod._kernels == {damping > 0: entry(solve_equalities)}
+        np.testing.assert_array_equal(one.solve(other).x, [1, 0])
+        assert hcod._kernels == {damping > 0: entry(solve_damped if damping else solve_hierarchy)}
+        res = one.solve(h)
+        assert (res.status, *res.x, *res.record) == (first.status, *first.x, *first.record)
+    assert clear == 40 if damping else 0 < clear < 40
 
 
 @pytest.mark.parametrize("limit", [1, 3, 6, 11])

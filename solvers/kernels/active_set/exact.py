@@ -94,16 +94,34 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
     n = x.size
     if n + exact_size(n, lower.size, sizes.size) > work.size:
         return TOO_SMALL
-    reference, work = work[:n], work[n:]
-    if all_equal(lower, upper):
-        assign(reference, x)
-        code = solve_by_staircase(A, lower, upper, sizes, x, settings, work)
-        if code != INACCURATE:
-            keep_staircase(lower, upper, record)
-            return code
-        assign(x, reference)
+    code = _by_staircase(A, lower, upper, sizes, x, record, settings, work)
+    if code != UNPROVED:
+        return code
     s, code, at = open_working_set(A, lower, upper, sizes, x, record, settings, work)
     return answer(s, record, settings, work[at:]) if code == SOLVED else finish(x, code)
+
+
+@compiled
+def solve_equalities(A, lower, upper, sizes, x, record, settings, work):
+    """Solve what `solve_hierarchy` solves by the staircase, with little to compile, or UNPROVED."""
+    return _by_staircase(A, lower, upper, sizes, x, record, settings, work)
+
+
+@inlined
+def _by_staircase(A, lower, upper, sizes, x, record, settings, work):
+    """Solve equalities whose pivots are clear; UNPROVED, with x as it was, of anything else."""
+    n = x.size
+    if n > work.size:
+        return TOO_SMALL
+    if not all_equal(lower, upper):
+        return UNPROVED
+    assign(work[:n], x)
+    code = solve_by_staircase(A, lower, upper, sizes, x, settings, work[n:])
+    if code == INACCURATE:
+        assign(x, work[:n])
+        return UNPROVED
+    keep_staircase(lower, upper, record)
+    return code
 
 
 @compiled
