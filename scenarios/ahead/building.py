@@ -139,7 +139,7 @@ def _arrays(_: Path) -> None:
     r: Any = np.random.default_rng(0)
     A, b, sizes = r.normal(size=(3, 5, 7)), r.normal(size=(3, 5)), np.array([3, 1, 1])
     solve(Batch(A, b, b, sizes=sizes), make("hcod"))
-    h = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0])])
+    h = Hierarchy.from_levels([(np.eye(3)[:1], [1.0]), (np.eye(3)[1:], [1.0, 2.0], [3.0, 3.0])])
     make("hcod", damping=0.05).solve(h).verified(h)
     make("hqp").solve(h.changed(give=np.array([1.0, 1.0, 0.0])))
     Merged().below_one_more(h)  # as of robots in which joints follow others
