@@ -316,12 +316,18 @@ def _equal(one: Any, other: Any) -> bool:
     return not isinstance(one, Task) and bool(one == other)
 
 
-def seen_by(task: Task, state: State) -> Measurement:
-    """Return what a state has measured; raise a HierarchyError, naming the task, for nothing."""
-    if state.measurement is None:
+def seen_by(task: Task, state: State, points: Sequence[ControlPoint]) -> Measurement:
+    """Return what a state has measured of the points of a task; HierarchyError for anything else.
+
+    The end effector, which is measured last, need not be one of them.
+    """
+    if (seen := state.measurement) is None:
         raise HierarchyError(f"task {task.name!r}: the state carries no measurement; let a sensor "
                              "measure it first, see docs/loop.md")
-    return state.measurement
+    spare = len(seen.distance) - len(points)
+    task.refuse(spare not in (0, 1), f"{len(points)} control points, and distances of "
+                f"{len(seen.distance)}")
+    return seen
 
 
 def in_turn(*functions: Writer) -> Writer:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 import pytest
 from refusals import refused
-from scene import FRAME, ROBOT, SENSOR
+from scene import FRAME, ROBOT, SENSOR, state_at
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
@@ -224,6 +224,9 @@ def limits(**settings):
     (lambda: tasks.Pointing(FRAME, (0.0, 0.0, 0.0), 0.1), "axis"),
     (lambda: tasks.Avoidance(POINTS, 2), "rows = 2: expected one of 1, 3"),
     (lambda: tasks.Avoidance(POINTS, 1).jacobian(STATE), "no measurement"),
+    *((lambda task=task: task.jacobian(state_at(STATE.q, STATE.v)), f"{len(task.points)} control "
+       "points, and distances of 9")  # beyond the end of an array
+      for task in (tasks.Avoidance(POINTS[:2]), tasks.CumulatedRepulsion(7, POINTS * 2, 0.1))),
     (lambda: tasks.JointDamping(7, 1.0, "momentum"), "weight"),
     *((lambda asked=asked: asked(PANDA), "on joint 'joint_7', which is 'panda_joint7' of robot "
        "'panda': it is of another robot") for asked in (
