@@ -304,7 +304,7 @@ class Robot:
 
     def check_same(self, what: str, robot: Robot) -> None:
         """Raise a RobotError for another robot, which has other joints."""
-        if robot is not self and robot.joint_names != self.joint_names:
+        if (robot.joint_names, robot.nq) != (self.joint_names, self.nq):
             raise RobotError(f"{what} is of robot {robot.name!r}, not of {self.name!r}")
 
     def limit_base(self, linear: float, angular: float) -> None:

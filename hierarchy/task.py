@@ -135,9 +135,9 @@ class Task(ABC):
         return tuple(f"row {i}" for i in range(self.dimension))
 
     def on(self, robot: Robot) -> Task:
-        """Return the task for a robot, whose rows a stack asks for; by default the task itself.
+        """Return the task for a robot, of which all methods are asked; by default the task itself.
 
-        A task whose number of rows depends on the robot returns one that knows it.
+        A task whose number of rows depends on the robot returns one of its class that knows it.
         """
         return self
 
@@ -281,7 +281,7 @@ def check_parts(task: Task) -> None:
 
 
 def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:
-    """Return a method of a task that refuses anything but a State in place of one.
+    """Return a method of a task, for the robot of a state, that refuses anything but a State.
 
     One that binds a kernel, which looks at no index, refuses the state of another robot.
     """
@@ -289,9 +289,10 @@ def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:
     def checked(self: Task, state: State, *rest: Any, **named: Any) -> Any:
         if not isinstance(state, State):
             expect(f"task {self.name!r}: state", state, State, "make one with State.at(robot, q)")
+        known = self.on(state.robot)
         if binds:
-            _check_robot(self, state.robot)
-        return method(self, state, *rest, **named)
+            _check_robot(known, state.robot)
+        return method(known, state, *rest, **named)
 
     return checked
 
@@ -313,6 +314,8 @@ def _equal(one: Any, other: Any) -> bool:
     if is_dataclass(one) and type(one) is type(other):
         return all(_equal(getattr(one, field.name), getattr(other, field.name))
                    for field in fields(one) if field.compare)
+    if isinstance(one, list | tuple) and type(one) is type(other):
+        return len(one) == len(other) and all(map(_equal, one, other))
     return not isinstance(one, Task) and bool(one == other)
 
 
@@ -343,6 +346,8 @@ def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Write
     """Return the writer of a task; at level "torque" one of the joints writes their columns."""
     check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
     check_gains(task, rows.lower.size)
+    task.refuse(task.dimension != rows.lower.size, f"{task.dimension} rows, and there were "
+                f"{rows.lower.size} when the stack first asked; make another stack")
     if level == "torque" and not task.of_forces:
         level, rows = "acceleration", rows._replace(A=rows.A[:, :state.n])
     try:
@@ -379,12 +384,12 @@ class Written(Task):
 
     def rows(self, state: State, level: Level = "velocity") -> Rows:
         """The rows at a state; of forces, see `ForceTask`."""
-        columns = state.n
+        columns, known = state.n, self.on(state.robot)
         if self.of_forces:
             level = "acceleration" if self.contacts is None else "torque"
             columns = columns if self.contacts is None else self.contacts.unknowns
-        rows = Rows.empty(self.dimension, columns)
-        self.writer(state, level, rows)()
+        rows = Rows.empty(known.dimension, columns)
+        known.writer(state, level, rows)()
         return rows
 
     def jacobian(self, state: State) -> Array:

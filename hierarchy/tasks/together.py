@@ -77,6 +77,10 @@ class Together(NamedRows, Written):
         readers = [task.error_reader(state) for task in self.tasks]
         return lambda: np.concatenate([read() for read in readers])
 
+    def desired_velocity(self, state: State) -> Array:
+        """Those of the tasks (m,), which `solve_ik` with `until` leaves out of the rows."""
+        return np.concatenate([task.desired_velocity(state) for task in self.tasks])
+
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         parts = rows.split([task.dimension for task in self.tasks])

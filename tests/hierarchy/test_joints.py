@@ -12,7 +12,7 @@ from hierarchy import Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import TABLES
 from hierarchy.robots.found import Loop
-from hierarchy.tasks import JointCoupling, JointLimits, Mechanism, Posture, model_rows
+from hierarchy.tasks import JointCoupling, JointLimits, Mechanism, Posture, Together, model_rows
 from solvers import make, solve_ik
 
 T = 0.01  # [s]
@@ -112,7 +112,7 @@ def test_compiled_rows_of_a_posture_are_those_of_its_methods(level, floating):
     robot = mobile(floating)
     v = np.random.default_rng(1).normal(size=robot.n)
     state, task = State(robot), Posture(THERE, 3.0, 2.0, 4.0)
-    stack = Stack([task], level)
+    stack, same = Stack([task], level), Posture(robot.configuration(THERE), 3.0, 2.0, 4.0)
     for values in (ANYWHERE, THERE, {}):
         state.move(0.0, robot.configuration(values), v)
         h = stack.hierarchy(state)
@@ -121,6 +121,8 @@ def test_compiled_rows_of_a_posture_are_those_of_its_methods(level, floating):
             3.0 * task.error(state) - 2.0 * v[robot.actuated:])
         np.testing.assert_allclose(h.lower, asked, atol=1e-12)
         np.testing.assert_array_equal(h.lower, h.upper)
+        np.testing.assert_array_equal(Together([same]).rows(state, level).lower, h.lower)
+        np.testing.assert_allclose(getattr(same, f"reference_{level}")(state), h.lower, atol=1e-12)
 
 
 @pytest.mark.parametrize(("turn", "values"), [
@@ -155,6 +157,24 @@ def test_a_mimic_joint_of_pinocchio_is_refused_by_its_kind():
     except TypeError:
         pytest.skip("older pinocchio has no such joint")
     refused("0 velocities of the kind Mimic is not known", Robot, model, "it", error=RobotError)
+
+
+def test_a_joint_within_which_axes_turn_is_refused():
+    """Its accelerations were wrong: pinocchio differentiates axes as if the body carried them."""
+    composite, model = pin.JointModelComposite(), pin.Model()
+    composite.addJoint(pin.JointModelRX())
+    composite.addJoint(pin.JointModelRY())
+    model.addJoint(0, composite, pin.SE3.Identity(), "both")
+    refused("kind Composite axes turn each other", Robot, model, "it", error=RobotError)
+
+
+def test_a_robot_of_the_same_names_and_other_coordinates_is_another():
+    plain, around = pin.Model(), pin.Model()
+    plain.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "a")
+    around.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "a")
+    task = JointCoupling(Robot(around, "around"), {"a": 1.0})  # it would read q[1] of one number
+    refused("of robot 'around', not of 'plain'", task.error, State(Robot(plain, "plain")),
+            error=RobotError)
 
 
 def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_path):
