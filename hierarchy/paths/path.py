@@ -302,7 +302,7 @@ class Recorded(Path):
         i, h, s = _interval(self.times, self.points, t, out)
         if i == 0:
             return
-        p0, p1 = np.asarray(self.points[i - 1]), np.asarray(self.points[i])
+        p0, p1 = np.asarray(self.points[i - 1:i + 1], dtype=float)
         m0, m1 = h * self._slopes[i - 1], h * self._slopes[i]
         c2, c3 = 3 * (p1 - p0) - 2 * m0 - m1, 2 * (p0 - p1) + m0 + m1
         out[0] = p0 + s * (m0 + s * (c2 + s * c3))

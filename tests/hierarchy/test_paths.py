@@ -55,6 +55,9 @@ def test_a_path_of_a_csv_file_passes_its_points_with_continuous_acceleration(nam
     rows = "\n".join(",".join(map(str, (t, *p))) for t, p in zip(TIMES, POINTS, strict=True))
     (tmp_path / "a.csv").write_text(f"{names}{rows}\n\n", encoding="utf-8")
     path = paths.Recorded.from_csv(tmp_path / "a.csv")
+    whole = [paths.Recorded(TIMES, np.round(9 * np.abs(POINTS)).astype(kind))
+             for kind in (np.uint8, float)]  # unsigned numbers wrap where they are subtracted
+    np.testing.assert_array_equal(*(one((TIMES[0] + TIMES[1]) / 2) for one in whole))
     for t, point in zip(TIMES, POINTS, strict=True):
         np.testing.assert_allclose(path(t)[0], point, atol=1e-12)
     for t in TIMES[1:-1]:

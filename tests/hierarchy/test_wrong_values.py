@@ -15,7 +15,14 @@ from standing import ROBOT as HUMANOID
 
 from hierarchy import Hierarchy, Robot, Stack, State, Task, tasks
 from hierarchy.activation import Activation
-from hierarchy.avoidance import Barrier, Capsule, Obstacle, Repulsion, SurveillanceAreas
+from hierarchy.avoidance import (
+    Barrier,
+    Capsule,
+    Obstacle,
+    Obstacles,
+    Repulsion,
+    SurveillanceAreas,
+)
 from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.gate import check_rotation
 from hierarchy.limits import Limits
@@ -95,6 +102,15 @@ def ramping(carried):
     state = State.at(HUMANOID, HUMANOID.rest, t=0.9)
     state.carried = carried
     return tasks.Friction(opening()).rows(state)
+
+
+def grown():
+    """A task of more rows than the arrays of its stack, past whose end kernels would write."""
+    directions = [(1, 0, 0)]
+    stack = Stack([tasks.Along(HAND, directions)], "velocity")
+    stack.hierarchy(STATE)
+    directions.append((0, 1, 0))
+    stack.hierarchy(State.at(ROBOT, STATE.q))
 
 
 def slow(speed):
@@ -263,11 +279,13 @@ def limits(**settings):
     (lambda: circle((0, 0, 0), 0.1, (0, 0, 0)), "normal: tuple (0, 0, 0) is no direction"),
     (lambda: corners((0, 1), (0, 1), (0, 0, 0)), "sole: up: tuple (0, 0, 0) is no direction"),
     (lambda: Loop(0.0), "loop: period [s] = 0: expected"), (lambda: Loop(0.1, behind=0), "behind"),
+    (lambda: Loop(0.1, behind=2.5), "behind = 2.5: expected a whole number from 1 on"),
     (lambda: Loop(0.1, overrun="skipp"), "did you mean 'skip'"),
     (lambda: Loop(0.25, watchdog=0.1), "watchdog 0.1 s must be longer than the period 0.25 s"),
     (lambda: Loop(0.1).run(print, None, 1.0), "safe_stop: expected a function, got NoneType None"),
     (lambda: Loop(1e-3).run(lambda t: A[0], Event, 1.0, record=3),
      "loop: record = 3, and the command is ndarray array([1., 0.])"),
+    (lambda: Loop(1e-3).run(lambda t: {}, Event, 1.0, record=3), "and the command is dict {}"),
     (lambda: Loop(1e-3).run(print, Event, 1e15), "loop: a log of 1e+18 ticks: "),
     (lambda: Loop(0.1).run(print, print, 1.0, record=-1), "loop: record = -1: expected a whole"),
     (lambda: Stack(metric="inertia"), "'mass' or None, got 'inertia'"),
@@ -325,6 +343,9 @@ def limits(**settings):
      "gain = [[1.0], [1.0, 2.0]], expected a number >= 0"),
     *((lambda wrong=wrong: StepLimits(slow(wrong), 0.01), f"velocity_limit[0] is {wrong:g}")
       for wrong in (-1.0, NAN)),
+    (grown, "task 'along': 2 rows, and there were 1 when the stack first asked"),
+    (lambda: StepLimits(ROBOT, 0.01, 0.0), "gain [1/s] = 0: expected a number > 0"),
+    (lambda: Obstacles([Obstacle("point", (0, 0, 0))]).shift(0, (NAN, 0, 0)), "shift: offset [m]"),
     (lambda: Robot.load("nowhere.SDF"), "does not exist"),
     (lambda: Robot.load("/"), "is a folder")])
 def test_a_wrong_value_is_refused_and_named(make, said):
