@@ -149,7 +149,9 @@ WRONG = [
     ({"more": '<link name="alone"/>'}, "links 'base', 'alone' have no parent"),
     ({"more": '<link name="upper"/>'}, "link 'upper' occurs 2 times"),
     ({"more": "<xacro:include>"}, "not valid XML"),
-    ({"mimic": '<mimic joint="elbow"/>'}, "joint 'elbow': it is to follow itself")]
+    ({"mimic": '<mimic joint="elbow"/>'}, "joint 'elbow': it is to follow itself"),
+    ({"mimic": '<mimic joint="shoulder"/>', "kind": "planar"},
+     "joint 'elbow': it is to follow joint 'shoulder', and a planar joint has several positions")]
 ONE_BODY = """<body name="{0}"><joint name="{0}" axis="0 0 1" range="-90 90"/><geom size="0.03"/>
 {1}</body>"""
 
