@@ -23,7 +23,10 @@ class ControlPoint:
 
     name: str
     joint: int
-    offset: Array
+    offset: Annotated[Array, partial(finite_numbers, size=3), "m"]
+
+    def __post_init__(self) -> None:
+        check_fields(self, f"control point {self.name!r}")
 
 
 class Points(NamedTuple):

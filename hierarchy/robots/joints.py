@@ -52,7 +52,6 @@ def parts_of(model: Any) -> tuple[Part, ...]:
     return tuple(parts)
 
 
-_TURNED = ("Composite", "SphericalZYX", "Universal")  # axes that others of the joint turn
 _SEVERAL = {"Spherical": [(4, "rad")], "Planar": [(1, "m"), (1, "m"), (2, "rad")],
             "FreeFlyer": [(1, "m"), (1, "m"), (1, "m"), (4, "rad")]}
 
@@ -60,7 +59,7 @@ _SEVERAL = {"Spherical": [(4, "rad")], "Planar": [(1, "m"), (1, "m"), (2, "rad")
 def _pieces(joint: Any) -> Sequence[tuple[int, str]]:
     """Return the number of coordinates and the unit of each part of a joint."""
     kind = joint.shortname().removeprefix("JointModel")
-    if kind in _TURNED:
+    if kind in ("Composite", "SphericalZYX", "Universal"):
         raise RobotError(f"joint {joint.id}: in a joint of the kind {kind} axes turn each other, "
                          "which pinocchio does not differentiate; give each a joint of its own")
     if joint.nq == joint.nv > 0:

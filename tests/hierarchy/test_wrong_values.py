@@ -18,6 +18,7 @@ from hierarchy.activation import Activation
 from hierarchy.avoidance import (
     Barrier,
     Capsule,
+    ControlPoint,
     Obstacle,
     Obstacles,
     Repulsion,
@@ -229,6 +230,10 @@ def limits(**settings):
     (lambda: SurveillanceAreas(0.2, 0.1, 0.1), "near"),
     (lambda: Barrier(0.1, recovery=NAN), "recovery = nan"),
     (lambda: Barrier(0.1, influence=0.1), "influence = 0.1 m must be more"),
+    *((lambda given=given: ControlPoint("x", *given), f"control point 'x': {said}")
+      for given, said in ((("hand", (0, 0, 0)), "joint = 'hand'"), ((1, (0, 0)), "offset [m]"))),
+    (lambda: tasks.Separation([ControlPoint("x", np.int64(99), (0, 0, 0))], KEPT).rows(STATE),
+     "points is on joint 99"),  # of another robot, past the end of its arrays
     (lambda: Capsule("x", 1, (0, 0, 0), (0, 0, 1), -1.0), "capsule 'x': radius [m] = -1"),
     (lambda: tasks.SelfSeparation(ARM[:2], KEPT), "'self-separation': no pair among 2"),
     (lambda: tasks.Separation((), KEPT), "'separation': points: expected at least one control"),

@@ -17,7 +17,6 @@ from hierarchy.tasks.contacts.forces import FixedRows, required
 
 _SLOW = 0.01      # [m/s] below which the friction of a sliding point falls to zero
 _NOTHING = 1e-6   # [N] of normal force that counts as none
-_SAME = 6         # decimals [m] at which corners of a sole are the same
 
 
 @dataclass(frozen=True)
@@ -193,7 +192,7 @@ class CentreOfPressure(FixedRows):
 def _distances(contact: Contact) -> Array:
     """Distance (edges, k) [m] of each point from each edge of the hull, inward positive."""
     points = np.array(contact.points, dtype=float) @ contact.sole[:2].T
-    different = np.unique(points.round(_SAME), axis=0, return_index=True)[1]
+    different = np.unique(points.round(6), axis=0, return_index=True)[1]  # to 1 um
     return np.array([(points - start) @ inward for start, inward in _edges(points[different])])
 
 
