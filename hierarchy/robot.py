@@ -27,7 +27,7 @@ from hierarchy.errors import (
 )
 from hierarchy.gate import array_of, check_rotation
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
+from hierarchy.records import equal, set_frozen
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
 from hierarchy.robots.found import (
@@ -70,6 +70,7 @@ class Frame:
     offset: Array
     rotation: Array
     of: str = field(default="", repr=False, compare=False)
+    __eq__ = equal
 
     def __post_init__(self) -> None:
         what = f"frame {self.name!r}"

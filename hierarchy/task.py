@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from functools import wraps
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
@@ -19,7 +19,7 @@ from hierarchy.errors import HierarchyError, brief, check_choice, expect, refuse
 from hierarchy.gate import check_rows, shaped
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.records import NUMBERS, Check, check_fields
+from hierarchy.records import NUMBERS, Check, check_fields, equal
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 
@@ -30,9 +30,10 @@ Kind = Literal["equality", "inequality"]
 _ROUNDING = 1e-9  # of a period, relative
 _STEP = 2.0**-10  # [s] of the differences that give the derivative of a Jacobian
 _GAINS = ("stiffness", "damping", "gain")
+_BINDS = ("measure", "writer", "distances", "follow_cone_error")  # a kernel
 _OF_STATE = ("error", "jacobian", "jacobian_derivative", "desired_velocity",
-             "desired_acceleration", "reference_velocity", "reference_acceleration", "measure",
-             "error_reader", "writer")
+             "desired_acceleration", "reference_velocity", "reference_acceleration",
+             "error_reader", *_BINDS)
 
 
 def _made(kind: type, remedy: str) -> Check:
@@ -107,10 +108,10 @@ class Task(ABC):
         """Let the methods that take a state refuse anything else, and `==` compare arrays."""
         super().__init_subclass__()
         if "__eq__" not in vars(cls):  # a dataclass writes one that raises on arrays
-            cls.__eq__ = _equal  # type: ignore[method-assign]
+            cls.__eq__ = equal  # type: ignore[method-assign]
         for name in _OF_STATE:
             if name in vars(cls):
-                setattr(cls, name, _of_state(vars(cls)[name], name in ("measure", "writer")))
+                setattr(cls, name, _of_state(vars(cls)[name], name in _BINDS))
 
     def __post_init__(self) -> None:
         """Check what the task was made with; raises HierarchyError.
@@ -305,18 +306,6 @@ def _check_robot(task: Task, robot: Robot) -> None:
         for part in value if isinstance(value, list | tuple) else (value,):
             if isinstance(joint := getattr(part, "joint", None), int):
                 robot.check_joint(what, joint, getattr(part, "of", ""))
-
-
-def _equal(one: Any, other: Any) -> bool:
-    """Whether two values are the same; of a dataclass, its fields, and of an array, its numbers."""
-    if one is other or isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        return one is other or np.array_equal(one, other)
-    if is_dataclass(one) and type(one) is type(other):
-        return all(_equal(getattr(one, field.name), getattr(other, field.name))
-                   for field in fields(one) if field.compare)
-    if isinstance(one, list | tuple) and type(one) is type(other):
-        return len(one) == len(other) and all(map(_equal, one, other))
-    return not isinstance(one, Task) and bool(one == other)
 
 
 def seen_by(task: Task, state: State, points: Sequence[ControlPoint]) -> Measurement:

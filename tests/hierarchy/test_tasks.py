@@ -180,6 +180,13 @@ def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(tas
         assert (f" {field.name}=" in f" {repr(task).partition('(')[2]}") == field.init
 
 
+def test_frames_and_points_are_compared_by_their_numbers():
+    points = [replace(point, offset=point.offset.copy()) for point in ROBOT.control_points]
+    assert tasks.Avoidance(points) == tasks.Avoidance(list(ROBOT.control_points))
+    assert tasks.Avoidance(points) != tasks.Avoidance(points[::-1])
+    assert ROBOT.frame("end_effector") == FRAME != ROBOT.frame("joint_3")
+
+
 def test_manipulability_is_yoshikawas_and_has_no_row_at_a_singular_posture():
     task, state = TASKS["manipulability"], state_at(*STATES[4])
     J = np.array(tasks.Position(task.frame, PATH).jacobian(state))

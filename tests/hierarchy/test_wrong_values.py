@@ -19,10 +19,13 @@ from hierarchy.avoidance import (
     Barrier,
     Capsule,
     ControlPoint,
+    Measurement,
     Obstacle,
     Obstacles,
+    Pairs,
     Repulsion,
     SurveillanceAreas,
+    measure_pairs,
 )
 from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.gate import check_rotation
@@ -235,6 +238,13 @@ def limits(**settings):
     (lambda: tasks.Separation([ControlPoint("x", np.int64(99), (0, 0, 0))], KEPT).rows(STATE),
      "points is on joint 99"),  # of another robot, past the end of its arrays
     (lambda: Capsule("x", 1, (0, 0, 0), (0, 0, 1), -1.0), "capsule 'x': radius [m] = -1"),
+    *((lambda ask=ask: ask(STATE), "on joint")  # of a larger robot, past the end of arrays
+      for ask in (tasks.SelfSeparation.of(HUMANOID, KEPT).error,
+                  tasks.Pointing(PALM, (0, 0, 1), 0.1).follow_cone_error)),
+    (lambda: setattr(Measurement(8), "active", 8), "active = 8: expected a whole number from -1"),
+    *((lambda size=size: measure_pairs(Pairs(*size), np.zeros((1, 3)), Obstacles()), said)
+      for size, said in (((2, 0), "points has shape (1, 3), expected (2, 3)"),
+                         ((1, 3), "0 obstacles, and pairs of 3"))),
     (lambda: tasks.SelfSeparation(ARM[:2], KEPT), "'self-separation': no pair among 2"),
     (lambda: tasks.Separation((), KEPT), "'separation': points: expected at least one control"),
     (lambda: tasks.CumulatedRepulsion(7, (), 0.1), "at least one control point"),
