@@ -241,6 +241,7 @@ def limits(**settings):
     *((lambda ask=ask: ask(STATE), "on joint")  # of a larger robot, past the end of arrays
       for ask in (tasks.SelfSeparation.of(HUMANOID, KEPT).error,
                   tasks.Pointing(PALM, (0, 0, 1), 0.1).follow_cone_error)),
+    (lambda: SENSOR.measure(PANDA), "ExactDistances: state is of robot 'panda', not of 'kuka_lwr'"),
     (lambda: setattr(Measurement(8), "active", 8), "active = 8: expected a whole number from -1"),
     *((lambda size=size: measure_pairs(Pairs(*size), np.zeros((1, 3)), Obstacles()), said)
       for size, said in (((2, 0), "points has shape (1, 3), expected (2, 3)"),
