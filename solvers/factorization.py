@@ -136,7 +136,8 @@ class Factorization:
             left = level.A.copy()
             for _ in range(2):
                 left -= (left @ basis.T) @ basis
-            while len(left) and (size := norm(left, axis=1) * (norm(left, axis=1) > zero)).any():
+            while len(basis) < min(above + len(left), self._n) and (
+                    size := norm(left, axis=1) * (norm(left, axis=1) > zero)).any():
                 q = left[size.argmax()] / size.max()
                 left -= np.outer(left @ q, q)
                 basis = np.vstack([basis, q])

@@ -80,6 +80,15 @@ def test_directions_of_deleted_levels_are_dropped_once_they_are_most():
     assert (sizes[0], max(sizes), sizes.count(3)) == (3, 13, 4)
 
 
+@pytest.mark.parametrize(("tolerance", "ranks"), [(1e-8, (3, 1)), (0.0, (3, 2))])
+def test_no_rank_is_more_than_the_rows(tolerance, ranks):
+    """With a tolerance of zero rounding counts, and counted on and on."""
+    A = np.random.default_rng(0).normal(size=(5, 7))
+    A[3] = A[0] + A[1]
+    levels = [A[:3], A[3:]]
+    assert Factorization(levels, settings=make("tpm", rank_tolerance=tolerance)).ranks == ranks
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_f_and_g_are_those_of_the_matrix_made_from_the_rows(case):
     factored = Factorization.of(build(case, True))
