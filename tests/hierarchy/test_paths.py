@@ -1,5 +1,6 @@
 """Paths: position, velocity and acceleration agree, and pass where they should."""
 
+from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -48,6 +49,14 @@ def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
             5 / 64 * 0.3 * np.linalg.norm(after - before))
     np.testing.assert_allclose(path(0.5)[0], POINTS[0])
     np.testing.assert_allclose(path(3.8), [POINTS[3], [0] * 3, [0] * 3], atol=1e-12)
+
+
+@pytest.mark.parametrize("make", [paths.Waypoints, paths.Recorded,
+                                  partial(paths.Blended, blend=0.5)])
+def test_times_of_few_digits_take_none_of_those_of_the_present(make):
+    times, points = np.array([1000, 1001, 1002], dtype=np.float32), np.array(POINTS[:3])
+    for t in (1000.2503, 1001.7501):
+        np.testing.assert_array_equal(make(times, points)(t), make(times.astype(float), points)(t))
 
 
 @pytest.mark.parametrize("names", ["", "t, x, y, z\n", "\ufeff"])
