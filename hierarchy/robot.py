@@ -164,13 +164,14 @@ class Robot:
         self.capsules, self.missing, self.coupled = found.capsules, found.missing, found.coupled
         self.rest = np.array(pin.neutral(model)) if found.rest is None else found.rest
         leaders = {one.other for one in self.coupled} - {"", *(one.joint for one in self.coupled)}
-        if leaders:
+        held = {one.joint: one.at(0.0) for one in self.coupled if not one.other}
+        if leaders or held:
             values = self.values(self.rest)
             ends = {self.joint_names[part.joint - 1]: (self.lower[part.q], self.upper[part.q])
                     for part in self.parts if part.size == 1}
-            self.rest = self.configuration(
-                {name: inside(float(values[name]), *room(name, ends, self.coupled))
-                 for name in leaders}, self.rest)
+            self.rest = self.configuration(held | {
+                name: inside(float(values[name]), *room(name, ends, self.coupled))
+                for name in leaders}, self.rest)
         self.loops, self.starts, self.apart = found.loops, found.starts, found.apart
         self.table = found.table
 

@@ -192,6 +192,7 @@ def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_
                                State.at(free, there).position("l2"), atol=1e-12)
     (held,) = locked.coupled
     assert (held.joint, held.other, held.coefficients) == ("c", "", (0.5 - 2.4,))
+    assert locked.vector(locked.rest)[1] == pytest.approx(0.5 - 2.4), "it is held at rest"
     assert Robot.load(path, locked={"c": 0.1}).coupled == ()
     assert free.values(free.configuration({"a": 0.2}))["c"] == pytest.approx(0.1)
     assert free.values(free.configuration({"a": 0.2, "c": 0.3}))["c"] == pytest.approx(0.3)
