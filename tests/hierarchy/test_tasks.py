@@ -13,6 +13,7 @@ from scipy.linalg import expm
 from urdf_text import LIMIT, joint, link, placed, urdf
 
 from hierarchy import Robot, Stack, State, Task, tasks
+from hierarchy.activation import Activation
 from hierarchy.avoidance import Barrier, Measurement, Pairs
 from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
@@ -201,6 +202,7 @@ def test_a_number_for_the_only_row_serves_together_with_others():
     state, whole = State.at(ROBOT, ROBOT.rest), tasks.Together([First(), tasks.Posture([0.5] * 7)])
     np.testing.assert_array_equal(whole.error(state), [0.3, *[0.5] * 7])
     np.testing.assert_array_equal(whole.desired_velocity(state), [0.1, *[0.0] * 7])
+    np.testing.assert_allclose(Activation(state, [First()], {"first": 0.6})(), [0.5])
 
 
 def test_frames_and_points_are_compared_by_their_numbers():
