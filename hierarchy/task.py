@@ -335,8 +335,8 @@ def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Write
     """Return the writer of a task; at level "torque" one of the joints writes their columns."""
     check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
     check_gains(task, rows.lower.size)
-    task.refuse(task.dimension != rows.lower.size, f"{task.dimension} rows, and there were "
-                f"{rows.lower.size} when the stack first asked; make another stack")
+    task.refuse(task.dimension != rows.lower.size, f"it has {task.dimension} rows, and arrays of "
+                f"{rows.lower.size} were made; make another stack")
     if level == "torque" and not task.of_forces:
         level, rows = "acceleration", rows._replace(A=rows.A[:, :state.n])
     try:

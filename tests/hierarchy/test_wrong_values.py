@@ -359,7 +359,7 @@ def limits(**settings):
      "gain = [[1.0], [1.0, 2.0]], expected a number >= 0"),
     *((lambda wrong=wrong: StepLimits(slow(wrong), 0.01), f"velocity_limit[0] is {wrong:g}")
       for wrong in (-1.0, NAN)),
-    (grown, "task 'along': 2 rows, and there were 1 when the stack first asked"),
+    (grown, "task 'along': it has 2 rows, and arrays of 1 were made; make another"),
     (lambda: StepLimits(ROBOT, 0.01, 0.0), "gain [1/s] = 0: expected a number > 0"),
     (lambda: Obstacles([Obstacle("point", (0, 0, 0))]).shift(0, (NAN, 0, 0)), "shift: offset [m]"),
     (lambda: Robot.load("nowhere.SDF"), "does not exist"),
