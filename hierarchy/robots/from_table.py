@@ -127,5 +127,7 @@ def _rod(table: DHTable, i: int) -> Any:
     length = max(float(np.hypot(table.a[i], table.d[i])), 2 * table.radius)
     across = table.mass[i] * (3 * table.radius**2 + length**2) / 12
     along = table.mass[i] * table.radius**2 / 2
-    centre = np.array([table.a[i], 0.0, table.d[i]]) / 2
-    return pin.Inertia(table.mass[i], centre, np.diag([across, across, along]))
+    end = table.a[i], 0.0, table.d[i]
+    R = np.eye(3) if end == _HERE else _axes_with_z(end)
+    return pin.Inertia(table.mass[i], np.array(end) / 2,
+                       R @ np.diag([across, across, along]) @ R.T)

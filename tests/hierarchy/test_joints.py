@@ -12,6 +12,8 @@ from hierarchy import Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import TABLES
 from hierarchy.robots.found import Loop
+from hierarchy.robots.from_table import from_table
+from hierarchy.robots.table import DHTable
 from hierarchy.tasks import JointCoupling, JointLimits, Mechanism, Posture, Together, model_rows
 from solvers import make, solve_ik
 
@@ -241,6 +243,14 @@ def test_an_entry_that_is_not_finite_is_named_by_its_own_joint(robot, what, entr
     for value in (np.nan, np.inf):
         given[what][entry] = value
         refused(f"{what}[{entry}] ({name}) is {value}", State.at, robot, **given, error=RobotError)
+
+
+@pytest.mark.parametrize(("a", "d"), [(1.0, 0.0), (-0.6, 0.8), (0.0, 1.0)])
+def test_a_link_of_a_table_is_a_rod_wherever_it_leads(a, d):
+    table = DHTable("rod", (a,), (d,), (0.0,), (90.0,), (1.0,), (1.0,), (3.0,), 1e-4, ())
+    found = from_table(table)
+    M = State(Robot(found.model, "rod", found=found)).mass_matrix()
+    np.testing.assert_allclose(M, [[3.0 * a**2 / 3.0]], atol=1e-7)
 
 
 @pytest.mark.parametrize("name", TABLES)
