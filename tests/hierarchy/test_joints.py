@@ -13,7 +13,7 @@ from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import TABLES
 from hierarchy.robots.found import Loop
 from hierarchy.robots.from_table import from_table
-from hierarchy.robots.table import DHTable
+from hierarchy.robots.table import DHTable, Link, TreeFrame, TreeJoint, TreeTable
 from hierarchy.tasks import JointCoupling, JointLimits, Mechanism, Posture, Together, model_rows
 from solvers import make, solve_ik
 
@@ -251,6 +251,16 @@ def test_a_link_of_a_table_is_a_rod_wherever_it_leads(a, d):
     found = from_table(table)
     M = State(Robot(found.model, "rod", found=found)).mass_matrix()
     np.testing.assert_allclose(M, [[3.0 * a**2 / 3.0]], atol=1e-7)
+
+
+@pytest.mark.parametrize("part", [
+    {"links": (("x", Link(mass=1.0)),)}, {"control_points": (("x", (0, 0, 0)),)},
+    {"frames": (TreeFrame("f", "x", (0, 0, 0)),)}])
+def test_a_joint_that_a_table_lacks_is_named(part):
+    """It was one beyond the last: a mass on it was written past the end of the model."""
+    one = TreeJoint("a", "", (0, 0, 0), "z", (-1, 1), 1.0, 1.0)
+    table = TreeTable(**{"name": "t", "joints": (one,), "frames": (), "end_effector": "a"} | part)
+    refused("unknown joint of table 't' 'x'", from_table, table, error=UnknownNameError)
 
 
 @pytest.mark.parametrize("name", TABLES)
