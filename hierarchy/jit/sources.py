@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hierarchy.jit.inside import BaseTuple, types
+from hierarchy.jit.inside import BaseTuple, dumps, types
 from hierarchy.jit.linking import found
 
 Kernel = Callable[..., Any]  # without annotations: its types are those of the first call
@@ -22,10 +22,18 @@ _KIND = re.compile(r"(readonly )?array\((\w+), (\d)d, (\w)\)|([\w.]+)(\()?|\)")
 
 
 def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
-    """Return the files of functions and of all kernels that they know, and the numbers in these."""
-    files, constants, ahead, seen = set(), set(), list(functions), set()
+    """Return the files of functions and of all kernels that they know, and the numbers in these.
+
+    A function that another made has numbers of that one too.
+    """
+    files, constants, ahead, seen = set[str](), set[str](), list(functions), set[Any]()
     while ahead:
         function = ahead.pop()
+        if function not in seen:
+            own = [cell.cell_contents for cell in function.__closure__ or ()]
+            ahead += [value.py_func for value in own if hasattr(value, "py_func")]
+            constants.update(str(dumps(value)) for value in own if not hasattr(value, "py_func"))
+            seen.add(function)
         known = function.__globals__
         files.add(known.get("__file__", function.__code__.co_filename))  # bundled code has no path
         if id(known) in seen:
