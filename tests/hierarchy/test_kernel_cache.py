@@ -7,10 +7,11 @@ import sys
 from types import FunctionType, SimpleNamespace
 
 import numba
+import numpy as np
 import pytest
 from refusals import refused
 
-from hierarchy.jit import saying
+from hierarchy.jit import compiled, saying
 from hierarchy.jit.sources import source_digest
 from hierarchy.measured import measured
 from solvers.kernels.active_set.exact import solve_hierarchy
@@ -45,6 +46,14 @@ def asked(folder, code=SOLVE, **settings):
     return done.stdout.split(), done.stderr
 
 
+weights = np.array([1.0, 2.0])
+
+
+@compiled
+def weighted(x):
+    return weights[0] * x
+
+
 def scaled(by):
     @measured
     def row(kinematics, reads, goal, J, motion):
@@ -57,6 +66,12 @@ def test_measures_that_one_function_makes_are_as_different_as_their_numbers():
     """All had the code of the first, also in later processes."""
     first, second, again = map(source_digest, map(scaled, (1.0, 2.0, 1.0)))
     assert first == again != second
+
+
+def test_a_number_or_array_that_a_kernel_names_counts(monkeypatch):
+    before = source_digest(weighted)
+    monkeypatch.setitem(globals(), "weights", np.array([1.0, 3.0]))
+    assert source_digest(weighted) != before
 
 
 @pytest.fixture(scope="module")
