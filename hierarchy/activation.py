@@ -45,7 +45,7 @@ class Activation:
 
     def __call__(self) -> Array:
         """Return the activations (m,)."""
-        return np.concatenate([np.empty(0), *(
+        return np.hstack([np.empty(0), *(
             activation(task.error(self._state), self._buffers[task.name])
             if task.name in self._buffers else rows for task, rows in self._tasks)])
 

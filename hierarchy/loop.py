@@ -124,7 +124,7 @@ class Log:
         if width := self._command.shape[1]:
             try:
                 self._command[k] = command
-            except ValueError as error:
+            except (TypeError, ValueError) as error:
                 raise HierarchyError(f"loop: record = {width}, and the command is "
                                      f"{brief(command)}") from error
         self.count, self.due = k + 1, tick + 1
@@ -205,7 +205,7 @@ class Loop:
                  sleep: Callable[[float], object] = time.sleep) -> None:
         check_name("overrun policy", overrun, OVERRUNS)
         positive("loop: period [s]", period)
-        number("loop: behind", behind, 1.0)
+        whole("loop: behind", behind, 1)
         number("loop: spin [s]", spin, 0.0)
         if priority is not None:
             whole("loop: priority", priority)

@@ -7,7 +7,7 @@ of all such tasks, for their gains and at each level.
 from abc import abstractmethod
 from collections.abc import Callable
 from types import FunctionType
-from typing import Any, ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,10 +129,10 @@ class Measured(Task):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        task, function, reads = self._function(state)
-        asked = task._asked(state, level, np.zeros((8, task.dimension)))
+        function, reads = self._function(state)
+        asked = self._asked(state, level, np.zeros((8, self.dimension)))
         write_rows = bind(function, state.kinematics, reads, asked, *rows)
-        move_goal = task.follow(state, asked.goal)
+        move_goal = self.follow(state, asked.goal)
         if move_goal is None:
             return write_rows
 
@@ -142,16 +142,15 @@ class Measured(Task):
 
         return write
 
-    def _function(self, state: State) -> tuple["Measured", Kernel, Any]:
-        """Return the task of the robot, with what its `measure` returns."""
-        task = cast("Measured", self.on(state.robot))
-        found = task.measure(state)
+    def _function(self, state: State) -> Measure:
+        """Return what `measure` returns."""
+        found = self.measure(state)
         function = found[0] if isinstance(found, tuple) and len(found) == 2 else None
         code = getattr(getattr(function, "py_func", function), "__code__", None)
         if code is not _rows.__code__:  # the text takes longer than the rest
-            task.refuse(True, f"measure returned {brief(found)}; expected a function under "
+            self.refuse(True, f"measure returned {brief(found)}; expected a function under "
                         "@measured or @plain, and a tuple of what it reads")
-        return task, *found
+        return found
 
     def _asked(self, state: State, level: Level, motion: Array) -> _Asked:
         m = self.dimension
@@ -168,19 +167,17 @@ class Measured(Task):
                   ) -> tuple[Array, Motion, Array]:
         """The Jacobian (m, n), the rest of what is measured, and the goal of each row (3, m)."""
         J, motion, goal = self._reader(state)(kinematics or state.kinematics)
-        columns = cast("Measured", self.on(state.robot)).columns
-        return J, motion, np.asarray(np.hstack([goal, np.zeros((3, 1))])[:, columns])
+        return J, motion, np.asarray(np.hstack([goal, np.zeros((3, 1))])[:, self.columns])
 
     def _reader(self, state: State) -> Callable[[Kinematics], tuple[Array, Motion, Array]]:
         """Return what `_measured` calls, for a state that moves; each call overwrites the last.
 
         It gives the goal as kernels read it.
         """
-        task, function, reads = self._function(state)
-        m = task.dimension
+        (function, reads), m = self._function(state), self.dimension
         J, sides, motion = np.zeros((m, state.n)), np.zeros((2, m)), np.zeros((8, m))
-        asked = task._asked(state, "velocity", motion)
-        move_goal = task.follow(state, asked.goal)
+        asked = self._asked(state, "velocity", motion)
+        move_goal = self.follow(state, asked.goal)
 
         def read(kinematics: Kinematics) -> tuple[Array, Motion, Array]:
             if move_goal is not None:

@@ -8,11 +8,13 @@ import builtins
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import Field, fields
+from dataclasses import Field, fields, is_dataclass
 from functools import partial
 from inspect import get_annotations
 from types import NoneType, SimpleNamespace
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
 
 from hierarchy.errors import check_choice, finite_numbers, number, positive, real, whole
 
@@ -76,3 +78,18 @@ def _hint(kind: type, field: Field[Any], names: Mapping[str, Any]) -> Any:
         one = SimpleNamespace(__annotations__={field.name: field.type})
         return get_type_hints(one, scope, include_extras=True)[field.name]
     return None
+
+
+def equal(one: Any, other: Any) -> bool:
+    """Whether two values are the same; of a dataclass, its fields, and of an array, its numbers.
+
+    It can be the `__eq__` of a class, in place of one that raises where a field is an array.
+    """
+    if one is other or isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return one is other or np.array_equal(one, other)
+    if is_dataclass(one) and type(one) is type(other):
+        return all(equal(getattr(one, field.name), getattr(other, field.name))
+                   for field in fields(one) if field.compare)
+    if isinstance(one, list | tuple) and type(one) is type(other):
+        return len(one) == len(other) and all(map(equal, one, other))
+    return one.__class__.__eq__ is not equal and bool(one == other)

@@ -27,7 +27,7 @@ from hierarchy.errors import (
 )
 from hierarchy.gate import array_of, check_rotation
 from hierarchy.problem import Array
-from hierarchy.records import set_frozen
+from hierarchy.records import equal, set_frozen
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
 from hierarchy.robots.found import (
@@ -70,6 +70,7 @@ class Frame:
     offset: Array
     rotation: Array
     of: str = field(default="", repr=False, compare=False)
+    __eq__ = equal
 
     def __post_init__(self) -> None:
         what = f"frame {self.name!r}"
@@ -163,13 +164,14 @@ class Robot:
         self.capsules, self.missing, self.coupled = found.capsules, found.missing, found.coupled
         self.rest = np.array(pin.neutral(model)) if found.rest is None else found.rest
         leaders = {one.other for one in self.coupled} - {"", *(one.joint for one in self.coupled)}
-        if leaders:
+        held = {one.joint: one.at(0.0) for one in self.coupled if not one.other}
+        if leaders or held:
             values = self.values(self.rest)
             ends = {self.joint_names[part.joint - 1]: (self.lower[part.q], self.upper[part.q])
                     for part in self.parts if part.size == 1}
-            self.rest = self.configuration(
-                {name: inside(float(values[name]), *room(name, ends, self.coupled))
-                 for name in leaders}, self.rest)
+            self.rest = self.configuration(held | {
+                name: inside(float(values[name]), *room(name, ends, self.coupled))
+                for name in leaders}, self.rest)
         self.loops, self.starts, self.apart = found.loops, found.starts, found.apart
         self.table = found.table
 
@@ -304,7 +306,7 @@ class Robot:
 
     def check_same(self, what: str, robot: Robot) -> None:
         """Raise a RobotError for another robot, which has other joints."""
-        if robot is not self and robot.joint_names != self.joint_names:
+        if (robot.joint_names, robot.nq) != (self.joint_names, self.nq):
             raise RobotError(f"{what} is of robot {robot.name!r}, not of {self.name!r}")
 
     def limit_base(self, linear: float, angular: float) -> None:

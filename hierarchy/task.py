@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from functools import wraps
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
@@ -19,7 +19,7 @@ from hierarchy.errors import HierarchyError, brief, check_choice, expect, refuse
 from hierarchy.gate import check_rows, shaped
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.records import NUMBERS, Check, check_fields
+from hierarchy.records import NUMBERS, Check, check_fields, equal
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 
@@ -30,9 +30,10 @@ Kind = Literal["equality", "inequality"]
 _ROUNDING = 1e-9  # of a period, relative
 _STEP = 2.0**-10  # [s] of the differences that give the derivative of a Jacobian
 _GAINS = ("stiffness", "damping", "gain")
+_BINDS = ("measure", "writer", "distances", "follow_cone_error")  # a kernel
 _OF_STATE = ("error", "jacobian", "jacobian_derivative", "desired_velocity",
-             "desired_acceleration", "reference_velocity", "reference_acceleration", "measure",
-             "error_reader", "writer")
+             "desired_acceleration", "reference_velocity", "reference_acceleration",
+             "error_reader", *_BINDS)
 
 
 def _made(kind: type, remedy: str) -> Check:
@@ -107,10 +108,10 @@ class Task(ABC):
         """Let the methods that take a state refuse anything else, and `==` compare arrays."""
         super().__init_subclass__()
         if "__eq__" not in vars(cls):  # a dataclass writes one that raises on arrays
-            cls.__eq__ = _equal  # type: ignore[method-assign]
+            cls.__eq__ = equal  # type: ignore[method-assign]
         for name in _OF_STATE:
             if name in vars(cls):
-                setattr(cls, name, _of_state(vars(cls)[name], name in ("measure", "writer")))
+                setattr(cls, name, _of_state(vars(cls)[name], name in _BINDS))
 
     def __post_init__(self) -> None:
         """Check what the task was made with; raises HierarchyError.
@@ -135,9 +136,9 @@ class Task(ABC):
         return tuple(f"row {i}" for i in range(self.dimension))
 
     def on(self, robot: Robot) -> Task:
-        """Return the task for a robot, whose rows a stack asks for; by default the task itself.
+        """Return the task for a robot, of which all methods are asked; by default the task itself.
 
-        A task whose number of rows depends on the robot returns one that knows it.
+        A task whose number of rows depends on the robot returns one of its class that knows it.
         """
         return self
 
@@ -281,7 +282,7 @@ def check_parts(task: Task) -> None:
 
 
 def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:
-    """Return a method of a task that refuses anything but a State in place of one.
+    """Return a method of a task, for the robot of a state, that refuses anything but a State.
 
     One that binds a kernel, which looks at no index, refuses the state of another robot.
     """
@@ -289,9 +290,10 @@ def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:
     def checked(self: Task, state: State, *rest: Any, **named: Any) -> Any:
         if not isinstance(state, State):
             expect(f"task {self.name!r}: state", state, State, "make one with State.at(robot, q)")
+        known = self.on(state.robot)
         if binds:
-            _check_robot(self, state.robot)
-        return method(self, state, *rest, **named)
+            _check_robot(known, state.robot)
+        return method(known, state, *rest, **named)
 
     return checked
 
@@ -306,22 +308,18 @@ def _check_robot(task: Task, robot: Robot) -> None:
                 robot.check_joint(what, joint, getattr(part, "of", ""))
 
 
-def _equal(one: Any, other: Any) -> bool:
-    """Whether two values are the same; of a dataclass, its fields, and of an array, its numbers."""
-    if one is other or isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        return one is other or np.array_equal(one, other)
-    if is_dataclass(one) and type(one) is type(other):
-        return all(_equal(getattr(one, field.name), getattr(other, field.name))
-                   for field in fields(one) if field.compare)
-    return not isinstance(one, Task) and bool(one == other)
+def seen_by(task: Task, state: State, points: Sequence[ControlPoint]) -> Measurement:
+    """Return what a state has measured of the points of a task; HierarchyError for anything else.
 
-
-def seen_by(task: Task, state: State) -> Measurement:
-    """Return what a state has measured; raise a HierarchyError, naming the task, for nothing."""
-    if state.measurement is None:
+    The end effector, which is measured last, need not be one of them.
+    """
+    if (seen := state.measurement) is None:
         raise HierarchyError(f"task {task.name!r}: the state carries no measurement; let a sensor "
                              "measure it first, see docs/loop.md")
-    return state.measurement
+    spare = len(seen.distance) - len(points)
+    task.refuse(spare not in (0, 1), f"{len(points)} control points, and distances of "
+                f"{len(seen.distance)}")
+    return seen
 
 
 def in_turn(*functions: Writer) -> Writer:
@@ -337,6 +335,8 @@ def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Write
     """Return the writer of a task; at level "torque" one of the joints writes their columns."""
     check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
     check_gains(task, rows.lower.size)
+    task.refuse(task.dimension != rows.lower.size, f"it has {task.dimension} rows, and arrays of "
+                f"{rows.lower.size} were made; make another stack")
     if level == "torque" and not task.of_forces:
         level, rows = "acceleration", rows._replace(A=rows.A[:, :state.n])
     try:
@@ -373,12 +373,12 @@ class Written(Task):
 
     def rows(self, state: State, level: Level = "velocity") -> Rows:
         """The rows at a state; of forces, see `ForceTask`."""
-        columns = state.n
+        columns, known = state.n, self.on(state.robot)
         if self.of_forces:
             level = "acceleration" if self.contacts is None else "torque"
             columns = columns if self.contacts is None else self.contacts.unknowns
-        rows = Rows.empty(self.dimension, columns)
-        self.writer(state, level, rows)()
+        rows = Rows.empty(known.dimension, columns)
+        known.writer(state, level, rows)()
         return rows
 
     def jacobian(self, state: State) -> Array:

@@ -136,7 +136,8 @@ class Factorization:
             left = level.A.copy()
             for _ in range(2):
                 left -= (left @ basis.T) @ basis
-            while len(left) and (size := norm(left, axis=1) * (norm(left, axis=1) > zero)).any():
+            while len(basis) < min(above + len(left), self._n) and (
+                    size := norm(left, axis=1) * (norm(left, axis=1) > zero)).any():
                 q = left[size.argmax()] / size.max()
                 left -= np.outer(left @ q, q)
                 basis = np.vstack([basis, q])
@@ -238,13 +239,12 @@ class Factorization:
         return level
 
     def _projected(self, A: Array) -> Array:
-        """Return C (m_k, r) with A = C Q^T, after adding the new directions of A to the basis.
-
-        NaN for a row whose square overflows: no answer is found with it.
-        """
+        """Return C (m_k, r) with A = C Q^T, after adding the new directions of A to the basis."""
         C = np.zeros((len(A), len(self._Q) + len(A)))
         for row, c in zip(A, C, strict=True):
-            w, size, r = row.copy(), norm(row), len(self._Q)
+            scale = np.exp2(np.frexp(np.abs(row).max())[1])  # so that no square vanishes
+            w, r = row / scale, len(self._Q)
+            size = norm(w)
             for _ in range(_PASSES):
                 along = self._Q @ w
                 c[:r] += along
@@ -252,6 +252,7 @@ class Factorization:
             left = norm(w)
             if left > _OUTSIDE * size and r < self._n:
                 c[r], self._Q = left, np.vstack([self._Q, w / left])
+            c *= scale
         return C[:, :len(self._Q)]
 
     @property

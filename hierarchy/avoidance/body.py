@@ -14,7 +14,7 @@ from hierarchy.errors import expect_each, finite_numbers
 from hierarchy.jit import compiled, inlined
 from hierarchy.kinematics import dot, less, place, plus, times, turned
 from hierarchy.problem import Array
-from hierarchy.records import NotNegative, check_fields
+from hierarchy.records import NotNegative, check_fields, equal
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,11 @@ class ControlPoint:
 
     name: str
     joint: int
-    offset: Array
+    offset: Annotated[Array, partial(finite_numbers, size=3), "m"]
+    __eq__ = equal
+
+    def __post_init__(self) -> None:
+        check_fields(self, f"control point {self.name!r}")
 
 
 class Points(NamedTuple):

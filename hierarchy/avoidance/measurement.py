@@ -8,6 +8,7 @@ import numpy as np
 from hierarchy.avoidance.laws import repulsion
 from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turning_off_obstacle
 from hierarchy.errors import refuse, whole
+from hierarchy.gate import shaped
 from hierarchy.jit import compiled
 from hierarchy.kinematics import Readings, dot, place, plus
 from hierarchy.problem import Array
@@ -59,7 +60,7 @@ class Measurement:
 
     @active.setter
     def active(self, index: int) -> None:
-        self.arrays.active[0] = index
+        self.arrays.active[0] = whole("Measurement: active", index, -1, len(self.distance) - 2)
 
     @property
     def minimal_distance(self) -> float:
@@ -140,7 +141,10 @@ class Pairs:
 
 
 def measure_pairs(pairs: Pairs, points: Array, obstacles: Obstacles) -> None:
-    """Fill Pairs from known geometry: points (P, 3) [m] against the current obstacles."""
+    """Fill Pairs from known geometry: points (P, 3) [m] against the current obstacles (H)."""
+    points = shaped("measure_pairs: points", points, (len(pairs.table), 3))
+    refuse(len(obstacles) != pairs.table.shape[1], f"measure_pairs: {len(obstacles)} obstacles, "
+           f"and pairs of {pairs.table.shape[1]}")
     _measure_pairs(points, obstacles.table, obstacles.motion, pairs.table)
 
 

@@ -7,7 +7,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import check_name, expect, expect_each, refuse
+from hierarchy.errors import check_name, expect, expect_each, finite_numbers, refuse
 from hierarchy.gate import Rotation, array_of
 from hierarchy.jit import inlined, internal
 from hierarchy.kinematics import dot, less, turned
@@ -87,8 +87,9 @@ class Obstacles:
 
         Its `motion` remains that of its path: a sensor does not know about displacements by hand.
         """
-        self.table[h, _CENTRE] += np.asarray(offset, dtype=float) - self.offset[h]
-        self.offset[h] = offset
+        moved = finite_numbers("shift: offset [m]", offset, 3)
+        self.table[h, _CENTRE] += moved - self.offset[h]
+        self.offset[h] = moved
 
     @property
     def centres(self) -> Array:

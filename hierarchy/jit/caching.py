@@ -103,8 +103,7 @@ class KernelCache(NullCache):  # type: ignore[misc]
         if folder is None or not digest:
             return None
         kinds = described(getattr(signature, "args", signature))
-        cells = [cell.cell_contents for cell in function.__closure__ or ()]
-        about = (self._name, function.__code__.co_firstlineno, digest, kinds, dumps(cells),
+        about = (self._name, function.__code__.co_firstlineno, digest, kinds,
                  context.codegen().magic_tuple(), numba.__version__, llvmlite.__version__,
                  sys.version_info[:3])
         return folder / f"{self._name}-{hashlib.sha256(repr(about).encode()).hexdigest()[:32]}"

@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -22,12 +23,24 @@ _KIND = re.compile(r"(readonly )?array\((\w+), (\d)d, (\w)\)|([\w.]+)(\()?|\)")
 
 
 def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
-    """Return the files of functions and of all kernels that they know, and the numbers in these."""
-    files, constants, ahead, seen = set(), set(), list(functions), set()
+    """Return the files of functions and of all kernels that they know, and the numbers in these.
+
+    Those are numbers, arrays and the like that a kernel names, also of a function that made it.
+    """
+    files, constants, ahead, seen = set[str](), set[str](), list(functions), set[Any]()
     while ahead:
         function = ahead.pop()
-        known = function.__globals__
-        files.add(known.get("__file__", function.__code__.co_filename))  # bundled code has no path
+        known, code = function.__globals__, function.__code__
+        if function not in seen:
+            seen.add(function)
+            own = [cell.cell_contents for cell in function.__closure__ or ()]
+            used = dict(zip(code.co_freevars, own, strict=True)) | {
+                name: known[name] for name in code.co_names if name in known}
+            ahead += [value.py_func for value in used.values() if hasattr(value, "py_func")]
+            numbers = {name: value.tolist() if hasattr(value, "tolist") else value for name, value
+                       in used.items() if not callable(value) and type(value) is not ModuleType}
+            constants.add(f"{function.__qualname__}: {numbers!r}")
+        files.add(known.get("__file__", code.co_filename))  # bundled code has no path
         if id(known) in seen:
             continue
         seen.add(id(known))

@@ -247,7 +247,7 @@ class Blended(Path):
             out[0] = self.points[0]
             return
         before, after = self._velocities[i - 1], self._velocities[i]
-        T, since = self.blend, t - self.times[i - 1]
+        T, since = self.blend, t - float(self.times[i - 1])
         s = min(since / T, 1.0)
         change, past = after - before, max(since - T, 0.0)
         # On the old line up to the middle of the blend, on the new one from there.
@@ -302,7 +302,7 @@ class Recorded(Path):
         i, h, s = _interval(self.times, self.points, t, out)
         if i == 0:
             return
-        p0, p1 = np.asarray(self.points[i - 1]), np.asarray(self.points[i])
+        p0, p1 = np.asarray(self.points[i - 1:i + 1], dtype=float)
         m0, m1 = h * self._slopes[i - 1], h * self._slopes[i]
         c2, c3 = 3 * (p1 - p0) - 2 * m0 - m1, 2 * (p0 - p1) + m0 + m1
         out[0] = p0 + s * (m0 + s * (c2 + s * c3))
@@ -315,8 +315,8 @@ def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: A
     """Return where the interval around t ends, its length, and t's share; outside, write and 0."""
     i = bisect_right(times, t)
     if 0 < i < len(times):
-        span = times[i] - times[i - 1]
-        return i, span, (t - times[i - 1]) / span
+        start, end = float(times[i - 1]), float(times[i])  # of float32, t would become one
+        return i, end - start, (t - start) / (end - start)
     out[0], out[1:] = points[min(i, len(times) - 1)], 0.0
     return 0, 0.0, 0.0
 

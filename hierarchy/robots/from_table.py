@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy.avoidance.body import Capsule, ControlPoint, Vector
+from hierarchy.errors import check_name
 from hierarchy.problem import Array
 from hierarchy.robots.found import Found
 from hierarchy.robots.library import pin
@@ -25,7 +26,7 @@ def from_table(table: Table, base: Base | None = None) -> Found:
 
 def _from_chain(table: DHTable, base: Base) -> Found:
     model = _empty(table.name, base)
-    joint = model.njoints - 1
+    root = joint = model.njoints - 1
     placement, links = pin.SE3.Identity(), list[Capsule]()
     for i, d in enumerate(table.d):
         limit = np.deg2rad([table.range[i]])
@@ -41,7 +42,7 @@ def _from_chain(table: DHTable, base: Base) -> Found:
         if (end := (table.a[i], 0.0, d)) != _HERE:  # neighbours cover a link of length zero
             links.append(Capsule(f"link {i + 1}", joint, _HERE, end, table.radius))
     model.addFrame(pin.Frame(END_EFFECTOR, joint, placement, pin.FrameType.OP_FRAME))
-    return Found(model, END_EFFECTOR, tuple(links), _points(model, table.control_points),
+    return Found(model, END_EFFECTOR, tuple(links), _points(model, table.control_points, root),
                  table=table)
 
 
@@ -72,8 +73,8 @@ def _from_tree(table: TreeTable, base: Base) -> Found:
     if base == "floating":
         q[2] = table.base_height
     q[model.nq - len(table.joints):] = np.deg2rad([joint.rest for joint in table.joints])
-    return Found(model, table.end_effector, tuple(capsules), _points(model, table.control_points),
-                 q, table=table)
+    return Found(model, table.end_effector, tuple(capsules),
+                 _points(model, table.control_points, root), q, table=table)
 
 
 def _empty(name: str, base: Base) -> Any:
@@ -85,12 +86,15 @@ def _empty(name: str, base: Base) -> Any:
     return model
 
 
-def _points(model: Any, points: tuple[tuple[str, Vector], ...]) -> tuple[ControlPoint, ...]:
-    return tuple(ControlPoint(f"{joint} {list(offset)}", int(model.getJointId(joint)),
+def _points(model: Any, points: tuple[tuple[str, Vector], ...], root: int
+            ) -> tuple[ControlPoint, ...]:
+    return tuple(ControlPoint(f"{joint} {list(offset)}", _index(model, joint, root),
                               np.array(offset, dtype=float)) for joint, offset in points)
 
 
 def _index(model: Any, name: str, root: int) -> int:
+    if name:  # of another one pinocchio returns an index beyond the end
+        check_name(f"joint of table {model.name!r}", name, list(model.names)[1:])
     return int(model.getJointId(name)) if name else root
 
 
@@ -127,5 +131,7 @@ def _rod(table: DHTable, i: int) -> Any:
     length = max(float(np.hypot(table.a[i], table.d[i])), 2 * table.radius)
     across = table.mass[i] * (3 * table.radius**2 + length**2) / 12
     along = table.mass[i] * table.radius**2 / 2
-    centre = np.array([table.a[i], 0.0, table.d[i]]) / 2
-    return pin.Inertia(table.mass[i], centre, np.diag([across, across, along]))
+    end = table.a[i], 0.0, table.d[i]
+    R = np.eye(3) if end == _HERE else _axes_with_z(end)
+    return pin.Inertia(table.mass[i], np.array(end) / 2,
+                       R @ np.diag([across, across, along]) @ R.T)

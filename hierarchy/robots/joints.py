@@ -59,8 +59,9 @@ _SEVERAL = {"Spherical": [(4, "rad")], "Planar": [(1, "m"), (1, "m"), (2, "rad")
 def _pieces(joint: Any) -> Sequence[tuple[int, str]]:
     """Return the number of coordinates and the unit of each part of a joint."""
     kind = joint.shortname().removeprefix("JointModel")
-    if kind == "Composite":
-        return [piece for inner in joint.extract().joints for piece in _pieces(inner)]
+    if kind in ("Composite", "SphericalZYX", "Universal"):
+        raise RobotError(f"joint {joint.id}: in a joint of the kind {kind} axes turn each other, "
+                         "which pinocchio does not differentiate; give each a joint of its own")
     if joint.nq == joint.nv > 0:
         return [(1, "m" if kind.startswith(("Translation", "P")) else "rad")] * joint.nq
     if (joint.nq, joint.nv) == (2, 1):

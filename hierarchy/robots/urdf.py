@@ -147,15 +147,16 @@ def _complaints(root: Element) -> Iterator[str]:
         yield "its <robot> has no name"
     if not links:
         yield "it has no link"
+    kinds = {name_of(joint): joint.get("type") for joint in root.findall("joint")}
     for joint in root.findall("joint"):
         name = f"joint {name_of(joint)!r}"
-        yield from (f"{name}: {said}" for said in _of_joint(joint, links, joints))
+        yield from (f"{name}: {said}" for said in _of_joint(joint, links, kinds))
     for link in root.findall("link"):
         yield from (f"link {name_of(link)!r}: {said}" for said in _of_link(link))
     yield from _of_tree(root, links)
 
 
-def _of_joint(joint: Element, links: list[str], joints: list[str]) -> Iterator[str]:
+def _of_joint(joint: Element, links: list[str], kinds: dict[str, str | None]) -> Iterator[str]:
     kind = joint.get("type")
     if kind not in _KINDS:
         yield f"its type is {kind!r}; expected one of {', '.join(_KINDS)}"
@@ -172,11 +173,15 @@ def _of_joint(joint: Element, links: list[str], joints: list[str]) -> Iterator[s
     yield from _unread(joint, "limit", 1, lower="0", upper="0", velocity="0", effort="0")
     yield from _of_limit(joint, kind)
     yield from _unread(joint, "mimic", 1, multiplier="0", offset="0")
-    mimic = joint.find("mimic")
-    if mimic is not None and mimic.get("joint") == name_of(joint):
-        yield "it is to follow itself"
-    if mimic is not None and mimic.get("joint") not in joints:
-        yield f"it is to follow joint {mimic.get('joint')!r}, which does not exist"
+    if joint.find("mimic") is not None:
+        leader = attribute_of(joint, "mimic", "joint") or ""
+        if leader == name_of(joint):
+            yield "it is to follow itself"
+        if leader not in kinds:
+            yield f"it is to follow joint {leader!r}, which does not exist"
+        if several := {"floating", "planar"} & {kind, kinds.get(leader)}:
+            yield (f"it is to follow joint {leader!r}, and a {listed(sorted(several), 'or')} joint "
+                   "has several positions")
 
 
 def _of_limit(joint: Element, kind: str | None) -> Iterator[str]:

@@ -94,7 +94,7 @@ class Avoidance(Measured):
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`; the error is the repulsion [m/s^2 or m/s]."""
-        return _avoidance, (*pack_points(self.points), seen_by(self, state).arrays)
+        return _avoidance, (*pack_points(self.points), seen_by(self, state, self.points).arrays)
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,8 @@ class CumulatedRepulsion(JointTask):
             self.base.writer(state, level, rows))
         parameters = (*pack_points(self.points), self.within, self.lever, level == "acceleration",
                       np.empty(state.n))
-        add = bind(_add, state.kinematics, parameters, seen_by(self, state).arrays, rows.lower,
-                   rows.upper)
+        seen = seen_by(self, state, self.points)
+        add = bind(_add, state.kinematics, parameters, seen.arrays, rows.lower, rows.upper)
         return in_turn(lambda: rows.lower.fill(0.0), below, add)
 
 
@@ -218,9 +218,7 @@ class DangerBounds(NamedRows, Written):
                        self._tighten(state, level, rows.lower, rows.upper))
 
     def _tighten(self, state: State, level: Level, lower: Array, upper: Array) -> Writer:
-        seen = seen_by(self, state)
-        self.refuse(len(self.points) > len(seen.distance), f"{len(self.points)} control points, "
-                    f"and distances of {len(seen.distance)}")
+        seen = seen_by(self, state, self.points)
         parameters = (*pack_points(self.points), self.reach, self.shape, self.lever,
                       self.limits.limits.packed[2], max(self.limits.period, self.limits.horizon),
                       level == "acceleration")

@@ -75,7 +75,11 @@ class Together(NamedRows, Written):
     def error_reader(self, state: State) -> Callable[[], Array]:
         """See `Task.error_reader`."""
         readers = [task.error_reader(state) for task in self.tasks]
-        return lambda: np.concatenate([read() for read in readers])
+        return lambda: np.hstack([read() for read in readers])  # of one row maybe a number
+
+    def desired_velocity(self, state: State) -> Array:
+        """Those of the tasks (m,), which `solve_ik` with `until` leaves out of the rows."""
+        return np.hstack([task.desired_velocity(state) for task in self.tasks])
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""

@@ -1,12 +1,24 @@
 """Contacts and tasks over their forces, each against an algorithm that shares no code with it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing import CONTACTS, ROBOT, drift_of, feet, moving_state, opening, wrenches_of, written
+from standing import (
+    CONTACTS,
+    LEFT,
+    ROBOT,
+    drift_of,
+    feet,
+    moving_state,
+    opening,
+    wrenches_of,
+    written,
+)
 
 from hierarchy import Robot, Stack, State, tasks
-from hierarchy.contacts import Contact, Contacts
+from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.task import Rows, Task
 
 STEP = 1e-6
@@ -70,11 +82,11 @@ def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
     assert task.row_names == tuple(f"{side}_foot edge {i}" for side in ("left", "right")
                                    for i in (1, 2, 3, 4))
     assert tasks.CentreOfPressure(contacts, 0.0).row_names == task.row_names
-    corners = np.array(contacts["right_foot"].points)[:, :2]
+    sole = np.array(contacts["right_foot"].points)[:, :2]
     rng, seen = np.random.default_rng(8), []
     for _ in range(300):
         normal = rng.exponential(size=4) ** 3
-        x, y = corners.T @ normal / normal.sum()
+        x, y = sole.T @ normal / normal.sum()
         f = np.zeros((8, 3))
         f[4:, 2] = normal
         value = task.fixed[0][:, ROBOT.n:] @ f.ravel()
@@ -85,6 +97,18 @@ def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
                                    atol=1e-12)
         assert not value[:4].any()
     assert 0 < sum(seen) < 300
+
+
+def test_corners_one_above_the_other_are_one_of_the_sole():
+    """Along an oblique `up` they differ by rounding, and edges between them had any direction."""
+    up = np.array([0.3, -0.4, 0.75**0.5])
+    sole = corners((-0.1, 0.1), (-0.05, 0.05), up)
+    box = Contact(LEFT.frame, np.vstack([sole, sole + 0.03 * up]).tolist(), up=up.tolist())
+    rows, *_ = tasks.CentreOfPressure(Contacts(ROBOT, [box]), 0.01).fixed
+    levers = rows[:, ROBOT.n + 2::3]
+    np.testing.assert_allclose(np.sort(levers[:, :4], axis=None),
+                               np.repeat([-0.01, 0.09, 0.19], [8, 4, 4]), atol=1e-12)
+    np.testing.assert_allclose(levers[:, :4], levers[:, 4:], atol=1e-12)
 
 
 @pytest.mark.parametrize(("t", "ramp", "load"), [
@@ -181,6 +205,10 @@ def test_contact_motion_rows_are_the_accelerations_of_contacts_with_baumgartes_t
     np.testing.assert_allclose(lower[6:9], -dJ - 20.0 * J @ state.v + 100.0 * gone, atol=1e-9)
     np.testing.assert_array_equal(lower, upper)
     assert np.abs(task.error(start)).max() < 1e-12
+    for anchors in (np.array(task.anchors), [anchor.copy() for anchor in task.anchors]):
+        other = tasks.ContactMotion(CONTACTS, anchors, 100.0)
+        np.testing.assert_array_equal(other.error(state), task.error(state))
+        assert isinstance(anchors, np.ndarray) or other == task != replace(task, gain=1.0)
 
 
 @pytest.mark.parametrize("part", ["both", "linear", "angular"])

@@ -12,7 +12,9 @@ from hierarchy import Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import TABLES
 from hierarchy.robots.found import Loop
-from hierarchy.tasks import JointCoupling, JointLimits, Mechanism, Posture, model_rows
+from hierarchy.robots.from_table import from_table
+from hierarchy.robots.table import DHTable, Link, TreeFrame, TreeJoint, TreeTable
+from hierarchy.tasks import JointCoupling, JointLimits, Mechanism, Posture, Together, model_rows
 from solvers import make, solve_ik
 
 T = 0.01  # [s]
@@ -112,7 +114,7 @@ def test_compiled_rows_of_a_posture_are_those_of_its_methods(level, floating):
     robot = mobile(floating)
     v = np.random.default_rng(1).normal(size=robot.n)
     state, task = State(robot), Posture(THERE, 3.0, 2.0, 4.0)
-    stack = Stack([task], level)
+    stack, same = Stack([task], level), Posture(robot.configuration(THERE), 3.0, 2.0, 4.0)
     for values in (ANYWHERE, THERE, {}):
         state.move(0.0, robot.configuration(values), v)
         h = stack.hierarchy(state)
@@ -121,6 +123,8 @@ def test_compiled_rows_of_a_posture_are_those_of_its_methods(level, floating):
             3.0 * task.error(state) - 2.0 * v[robot.actuated:])
         np.testing.assert_allclose(h.lower, asked, atol=1e-12)
         np.testing.assert_array_equal(h.lower, h.upper)
+        np.testing.assert_array_equal(Together([same]).rows(state, level).lower, h.lower)
+        np.testing.assert_allclose(getattr(same, f"reference_{level}")(state), h.lower, atol=1e-12)
 
 
 @pytest.mark.parametrize(("turn", "values"), [
@@ -157,6 +161,24 @@ def test_a_mimic_joint_of_pinocchio_is_refused_by_its_kind():
     refused("0 velocities of the kind Mimic is not known", Robot, model, "it", error=RobotError)
 
 
+def test_a_joint_within_which_axes_turn_is_refused():
+    """Its accelerations were wrong: pinocchio differentiates axes as if the body carried them."""
+    composite, model = pin.JointModelComposite(), pin.Model()
+    composite.addJoint(pin.JointModelRX())
+    composite.addJoint(pin.JointModelRY())
+    model.addJoint(0, composite, pin.SE3.Identity(), "both")
+    refused("kind Composite axes turn each other", Robot, model, "it", error=RobotError)
+
+
+def test_a_robot_of_the_same_names_and_other_coordinates_is_another():
+    plain, around = pin.Model(), pin.Model()
+    plain.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "a")
+    around.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "a")
+    task = JointCoupling(Robot(around, "around"), {"a": 1.0})  # it would read q[1] of one number
+    refused("of robot 'around', not of 'plain'", task.error, State(Robot(plain, "plain")),
+            error=RobotError)
+
+
 def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_path):
     path = tmp_path / "c.urdf"  # where a link has the name of a joint, as in NAO's
     mimic = '<mimic joint="a" multiplier="-2" offset="0.5"/>'
@@ -172,6 +194,7 @@ def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_
                                State.at(free, there).position("l2"), atol=1e-12)
     (held,) = locked.coupled
     assert (held.joint, held.other, held.coefficients) == ("c", "", (0.5 - 2.4,))
+    assert locked.vector(locked.rest)[1] == pytest.approx(0.5 - 2.4), "it is held at rest"
     assert Robot.load(path, locked={"c": 0.1}).coupled == ()
     assert free.values(free.configuration({"a": 0.2}))["c"] == pytest.approx(0.1)
     assert free.values(free.configuration({"a": 0.2, "c": 0.3}))["c"] == pytest.approx(0.3)
@@ -220,6 +243,24 @@ def test_an_entry_that_is_not_finite_is_named_by_its_own_joint(robot, what, entr
     for value in (np.nan, np.inf):
         given[what][entry] = value
         refused(f"{what}[{entry}] ({name}) is {value}", State.at, robot, **given, error=RobotError)
+
+
+@pytest.mark.parametrize(("a", "d"), [(1.0, 0.0), (-0.6, 0.8), (0.0, 1.0)])
+def test_a_link_of_a_table_is_a_rod_wherever_it_leads(a, d):
+    table = DHTable("rod", (a,), (d,), (0.0,), (90.0,), (1.0,), (1.0,), (3.0,), 1e-4, ())
+    found = from_table(table)
+    M = State(Robot(found.model, "rod", found=found)).mass_matrix()
+    np.testing.assert_allclose(M, [[3.0 * a**2 / 3.0]], atol=1e-7)
+
+
+@pytest.mark.parametrize("part", [
+    {"links": (("x", Link(mass=1.0)),)}, {"control_points": (("x", (0, 0, 0)),)},
+    {"frames": (TreeFrame("f", "x", (0, 0, 0)),)}])
+def test_a_joint_that_a_table_lacks_is_named(part):
+    """It was one beyond the last: a mass on it was written past the end of the model."""
+    one = TreeJoint("a", "", (0, 0, 0), "z", (-1, 1), 1.0, 1.0)
+    table = TreeTable(**{"name": "t", "joints": (one,), "frames": (), "end_effector": "a"} | part)
+    refused("unknown joint of table 't' 'x'", from_table, table, error=UnknownNameError)
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -7,11 +7,13 @@ import sys
 from types import FunctionType, SimpleNamespace
 
 import numba
+import numpy as np
 import pytest
 from refusals import refused
 
-from hierarchy.jit import saying
+from hierarchy.jit import compiled, saying
 from hierarchy.jit.sources import source_digest
+from hierarchy.measured import measured
 from solvers.kernels.active_set.exact import solve_hierarchy
 from solvers.kernels.active_set.working_set import meet
 from solvers.kernels.linalg.rows import swap
@@ -42,6 +44,34 @@ def asked(folder, code=SOLVE, **settings):
     done = subprocess.run([sys.executable, "-c", code], cwd=folder, text=True, check=True,
                           capture_output=True, env={**kept, **settings})
     return done.stdout.split(), done.stderr
+
+
+weights = np.array([1.0, 2.0])
+
+
+@compiled
+def weighted(x):
+    return weights[0] * x
+
+
+def scaled(by):
+    @measured
+    def row(kinematics, reads, goal, J, motion):
+        J[0, 0] = by
+
+    return row
+
+
+def test_measures_that_one_function_makes_are_as_different_as_their_numbers():
+    """All had the code of the first, also in later processes."""
+    first, second, again = map(source_digest, map(scaled, (1.0, 2.0, 1.0)))
+    assert first == again != second
+
+
+def test_a_number_or_array_that_a_kernel_names_counts(monkeypatch):
+    before = source_digest(weighted)
+    monkeypatch.setitem(globals(), "weights", np.array([1.0, 3.0]))
+    assert source_digest(weighted) != before
 
 
 @pytest.fixture(scope="module")

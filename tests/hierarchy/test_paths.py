@@ -1,5 +1,6 @@
 """Paths: position, velocity and acceleration agree, and pass where they should."""
 
+from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -50,11 +51,22 @@ def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
     np.testing.assert_allclose(path(3.8), [POINTS[3], [0] * 3, [0] * 3], atol=1e-12)
 
 
+@pytest.mark.parametrize("make", [paths.Waypoints, paths.Recorded,
+                                  partial(paths.Blended, blend=0.5)])
+def test_times_of_few_digits_take_none_of_those_of_the_present(make):
+    times, points = np.array([1000, 1001, 1002], dtype=np.float32), np.array(POINTS[:3])
+    for t in (1000.2503, 1001.7501):
+        np.testing.assert_array_equal(make(times, points)(t), make(times.astype(float), points)(t))
+
+
 @pytest.mark.parametrize("names", ["", "t, x, y, z\n", "\ufeff"])
 def test_a_path_of_a_csv_file_passes_its_points_with_continuous_acceleration(names, tmp_path):
     rows = "\n".join(",".join(map(str, (t, *p))) for t, p in zip(TIMES, POINTS, strict=True))
     (tmp_path / "a.csv").write_text(f"{names}{rows}\n\n", encoding="utf-8")
     path = paths.Recorded.from_csv(tmp_path / "a.csv")
+    whole = [paths.Recorded(TIMES, np.round(9 * np.abs(POINTS)).astype(kind))
+             for kind in (np.uint8, float)]  # unsigned numbers wrap where they are subtracted
+    np.testing.assert_array_equal(*(one((TIMES[0] + TIMES[1]) / 2) for one in whole))
     for t, point in zip(TIMES, POINTS, strict=True):
         np.testing.assert_allclose(path(t)[0], point, atol=1e-12)
     for t in TIMES[1:-1]:

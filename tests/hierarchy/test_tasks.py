@@ -12,7 +12,8 @@ from scene import FRAME, PATH, ROBOT, TASKS, compiled_rows, place_of, state_at, 
 from scipy.linalg import expm
 from urdf_text import LIMIT, joint, link, placed, urdf
 
-from hierarchy import Robot, Stack, State, tasks
+from hierarchy import Robot, Stack, State, Task, tasks
+from hierarchy.activation import Activation
 from hierarchy.avoidance import Barrier, Measurement, Pairs
 from hierarchy.kinematics import cross, rotation_vector
 from hierarchy.paths import Ellipse
@@ -178,6 +179,37 @@ def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(tas
             assert replace(task, **{field.name: array.copy()}) == task
             assert replace(task, **{field.name: -array[::-1]}) != task
         assert (f" {field.name}=" in f" {repr(task).partition('(')[2]}") == field.init
+
+
+class First(Task):
+    """The first joint, by a user: of its one row the methods return a number."""
+
+    name, dimension = "first", 1
+
+    def error(self, state):
+        return 0.3 - state.q[0]
+
+    def jacobian(self, state):
+        return np.eye(1, state.n)
+
+    jacobian_derivative = jacobian
+
+    def desired_velocity(self, state):
+        return 0.1
+
+
+def test_a_number_for_the_only_row_serves_together_with_others():
+    state, whole = State.at(ROBOT, ROBOT.rest), tasks.Together([First(), tasks.Posture([0.5] * 7)])
+    np.testing.assert_array_equal(whole.error(state), [0.3, *[0.5] * 7])
+    np.testing.assert_array_equal(whole.desired_velocity(state), [0.1, *[0.0] * 7])
+    np.testing.assert_allclose(Activation(state, [First()], {"first": 0.6})(), [0.5])
+
+
+def test_frames_and_points_are_compared_by_their_numbers():
+    points = [replace(point, offset=point.offset.copy()) for point in ROBOT.control_points]
+    assert tasks.Avoidance(points) == tasks.Avoidance(list(ROBOT.control_points))
+    assert tasks.Avoidance(points) != tasks.Avoidance(points[::-1])
+    assert ROBOT.frame("end_effector") == FRAME != ROBOT.frame("joint_3")
 
 
 def test_manipulability_is_yoshikawas_and_has_no_row_at_a_singular_posture():

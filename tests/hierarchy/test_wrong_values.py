@@ -9,13 +9,24 @@ from typing import Annotated, Literal
 import numpy as np
 import pytest
 from refusals import refused
-from scene import FRAME, ROBOT, SENSOR
+from scene import FRAME, ROBOT, SENSOR, state_at
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
 from hierarchy import Hierarchy, Robot, Stack, State, Task, tasks
 from hierarchy.activation import Activation
-from hierarchy.avoidance import Barrier, Capsule, Obstacle, Repulsion, SurveillanceAreas
+from hierarchy.avoidance import (
+    Barrier,
+    Capsule,
+    ControlPoint,
+    Measurement,
+    Obstacle,
+    Obstacles,
+    Pairs,
+    Repulsion,
+    SurveillanceAreas,
+    measure_pairs,
+)
 from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.gate import check_rotation
 from hierarchy.limits import Limits
@@ -95,6 +106,15 @@ def ramping(carried):
     state = State.at(HUMANOID, HUMANOID.rest, t=0.9)
     state.carried = carried
     return tasks.Friction(opening()).rows(state)
+
+
+def grown():
+    """A task of more rows than the arrays of its stack, past whose end kernels would write."""
+    directions = [(1, 0, 0)]
+    stack = Stack([tasks.Along(HAND, directions)], "velocity")
+    stack.hierarchy(STATE)
+    directions.append((0, 1, 0))
+    stack.hierarchy(State.at(ROBOT, STATE.q))
 
 
 def slow(speed):
@@ -213,7 +233,19 @@ def limits(**settings):
     (lambda: SurveillanceAreas(0.2, 0.1, 0.1), "near"),
     (lambda: Barrier(0.1, recovery=NAN), "recovery = nan"),
     (lambda: Barrier(0.1, influence=0.1), "influence = 0.1 m must be more"),
+    *((lambda given=given: ControlPoint("x", *given), f"control point 'x': {said}")
+      for given, said in ((("hand", (0, 0, 0)), "joint = 'hand'"), ((1, (0, 0)), "offset [m]"))),
+    (lambda: tasks.Separation([ControlPoint("x", np.int64(99), (0, 0, 0))], KEPT).rows(STATE),
+     "points is on joint 99"),  # of another robot, past the end of its arrays
     (lambda: Capsule("x", 1, (0, 0, 0), (0, 0, 1), -1.0), "capsule 'x': radius [m] = -1"),
+    *((lambda ask=ask: ask(STATE), "on joint")  # of a larger robot, past the end of arrays
+      for ask in (tasks.SelfSeparation.of(HUMANOID, KEPT).error,
+                  tasks.Pointing(PALM, (0, 0, 1), 0.1).follow_cone_error)),
+    (lambda: SENSOR.measure(PANDA), "ExactDistances: state is of robot 'panda', not of 'kuka_lwr'"),
+    (lambda: setattr(Measurement(8), "active", 8), "active = 8: expected a whole number from -1"),
+    *((lambda size=size: measure_pairs(Pairs(*size), np.zeros((1, 3)), Obstacles()), said)
+      for size, said in (((2, 0), "points has shape (1, 3), expected (2, 3)"),
+                         ((1, 3), "0 obstacles, and pairs of 3"))),
     (lambda: tasks.SelfSeparation(ARM[:2], KEPT), "'self-separation': no pair among 2"),
     (lambda: tasks.Separation((), KEPT), "'separation': points: expected at least one control"),
     (lambda: tasks.CumulatedRepulsion(7, (), 0.1), "at least one control point"),
@@ -224,6 +256,9 @@ def limits(**settings):
     (lambda: tasks.Pointing(FRAME, (0.0, 0.0, 0.0), 0.1), "axis"),
     (lambda: tasks.Avoidance(POINTS, 2), "rows = 2: expected one of 1, 3"),
     (lambda: tasks.Avoidance(POINTS, 1).jacobian(STATE), "no measurement"),
+    *((lambda task=task: task.jacobian(state_at(STATE.q, STATE.v)), f"{len(task.points)} control "
+       "points, and distances of 9")  # beyond the end of an array
+      for task in (tasks.Avoidance(POINTS[:2]), tasks.CumulatedRepulsion(7, POINTS * 2, 0.1))),
     (lambda: tasks.JointDamping(7, 1.0, "momentum"), "weight"),
     *((lambda asked=asked: asked(PANDA), "on joint 'joint_7', which is 'panda_joint7' of robot "
        "'panda': it is of another robot") for asked in (
@@ -260,11 +295,13 @@ def limits(**settings):
     (lambda: circle((0, 0, 0), 0.1, (0, 0, 0)), "normal: tuple (0, 0, 0) is no direction"),
     (lambda: corners((0, 1), (0, 1), (0, 0, 0)), "sole: up: tuple (0, 0, 0) is no direction"),
     (lambda: Loop(0.0), "loop: period [s] = 0: expected"), (lambda: Loop(0.1, behind=0), "behind"),
+    (lambda: Loop(0.1, behind=2.5), "behind = 2.5: expected a whole number from 1 on"),
     (lambda: Loop(0.1, overrun="skipp"), "did you mean 'skip'"),
     (lambda: Loop(0.25, watchdog=0.1), "watchdog 0.1 s must be longer than the period 0.25 s"),
     (lambda: Loop(0.1).run(print, None, 1.0), "safe_stop: expected a function, got NoneType None"),
     (lambda: Loop(1e-3).run(lambda t: A[0], Event, 1.0, record=3),
      "loop: record = 3, and the command is ndarray array([1., 0.])"),
+    (lambda: Loop(1e-3).run(lambda t: {}, Event, 1.0, record=3), "and the command is dict {}"),
     (lambda: Loop(1e-3).run(print, Event, 1e15), "loop: a log of 1e+18 ticks: "),
     (lambda: Loop(0.1).run(print, print, 1.0, record=-1), "loop: record = -1: expected a whole"),
     (lambda: Stack(metric="inertia"), "'mass' or None, got 'inertia'"),
@@ -322,6 +359,9 @@ def limits(**settings):
      "gain = [[1.0], [1.0, 2.0]], expected a number >= 0"),
     *((lambda wrong=wrong: StepLimits(slow(wrong), 0.01), f"velocity_limit[0] is {wrong:g}")
       for wrong in (-1.0, NAN)),
+    (grown, "task 'along': it has 2 rows, and arrays of 1 were made; make another"),
+    (lambda: StepLimits(ROBOT, 0.01, 0.0), "gain [1/s] = 0: expected a number > 0"),
+    (lambda: Obstacles([Obstacle("point", (0, 0, 0))]).shift(0, (NAN, 0, 0)), "shift: offset [m]"),
     (lambda: Robot.load("nowhere.SDF"), "does not exist"),
     (lambda: Robot.load("/"), "is a folder")])
 def test_a_wrong_value_is_refused_and_named(make, said):

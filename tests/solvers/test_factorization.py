@@ -80,6 +80,15 @@ def test_directions_of_deleted_levels_are_dropped_once_they_are_most():
     assert (sizes[0], max(sizes), sizes.count(3)) == (3, 13, 4)
 
 
+@pytest.mark.parametrize(("tolerance", "ranks"), [(1e-8, (3, 1)), (0.0, (3, 2))])
+def test_no_rank_is_more_than_the_rows(tolerance, ranks):
+    """With a tolerance of zero rounding counts, and counted on and on."""
+    A = np.random.default_rng(0).normal(size=(5, 7))
+    A[3] = A[0] + A[1]
+    levels = [A[:3], A[3:]]
+    assert Factorization(levels, settings=make("tpm", rank_tolerance=tolerance)).ranks == ranks
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_f_and_g_are_those_of_the_matrix_made_from_the_rows(case):
     factored = Factorization.of(build(case, True))
@@ -94,6 +103,14 @@ def test_f_and_g_are_those_of_the_matrix_made_from_the_rows(case):
 
 
 @pytest.mark.filterwarnings("ignore:overflow")  # of the kernels as plain Python
+@pytest.mark.parametrize("scale", [1e-300, 1e-160, 1.0, 1e150])
+def test_rows_of_any_size_are_met(scale):
+    A = np.array([[1.0, 2.0, 3.0], [0.0, 1.0, 1.0]])
+    res = Factorization([scale * A]).solve(np.array([scale, 0.0]))
+    assert res.status is Status.SOLVED
+    np.testing.assert_allclose(A @ res.x, [1.0, 0.0], atol=1e-12)
+
+
 def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     factored = Factorization([[[1.0, 0.0]], [[1e200, 1e200]]], names=["a", "b"])
     for _ in range(2):

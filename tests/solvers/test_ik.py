@@ -263,6 +263,7 @@ def test_a_configuration_does_not_depend_on_the_gains_of_its_tasks():
 
 @pytest.mark.parametrize("make_task", [
     lambda path: Position(FRAME, path), lambda path: FrameLog(FRAME, path, np.eye(3)),
+    lambda path: Together([Position(FRAME, path), Orientation(FRAME, np.eye(3))]),
     lambda path: Along(Position(FRAME, path), ((0.6, 0.0, 0.8), (0.0, 1.0, 0.0)))])
 def test_a_target_that_moves_is_reached_where_it_is_at_that_time(make_task):
     found = solve_ik(ROBOT, Q, [make_task(circle([0.3, 0.4, 0.3], 0.1))], until=1e-6, t=0.3)

@@ -85,8 +85,9 @@ class ContactMotion(NamedRows, Written):
 
     @property
     def _tasks(self) -> Together:
-        anchors = self.anchors or [np.vstack([np.zeros(3), np.eye(3)])] * len(self.of.contacts)
-        return Together([self._task(*pair) for pair in zip(self.of.contacts, anchors, strict=True)])
+        contacts, anchors = self.of.contacts, self.anchors
+        anchors = [np.eye(4, 3, -1)] * len(contacts) if anchors is None else anchors
+        return Together([self._task(*pair) for pair in zip(contacts, anchors, strict=True)])
 
     def _task(self, contact: Contact, anchor: Array) -> Task:
         frame, path, name = _held(contact), Still(anchor[0].tolist()), contact.name

@@ -192,8 +192,8 @@ class CentreOfPressure(FixedRows):
 def _distances(contact: Contact) -> Array:
     """Distance (edges, k) [m] of each point from each edge of the hull, inward positive."""
     points = np.array(contact.points, dtype=float) @ contact.sole[:2].T
-    edges = _edges(np.unique(points, axis=0))
-    return np.array([(points - start) @ inward for start, inward in edges])
+    different = np.unique(points.round(6), axis=0, return_index=True)[1]  # to 1 um
+    return np.array([(points - start) @ inward for start, inward in _edges(points[different])])
 
 
 def _edges(points: Array) -> Iterator[tuple[Array, Array]]:

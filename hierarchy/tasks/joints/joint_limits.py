@@ -185,7 +185,8 @@ class StepLimits(JointRows):
     def __post_init__(self) -> None:
         positive(f"task {self.name!r}: period [s]", self.period)
         gain = APPROACH / self.period if self.gain is None else self.gain
-        number(f"task {self.name!r}: gain [1/s]", gain, 0.0, 1.0 / self.period)
+        number(f"task {self.name!r}: gain [1/s]", gain, largest=1.0 / self.period)
+        positive(f"task {self.name!r}: gain [1/s]", gain)
         set_frozen(self, gain=gain)
         super().__post_init__()
         fastest = self.robot.velocity_limit

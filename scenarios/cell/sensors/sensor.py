@@ -60,7 +60,7 @@ class ExactDistances:
     def __init__(self, robot: Robot, obstacles: Obstacles, body: Repulsion | None = None,
                  tip: Repulsion | None = None,
                  mean_within: tuple[float, float] = (0.0, 0.0), pairs: bool = False) -> None:
-        self.points = sensed_points(robot)
+        self._robot, self.points = robot, sensed_points(robot)
         self._obstacles, self._mean_within = obstacles, np.array(mean_within)
         self._joints, self._offsets = pack_points(self.points)
         self._laws = packed_laws(body, tip)
@@ -83,6 +83,7 @@ class ExactDistances:
     def measure(self, state: State) -> Measurement:
         """Measure at a state and attach the measurement to it; valid until the next call."""
         if state is not self._followed:
+            self._robot.check_same("ExactDistances: state", state.robot)
             self._followed = state
             self._measure = bind(measure_exactly, state.placements, self._joints, self._offsets,
                                  self._obstacles.table, self._laws, self._mean_within,
