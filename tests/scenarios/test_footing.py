@@ -79,7 +79,9 @@ def a_biped(folder):
 def test_feet_that_hold_each_other_in_a_symmetric_pose_are_said(tmp_path):
     keys = a_biped(tmp_path)
     words = "1 of 18 rows that hold the contacts depend on the others"
-    assert words in " ".join(said(load("stand-push").with_changes(keys)))
+    for place in ("stack", "bounds"):
+        changed = {**keys, "limits.place": place}
+        assert words in " ".join(said(load("stand-push").with_changes(changed)))
     keys["start"]["joints"] |= {"l_yaw": 0.2, "r_yaw": -0.2}
     assert words not in " ".join(said(load("stand-push").with_changes(keys)))
 
