@@ -57,6 +57,8 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, com
     simulation_is(breaks_under_recursive, monkeypatch)
     done = compare("ellipse", ["recursive", "tpm"], out=tmp_path / "b")
     assert [run.fault for run in done.runs] == ["ArithmeticError: [bold]no[/bold] answer", None]
+    command("replay b")
+    assert (tmp_path / "b" / "replay.html").exists()
     said = command("compare ellipse --resolvers recursive,tpm --workers 1 --out c", code=1).err
     assert "[bold]no[/bold] answer" in said
 
