@@ -219,6 +219,9 @@ def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
     run = simulate(load("reach-torque-smooth").with_changes({"control.duration": 0.05}))
     assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
     assert [jump.tick for jump in jumps(run, 1)] == [1]  # the first that has one before it
+    calm = {"control.duration": 0.26, "control.damping": 1.0}
+    run = simulate(load("strictness", calm).with_resolver("merged"))
+    assert [cause.kind for cause in jumps(run, 250)[0].causes] == ["data"]
 
 
 @pytest.mark.parametrize(("step", "shown"), [(50.0 * (1.0 + 1e-14), 0), (50.1, 1)])
