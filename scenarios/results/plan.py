@@ -213,7 +213,7 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
     lasting = {"control.duration": sweep.duration} if sweep.duration else {}
     asked = [load(name, lasting) for name in sweep.scenarios] if scenarios is None else scenarios
     columns, refused = side_by_side(asked, sweep.resolvers or None, f"sweep {sweep.name!r}: ")
-    alone = len({run.spec for run in columns}) == 1 and len(asked) > 1
+    alone = len({run.spec for run in columns}) == 1 < len(columns)
     code, content = digest(), cache(_content)
     runs: dict[str, Job] = {}
     for index in range(sweep.samples):
