@@ -16,6 +16,7 @@ from hierarchy import HierarchyError
 from scenarios import load, shipped, simulate
 from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
+from scenarios.results import plan as plan_of
 from scenarios.results import pool, sampled_page
 from scenarios.results.columns import Results, verdict
 from scenarios.results.plan import Job, Outcome, load_sweep, outcome, plan, shipped_sweeps
@@ -132,6 +133,16 @@ def test_runs_are_made_again_after_a_file_that_their_scenario_names_has_changed(
         keys.append({one.key for one in planned.runs})
     assert keys[0] == keys[1]
     assert not keys[0] & keys[2]
+
+
+def test_runs_are_made_again_after_a_file_that_a_robots_file_includes_has_changed(tmp_path):
+    (tmp_path / "whole.xml").write_text(
+        '<mujoco><worldbody><include file="part.xml"/></worldbody></mujoco>')
+    digests = []
+    for mass in "115":
+        (tmp_path / "part.xml").write_text(f'<mujocoinclude><geom size="1" mass="{mass}"/></>')
+        digests.append(plan_of._content(str(tmp_path / "whole.xml")))
+    assert digests[0] == digests[1] != digests[2]
 
 
 @pytest.mark.parametrize(("variation", "says"), [
