@@ -30,8 +30,9 @@ def footing(controller: Controller) -> Iterator[str]:
         yield from _balanced(controller)
         yield from _unsupported(controller)
     if controller.answered:
-        yield from _too_fast(controller)
-        yield from _held_by_friction(controller)
+        if controller.sent.size:  # there are joints
+            yield from _too_fast(controller)
+            yield from _held_by_friction(controller)
         yield from _not_held(controller)
         yield from _dependent(controller)
 
