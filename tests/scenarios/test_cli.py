@@ -212,6 +212,7 @@ def test_an_error_names_the_one_file_of_a_command_once(text, files, said):
 def test_names_of_settings_that_differ_late_give_different_folders():
     one, other = (slug(f"tpm:damping=0.{'0' * 300}{digit}") for digit in "12")
     assert one != other
+    assert slug("weighted:strict_levels=1") != slug("weighted:strict_levels=-1")
     assert max(len(one), len(other)) <= 200
     assert len(f"{in_runs(100 * '日').name}-2".encode()) <= 255
 
