@@ -171,7 +171,7 @@ def finite_numbers(what: str, values: object, size: int | None = None) -> NDArra
 
 
 def file_path(what: str, value: object) -> Path:
-    """Return a path; raise a HierarchyError unless it is a text or a path that a file can have."""
+    """Return a path, ~ as the home folder; refuse all but texts and paths that a file can have."""
     if not isinstance(value, str | os.PathLike) or not str(value).strip():
         raise HierarchyError(f"{what}: expected a path, got {brief(value)}")
     try:
@@ -179,7 +179,7 @@ def file_path(what: str, value: object) -> Path:
     except (OSError, ValueError) as error:
         refuse(isinstance(error, ValueError) or getattr(error, "errno", 0) == ENAMETOOLONG,
                f"{what}: no file can be called {str(value)[:60]!r}")
-    return Path(value)
+    return Path(os.path.expanduser(value))  # noqa: PTH111 - raises for no user
 
 
 def missing(error: ModuleNotFoundError, extra: str) -> ModuleNotFoundError:

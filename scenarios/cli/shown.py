@@ -33,16 +33,20 @@ def view(folders: Runs,
     """
     from scenarios.draw.viewer.server import announce, served
 
-    runs = [run for folder in folders for run in (
-        sorted(file.parent for file in folder.glob("*/*/run.npz"))
-        if (folder / "comparison.json").is_file() else [folder])]
-    page = _replay(runs, beside=side_by_side)
+    page = _replay(_each(folders), beside=side_by_side)
     with served(port, lambda: page) as address, suppress(KeyboardInterrupt):
         announce(address, browser)
         while True:
             time.sleep(3600.0)
     print()
     return 0
+
+
+def _each(folders: list[Path]) -> list[Path]:
+    """Return the folders of runs, of a comparison those of its own."""
+    return [run for folder in folders for run in (
+        sorted(file.parent for file in folder.glob("*/*/run.npz"))
+        if (folder / "comparison.json").is_file() else ()) or [folder]]
 
 
 def _replay(folders: list[Path], rate: float = 30.0, beside: bool = False) -> str:
@@ -141,7 +145,7 @@ def replay(folders: Runs,
 
     target = out if out is not None else folders[0] / "replay.html"
     refuse(target.suffix != ".html", f"{target} is no .html file")  # which another may be
-    text = _replay(folders, rate)
+    text = _replay(_each(folders), rate)
     with named(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         write_text(target, text)
@@ -185,4 +189,4 @@ def figures(folders: Runs,
     """
     from scenarios.draw.figures.letter import redraw
 
-    print_files(redraw(folders, style, out), as_json)
+    print_files(redraw(_each(folders), style, out), as_json)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from hierarchy.errors import refuse
 from hierarchy.robots.names import in_package, is_file_name
 from scenarios.config.distributions import flat
 
@@ -26,9 +27,10 @@ def files_in(data: dict[str, Any]) -> Iterator[tuple[Any, Any]]:
 
 
 def make_absolute(data: dict[str, Any], here: Path) -> None:
-    """Put the folder `here` in front of the files that the data name."""
+    """Put the folder `here` in front of the files that the data name; refuse names not in UTF-8."""
     for table, key in files_in(data):
-        table[key] = str((here / table[key]).absolute())
+        table[key] = path = str((here / table[key]).absolute())
+        refuse(path.encode(errors="ignore").decode() != path, f"{path!r} is not UTF-8: rename it")
 
 
 def _recorded(data: Any) -> Iterator[tuple[Any, Any]]:

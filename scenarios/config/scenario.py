@@ -138,7 +138,7 @@ class Scenario(Section):
     def _lists_tasks_apart(self) -> Iterator[str]:
         if self.tasks and self.control.stack == "switched":
             yield '[[tasks]] goes with control.stack = "hierarchical"'
-        names = [task.title for task in self.tasks]
+        names = [task.title.replace(" ", "_") for task in self.tasks]  # as in those of signals
         names += [name for name in ("position", "pointing", "posture") if getattr(self, name)]
         for name, count in Counter(names).items():
             if count > 1:

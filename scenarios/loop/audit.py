@@ -13,6 +13,7 @@ from scenarios.cell.sensors import ExactDistances
 from scenarios.loop.controller import Controller
 from solvers import Resolution, Status, certify
 from solvers.resolution import SaturatedResolution
+from solvers.resolver import Around
 from solvers.resolvers.settled import Settled
 from solvers.status import EQUAL, FREE
 
@@ -88,6 +89,8 @@ class ActiveSets:
 def certify_tick(tick: int, controller: Controller) -> Signals:
     """Whether `solvers.certify` accepts the answer, to what the resolver was asked in the end."""
     h, resolver, found = controller.hierarchy, controller.resolver, controller.resolution
+    if isinstance(resolver, Around) and not isinstance(resolver, Settled):
+        resolver = resolver.inner  # that which faults are around
     if isinstance(resolver, Settled) and h.plain:
         h = resolver.asked(h)
     return {"certified": certify(h, found.x, witnesses=found.witnesses).certified}

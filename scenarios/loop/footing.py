@@ -30,8 +30,9 @@ def footing(controller: Controller) -> Iterator[str]:
         yield from _balanced(controller)
         yield from _unsupported(controller)
     if controller.answered:
-        yield from _too_fast(controller)
-        yield from _held_by_friction(controller)
+        if controller.sent.size:  # there are joints
+            yield from _too_fast(controller)
+            yield from _held_by_friction(controller)
         yield from _not_held(controller)
         yield from _dependent(controller)
 
@@ -121,13 +122,12 @@ def _not_held(controller: Controller) -> Iterator[str]:
 def _dependent(controller: Controller) -> Iterator[str]:
     """Yield that contacts and mechanism have fewer independent rows at the start than nearby."""
     cell, h = controller.cell, controller.hierarchy
-    count = sum(size for name, size in zip(h.names, h.sizes, strict=True)
-                if name in ("mechanism", "physics"))
+    holding = np.isin(np.repeat(h.names, h.sizes), ("mechanism", "physics"))
     order, rest = h.names, np.zeros(cell.robot.n)
 
     def rank(q: Array) -> int:
         cell.state.move(0.0, q, rest)
-        rows = cell.stack.hierarchy(cell.state, order).A[:count]
+        rows = cell.stack.hierarchy(cell.state, order).A[holding]
         return int((np.linalg.svd(_unit(rows), compute_uv=False) > _DEPENDENT).sum())
 
     q = cell.state.q.copy()

@@ -141,7 +141,7 @@ def _limits(recording: Recording) -> Iterator[_Asked]:
     yield from _of_units("speed limits", speeds, beyond)
     if "torque_limit" in recording:
         beyond = np.abs(recording["command"]) - recording["torque_limit"]
-        yield from _of_units("torque limits", ["N m"] * beyond.shape[1], beyond)
+        yield from _of_units("torque limits", robot.effort_units[robot.actuated:], beyond)
 
 
 def _of_units(name: str, units: Sequence[str], beyond: Array) -> Iterator[_Asked]:

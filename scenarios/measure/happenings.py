@@ -27,7 +27,6 @@ _LARGEST = 3       # jumps
 _LOOKED_AT = 20   # ticks of a level, spread over those in which it was missed
 _LEAST = 0.01     # share of a level's ticks: what is given up for less is not said
 _OFTEN = 0.25     # share of the ticks looked at: what holds back less often is not said
-_TORQUE = {"rad": "N m", "m": "N"}
 _PER = {"acceleration": "/s^2", "velocity": "/s"}
 
 Shares = tuple[tuple[str, float], ...]
@@ -67,9 +66,9 @@ def jumps(recording: Recording, tick: int | None = None, least: float = 0.0) -> 
     for k, solve in solves.items():
         change = np.nan_to_num(np.abs(recording["command"][k] - recording["command"][k - 1]))
         i = int(change.argmax())
-        joint, of = cell.robot.n - len(change) + i, cell.robot
-        unit = of.velocity_units[joint]
-        unit = _TORQUE[unit] if level == "torque" else unit + _PER[level]
+        joint, of = cell.robot.n - len(change) + i, recording.facts.robot
+        unit = (of.effort_units[joint] if level == "torque" else
+                of.velocity_units[joint] + _PER[level])
         found.append(Jump(k, float(recording["t"][k]), f"{level} of {of.velocity_names[joint]}",
                           float(change[i]), unit, tuple(_causes(recording, cell, rows, k, solve))))
     return found
@@ -85,7 +84,8 @@ def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
     def answer(memory: Any, h: Hierarchy) -> Array:
         return resolver.solve(h, memory).x
 
-    for k in range(max(ticks) + 1 if isinstance(resolver, Merged) else 0):
+    merged = isinstance(getattr(resolver, "inner", resolver), Merged)  # settled or not
+    for k in range(max(ticks) + 1 if merged else 0):
         carried[k] = memory
         if (h := rows.hierarchy(k)) is not None:
             memory = resolver.solve(h, memory).memory

@@ -94,10 +94,9 @@ def judge(recording: Recording, cell: Cell) -> None:
     rows = Rows(recording, cell)
     fates = Fates(recording.task_names, recording.ticks, cell.robot.n)
     accuracy, commands = recording.facts.resolver.accuracy, rows.meant
-    changed = recording.get("changed", np.zeros(recording.ticks, bool))
     try:
         for k in range(recording.ticks):
-            h = None if changed[k] else rows.hierarchy(k)
+            h = rows.hierarchy(k)
             if h is not None and not np.isnan(commands[k, 0]):
                 fates.judge(k, cell, h, commands[k], accuracy)
     finally:
@@ -118,6 +117,7 @@ class Rows:
         self._follows = level != "acceleration"  # whether rows depend on the last command
         self._first = self._v[0] if level == "velocity" else None
         self._carried: list[Array | None] = [None]  # by the contacts before each tick
+        self._changed = recording.get("changed", np.zeros(recording.ticks, bool))
         self.meant = recording["command"] if level != "torque" else np.hstack([
             recording["planned_acceleration"],
             recording["planned_force"].reshape(recording.ticks, -1)])
@@ -135,7 +135,7 @@ class Rows:
     def hierarchy(self, k: int) -> Hierarchy | None:
         """Return the rows of tick k, valid until the next; None if they differ from the run's."""
         t, q, v, cell, order = self._t, self._q, self._v, self._cell, self._orders[self._order[k]]
-        if not order:
+        if not order or self._changed[k]:
             return None
         if cell.state.period > 0.0:  # differences are against the tick before
             cell.state.move(t[max(k - 1, 0)], q[max(k - 1, 0)], v[max(k - 1, 0)])

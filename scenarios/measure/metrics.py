@@ -10,7 +10,7 @@ import numpy as np
 from hierarchy import plugins
 from hierarchy.errors import expect_each
 from hierarchy.problem import Array
-from scenarios.measure import safety  # noqa: F401, registers metrics
+from scenarios.measure import safety
 from scenarios.measure.metric import NOTHING, Criteria, finite, known, largest, register, true
 from scenarios.measure.metric import Metric as Metric
 from scenarios.recording import listed
@@ -110,10 +110,11 @@ def _returning(recording: Recording, by: Criteria) -> Iterator[Metric]:
     yield from _rms_and_max("error_returned", "Error after return", returned, "m", group=group,
                             note=f"from {_AFTER:g} s after the path is within reach")
     jerk = np.diff(recording["a"], axis=0) / np.diff(t)[:, None]
-    yield from _rms_and_max("jerk", "Joint jerk", jerk, "rad/s^3", group=group)
+    yield from _rms_and_max("jerk", "Joint jerk", jerk, safety.units_of(recording, "/s^3"),
+                            group=group)
     excess = np.maximum(np.abs(v) - recording["velocity_limit"], 0.0)
-    yield Metric("speed_limit_excess", "Beyond a speed limit, max", largest(excess), "rad/s",
-                 group=group)
+    yield Metric("speed_limit_excess", "Beyond a speed limit, max", largest(excess),
+                 safety.units_of(recording, "/s"), group=group)
 
 
 def _left_path(recording: Recording) -> tuple[Spans, Array] | None:

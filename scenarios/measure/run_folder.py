@@ -43,7 +43,8 @@ def save(recording: Recording, folder: str | Path) -> Path:
     signals: dict[str, Any] = recording.signals
     times = {name: signal for name, signal in signals.items() if name.startswith("time_")}
     rest = {name: signal for name, signal in signals.items() if name not in times}
-    with whole(file_path("save", folder)) as partial:
+    path = file_path("save", folder)
+    with whole(path) as partial:
         np.savez_compressed(partial / "run.npz", **rest,
                             orders=np.array(recording.orders, dtype=np.str_),
                             fault=np.array(recording.fault or ""),
@@ -56,7 +57,7 @@ def save(recording: Recording, folder: str | Path) -> Path:
         (partial / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
         write_json(partial / "metrics.json", metrics.as_plain_data(recording)
                    | verdict(recording).as_plain_data())
-    return Path(folder)
+    return path
 
 
 def kept(recording: Recording, folder: Path) -> str | None:

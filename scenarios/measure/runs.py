@@ -1,7 +1,7 @@
 """Runs of scenarios side by side: what was measured, in rows with the best values marked."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -124,12 +124,11 @@ def table(runs: Sequence[Run]) -> list[Row]:
     """
     one_scenario = len({run.scenario.name for run in runs}) == 1
     competes = [one_scenario and run.fault is None for run in runs]
-    known = {name: metric for run in runs for name, metric in run.metrics.items()
-             if not metric.detail}
     rows = []
-    for name, metric in known.items():
-        found = [run.metrics.get(name) for run in runs]
-        if all(m is None or m.value is None for m in found):
+    for name, metric in by_name(run.metrics for run in runs).items():
+        found = [replace(run.metrics[name], unit=metric.unit) if name in run.metrics else None
+                 for run in runs]
+        if metric.detail or all(m is None or m.value is None for m in found):
             continue
         best = _best({i: m.value for i, m in enumerate(found)
                       if m and m.value is not None and competes[i]}, metric.lower_is_better)
@@ -137,6 +136,15 @@ def table(runs: Sequence[Run]) -> list[Row]:
             Cell(m.shown() if m else "–", "best" if i in best else "out" if runs[i].fault else "",
                  m.note if m else "") for i, m in enumerate(found))))
     return grouped(rows)
+
+
+def by_name(each: Iterable[Mapping[str, Metric]]) -> dict[str, Metric]:
+    """Return the metrics of runs by name, in "rad or m" where joints turn in some and slide."""
+    found: dict[str, Metric] = {}
+    for name, one in (item for of in each for item in of.items()):
+        units = [*found[name].unit.split(" or "), one.unit] if name in found else [one.unit]
+        found[name] = replace(one, unit=" or ".join(dict.fromkeys(units)))
+    return found
 
 
 def grouped(rows: Sequence[Row]) -> list[Row]:

@@ -7,7 +7,17 @@ import numpy as np
 
 from hierarchy.problem import Array
 from scenarios.config.sections.kinds import ListedForce
-from scenarios.measure.metric import Criteria, Metric, known, largest, least, passed, register, true
+from scenarios.measure.metric import (
+    Criteria,
+    Metric,
+    finite,
+    known,
+    largest,
+    least,
+    passed,
+    register,
+    true,
+)
 from scenarios.recording.recording import Recording
 
 _ON_IT = 1e-4  # [m] below a distance that still counts as keeping it
@@ -58,16 +68,17 @@ def _contacts(recording: Recording, by: Criteria) -> Iterator[Metric]:
 
 @register("motion")
 def _motion(recording: Recording, by: Criteria) -> Iterator[Metric]:
-    v = true(recording, "v")
+    control, first = recording.scenario.control, recording.facts.robot.actuated
+    v, a, command = (values[:, first:] for values in (
+        true(recording, "v"), recording["a"], recording["command"]))
     speed, rate = units_of(recording, "/s"), units_of(recording, "/s^2")
     yield _joint_limit_excess(recording)
     yield _metric("speed_max", "Joint speed, max", largest(v), speed)
     yield from steps("velocity", "Joint speed", v, speed, "of the joints, not of the command")
     if "true_v" in recording:
         yield _metric("velocity_step_max_measured", "Joint speed step measured, max",
-                      largest(np.diff(recording["v"], axis=0)), speed, None, detail=True,
+                      largest(np.diff(recording["v"][:, first:], axis=0)), speed, None, detail=True,
                       note="with the errors of the sensor")
-    control, command = recording.scenario.control, recording["command"]
     commanded = "of the command, not of the joints"
     meant = "" if recording.scenario.plant.follows or control.level == "torque" else commanded
     if control.level != "torque":
@@ -75,15 +86,14 @@ def _motion(recording: Recording, by: Criteria) -> Iterator[Metric]:
                       largest(np.diff(command, axis=0) if control.level == "velocity" else
                               command * control.period), speed,
                       note=commanded)
-    yield _metric("acceleration_max", "Joint acceleration, max", largest(recording["a"]),
-                  rate, note=meant)
-    yield from steps("acceleration", "Joint acceleration", recording["a"], rate, meant)
+    yield _metric("acceleration_max", "Joint acceleration, max", largest(a), rate, note=meant)
+    yield from steps("acceleration", "Joint acceleration", a, rate, meant)
 
 
 def units_of(recording: Recording, per: str = "") -> str:
     """Return the units of the joints, "rad", "m" or "rad or m", each `per` something."""
     robot = recording.facts.robot
-    joints = robot.velocity_units[6 if robot.base == "floating" else 0:]
+    joints = robot.velocity_units[robot.actuated:]
     return " or ".join(f"{unit}{per}" for unit in sorted({*joints}, reverse=True)) or f"rad{per}"
 
 
@@ -166,7 +176,7 @@ def _wanted(recording: Recording, settle: float) -> Iterator[Metric]:
         key, title = task.title.replace(" ", "_"), f"{task.title[0].upper()}{task.title[1:]}"
         error = force[after] - task.target[0]
         yield Metric(f"{key}_rms", f"{title}: error after {settle:g} s, rms",
-                     float(np.sqrt(np.mean(error**2))), "N", group="Contacts")
+                     finite(np.sqrt(np.mean(error**2))), "N", group="Contacts")
         yield Metric(f"{key}_touching_share", f"{title}: time in contact after {settle:g} s",
                      float(np.mean(force[after] > 0.0)), "share", False, "Contacts")
 
@@ -182,22 +192,24 @@ def wanted_forces(recording: Recording) -> Iterator[tuple[ListedForce, Array]]:
 def _torques(recording: Recording) -> Iterator[Metric]:
     """Yield the largest use of the torque limits, and the largest torque steps."""
     torque, metric = recording["command"], partial(Metric, group="Torques")
+    robot = recording.facts.robot
     if "torque_limit" in recording:
         at = (np.abs(torque) >= _AT_LIMIT * recording["torque_limit"]).any(axis=1)
         yield metric("torque_limit_share", "Time with a torque at its limit", float(at.mean()),
                      "share")
-    yield from steps("torque", "Torque", torque, "N m", group="Torques")
-    if "com" in recording and recording.facts.robot.base == "floating":
+    units = sorted({*robot.effort_units[robot.actuated:]}, reverse=True)
+    yield from steps("torque", "Torque", torque, " or ".join(units), group="Torques")
+    if "com" in recording and robot.base == "floating":
         height = recording["com"][:, 2]
         yield metric("com_drop_max", "Centre of mass below its start, max",
-                     float(height[0] - height.min()), "m")
+                     finite(height[0] - height.min()), "m")
         moved = np.linalg.norm((recording["com"][-1] - recording["com"][0])[:2])
         stands = standing(recording)
         if stands is not None:
             yield metric("stands_at_rest", f"Stands at rest in the last {REST:g} s",
                          float(stands), "", False,
                          note=f"joints below {CALM:g} rad/s, less than {SUNK:g} m below its start")
-        yield metric("com_travel", "Centre of mass from start to end", float(moved), "m", None)
+        yield metric("com_travel", "Centre of mass from start to end", finite(moved), "m", None)
 
 
 def standing(recording: Recording) -> bool | None:

@@ -108,16 +108,17 @@ def _ends(found: Sequence[Verdict]) -> str:
 
 def _promises(found: Sequence[Verdict]) -> str:
     """Return which promises broke, under whom, and by how much at worst."""
-    by: dict[str, list[tuple[str, Goal]]] = {}
+    by: dict[tuple[str, str], list[tuple[str, Goal]]] = {}
     for one in found:
         for goal in one.goals:
             if goal.promise and not goal.met:
-                by.setdefault(f"{goal.name} {goal.asked}".strip(), []).append((one.label, goal))
+                by.setdefault((f"{goal.name} {goal.asked}".strip(), goal.unit), []).append(
+                    (one.label, goal))
     if not by:
         promised = any(goal.promise for one in found for goal in one.goals)
         return "Every promise was kept." if promised else ""
     said = []
-    for what, who in by.items():
+    for (what, _), who in by.items():
         worst = max((goal for _, goal in who), key=lambda goal: goal.worst)
         under = "" if len(found) == 1 else " under all" if len(who) == len(found) else (
             f" under {some([label for label, _ in who], _NAMED)}")
@@ -131,14 +132,14 @@ def _targets(found: Sequence[Verdict]) -> str:
 
     Those that were left come first, in order of priority.
     """
-    by: dict[str, dict[str, Goal]] = {}
+    by: dict[tuple[str, str], dict[str, Goal]] = {}
     for one in found:
         for goal in one.goals:
             if not goal.promise:
-                by.setdefault(goal.name, {})[one.label] = goal
+                by.setdefault((goal.name, goal.unit), {})[one.label] = goal
     left = sorted(by.items(), key=lambda one: all(goal.met for goal in one[1].values()))
     said = []
-    for name, of in left[:_NAMED]:
+    for (name, _), of in left[:_NAMED]:
         ranked = sorted(of, key=lambda label: float(f"{of[label].median:.3g}"))
         low, high = (shown(of[label].median, of[label].unit) for label in (ranked[0], ranked[-1]))
         worst = max(of.values(), key=lambda goal: goal.worst)

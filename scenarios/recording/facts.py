@@ -79,6 +79,16 @@ class RobotFacts:
     floor: float
 
     @property
+    def actuated(self) -> int:
+        """The first velocity of a joint: those before are a floating base's."""
+        return 6 if self.base == "floating" else 0
+
+    @property
+    def effort_units(self) -> tuple[str, ...]:
+        """The unit of the effort along each velocity (n,)."""
+        return tuple("N" if unit == "m" else "N m" for unit in self.velocity_units)
+
+    @property
     def speed_names(self) -> tuple[str, ...]:
         """The name of each velocity, with its unit where that is not rad/s."""
         return tuple(name if unit == "rad" else f"{name} [{unit}/s]" for name, unit in zip(

@@ -175,7 +175,7 @@ class Recording:
         per_joint = {
             "joint": robot.position_units, "joint/s": velocities, "joint/s^2": accelerations,
             "command": {"velocity": velocities, "acceleration": accelerations,
-                        "torque": ("N m",)}[level]}
+                        "torque": robot.effort_units[robot.actuated:]}[level]}
         return {name: per_joint.get(of.unit, (of.unit,)) for name in self.signals
                 if (of := known(name)) and of.unit}
 

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -15,14 +15,22 @@ from hierarchy.words import listed
 from scenarios.measure import statistics
 from scenarios.measure.metric import NOTHING
 from scenarios.measure.metrics import Metric
-from scenarios.measure.runs import Cell, Row, grouped
+from scenarios.measure.runs import Cell, Row, by_name, grouped
 from scenarios.measure.statistics import Paired, Spread, paired, wilson
 from scenarios.results.plan import Job, Outcome, Plan
 
 # What is weighed in the verdict.
 _WEIGHED = ("position_error_median_settled", "body_distance_min", "ee_distance_min",
             "cone_violation_max", "speed_max", "acceleration_max")
-_TOLERANCE = 1e-6  # [rad] beyond a joint limit that still counts as within it
+# Criteria, and the values of metrics with which a run does not meet them; 1e-6 rad are rounding.
+_BROKEN: dict[str, dict[str, tuple[Callable[..., NDArray[np.bool_]], float]]] = {
+    "Touched nothing": {"body_distance_min": (np.less_equal, 0.0),
+                        "ee_distance_min": (np.less_equal, 0.0),
+                        "contact_ticks": (np.greater, 0.0)},
+    "Kept the joint limits": {"joint_limit_excess": (np.greater, 1e-6)},
+    "Every tick solved": {"ticks_not_solved": (np.greater, 0.0)},
+    "Kept the distance asked for": {"body_below_share": (np.greater, 0.0),
+                                    "ee_below_share": (np.greater, 0.0)}}
 
 
 class Share(NamedTuple):
@@ -115,25 +123,15 @@ class Results:
     def shares(self) -> dict[str, dict[str, Share]]:
         """Return the share of each resolver's runs that meet a criterion, by criterion and label.
 
-        Those are the criteria that can be judged; a failed run meets none.
+        Those are the criteria that any run has metrics of. A run without them meets a criterion if
+        it reached its end: it asked for no distance, or its robot has no limits.
         """
         met = {"Reached the end": self._ended}
-        near = [self.values[name] for name in ("body_distance_min", "ee_distance_min")
-                if name in self.values]
-        contacts = [self.values["contact_ticks"]] if "contact_ticks" in self.values else []
-        if near or contacts:
-            met["Touched nothing"] = np.all(
-                [*(values > 0.0 for values in near), *(values == 0.0 for values in contacts)],
-                axis=0)
-        for what, name, most in (("Kept the joint limits", "joint_limit_excess", _TOLERANCE),
-                                 ("Every tick solved", "ticks_not_solved", 0.0)):
-            if name in self.values:
-                met[what] = self.values[name] <= most
-        below = [self.values[name] for name in ("body_below_share", "ee_below_share")
-                 if name in self.values]
-        if below:
-            met["Kept the distance asked for"] = np.any(np.isfinite(below), axis=0) & ~np.any(
-                np.array(below) > 0.0, axis=0)
+        for what, of in _BROKEN.items():
+            if found := [(self.values[name], *of[name]) for name in of if name in self.values]:
+                known = np.any([np.isfinite(values) for values, *_ in found], axis=0)
+                met[what] = (known | self._ended) & ~np.any(
+                    [beyond(values, limit) for values, beyond, limit in found], axis=0)
         met["All of the above"] = np.all(list(met.values()), axis=0)
         return {what: {label: Share(int((runs & of).sum()), int(of.sum()))
                        for label, of in self._of.items()} for what, runs in met.items()}
@@ -165,7 +163,8 @@ class Results:
     def alike(self) -> list[list[str]]:
         """Return the labels, together where no metric of any sample differs, nor how it ended."""
         found: list[list[str]] = []
-        each = [self._ended, *(self.values[metric.name] for metric in self.shown())]
+        ends = np.unique([str(reason) for reason in self.reasons], return_inverse=True)[1]
+        each = [ends, *(self.values[metric.name] for metric in self.shown())]
         for label in self.labels:
             like = (group for group in found if not any(
                 paired(self._by_sample(one, group[0]), self._by_sample(one, label)).differ
@@ -244,7 +243,7 @@ def results(plan: Plan, kept: Mapping[str, Outcome]) -> dict[str, Results]:
     for name, runs in groups.items():
         each = [{one.name: one for one in kept[run.key].metrics if one.value is not None}
                 for run in runs]
-        metrics = {metric: one for known in each for metric, one in known.items()}
+        metrics = by_name(each)
         values = {metric: np.array([known[metric].value if metric in known else np.nan
                                     for known in each], dtype=float) for metric in metrics}
         found[name] = Results(tuple(runs), tuple(kept[run.key].reason for run in runs), metrics,

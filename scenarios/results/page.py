@@ -82,7 +82,6 @@ def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
                   said=" ".join(said))
 
 
-_STARTS = 16  # starts to sample before a difference is believed
 _REPLAY_BYTES, _REPLAYS_BYTES = 3_000_000, 8_000_000  # of one replay, and of all on a page
 
 
@@ -101,8 +100,7 @@ def comparison_page(comparison: Comparison, planned: int = 0) -> str:
                       about_rows=_about_rows(comparison), file="",
                       contents=ends if len(ends) > 1 else {},
                       count=in_words(len(groups)).capitalize(),
-                      sampled=comparison.asked("--starts", str(_STARTS)), groups=articles,
-                      refused=comparison.refused, command=comparison.command,
+                      groups=articles, refused=comparison.refused, command=comparison.command,
                       versions=comparison.versions))
 
 

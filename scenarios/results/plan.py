@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import os
+import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -34,6 +36,7 @@ from scenarios.toml_text import read_toml
 _NOT_IN_A_RUN = ("cli/", "draw/", "export/", "library/", "problems/", "results/", "scene/",
                  "files.py", "templates.py", *(f"measure/{name}.py" for name in (
                      "goals", "motions", "runs", "statistics", "verdict")))
+_NAMED = re.compile(rb"""\bfile(?:name)?=["']([^"'\0]+)["']""")  # in URDF and MJCF
 _PLACE = ("system", "processor")  # entries of versions() that describe the machine
 
 
@@ -182,11 +185,17 @@ def load_sweep(name_or_path: str | Path) -> Sweep:
 
 
 def _content(path: str) -> str:
-    """Return a digest of a file, or of all in a folder: what a run depends on beside its text."""
+    """Return a digest of a file, or of all in a folder: what a run depends on beside its text.
+
+    Beside a robot's file those count that it includes, and meshes, if they are named from there.
+    """
     here = Path(path)
-    files = sorted(here.iterdir()) if here.is_dir() else [here] if here.is_file() else []
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files if file.is_file())
-                          ).hexdigest()[:16]
+    files, texts = sorted(here.iterdir()) if here.is_dir() else [here], list[bytes]()
+    for file in files:
+        texts.append(file.read_bytes() if file.is_file() else b"")
+        named = (here.parent / os.fsdecode(name) for name in _NAMED.findall(texts[-1]))
+        files += [one for one in dict.fromkeys(named) if one not in files]
+    return hashlib.sha256(b"".join(texts)).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
@@ -213,7 +222,7 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
     lasting = {"control.duration": sweep.duration} if sweep.duration else {}
     asked = [load(name, lasting) for name in sweep.scenarios] if scenarios is None else scenarios
     columns, refused = side_by_side(asked, sweep.resolvers or None, f"sweep {sweep.name!r}: ")
-    alone = len({run.spec for run in columns}) == 1 and len(asked) > 1
+    alone = len({run.spec for run in columns}) == 1 < len(columns)
     code, content = digest(), cache(_content)
     runs: dict[str, Job] = {}
     for index in range(sweep.samples):

@@ -70,10 +70,10 @@ def sweep(name_or_path: str | Path, out: str | Path, workers: Workers | None = N
     FullError : a file cannot be written, such as on a full disk.
     ClusterError : the scheduler is lost, or a worker has another version of the code.
     """
+    planned = plan(load_sweep(name_or_path))
     text = find(name_or_path).read_text(encoding="utf-8")
     said = command or shlex.join(["hierarchy", "sweep", str(name_or_path), "--out", str(out)])
-    return _made(plan(load_sweep(name_or_path)), out, (said, text), workers or Workers(),
-                 progress)
+    return _made(planned, out, (said, text), workers or Workers(), progress)
 
 
 def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str] | None,
@@ -96,7 +96,8 @@ def compare_starts(scenarios: Sequence[str | Scenario], resolvers: Sequence[str]
         "title": f"{listed(names)} from {starts} sampled starts",
         "scenarios": names, "resolvers": resolvers or ()}, "compare_starts")
     said = command or shlex.join(
-        ["hierarchy", "compare", *asked.scenarios, "--resolvers", ",".join(asked.resolvers),
+        ["hierarchy", "compare", *asked.scenarios,
+         *(["--resolvers", ",".join(asked.resolvers)] if asked.resolvers else []),
          "--starts", str(starts), "--seed", str(seed), "--out", str(out)])
     return _made(plan(asked, chosen), out, (said, ""), workers or Workers(), progress)
 

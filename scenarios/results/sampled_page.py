@@ -84,10 +84,11 @@ def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, A
         worst.setdefault(run.key, []).append(metric)
     of_key = {run.key: run for run in results.runs}
     one = next((one for one in plan.scenarios if one.name == name), None)
-    each = "; ".join(f"{one.name}: {one.title}" for one in plan.scenarios)
+    each = "; ".join(f"{one.name}: {one.title}" for one in plan.scenarios
+                     if one.name in results.labels)
     return {
         "name": name, "title": one.title if one else
-        f"{in_words(len(plan.scenarios))} scenarios side by side",
+        f"{in_words(len(results.labels))} scenarios side by side",
         "about": one.description if one else f"{each}.", "verdict": verdict(results),
         "shares": svg(_shares(results), f"{name}: shares of runs"),
         "failures": [(one, *_again(one.run, folder)) for one in failures[:_FAILURES]],

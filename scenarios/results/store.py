@@ -84,7 +84,7 @@ class Store:
         new = not (self.file.exists() and self.file.stat().st_size)
         text = _as_text([COLUMNS] * new + rows(job, outcome))
         with writing(self.file), self.file.open("ab") as stream:
-            stream.write(text.encode())
+            stream.write(text.encode(errors="backslashreplace"))  # paths may not be UTF-8
             stream.flush()
             os.fsync(stream.fileno())
 
@@ -117,7 +117,7 @@ def write_table(file: Path, found: Iterable[tuple[Job, Outcome]]) -> None:
 def _as_text(lines: Iterable[Sequence[Any]]) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(lines)
-    return text.getvalue()
+    return text.getvalue().replace("\r", " ")  # csv does not quote it, and reads it as a line's end
 
 
 def read(file: Path) -> dict[str, Outcome]:

@@ -84,7 +84,7 @@ def _forces(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
     if "torque_limit" in recording:
         share = 100.0 * np.abs(recording["command"]) / recording["torque_limit"]
         yield _sampled("Largest torque, of its limit", "%", ("largest torque",),
-                       share.max(axis=1), ticks, (("limit", 100.0),))
+                       share.max(axis=1, initial=0.0), ticks, (("limit", 100.0),))
 
 
 def _sampled(name: str, unit: str, labels: tuple[str, ...], values: Array,

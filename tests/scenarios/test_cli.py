@@ -57,6 +57,8 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, com
     simulation_is(breaks_under_recursive, monkeypatch)
     done = compare("ellipse", ["recursive", "tpm"], out=tmp_path / "b")
     assert [run.fault for run in done.runs] == ["ArithmeticError: [bold]no[/bold] answer", None]
+    command("replay b")
+    assert (tmp_path / "b" / "replay.html").exists()
     said = command("compare ellipse --resolvers recursive,tpm --workers 1 --out c", code=1).err
     assert "[bold]no[/bold] answer" in said
 
@@ -210,6 +212,7 @@ def test_an_error_names_the_one_file_of_a_command_once(text, files, said):
 def test_names_of_settings_that_differ_late_give_different_folders():
     one, other = (slug(f"tpm:damping=0.{'0' * 300}{digit}") for digit in "12")
     assert one != other
+    assert slug("weighted:strict_levels=1") != slug("weighted:strict_levels=-1")
     assert max(len(one), len(other)) <= 200
     assert len(f"{in_runs(100 * '日').name}-2".encode()) <= 255
 

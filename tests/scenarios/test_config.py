@@ -83,6 +83,9 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     refused("scenario 'idle': the stack is empty", lambda: build(load(path)), error=ScenarioError)
     posture = load(path, ["control.stack=hierarchical", "posture.role=task"])
     assert build(posture).stack.names == ("posture",)
+    refused("2 tasks are named 'a_b'", load, path, [  # the errors of both would be one signal
+        "control.stack=hierarchical",
+        "tasks=[{kind='posture', name='a b'}, {kind='com', name='a_b'}]"])
 
 
 def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():

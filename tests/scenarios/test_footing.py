@@ -7,11 +7,12 @@ import pinocchio as pin
 import pytest
 from urdf_text import INERTIAL, LIMIT, joint, link, placed, shape, urdf
 
-from scenarios import load
+from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cli.check import checked
 from scenarios.loop.controller import Controller
 from scenarios.loop.footing import footing
+from scenarios.scene.drawn import scene
 
 DATA = Path(__file__).parents[1] / "data"
 pytestmark = pytest.mark.usefixtures("with_mujoco")
@@ -79,7 +80,9 @@ def a_biped(folder):
 def test_feet_that_hold_each_other_in_a_symmetric_pose_are_said(tmp_path):
     keys = a_biped(tmp_path)
     words = "1 of 18 rows that hold the contacts depend on the others"
-    assert words in " ".join(said(load("stand-push").with_changes(keys)))
+    for place in ("stack", "bounds"):
+        changed = {**keys, "limits.place": place}
+        assert words in " ".join(said(load("stand-push").with_changes(changed)))
     keys["start"]["joints"] |= {"l_yaw": 0.2, "r_yaw": -0.2}
     assert words not in " ".join(said(load("stand-push").with_changes(keys)))
 
@@ -96,6 +99,18 @@ def test_a_robot_that_is_put_on_the_floor_is_carried_from_the_first_tick_on():
     cell.plant.act(controller.command(0.0, cell.plant.q, cell.plant.v))
     assert cell.plant.extra["floor_force"][:, 2].min() > 1.0
     assert np.abs(cell.plant.v[6:]).max() < 0.2
+
+
+def test_a_body_without_joints_stands_too(tmp_path):
+    (tmp_path / "brick.urdf").write_text(urdf(link("trunk")))
+    sole = {"frame": "trunk", "x": [-0.4, 0.4], "y": [-0.4, 0.4], "offset": [0.0, 0.0, -0.1]}
+    scenario = load("stand-push", {
+        "robot": {"model": str(tmp_path / "brick.urdf"), "base": "floating"}, "contacts": [sole],
+        "start": {"on_floor": True}, "tasks": [{"kind": "com"}], "plant.pushes": [],
+        "control.duration": 0.005})
+    assert not said(scenario)
+    (torque,) = (one.value for one in scene(simulate(scenario)).series if "torque" in one.name)
+    assert (torque == 0.0).all()
 
 
 FOLDED = LIMIT.replace('"-1"', '"-2.7"').replace('"1"', '"-0.9"')  # its middle turns a knee down

@@ -10,12 +10,12 @@ from scipy.stats import PermutationMethod, wilcoxon
 from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.measure.causes import Tick, causes
-from scenarios.measure.goals import goals
+from scenarios.measure.goals import Goal, goals
 from scenarios.measure.happenings import given_up, happened, jumps
 from scenarios.measure.metrics import measure
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import EXACT, best, paired, wilson
-from scenarios.measure.verdict import verdicts
+from scenarios.measure.verdict import Verdict, lines, verdicts
 from solvers import make
 
 
@@ -69,6 +69,13 @@ def test_limits_of_joints_that_turn_and_of_those_that_slide_are_two_goals():
     mixed = replace(run, facts=replace(run.facts, robot=robot))
     found = {one.title: one.flag for one in goals(mixed) if one.name == "joint limits"}
     assert found == {"joint limits, in rad": "broken", "joint limits, in m": "kept"}
+
+
+def test_goals_of_one_name_in_two_units_are_not_weighed_against_each_other():
+    hand = Goal("hand", "", "m", False, 1e-3, 0.02, 0.02, 0.5, 0.0, 0.0)
+    off = lines([Verdict(unit, 1.0, 1.0, None, False, (replace(hand, unit=unit),))
+                 for unit in ("m", "deg")])[-1]
+    assert off.count("at worst") == 2
 
 
 def test_a_run_lasts_as_long_as_its_whole_ticks():
@@ -219,6 +226,9 @@ def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
     run = simulate(load("reach-torque-smooth").with_changes({"control.duration": 0.05}))
     assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
     assert [jump.tick for jump in jumps(run, 1)] == [1]  # the first that has one before it
+    calm = {"control.duration": 0.26, "control.damping": 1.0}
+    run = simulate(load("strictness", calm).with_resolver("merged"))
+    assert [cause.kind for cause in jumps(run, 250)[0].causes] == ["data"]
 
 
 @pytest.mark.parametrize(("step", "shown"), [(50.0 * (1.0 + 1e-14), 0), (50.1, 1)])

@@ -27,6 +27,12 @@ from scenarios.recording.signals import Signal, known
 from scenarios.results.sections import multiples
 
 
+def test_a_run_in_the_home_folder_is_found_where_it_was_saved(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert save(simulate(load("ellipse", ["control.duration=0.003"])), "~/a") == tmp_path / "a"
+    assert load_run("~/a").ticks == 3
+
+
 def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
     saved = recording(q=np.random.default_rng(0).normal(size=(5, 7)), fault="stopped at tick 5")
     loaded = load_run(save(saved, tmp_path / "run"))

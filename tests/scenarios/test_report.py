@@ -15,6 +15,7 @@ from hierarchy.avoidance.measurement import measure_exactly
 from scenarios import load, save, simulate
 from scenarios.cell.sensors.sensor import packed_laws
 from scenarios.draw.figures import drawing, letter, picture, timeline
+from scenarios.measure.metrics import Metric
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
@@ -55,6 +56,14 @@ def test_the_best_of_each_row_is_marked(runs, label, marked):
     assert best(next(row for row in table(runs) if row.label.startswith(label))) == marked
 
 
+def test_units_of_joints_that_turn_and_of_those_that_slide_are_not_mixed():
+    runs = [made(LETTER), made(LETTER, scenario=asked(name="other"))]
+    for run, unit in zip(runs, ("rad", "m"), strict=True):
+        vars(run)["metrics"] = {"excess": Metric("excess", "Beyond", 0.5, unit)}
+    (row,) = table(runs)
+    assert (row.unit, *(cell.text for cell in row.cells)) == ("rad or m", "0.500", "0.500")
+
+
 def test_times_are_those_of_a_run_that_was_alone_and_nothing_else_is():
     alone = recording(time_tick=np.full(5, 9e-6), a=2.0 * ONES)
     found = dataclasses.replace(made(LETTER, a=ONES), timing=alone).metrics
@@ -78,6 +87,7 @@ def test_a_page_is_whole_and_needs_nothing_outside_itself(runs, request):
     text = page(comparison(*runs))
     Balanced(text)
     assert "<script>alert" not in text
+    assert "--resolvers" not in text  # names of scenarios that `compare` does not know
     assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//""", text)
     assert not re.search(r"<(?:link|img|(?:iframe|script)[^>]* src)\b|@import|url\((?!#)", text)
 

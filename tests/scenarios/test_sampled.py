@@ -16,10 +16,11 @@ from hierarchy import HierarchyError
 from scenarios import load, shipped, simulate
 from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
+from scenarios.results import plan as plan_of
 from scenarios.results import pool, sampled_page
 from scenarios.results.columns import Results, verdict
 from scenarios.results.plan import Job, Outcome, load_sweep, outcome, plan, shipped_sweeps
-from scenarios.results.sampled import Workers, compare_starts, complete
+from scenarios.results.sampled import Workers, compare_starts, complete, sweep
 from scenarios.results.store import FullError, Store
 
 BODY = {"name": '"small"', "scenarios": '["ellipse"]', "resolvers": '["tpm", "recursive"]',
@@ -72,10 +73,11 @@ def test_a_wrong_file_is_refused_before_anything_is_run(parameters, changed, say
 
 def test_a_scenario_is_no_sweep_and_a_file_with_neither_is_an_incomplete_one(tmp_path):
     path = tmp_path / "one.toml"
-    for text, said in (('extends = "ellipse"', "is a scenario, to be run by"),
-                       ('name = "one"', "samples: Field required")):
-        path.write_text(text)
+    for text, said in ((b'extends = "ellipse"', "is a scenario, to be run by"),
+                       (b'name = "one"', "samples: Field required"), (b"\xff", "is not UTF-8")):
+        path.write_bytes(text)
         refused(said, load_sweep, path)
+        refused(said, sweep, path, tmp_path / "out")
 
 
 def test_every_shipped_sweep_can_be_planned_and_every_scenario_varies():
@@ -133,6 +135,16 @@ def test_runs_are_made_again_after_a_file_that_their_scenario_names_has_changed(
     assert not keys[0] & keys[2]
 
 
+def test_runs_are_made_again_after_a_file_that_a_robots_file_includes_has_changed(tmp_path):
+    (tmp_path / "whole.xml").write_text(
+        '<mujoco><worldbody><include file="part.xml"/></worldbody></mujoco>')
+    digests = []
+    for mass in "115":
+        (tmp_path / "part.xml").write_text(f'<mujocoinclude><geom size="1" mass="{mass}"/></>')
+        digests.append(plan_of._content(str(tmp_path / "whole.xml")))
+    assert digests[0] == digests[1] != digests[2]
+
+
 @pytest.mark.parametrize(("variation", "says"), [
     ({}, r"'ellipse' has no \[variation\]"),
     ({"start.p": {"around": 1.0}}, r"variation\.start\.p"),
@@ -187,6 +199,25 @@ def test_the_distance_was_kept_by_runs_that_were_never_below_it():
     below = {"body_below_share": np.array([0.0, 0.5, 1.0])}
     assert Results(jobs, (None,) * 3, {}, below).shares()["Kept the distance asked for"] == {
         "tpm": (1, 3)}
+    below["joint_limit_excess"] = np.full(3, np.nan)  # a robot without limits keeps to them
+    found = Results(jobs, (None, None, "broke"), {}, below).shares()
+    assert found["Kept the joint limits"]["tpm"] == (2, 3)
+
+
+@pytest.mark.parametrize("names", [("ellipse", "singular"), ("ellipse", "ellipse-hqp")])
+def test_what_is_not_asked_for_or_not_run_counts_for_nothing(names, tmp_path, undrawn):
+    """One of two scenarios has no obstacles; one of two is refused by the resolver."""
+    found = compare_starts([load(name, SHORT) for name in names], ["tpm"], 2, 0, tmp_path / "out",
+                           workers=Workers(1)).found
+    alone = "ellipse-hqp" in names
+    (group, results), = found.items()
+    assert (group, results.labels) == (("ellipse", ("tpm",)) if alone else ("tpm", names))
+    assert {*results.shares()["All of the above"].values()} == {(2, 2)}
+
+
+def test_runs_that_stopped_for_different_reasons_are_not_the_same():
+    jobs = tuple(Job("", "", "", label=label) for label in "abc")
+    assert Results(jobs, ("fell", "broke", "fell"), {}, {}).alike() == [["a", "c"], ["b"]]
 
 
 @pytest.mark.parametrize(("outlier", "high"), [(12.0, 12.0), (13.0, 11.0), (30.0, 11.0)])
@@ -229,6 +260,12 @@ def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path,
     speed = metrics.Metric("speed_max", "Joint speed, max", 1.5, "rad/s", note='"v", é')
     runs = {key: Outcome(key, 20, said, 0.1, (speed,))
             for key, said in (("a", None), ("b", 'broke,\n"é" once'), ("c", None))}
+    odd = Outcome("d", 20, "broke\r\nin \udcff", 0.1)
+    with Store(tmp_path / "odd").opened():
+        Store(tmp_path / "odd").add(jobs[0], odd)
+    with Store(tmp_path / "odd").opened():
+        pass
+    assert len(Store(tmp_path / "odd").outcomes()) == 1
     with store.opened():
         store.add(jobs[0], runs["a"])
         one = store.file.stat().st_size

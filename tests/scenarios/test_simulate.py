@@ -44,6 +44,13 @@ def test_a_tick_in_which_a_run_is_interrupted_is_not_part_of_it(within, monkeypa
     np.testing.assert_array_equal(run["desired_position"], whole["desired_position"][:7])
 
 
+def test_answers_that_settle_are_certified_under_faults_too():
+    keys = {"control.duration": 5.0, "control.damping": 1.0, "control.period": 0.01,
+            "faults": [{"kind": "overrun", "at": 0.5, "duration": 0.1, "takes": 0.001}]}
+    scenario = load("singular", keys).with_resolver("hcod:damping=0.0")
+    assert simulate(scenario, certified=True)["certified"].all()
+
+
 def test_what_needs_a_whole_run_is_interrupted_with_it():
     """Such as a benchmark of ticks, or the recording of problems, which tried the next run."""
     def interrupt(tick, controller):

@@ -21,6 +21,7 @@ from scenarios.cell.plants.torque import TorqueRobot, inside
 from scenarios.config import ScenarioError
 from scenarios.config.sections.plant import PushSection, TorqueSection
 from scenarios.loop.first_tick import first_tick
+from scenarios.measure.metrics import measure
 from scenarios.measure.safety import standing
 
 pytestmark = pytest.mark.usefixtures("with_mujoco")
@@ -229,6 +230,29 @@ def test_a_joint_that_passes_its_stop_ends_the_run_with_a_fault():
     assert run.ticks < 300
     column = ROBOT.coordinate_names.index(name)
     assert (run["q"][:, column] < ROBOT.upper[column] + 0.1).all()
+
+
+@pytest.mark.parametrize(("name", "keys"), [
+    ("wipe", {"plant.pushes": [{"joint": "joint_4", "force": 1e200, "direction": 0.0, "at": 2.003,
+                                "duration": 0.1}], "control.duration": 2.1}),
+    ("stand-push", {"plant.pushes": [{"joint": "trunk_pitch", "force": 1e200, "direction": 0.0,
+                                      "at": 0.012, "duration": 0.1}],
+                    "control.duration": 0.05, "control.period": 0.004})])
+def test_a_run_whose_simulation_breaks_is_measured_up_to_there(name, keys):
+    run = simulate(load(name, keys))
+    assert run.fault.startswith("the state is not finite")
+    assert np.isnan(run["floor_force"][-1]).any()
+    assert measure(run)["stack_changes"].value == 0.0
+
+
+def test_the_effort_of_a_joint_that_slides_is_a_force(tmp_path):
+    (tmp_path / "one.urdf").write_text(urdf(link("base"), link("arm"), joint(
+        "only", "prismatic", "base", "arm", LIMIT)))
+    robot = {"model": str(tmp_path / "one.urdf")}
+    run = simulate(load("wipe", {"robot": robot, "start": {}, "contacts": [], "plant.pushes": [],
+                                 "tasks": [{"kind": "posture"}], "control.duration": 0.002}))
+    assert run.units()["command"] == ("N",)
+    assert measure(run)["torque_step_max"].unit == "N"
 
 
 def test_a_base_that_tilts_has_fallen():

@@ -21,6 +21,7 @@ from scenarios.draw.replay import NOTHING, html
 from scenarios.draw.viewer.live import Live
 from scenarios.draw.viewer.live_page import LivePage
 from scenarios.draw.viewer.server import is_own, served
+from scenarios.measure.happenings import jumps
 from scenarios.scene.drawn import scene
 
 LIMITED = load("ellipse-limits", ["control.duration=0.6"])
@@ -55,6 +56,15 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_
     assert not live.obstacles.offset.any()
     ticks(live, 1)
     np.testing.assert_array_equal(live.recording()["q"][0], recording["q"][0])
+
+
+def test_a_jump_that_a_hand_has_made_is_not_explained_by_rows_without_it():
+    live = Live(LIMITED)
+    ticks(live, 10)
+    live.change({"position.stiffness": 400.0})
+    ticks(live, 1)
+    (cause,) = jumps(live.recording(), 10)[0].causes
+    assert cause.text == "its rows do not follow from the recording"
 
 
 def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_motion():

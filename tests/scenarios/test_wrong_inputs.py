@@ -89,6 +89,13 @@ def test_a_file_that_cannot_be_read_is_named(text, said, tmp_path):
     assert "bad.toml" in refused(said, load, path, error=ScenarioError)
 
 
+def test_a_file_in_a_folder_that_no_scenario_can_name_is_refused(tmp_path):
+    path = tmp_path / "\udcff" / "one.toml"
+    path.parent.mkdir()
+    path.write_text('extends = "ellipse"\n[robot]\nmodel = "one.urdf"')
+    refused("is not UTF-8: rename it", load, path)
+
+
 def test_files_that_extend_each_other_a_thousand_deep_are_refused(tmp_path):
     for i in range(1000):
         base = "ellipse" if i == 0 else f"{i - 1}.toml"

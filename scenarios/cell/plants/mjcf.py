@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy import Robot, State
-from hierarchy.avoidance import Obstacle
+from hierarchy.avoidance import Capsule, Obstacle
 from hierarchy.avoidance.body import measure_capsules, pack_capsules, pairs_of_tree
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.problem import Array
@@ -118,9 +118,15 @@ def _arm(world: Element, robot: Robot, q: Array, joints: JointsSection,
             frictionloss=friction[i], damping=damping[i], armature=armature[i],
             actuatorgravcomp="true", **stops[i], **efforts)
     for capsule in robot.capsules:
-        add(elements[capsule.joint], "geom", name=capsule.name, type="capsule",
-            fromto=(*capsule.start, *capsule.end), size=capsule.radius, contype="1",
-            conaffinity="0")
+        add(elements[capsule.joint], "geom", name=capsule.name, **_link(capsule),
+            contype="1", conaffinity="0")
+
+
+def _link(capsule: Capsule) -> dict[str, Any]:
+    """Return the shape of a link: a ball if it has no length."""
+    if capsule.start == capsule.end:
+        return {"type": "sphere", "pos": capsule.start, "size": capsule.radius}
+    return {"type": "capsule", "fromto": (*capsule.start, *capsule.end), "size": capsule.radius}
 
 
 def _obstacles(world: Element, obstacles: Sequence[Obstacle]) -> None:
@@ -170,11 +176,8 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
 def _capsules(elements: list[Element], contact: Element, robot: Robot, q: Array) -> None:
     """Add the capsules of a robot at q (nq,), and the pairs that may touch later."""
     for capsule in robot.capsules:
-        same = capsule.start == capsule.end
-        place: dict[str, Any] = {"pos": capsule.start} if same else {
-            "fromto": (*capsule.start, *capsule.end)}
         add(elements[capsule.joint], "geom", name=f"capsule {capsule.name}", contype="0",
-            conaffinity="0", type="sphere" if same else "capsule", size=capsule.radius, **place)
+            conaffinity="0", **_link(capsule))
     pairs = np.array(pairs_of_tree(robot.capsules, robot.parents), dtype=np.int64).reshape(-1, 2)
     seen = measure_capsules(State.at(robot, q).placements, *pack_capsules(robot.capsules), pairs)
     for i, j in pairs[seen[:, 0] > 0.0]:
