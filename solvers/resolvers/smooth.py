@@ -68,7 +68,7 @@ class Smooth(Resolver):
 
     def can_resolve(self, required: Handles) -> bool:
         """Equalities act fully; for other rows it needs activations."""
-        return required in ("equalities", "activations")
+        return super().can_resolve(required) and required in ("equalities", "activations")
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h with all rows fully active; HierarchyError for an inequality."""

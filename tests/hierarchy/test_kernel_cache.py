@@ -12,6 +12,8 @@ from refusals import refused
 
 from hierarchy.jit import saying
 from hierarchy.jit.sources import source_digest
+from hierarchy.kinematics import rotation_of
+from hierarchy.tasks.pose import _write_jacobian
 from solvers.kernels.active_set.exact import solve_hierarchy
 from solvers.kernels.active_set.working_set import meet
 from solvers.kernels.linalg.rows import swap
@@ -144,3 +146,8 @@ def test_compiling_is_said_once_and_not_by_a_worker(monkeypatch, capsys):
 def test_python_cannot_call_what_is_compiled_for_other_kernels():
     for kernel in (meet, swap):
         refused(f"{kernel.py_func.__name__} is compiled for other", kernel, error=TypeError)
+
+
+def test_what_makes_arrays_itself_or_by_what_it_calls_is_known():
+    assert (rotation_of.allocates, _write_jacobian.allocates, swap.allocates, meet.allocates) == (
+        True, True, False, False)

@@ -16,6 +16,7 @@ from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, load, members, shipped
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
+from scenarios.config.validation import tag_at
 from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run
 from scenarios.results.plan import load_sweep
@@ -74,6 +75,14 @@ def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
     assert s.with_resolver("tpm-published") == load("ellipse")
     assert load("ellipse").with_resolver("tpm:damping=0.01").control.settings() == {
         "damping": 0.01, "threshold": 0.1}
+
+
+@pytest.mark.parametrize(("section", "tag"), [
+    ("tasks.0", ("kind", None)), ("position.path", ("kind", None)),
+    ("plant", ("kind", "kinematic")), ("avoidance.obstacles.1", ("shape", "point")),
+    ("robot", None), ("faults.0", None)])
+def test_the_key_that_says_the_kind_of_a_section_may_have_a_default(section, tag):
+    assert tag_at(Scenario, section.split(".")) == tag
 
 
 def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):

@@ -185,3 +185,17 @@ def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_
     np.testing.assert_allclose(link.get_xydata(), ends, atol=1e-3)
     assert [line.get_linestyle() for line in lines].count("--") == 1  # the path of `wipe`
     assert not letter.PANEL["active-point"].shows(run)  # rows push all points at once
+
+
+@pytest.mark.parametrize(("pixels", "u", "v"), [
+    ([[50.0, 40.0], [70.0, 50.0]], (29.5, 89.5), (59.5, 29.5)),  # its height is the larger share
+    ([[20.0, 40.0], [80.0, 44.0]], (9.5, 89.5), (61.5, 21.5)),  # its width
+    ([[2.0, 3.0], [4.0, 5.0]], (-0.5, 43.5), (21.5, -0.5)),
+    ([[190.0, 90.0], [199.0, 99.0]], (141.5, 199.5), (99.5, 70.5)),
+    ([[-50.0, 0.0], [300.0, 300.0]], (-0.5, 199.5), (99.5, -0.5))],
+    ids=["high", "wide", "in a corner", "in the other", "beyond the image"])
+def test_a_depth_image_is_cut_to_the_surroundings_of_points_in_its_own_proportions(pixels, u, v):
+    ax = drawing.figure(width=4.0, height=3.0)[1][0]
+    letter._show_around(ax, np.array(pixels), 10.0, (100, 200))
+    assert ax.get_xlim() == pytest.approx(u)
+    assert ax.get_ylim() == pytest.approx(v)

@@ -121,6 +121,9 @@ def test_its_search_for_multipliers_finds_the_least_that_scipys_finds():
         C, b = rng.random((9, 8)) + 0.2 * rng.normal(size=(9, 8)), rng.random(9)
         own, scipys = (certificate._non_negative(C, b, 0.0, by_scipy) for by_scipy in (False, True))
         np.testing.assert_allclose(own, scipys, atol=1e-9)
+        for small, large in ((1e-12, 1e6), (1e9, 1e-9)):  # units of rows and of what they explain
+            found = certificate._non_negative(small * C, large * b, 0.0)
+            np.testing.assert_allclose(found * small / large, own, atol=1e-9)
         with localcontext(prec=120):
             left = proof._pushed_back(*map(np.vectorize(Decimal, [object]), (C.T, b)))
         np.testing.assert_allclose(left.astype(float), b - C @ own, atol=1e-9)

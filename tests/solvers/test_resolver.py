@@ -36,6 +36,15 @@ def test_settings_of_every_resolver_are_checked_by_name(name):
         refused(f"{name}: {setting} = ", make, name, **{setting: value})
 
 
+@pytest.mark.parametrize(("name", "kinds"), [
+    ("recursive", {"equalities"}), ("tpm", {"equalities", "bounds"}),
+    ("hcod", {"equalities", "bounds", "inequalities"}), ("smooth", {"equalities", "activations"})])
+def test_a_resolver_says_which_rows_it_can_resolve(name, kinds):
+    assert {kind for kind in ("equalities", "bounds", "inequalities", "activations")
+            if make(name).can_resolve(kind)} == kinds
+    refused("equality", make(name).can_resolve, "equality")
+
+
 @pytest.mark.parametrize(("name", "settings"), [
     ("smooth", {"eta": 0.0}),
     *(("hcod", {"max_iterations": wrong}) for wrong in (2**31, 1.5, True)),
