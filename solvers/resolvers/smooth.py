@@ -95,6 +95,7 @@ class Smooth(Resolver):
             return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
         return Resolution(rho)
 
+    @np.errstate(all="ignore")
     def _descend(self, rho: Array, Q: Array, J: Array, A: Array, rate: Array
                  ) -> tuple[Array, Array]:
         """Return rho and Q after a level of rows J (m, n), activations A (m,) and rates (m,)."""

@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import re
 import shlex
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -12,12 +13,15 @@ from headless import Balanced, chromium
 
 from hierarchy.avoidance import Measurement, Obstacle
 from hierarchy.avoidance.measurement import measure_exactly
+from hierarchy.errors import HierarchyError
 from scenarios import load, save, simulate
 from scenarios.cell.sensors.sensor import packed_laws
 from scenarios.draw.figures import drawing, letter, picture, timeline
+from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
+from scenarios.results import page as results_page
 from scenarios.results.page import comparison_page as page
 from scenarios.results.page import run_command
 from scenarios.scene.drawn import scene
@@ -185,6 +189,19 @@ def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_
     np.testing.assert_allclose(link.get_xydata(), ends, atol=1e-3)
     assert [line.get_linestyle() for line in lines].count("--") == 1  # the path of `wipe`
     assert not letter.PANEL["active-point"].shows(run)  # rows push all points at once
+
+
+def test_a_replay_that_would_be_too_large_has_fewer_frames_a_second_but_five(monkeypatch):
+    monkeypatch.setattr(results_page, "html", lambda *_, rate, **__: int(100 * rate) * "x")
+    found = motions([made(LETTER)])
+    for most, rate in ((3000, 30), (2999, 29), (1000, 10), (100, 5)):
+        text = results_page.replay("hand-made", found, most)
+        assert f"{rate} frames per second" in text
+        assert f"'{100 * rate * 'x'}'" in text
+    monkeypatch.setattr(results_page, "html", mock.Mock(side_effect=HierarchyError("no frames")))
+    text = results_page.replay("hand-made", found, 3000)
+    assert "no frames" in text
+    assert "<iframe" not in text
 
 
 @pytest.mark.parametrize(("pixels", "u", "v"), [

@@ -1,6 +1,8 @@
 """The certificate accepts the answer and nothing else, and a proof in 120 digits is one."""
 
+import re
 from decimal import Decimal, localcontext
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from hierarchy import Hierarchy
 from scenarios.problems import recorded
 from solvers import certificate, certify, make, problems, proof
 from solvers.proof import prove
+from solvers.qp import refinement
 
 # Not DEGEN7: some of its rows are at an angle of 2e-9, whose answer is 1e8 away or not.
 FAMILIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10", "INEQ7", "HUM38", "DYN60")
@@ -129,6 +132,14 @@ def test_its_search_for_multipliers_finds_the_least_that_scipys_finds():
         np.testing.assert_allclose(left.astype(float), b - C @ own, atol=1e-9)
 
 
+def test_a_search_of_scipys_that_gives_up_finds_nothing(monkeypatch):
+    monkeypatch.setattr("scipy.optimize.nnls", mock.Mock(side_effect=RuntimeError))
+    np.testing.assert_array_equal(certificate._by_scipy(np.eye(3)[:2], np.ones(2)), np.zeros(3))
+    for huge in (1.0, 1e51):  # too large for it
+        found, off = refinement._non_negative(huge * np.eye(3)[:2], np.ones(2))
+        assert (found.tolist(), off) == ([0.0, 0.0, 0.0], np.inf)
+
+
 def test_an_answer_for_rows_turned_until_they_depend_is_certified():
     """Two rows depend up to 1.3e-9 where others are at a side; neither a shift nor a turn alone
     explains x."""
@@ -190,6 +201,8 @@ def test_a_residual_may_be_the_tolerance_and_no_more(stationarity, nearest, verd
                                     ("hand", "posture"))
     assert (str(found), found.certified) == (verdict, verdict.startswith("certified"))
     assert found.optimal == (not verdict.startswith("not optimal"))
+    assert re.findall(r"<td>(yes|no)", found._repr_html_()) == [
+        "yes" if one <= 1e-6 else "no" for one in (0.0, stationarity, nearest)]
 
 
 @pytest.mark.parametrize("name", [
