@@ -139,6 +139,11 @@ def test_the_load_of_a_sole_falls_in_its_ramp_from_what_it_carried(largest):
         write()
         assert (rows[1][40], rows[2][40]) == (-np.inf, pytest.approx(up))
         np.testing.assert_allclose(rows[1][24:40:5], least, atol=1e-12)  # of each point's normal
+    for carried, up, least in ((4e-6, 2e-6, 1.0), (1e-6, np.inf, 0.0)):  # the half of which is none
+        state.carried = np.array([300.0, carried])
+        state.move(0.9, state.q, state.v)
+        write()
+        assert (rows[2][40], rows[1][24]) == (pytest.approx(up), pytest.approx(least))
 
 
 def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_open():

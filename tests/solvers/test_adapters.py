@@ -264,6 +264,10 @@ def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
     mujoco, adapter, model, data = arm
     start, turn = adapter.frame(model, data, "tip", "site")
     goal, wanted = start + np.array([0.03, -0.05, 0.02]), turn
+    _, lower, upper = adapter.limit_level(model, data, 0.5, 4.8)
+    rates = (model.jnt_range.T - POSE) / 0.5
+    np.testing.assert_allclose([lower, upper], np.clip(rates, -4.8, 4.8))
+    assert {*np.abs(np.r_[lower, upper])} > {4.8}  # some by their velocity
     for _ in range(60):
         levels = [adapter.limit_level(model, data, 0.01, 3.0),
                   adapter.position_level(model, data, "tip", goal, 20.0, "site"),
