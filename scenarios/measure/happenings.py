@@ -85,10 +85,11 @@ def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
     def answer(memory: Any, h: Hierarchy) -> Array:
         return resolver.solve(h, memory).x
 
-    for k in range(max(ticks) + 1 if isinstance(resolver, Merged) else 0):
-        carried[k] = memory
-        if (h := rows.hierarchy(k)) is not None:
-            memory = resolver.solve(h, memory).memory
+    if isinstance(resolver, Merged):
+        for k in range(max(ticks) + 1):
+            carried[k] = memory
+            if (h := rows.hierarchy(k)) is not None:
+                memory = resolver.solve(h, memory).memory
     return {k: partial(answer, carried.get(k)) for k in ticks}
 
 

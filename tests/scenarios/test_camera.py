@@ -294,6 +294,13 @@ def test_a_camera_sees_the_true_robot_and_not_where_late_joints_say_it_is():
     assert max(missed) == 0
 
 
+def test_the_robot_of_a_recorded_image_is_where_its_joints_say_or_where_it_is():
+    frames, joints = RecordedFrames("hand", ROBOT), State.at(ROBOT, ROBOT.rest)
+    frames._placements[:2] = None, joints.placements
+    assert frames.image(0, STATE)[1] is STATE.placements
+    assert frames.image(1, STATE)[1] is joints.placements
+
+
 def test_frames_that_cannot_be_used_are_refused_by_name(tmp_path):
     run = simulate(load("human", [*QUICK, "control.duration=0.3"]))
     example = Path(__file__).parents[2] / "examples" / "record_frames.py"

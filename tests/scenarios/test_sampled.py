@@ -193,6 +193,10 @@ def test_the_distance_was_kept_by_runs_that_were_never_below_it():
 def test_an_axis_shows_values_up_to_twice_the_width_of_their_middle_away(outlier, high):
     values = np.append(np.linspace(10.0, 11.0, 100), outlier)
     assert sampled_page._limits([values]) == pytest.approx((10.0, high))
+    assert sampled_page._limits([-values]) == pytest.approx((-high, -10.0))
+    for beyond, ends in ((0.0, (-2.0, 3.0)), (0.01, (0.0, 1.0))):
+        two = np.r_[-2.0 - beyond, np.zeros(20), np.ones(20), 3.0 + beyond]
+        assert sampled_page._limits([two]) == ends
     for same, room in ((-8.0, 0.04), (0.0, 0.005)):
         assert sampled_page._limits([np.full(9, same)]) == pytest.approx((same - room, same + room))
 

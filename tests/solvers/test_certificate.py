@@ -118,6 +118,22 @@ def test_what_is_not_finite_is_never_certified(bad, where):
     assert (verdict.certified, verdict.level) == (False, 0)
 
 
+def test_a_side_that_is_no_number_is_never_certified_even_of_a_row_of_zeros():
+    h = Hierarchy.from_levels([([[1.0, 0.0], [0.0, 0.0]], [1.0, 0.0])])
+    assert certify(h, [1.0, 0.0]).certified
+    h.lower[1] = np.nan
+    assert not certify(h, [1.0, 0.0]).certified
+
+
+@pytest.mark.parametrize("unit", [1e-170, 1e-3, 1e170])
+def test_units_of_rows_do_not_matter(unit):
+    h = Hierarchy.from_levels([(unit * np.eye(2)[:1], [-np.inf], [unit]),
+                               (unit * np.eye(2), [5.0 * unit, 2.0 * unit])])
+    assert certify(h, [1.0, 2.0]).certified
+    for wrong in ([1.0, 2.1], [0.9, 2.0], [1.1, 2.0]):
+        assert not certify(h, wrong).certified
+
+
 def test_its_search_for_multipliers_finds_the_least_that_scipys_finds():
     rng = np.random.default_rng(0)
     for _ in range(50):
@@ -138,6 +154,18 @@ def test_a_search_of_scipys_that_gives_up_finds_nothing(monkeypatch):
     for huge in (1.0, 1e51):  # too large for it
         found, off = refinement._non_negative(huge * np.eye(3)[:2], np.ones(2))
         assert (found.tolist(), off) == ([0.0, 0.0, 0.0], np.inf)
+
+
+def test_rows_that_repeat_heavier_ones_count_as_zero_and_others_keep_what_is_outside_a_span():
+    C = np.array([[1.0, 1.0], [1e15, 1e15], [1.0, -1.0], [0.0, 0.0]])
+    np.testing.assert_array_equal(certificate._unrepeated(C, np.abs(C)), [[0.0] * 2, *C[1:]])
+    alone = certificate._unrepeated(C, np.full_like(C, 1e15))  # where these are the terms of all
+    np.testing.assert_array_equal(alone, np.diag([0.0, 1.0, 0.0, 0.0]) @ C)
+    basis = np.linalg.qr(np.random.default_rng(3).normal(size=(5, 3)))[0].T
+    rows = np.vstack([basis[0] - 2.0 * basis[2], np.eye(5)])
+    left = certificate._outside(rows, basis)
+    np.testing.assert_allclose(left @ basis.T, 0.0, atol=1e-15)
+    np.testing.assert_allclose(left[1:], np.eye(5) - basis.T @ basis, atol=1e-15)
 
 
 def test_an_answer_for_rows_turned_until_they_depend_is_certified():
@@ -226,6 +254,16 @@ def test_a_wrong_candidate_proves_nothing_and_a_metric_is_refused():
     np.testing.assert_array_equal(right.x, [1.0, 1.0])
     np.testing.assert_array_equal(right.least, [0.0, 1.0])
     refused("metric", lambda: prove(h.changed(metric=np.diag([1.0, 2.0])), [[1.0, 0.0]]))
+
+
+@pytest.mark.parametrize(("off", "gap"), [
+    (0.0, 1.0), (5e-9, 5e-8), (5e-8, 5e-7), (5e-7, 1.0), (0.0, 5e-9), (0.0, 5e-11)])
+def test_a_candidate_may_be_off_a_side_where_no_other_is_as_near(off, gap):
+    h = Hierarchy.from_levels([(np.eye(2), [-9.0] * 2, [1.0] * 2), (np.eye(2), [5.0, 1.0 - gap])])
+    found = prove(h, [[1.0 + off, 1.0 - gap]], unclear=1e-13)
+    assert (found.complete, found.shift, found.turn) == (True, 0.0, 0.0)
+    np.testing.assert_array_equal(found.x, [1.0, 1.0 - gap])
+    assert not prove(h, [[1.0 + 1e-5, 1.0 - gap]], unclear=1e-13).complete
 
 
 def test_optimal_but_not_nearest_to_the_reference_is_not_the_answer():
