@@ -125,13 +125,15 @@ def test_a_side_that_is_no_number_is_never_certified_even_of_a_row_of_zeros():
     assert not certify(h, [1.0, 0.0]).certified
 
 
-@pytest.mark.parametrize("unit", [1e-170, 1e-3, 1e170])
+@pytest.mark.parametrize("unit", [1e-170, 1e-20, 1e20, 1e170])
 def test_units_of_rows_do_not_matter(unit):
     h = Hierarchy.from_levels([(unit * np.eye(2)[:1], [-np.inf], [unit]),
                                (unit * np.eye(2), [5.0 * unit, 2.0 * unit])])
     assert certify(h, [1.0, 2.0]).certified
     for wrong in ([1.0, 2.1], [0.9, 2.0], [1.1, 2.0]):
         assert not certify(h, wrong).certified
+    if 1e-100 < unit < 1e100:  # whose squares are doubles too
+        assert prove(h, [[1.0, 2.0]]).x.tolist() == [1.0, 2.0]
 
 
 def test_its_search_for_multipliers_finds_the_least_that_scipys_finds():
