@@ -8,6 +8,7 @@ from standing import CONTACTS, ROBOT, drift_of, feet, moving_state, opening, wre
 from hierarchy import Robot, Stack, State, tasks
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.task import Rows, Task
+from hierarchy.tasks.contacts.friction import _edges
 
 STEP = 1e-6
 N = ROBOT.n
@@ -85,6 +86,13 @@ def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
                                    atol=1e-12)
         assert not value[:4].any()
     assert 0 < sum(seen) < 300
+
+
+def test_the_edges_of_a_sole_are_those_of_its_hull():
+    """Each from corner to corner, past points between them."""
+    points = np.array([(0.0, 0.0), (0.0, 2.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.0), (1.0, 1.0)])
+    assert {(*start, *inward) for start, inward in _edges(points)} == {
+        (0, 0, 0, 1), (2, 0, -1, 0), (2, 2, 0, -1), (0, 2, 1, 0)}
 
 
 @pytest.mark.parametrize(("t", "ramp", "load"), [
