@@ -3,7 +3,17 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing import CONTACTS, ROBOT, drift_of, feet, moving_state, opening, wrenches_of, written
+from standing import (
+    CONTACTS,
+    ROBOT,
+    WEIGHT,
+    drift_of,
+    feet,
+    moving_state,
+    opening,
+    wrenches_of,
+    written,
+)
 
 from hierarchy import Robot, Stack, State, tasks
 from hierarchy.contacts import Contact, Contacts
@@ -90,7 +100,7 @@ def test_the_centre_of_pressure_rows_change_sides_at_the_margin():
 
 def test_the_edges_of_a_sole_are_those_of_its_hull():
     """Each from corner to corner, past points between them."""
-    points = np.array([(0.0, 0.0), (0.0, 2.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.0), (1.0, 1.0)])
+    points = np.array([(0.0, 0.0), (0.0, 2.0), (2.0, 0.0), (2.0, 2.0), (1.0, -1e-12), (1.0, 1.0)])
     assert {(*start, *inward) for start, inward in _edges(points)} == {
         (0, 0, 0, 1), (2, 0, -1, 0), (2, 2, 0, -1), (0, 2, 1, 0)}
 
@@ -152,6 +162,9 @@ def test_the_load_of_a_sole_falls_in_its_ramp_from_what_it_carried(largest):
         state.move(0.9, state.q, state.v)
         write()
         assert (rows[2][40], rows[1][24]) == (pytest.approx(up), pytest.approx(least))
+    state.carried = None  # then what the whole robot weighs
+    write()
+    assert rows[2][40] == pytest.approx(0.5 * WEIGHT)
 
 
 def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_open():
@@ -244,6 +257,9 @@ def test_the_force_on_a_sliding_point_is_friction_against_its_velocity(faces):
     assert (lower[-1], upper[-1]) == (0.0, np.inf)        # and it pushes
     assert np.isinf([side[:-1][~equal[:-1]] for side in (lower, upper)]).all()
     assert rows_at(v, least=2.0)[1][-1] == 2.0
+    slow = 0.004 / np.linalg.norm(along) * v  # [m/s], in proportion below 0.01
+    A, lower, upper, _ = rows_at(slow, faces=faces)
+    np.testing.assert_allclose((A @ (force * [0.4, 0.4, 1.0]))[lower == upper], 0.0, atol=1e-12)
 
 
 def test_a_sliding_contact_is_held_along_its_normal_only():

@@ -10,7 +10,7 @@ import numba
 import pytest
 from refusals import refused
 
-from hierarchy.jit import saying
+from hierarchy.jit import compiling, saying
 from hierarchy.jit.sources import source_digest
 from hierarchy.kinematics import rotation_of
 from hierarchy.tasks.pose import _write_jacobian
@@ -151,3 +151,14 @@ def test_python_cannot_call_what_is_compiled_for_other_kernels():
 def test_what_makes_arrays_itself_or_by_what_it_calls_is_known():
     assert (rotation_of.allocates, _write_jacobian.allocates, swap.allocates, meet.allocates) == (
         True, True, False, False)
+
+
+def test_the_files_of_a_kernel_are_looked_for_once(monkeypatch):
+    kinds, found = (numba.float64,), [None, "entry"]
+    monkeypatch.setattr(compiling, "find", lambda *_: found.pop(0))
+    monkeypatch.setattr(compiling, "asked", set())
+    monkeypatch.setattr(solve_hierarchy, "ready", {})
+    monkeypatch.setattr(solve_hierarchy, "_insert", lambda *_: None)
+    assert [solve_hierarchy._ready(kinds) for _ in range(3)] == [None, "entry", "entry"]
+    assert found == []
+    assert len(compiling.asked) == 1
