@@ -158,6 +158,16 @@ def test_a_search_of_scipys_that_gives_up_finds_nothing(monkeypatch):
         assert (found.tolist(), off) == ([0.0, 0.0, 0.0], np.inf)
 
 
+@pytest.mark.parametrize("row", [0, 1, 2])
+def test_a_row_is_in_the_span_of_a_level_if_it_is_where_each_turns_by_the_angle(row):
+    """Its own turn and that of the row which it follows, whatever that weighs."""
+    view = certificate._View.of(np.eye(4)[:3], np.array([1.0, 1e-2, 1e-5]), 1e-8)
+    for beside, outside in ((0.5e-8, False), (1.9e-8, False), (2.1e-8, True)):
+        effect, _ = view.weighted(np.eye(4)[row:row + 1] + beside * np.eye(4)[3:])
+        assert np.any(effect[3]) == outside
+        assert np.any(effect[:3])
+
+
 def test_rows_that_repeat_heavier_ones_count_as_zero_and_others_keep_what_is_outside_a_span():
     C = np.array([[1.0, 1.0], [1e15, 1e15], [1.0, -1.0], [0.0, 0.0]])
     np.testing.assert_array_equal(certificate._unrepeated(C, np.abs(C)), [[0.0] * 2, *C[1:]])
