@@ -15,7 +15,7 @@ from urdf_text import joint, link, shape, urdf
 from hierarchy import Robot
 from hierarchy.avoidance.body import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.robots import names
+from hierarchy.robots import files, names
 from hierarchy.robots.from_table import _capsule_inertia
 from hierarchy.robots.joints import _pieces
 from hierarchy.robots.table import Link
@@ -236,3 +236,11 @@ def test_the_inertia_of_a_link_of_a_table_is_that_of_a_cylinder_along_it(end):
     np.testing.assert_allclose(found.inertia, expected, atol=1e-15)
     np.testing.assert_allclose(found.lever, np.array(end) / 2)
     assert (found.mass, _capsule_inertia(Link(end, 0.05)).mass) == (3.0, 0.0)
+
+
+def test_a_robot_whose_shapes_cannot_be_read_has_none_and_says_so(arm, monkeypatch):
+    read = mock.Mock(side_effect=[RuntimeError("no mesh"), RuntimeError("no shape")])
+    monkeypatch.setattr(files, "_urdf_shapes", read)
+    robot = Robot.from_file(arm())
+    assert robot.capsules == ()
+    assert [what in " ".join(robot.missing) for what in ("no mesh", "no shape")] == [True, True]
