@@ -41,7 +41,7 @@ class UnknownNameError(HierarchyError):
     def __init__(self, what: str, name: object, known: Iterable[str], more: str = "",
                  above: str = "") -> None:
         known = sorted(known)
-        near = nearest(name, known, 1, _NEAR)
+        near = nearest(name, known, similarity=_NEAR)
         hint = f"; did you mean {above + near[0]!r}?" if near else "."
         said = (f"Known: {', '.join(known) or 'none'}." if len(known) <= _LISTED else
                 f"The nearest of {len(known)}: {', '.join(nearest(name, known))}.")

@@ -353,12 +353,12 @@ def _pushed_back(rows: Exact, target: Exact) -> Exact:
         while True:
             chosen = rows[free]
             s = _solved(chosen @ chosen.T, chosen @ target)
-            negative = [j for j, i in enumerate(free) if s[j] < 0]
-            if not negative:
+            share = {i: z[i] / (z[i] - s[j]) for j, i in enumerate(free) if s[j] < 0}
+            if not share:
                 break
-            share = min(z[free[j]] / (z[free[j]] - s[j]) for j in negative)
-            z[free] = z[free] + share * (s - z[free])
-            gone = [free[j] for j in negative if z[free[j]] <= ZERO * abs(s[j])]
+            least = min(share.values())
+            z[free] = z[free] + least * (s - z[free])
+            gone = [i for i in share if share[i] == least]
             z[gone] = Decimal(0)
             free = [i for i in free if i not in gone]
         z[free] = s

@@ -84,11 +84,11 @@ def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
     def answer(memory: Any, h: Hierarchy) -> Array:
         return resolver.solve(h, memory).x
 
-    merged = isinstance(getattr(resolver, "inner", resolver), Merged)  # settled or not
-    for k in range(max(ticks) + 1 if merged else 0):
-        carried[k] = memory
-        if (h := rows.hierarchy(k)) is not None:
-            memory = resolver.solve(h, memory).memory
+    if isinstance(getattr(resolver, "inner", resolver), Merged):  # settled or not
+        for k in range(max(ticks) + 1):
+            carried[k] = memory
+            if (h := rows.hierarchy(k)) is not None:
+                memory = resolver.solve(h, memory).memory
     return {k: partial(answer, carried.get(k)) for k in ticks}
 
 

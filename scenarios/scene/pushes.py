@@ -126,9 +126,7 @@ def _shove(robot: RobotFacts, push: PushSection, t: Array, placements: Array) ->
 def _arrow(way: Array) -> Array:
     """Return shaft and head (5, 2, 3) of an arrow along `way` (3,) [m] to the origin."""
     length = float(np.linalg.norm(way))
-    if length == 0.0:
-        return np.zeros((5, 2, 3))
-    along = way / length
+    along = way / (length or 1.0)
     across = 0.4 * np.linalg.svd(along[None])[2][1:]
     barbs = min(_HEAD, length) * (np.concatenate([across, -across]) - along)
     return np.stack([np.array([-way, *barbs]), np.zeros((5, 3))], axis=1)

@@ -68,7 +68,7 @@ class Smooth(Resolver):
 
     def can_resolve(self, required: Handles) -> bool:
         """Equalities act fully; for other rows it needs activations."""
-        return required in ("equalities", "activations")
+        return super().can_resolve(required) and required in ("equalities", "activations")
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h with all rows fully active; HierarchyError for an inequality."""
@@ -95,6 +95,7 @@ class Smooth(Resolver):
             return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
         return Resolution(rho)
 
+    @np.errstate(all="ignore")
     def _descend(self, rho: Array, Q: Array, J: Array, A: Array, rate: Array
                  ) -> tuple[Array, Array]:
         """Return rho and Q after a level of rows J (m, n), activations A (m,) and rates (m,)."""

@@ -7,6 +7,7 @@ import inspect
 import itertools
 import pkgutil
 import re
+from collections.abc import Mapping
 from types import SimpleNamespace
 
 import numpy as np
@@ -39,6 +40,7 @@ from solvers.problems import ANY, generate, structured
 from solvers.proof import prove
 from solvers.qp.programs import level_problem
 from solvers.resolvers.set_based import SetBased
+from solvers.resolvers.settled import Settled
 from solvers.resolvers.weighted import lexicographic_weights
 
 BARRED = {f"{count} barred": tasks.Separation(SENSOR.points, Barrier(0.05), count)
@@ -114,6 +116,52 @@ def certificates():
         if h.n < 8 and h.m:
             one = prove(h, [make("hcod").solve(h).x])
             found[name] = dataclasses.asdict(one) | {"judged": one.judged, "turned": one.turn > 0.0}
+    return found
+
+
+def settled():
+    """What comes to rest of levels within and out of reach, at limits, and what is asked for it."""
+    found, eye = {}, np.eye(6)
+    for seed in range(9):
+        rng, size = np.random.default_rng(seed), 10.0 ** -(seed % 3)
+        far = (2.0, 0.1, 1e-3)[seed // 3]
+        U, V = (np.linalg.qr(rng.normal(size=(n, n)))[0] for n in (3, 6))
+        V[:, 4] = 0.0  # a motor before a gear
+        levels = {"limits": (eye, np.full(6, -1.5), np.full(6, 1.5)),
+                  "gear": (eye[4:5] - 0.1 * eye[5:], [0.0]),
+                  "hand": (size * U @ np.diag([1.0, 0.5, 0.1 ** (1 + seed)]) @ V[:3],
+                           far * size * rng.normal(size=3)),
+                  "cone": (size * rng.normal(size=(3, 6)), far * size * np.array([-np.inf, 1, -5]),
+                           far * size * np.array([-1.0, np.inf, 5.0])),
+                  "height": (size * 0.1 * rng.normal(size=(1, 6)), [far * size]),
+                  "posture": (eye, rng.normal(size=6))}
+        for inner, left_out in (("hcod", ()), ("merged", ()), ("tpm", ("cone",)), (
+                "recursive", ("limits", "cone"))):
+            kept = {name: level for name, level in levels.items() if name not in left_out}
+            h = Hierarchy.from_levels([*kept.values()], names=[*kept])
+            for k, more in enumerate(({"curved": frozenset(["hand"])}, {
+                    "curved": frozenset(["hand", "height"]), "bends": {"height": 2.0, "cone": 0.5},
+                    "geared": True}, {"curved": frozenset(kept), "softness": 9.0})):
+                resolver = Settled(inner=make(inner), period=0.1, **more)
+                res = resolver.solve(h)
+                again = resolver.solve(h, res.memory)
+                found[f"{seed} {inner} {k}"] = [res.x, res.status.name, res.active, again.x, [
+                    part for A in resolver.asked(h).levels() for part in map(np.abs, A)]]
+    return found
+
+
+def judged():
+    """Certificates of answers to degenerate problems, a little off, and proofs of some."""
+    found = {}
+    for seed in range(30):
+        h = structured(seed)
+        x = make("hcod").solve(h).x
+        for off in (1e-9, 1e-7, 1e-4):
+            one = certify(h, x + off * np.sin(seed + np.arange(h.n)) * (1.0 + np.abs(x)))
+            found[f"{seed} {off}"] = [one.level, one.certified, one.violations, np.where(
+                one.stationarity > 1e-9, one.stationarity, 0.0), max(one.nearest, 1e-9)]
+        if h.n < 7 and h.m < 16:
+            found[f"{seed}"] = dataclasses.asdict(prove(h, [x]))
     return found
 
 
@@ -210,6 +258,9 @@ def defaults():
             found |= {f"{name} {key}": [repr(one)] for key, one in module.items() if key.isupper()
                       and isinstance(one, (int, float, tuple, np.ndarray))
                       and not re.search(r"^\D*$|<|Table\(", repr(one)) and ".jit." not in name}
+            found |= {f"{name} {key}": [repr(one)] for key, one in module.items() if key.isupper()
+                      and isinstance(one, Mapping) and re.search(r"[:(] ?-?\d", repr(one))
+                      and not re.search(r"<|Table\(|Posed\(", repr(one))}
             public = [(f"{name} {key}", one) for key, one in module.items()
                       if key[0] != "_" and getattr(one, "__module__", "") == name
                       and not hasattr(one, "__members__")]
@@ -326,5 +377,6 @@ def measured():
 
 COMPUTED = {"rows": rows, "derived": derived, "adapted": adapted, "defaults": defaults,
             "mechanism": mechanism, "certificates": certificates, "programs": programs,
+            "settled": settled, "judged": judged,
             "edited": edited, "odd": odd, "solved": solved, "measured": measured,
             "paths": lambda: [[path(t) for t in np.linspace(-0.2, 4.4, 24)] for path in PATHS]}

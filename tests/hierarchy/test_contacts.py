@@ -9,6 +9,7 @@ from standing import (
     CONTACTS,
     LEFT,
     ROBOT,
+    WEIGHT,
     drift_of,
     feet,
     moving_state,
@@ -20,6 +21,7 @@ from standing import (
 from hierarchy import Robot, Stack, State, tasks
 from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.task import Rows, Task
+from hierarchy.tasks.contacts.friction import _edges
 
 STEP = 1e-6
 N = ROBOT.n
@@ -111,6 +113,13 @@ def test_corners_one_above_the_other_are_one_of_the_sole():
     np.testing.assert_allclose(levers[:, :4], levers[:, 4:], atol=1e-12)
 
 
+def test_the_edges_of_a_sole_are_those_of_its_hull():
+    """Each from corner to corner, past points between them."""
+    points = np.array([(0.0, 0.0), (0.0, 2.0), (2.0, 0.0), (2.0, 2.0), (1.0, -1e-12), (1.0, 1.0)])
+    assert {(*start, *inward) for start, inward in _edges(points)} == {
+        (0, 0, 0, 1), (2, 0, -1, 0), (2, 2, 0, -1), (0, 2, 1, 0)}
+
+
 @pytest.mark.parametrize(("t", "ramp", "load"), [
     (0.0, 0.2, 1.0), (0.8, 0.2, 1.0), (0.9, 0.2, 0.5), (1.0, 0.2, 0.0), (1.5, 0.2, 0.0),
     (2.0, 0.2, 0.0), (2.05, 0.2, 0.25), (2.5, 0.2, 1.0), (0.99, 0.0, 1.0), (1.5, 0.0, 0.0)])
@@ -163,6 +172,14 @@ def test_the_load_of_a_sole_falls_in_its_ramp_from_what_it_carried(largest):
         write()
         assert (rows[1][40], rows[2][40]) == (-np.inf, pytest.approx(up))
         np.testing.assert_allclose(rows[1][24:40:5], least, atol=1e-12)  # of each point's normal
+    for carried, up, least in ((4e-6, 2e-6, 1.0), (1e-6, np.inf, 0.0)):  # the half of which is none
+        state.carried = np.array([300.0, carried])
+        state.move(0.9, state.q, state.v)
+        write()
+        assert (rows[2][40], rows[1][24]) == (pytest.approx(up), pytest.approx(least))
+    state.carried = None  # then what the whole robot weighs
+    write()
+    assert rows[2][40] == pytest.approx(0.5 * WEIGHT)
 
 
 def test_what_a_contact_carries_is_kept_while_it_ramps_and_forgotten_when_it_is_open():
@@ -259,6 +276,9 @@ def test_the_force_on_a_sliding_point_is_friction_against_its_velocity(faces):
     assert (lower[-1], upper[-1]) == (0.0, np.inf)        # and it pushes
     assert np.isinf([side[:-1][~equal[:-1]] for side in (lower, upper)]).all()
     assert rows_at(v, least=2.0)[1][-1] == 2.0
+    slow = 0.004 / np.linalg.norm(along) * v  # [m/s], in proportion below 0.01
+    A, lower, upper, _ = rows_at(slow, faces=faces)
+    np.testing.assert_allclose((A @ (force * [0.4, 0.4, 1.0]))[lower == upper], 0.0, atol=1e-12)
 
 
 def test_a_sliding_contact_is_held_along_its_normal_only():

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from hierarchy.jit import compiled, saying
+from hierarchy.jit import compiled, compiling, saying
 from hierarchy.jit.sources import source_digest
+from hierarchy.kinematics import rotation_of
 from hierarchy.measured import measured
+from hierarchy.tasks.pose import _write_jacobian
 from solvers.kernels.active_set.exact import solve_hierarchy
 from solvers.kernels.active_set.working_set import meet
 from solvers.kernels.linalg.rows import swap
@@ -174,3 +176,19 @@ def test_compiling_is_said_once_and_not_by_a_worker(monkeypatch, capsys):
 def test_python_cannot_call_what_is_compiled_for_other_kernels():
     for kernel in (meet, swap):
         refused(f"{kernel.py_func.__name__} is compiled for other", kernel, error=TypeError)
+
+
+def test_what_makes_arrays_itself_or_by_what_it_calls_is_known():
+    assert (rotation_of.allocates, _write_jacobian.allocates, swap.allocates, meet.allocates) == (
+        True, True, False, False)
+
+
+def test_the_files_of_a_kernel_are_looked_for_once(monkeypatch):
+    kinds, found = (numba.float64,), [None, "entry"]
+    monkeypatch.setattr(compiling, "find", lambda *_: found.pop(0))
+    monkeypatch.setattr(compiling, "asked", set())
+    monkeypatch.setattr(solve_hierarchy, "ready", {})
+    monkeypatch.setattr(solve_hierarchy, "_insert", lambda *_: None)
+    assert [solve_hierarchy._ready(kinds) for _ in range(3)] == [None, "entry", "entry"]
+    assert found == []
+    assert len(compiling.asked) == 1

@@ -4,8 +4,10 @@ import sys
 from itertools import combinations
 from pathlib import Path
 from types import ModuleType
+from unittest import mock
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from refusals import refused
 from urdf_text import joint, link, shape, urdf
@@ -13,6 +15,10 @@ from urdf_text import joint, link, shape, urdf
 from hierarchy import Robot
 from hierarchy.avoidance.body import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
+from hierarchy.robots import files, names
+from hierarchy.robots.from_table import _capsule_inertia
+from hierarchy.robots.joints import _pieces
+from hierarchy.robots.table import Link
 from hierarchy.tasks.pairs import separable_pairs
 from scenarios.cell.robot import make_robot
 from scenarios.config.sections.robot import RobotSection
@@ -197,3 +203,47 @@ def test_a_file_with_the_name_of_a_table_is_not_that_table(arm):
     assert (robot.name, robot.table) == ("humanoid", None)
     assert separable_pairs(Robot.load("humanoid"), 9.0), "a table says what is watched"
     assert separable_pairs(robot, 0.01) == [(0, 2)]
+
+
+def test_a_composite_joint_has_the_pieces_of_those_in_it():
+    model, both = pin.Model(), pin.JointModelComposite(3)
+    for one in (pin.JointModelRX(), pin.JointModelSpherical(), pin.JointModelPY()):
+        both.addJoint(one)
+    model.addJoint(0, both, pin.SE3.Identity(), "both")
+    assert _pieces(model.joints[1]) == [(1, "rad"), (4, "rad"), (1, "m")]
+
+
+def test_a_joint_with_more_coordinates_than_velocities_has_no_limits():
+    ball = Robot.load(ROBOTS / "odd.xml")
+    assert np.isinf(ball.position_limits()[0][3:6]).all()
+    ball.lower[3] = -1.0
+    refused("joint 'wrist' has 4 coordinates for 3 velocities", ball.position_limits)
+
+
+def test_a_name_is_looked_for_in_the_installed_packages(monkeypatch):
+    monkeypatch.setattr(names, "_NAMES", {
+        "one": lambda: {"stretch": None, "straight": None, "stretched_arm": None},
+        "other": mock.Mock(side_effect=ImportError), "third": lambda: {"stretcher": None}})
+    assert names.elsewhere("stretchy") == (
+        "The installed packages have one:stretch, third:stretcher.")
+    assert "descriptions" in names.elsewhere("ur5")
+
+
+@pytest.mark.parametrize("end", [
+    (0.4, 0.0, 0.0), (0.0, -0.3, 0.0), (0.3, 0.0, 0.4), (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)])
+def test_the_inertia_of_a_link_of_a_table_is_that_of_a_cylinder_along_it(end):
+    found, length = _capsule_inertia(Link(end, 0.05, 3.0)), np.linalg.norm(end)
+    axis = np.array(end) / length if length else np.eye(3)[2]
+    along, across = 3.0 * 0.05**2 / 2, 3.0 * (3 * 0.05**2 + (length + 0.1)**2) / 12
+    expected = across * np.eye(3) + (along - across) * np.outer(axis, axis)
+    np.testing.assert_allclose(found.inertia, expected, atol=1e-15)
+    np.testing.assert_allclose(found.lever, np.array(end) / 2)
+    assert (found.mass, _capsule_inertia(Link(end, 0.05)).mass) == (3.0, 0.0)
+
+
+def test_a_robot_whose_shapes_cannot_be_read_has_none_and_says_so(arm, monkeypatch):
+    read = mock.Mock(side_effect=[RuntimeError("no mesh"), RuntimeError("no shape")])
+    monkeypatch.setattr(files, "_urdf_shapes", read)
+    robot = Robot.from_file(arm())
+    assert robot.capsules == ()
+    assert [what in " ".join(robot.missing) for what in ("no mesh", "no shape")] == [True, True]

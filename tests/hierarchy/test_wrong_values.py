@@ -35,6 +35,7 @@ from hierarchy.measured import Measured
 from hierarchy.paths import Blended, Jittered, Shifted, Still, circle, read_bvh
 from hierarchy.robot import Frame
 from hierarchy.tasks.joints.joint_limits import StepLimits
+from hierarchy.words import some
 
 NAN, INF = float("nan"), float("inf")
 A, B = np.eye(2), np.ones(2)
@@ -381,3 +382,8 @@ def test_what_takes_a_state_refuses_anything_else(task, given):
     for method in (task.error, task.jacobian, task.jacobian_derivative, task.reference_velocity,
                    task.reference_acceleration):
         refused(f"task '{task.name}': state: expected a State", method, given)
+
+
+def test_of_many_names_the_first_are_told_and_never_that_there_is_one_more():
+    assert [some("abcd"[:count], 2) for count in (1, 2, 3, 4)] == [
+        "a", "a, b", "a, b, c", "a, b and 2 more"]

@@ -294,6 +294,13 @@ def test_a_camera_sees_the_true_robot_and_not_where_late_joints_say_it_is():
     assert max(missed) == 0
 
 
+def test_the_robot_of_a_recorded_image_is_where_its_joints_say_or_where_it_is():
+    frames, joints = RecordedFrames("hand", ROBOT), State.at(ROBOT, ROBOT.rest)
+    frames._placements[:2] = None, joints.placements
+    assert frames.image(0, STATE)[1] is STATE.placements
+    assert frames.image(1, STATE)[1] is joints.placements
+
+
 def test_frames_that_cannot_be_used_are_refused_by_name(tmp_path):
     run = simulate(load("human", [*QUICK, "control.duration=0.3"]))
     example = Path(__file__).parents[2] / "examples" / "record_frames.py"
@@ -324,3 +331,14 @@ def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
     assert ticks[0] in (35, 36)  # the last frame was taken in tick 14, at 0.07 s
     assert np.abs(run["v"][79]).max() < 0.5 * np.abs(run["v"][ticks[0]]).max()
     assert {event.action for event in run.events} == {"brake"}
+
+
+def test_an_obstacle_at_a_point_of_the_robot_is_refused_at_the_start():
+    def exact(centre):
+        return ExactDistances(ROBOT, Obstacles((Obstacle("point", centre),)))
+
+    points = exact((9.0, 9.0, 9.0)).measure(STATE).points.copy()
+    for k, said in ((0, "control point 1"), (-2, f"control point {len(points) - 1}"),
+                    (-1, "end effector")):
+        refused(f"touches {said} (", exact(tuple(points[k])).check_start, STATE)
+    exact(tuple(points[0] + 1e-8)).check_start(STATE)

@@ -14,8 +14,10 @@ from hierarchy import HierarchyError
 from scenarios import compare
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError, load, members, shipped
+from scenarios.config.distributions import flat
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
+from scenarios.config.validation import _table, tag_at
 from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run
 from scenarios.results.plan import load_sweep
@@ -74,6 +76,21 @@ def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
     assert s.with_resolver("tpm-published") == load("ellipse")
     assert load("ellipse").with_resolver("tpm:damping=0.01").control.settings() == {
         "damping": 0.01, "threshold": 0.1}
+
+
+@pytest.mark.parametrize(("section", "tag"), [
+    ("tasks.0", ("kind", None)), ("position.path", ("kind", None)),
+    ("plant", ("kind", "kinematic")), ("avoidance.obstacles.1", ("shape", "point")),
+    ("robot", None), ("faults.0", None)])
+def test_the_key_that_says_the_kind_of_a_section_may_have_a_default(section, tag):
+    assert tag_at(Scenario, section.split(".")) == tag
+
+
+def test_tables_are_read_at_a_path_and_flattened_and_what_is_none_is_empty_or_stays():
+    assert (flat(3), flat({"a": {"b": {"around": 1}}})) == (3, {"a.b": {"around": 1}})
+    data = {"a": 3, "b": [{"c": 1}]}
+    assert [_table(data, path) for path in (["b", 0], ["a"], ["a", "d"], ["b", 1], [])] == [
+        {"c": 1}, {}, {}, {}, data]
 
 
 def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacle
 from scenarios import load, save, simulate
-from scenarios.export import export, foxglove
+from scenarios.export import _bytes, export, foxglove
 from scenarios.recording.recording import Event
 from scenarios.scene.drawn import scene
 
@@ -78,6 +78,20 @@ def assert_fits(value, schema, where):
     if isinstance(value, list):
         for part in value:
             assert_fits(part, schema["items"], f"{where}[]")
+
+
+def test_a_capsule_without_length_is_two_balls():
+    place = np.array([1.0, 2.0, 3.0])
+    assert {what: len(found) for what, found in foxglove._capsule(
+        place, place, 0.5, foxglove._ARM).items()} == {"spheres": 2}
+    parts = foxglove._capsule(place, place + np.array([0.0, 0.0, 2.0]), 0.5, foxglove._ARM)
+    assert {what: len(found) for what, found in parts.items()} == {"spheres": 2, "cylinders": 1}
+    assert parts["cylinders"][0]["size"] == {"x": 1.0, "y": 1.0, "z": 2.0}
+
+
+def test_what_is_no_number_in_json_is_not_written():
+    with pytest.raises(ValueError, match="JSON"):
+        _bytes({"x": [1.0, np.inf]})
 
 
 def test_frames_are_where_the_robot_is(run, messages):

@@ -25,6 +25,12 @@ def test_an_error_of_a_listed_task_that_only_rounding_makes_is_none(monkeypatch)
         assert found[f"task_elbow_{key}"].value > 0.0
 
 
+def test_the_error_of_a_task_that_cannot_be_read_is_none():
+    assert np.isnan(listed._error_reader(SimpleNamespace(), None)())
+    plain = SimpleNamespace(error_reader=lambda state: lambda: 3.0)
+    assert listed._error_reader(plain, None)() == 3.0
+
+
 @pytest.mark.parametrize(("value", "unit", "shown"), [
     *((12.3456789, unit, shown) for unit, shown in (
         ("m", "12346"), ("s", "12.346"), ("deg", "12.346"), ("share", "1235"), ("rad", "12.346"),

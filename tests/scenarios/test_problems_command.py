@@ -56,6 +56,20 @@ def test_ticks_of_the_humanoid_are_ten_in_a_row_after_its_push_of_runs_that_last
                         plant.armature))
 
 
+def test_a_window_begins_at_the_tick_of_its_seed_in_the_first_run_that_lasts(monkeypatch):
+    asked = []
+
+    def window(scenario, first, count):
+        asked.append((first, tuple(scenario.start.q)))
+        return [None] * (count - (len(asked) in (2, 3)))
+
+    monkeypatch.setattr(recorded, "window", window)
+    for seed in (0, 3, 4):
+        assert recorded.recorded("ellipse-limits", seed, 2) == [None, None]
+    assert [first for first, _ in asked] == [7540, 3047, 3047, 3047, 9393]
+    assert len({q for _, q in asked}) == 5
+
+
 def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
     from scenarios.config import ScenarioError
 

@@ -23,6 +23,7 @@ from scenarios.measure import run_folder
 from scenarios.measure.metrics import Metric
 from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
+from scenarios.recording.facts import _plain
 from scenarios.recording.signals import Signal, known
 from scenarios.results.sections import multiples
 
@@ -44,6 +45,13 @@ def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
     versions = json.loads((tmp_path / "run" / "versions.json").read_text())
     assert versions["numpy"] == np.__version__
     assert {"python", "pin", "task-hierarchy"} <= versions.keys()
+
+
+@pytest.mark.parametrize(("value", "kept"), [
+    (1.5, 1.5), (None, None), ((1, 2.0), (1, 2.0)), (np.inf, "inf"), ((1.0, np.inf), "(1.0, inf)"),
+    ([1.0], "[1.0]")])
+def test_a_setting_that_json_lacks_is_kept_as_text(value, kept):
+    assert _plain(value) == kept
 
 
 @pytest.mark.parametrize(("told", "said"), [("arm", "arm"), ("", "unknown processor")])

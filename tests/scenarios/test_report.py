@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import re
 import shlex
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -12,13 +13,16 @@ from headless import Balanced, chromium
 
 from hierarchy.avoidance import Measurement, Obstacle
 from hierarchy.avoidance.measurement import measure_exactly
+from hierarchy.errors import HierarchyError
 from scenarios import load, save, simulate
 from scenarios.cell.sensors.sensor import packed_laws
 from scenarios.draw.figures import drawing, letter, picture, timeline
 from scenarios.measure.metrics import Metric
+from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
+from scenarios.results import page as results_page
 from scenarios.results.page import comparison_page as page
 from scenarios.results.page import run_command
 from scenarios.scene.drawn import scene
@@ -195,3 +199,30 @@ def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_
     np.testing.assert_allclose(link.get_xydata(), ends, atol=1e-3)
     assert [line.get_linestyle() for line in lines].count("--") == 1  # the path of `wipe`
     assert not letter.PANEL["active-point"].shows(run)  # rows push all points at once
+
+
+def test_a_replay_that_would_be_too_large_has_fewer_frames_a_second_but_five(monkeypatch):
+    monkeypatch.setattr(results_page, "html", lambda *_, rate, **__: int(100 * rate) * "x")
+    found = motions([made(LETTER)])
+    for most, rate in ((3000, 30), (2999, 29), (1000, 10), (100, 5)):
+        text = results_page.replay("hand-made", found, most)
+        assert f"{rate} frames per second" in text
+        assert f"'{100 * rate * 'x'}'" in text
+    monkeypatch.setattr(results_page, "html", mock.Mock(side_effect=HierarchyError("no frames")))
+    text = results_page.replay("hand-made", found, 3000)
+    assert "no frames" in text
+    assert "<iframe" not in text
+
+
+@pytest.mark.parametrize(("pixels", "u", "v"), [
+    ([[50.0, 40.0], [70.0, 50.0]], (29.5, 89.5), (59.5, 29.5)),  # its height is the larger share
+    ([[20.0, 40.0], [80.0, 44.0]], (9.5, 89.5), (61.5, 21.5)),  # its width
+    ([[2.0, 3.0], [4.0, 5.0]], (-0.5, 43.5), (21.5, -0.5)),
+    ([[190.0, 90.0], [199.0, 99.0]], (141.5, 199.5), (99.5, 70.5)),
+    ([[-50.0, 0.0], [300.0, 300.0]], (-0.5, 199.5), (99.5, -0.5))],
+    ids=["high", "wide", "in a corner", "in the other", "beyond the image"])
+def test_a_depth_image_is_cut_to_the_surroundings_of_points_in_its_own_proportions(pixels, u, v):
+    ax = drawing.figure(width=4.0, height=3.0)[1][0]
+    letter._show_around(ax, np.array(pixels), 10.0, (100, 200))
+    assert ax.get_xlim() == pytest.approx(u)
+    assert ax.get_ylim() == pytest.approx(v)

@@ -224,6 +224,12 @@ def test_runs_that_stopped_for_different_reasons_are_not_the_same():
 def test_an_axis_shows_values_up_to_twice_the_width_of_their_middle_away(outlier, high):
     values = np.append(np.linspace(10.0, 11.0, 100), outlier)
     assert sampled_page._limits([values]) == pytest.approx((10.0, high))
+    assert sampled_page._limits([-values]) == pytest.approx((-high, -10.0))
+    for beyond, ends in ((0.0, (-2.0, 3.0)), (0.01, (0.0, 1.0))):
+        two = np.r_[-2.0 - beyond, np.zeros(20), np.ones(20), 3.0 + beyond]
+        assert sampled_page._limits([two]) == ends
+    for beyond, end in ((20.0, 20.0), (25.0, 8.04)):  # of values that are the same twice these
+        assert sampled_page._limits([np.r_[np.full(99, 8.0), beyond]])[1] == pytest.approx(end)
     for same, room in ((-8.0, 0.04), (0.0, 0.005)):
         assert sampled_page._limits([np.full(9, same)]) == pytest.approx((same - room, same + room))
 

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+from operator import eq
 
 import pytest
 from pinned import FOLDER, leaves
@@ -17,7 +18,8 @@ def before():
 def test_what_is_seen_is_as_it_was(part, before):
     if part not in PLAIN:
         pytest.importorskip("mujoco")
+    same = eq if part == "computed defaults" else alike  # numbers as they are written
     found, expected = leaves(seen(part)), leaves(before[part])
     assert found.keys() == expected.keys()
     assert {place: (value, expected[place]) for place, value in found.items()
-            if not alike(value, expected[place])} == {}
+            if not same(value, expected[place])} == {}

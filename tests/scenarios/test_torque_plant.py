@@ -62,6 +62,19 @@ def one_joint(folder, inertial=INERTIAL, limit=LIMIT):
     return robot, TorqueRobot(robot, Contacts(robot, ()), np.zeros(1), section=plant_with())
 
 
+@pytest.mark.parametrize("period", [0.0005, 0.001, 0.0025, 0.004])
+def test_a_period_is_simulated_in_steps_of_a_millisecond_at_most(period, tmp_path):
+    robot, _ = one_joint(tmp_path)
+    plant = TorqueRobot(robot, Contacts(robot, ()), np.zeros(1), period=period,
+                        section=plant_with(bandwidth=60.0))
+    before = plant.data.ctrl.copy()
+    plant.act(np.full(1, 2.0))
+    assert plant.data.time == pytest.approx(period)
+    assert 0.0005 <= plant.model.opt.timestep <= 0.001
+    share = 1.0 - np.exp(-2.0 * np.pi * 60.0 * period)
+    np.testing.assert_allclose(plant.data.ctrl, before + share * (2.0 - before))
+
+
 def test_an_inertia_that_no_body_has_becomes_its_mean(tmp_path):
     robot, plant = one_joint(tmp_path, INERTIAL.replace("0.4", "1.4"))
     moments = np.linalg.eigvalsh(robot.model.inertias[1].inertia)

@@ -44,6 +44,7 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_
         assert (found[name] == recording[name]).all(), name
     live = Live(LIMITED)
     ticks(live, 10)
+    live.drag(0, (3.0, 4.0, 0.0))  # as far as it may go
     live.drag(0, (0.0, 0.0, 0.1))
     live.change({"pointing.alpha_d": 15.0})
     ticks(live, 50)

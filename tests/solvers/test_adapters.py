@@ -11,6 +11,7 @@ from refusals import refused
 
 from hierarchy import Hierarchy, Robot, Stack, State
 from solvers import make
+from solvers.adapters import drop_in
 from solvers.adapters.for_pink import solve_ik
 from solvers.adapters.from_pink import PinkTask
 from solvers.adapters.from_pink import hierarchy as pink_hierarchy
@@ -156,9 +157,14 @@ def test_pinks_arguments_are_taken_in_pinks_order(configuration):
     np.testing.assert_array_equal(given, solve_ik(configuration, hand, DT, limits=[]))
 
 
-def test_a_solver_of_qpsolvers_is_answered_by_hcod_with_a_note(configuration):
-    from solvers.adapters import drop_in
+def test_an_answer_that_holds_is_found_without_a_hierarchy(configuration, monkeypatch):
+    hand = [frame_task(configuration)]
+    expected = solve_ik(configuration, hand, DT, make("tpm"))
+    monkeypatch.setattr(drop_in, "_solved", lambda *_: pytest.fail("a hierarchy is made"))
+    np.testing.assert_allclose(solve_ik(configuration, hand, DT, "hcod"), expected, atol=1e-9)
 
+
+def test_a_solver_of_qpsolvers_is_answered_by_hcod_with_a_note(configuration):
     drop_in._noted.clear()
     hand = [frame_task(configuration)]
     expected = solve_ik(configuration, hand, DT)
@@ -258,6 +264,10 @@ def test_levels_out_of_mujoco_move_the_tip_within_the_ranges(arm):
     mujoco, adapter, model, data = arm
     start, turn = adapter.frame(model, data, "tip", "site")
     goal, wanted = start + np.array([0.03, -0.05, 0.02]), turn
+    _, lower, upper = adapter.limit_level(model, data, 0.5, 4.8)
+    rates = (model.jnt_range.T - POSE) / 0.5
+    np.testing.assert_allclose([lower, upper], np.clip(rates, -4.8, 4.8))
+    assert {*np.abs(np.r_[lower, upper])} > {4.8}  # some by their velocity
     for _ in range(60):
         levels = [adapter.limit_level(model, data, 0.01, 3.0),
                   adapter.position_level(model, data, "tip", goal, 20.0, "site"),

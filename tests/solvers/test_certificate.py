@@ -1,6 +1,8 @@
 """The certificate accepts the answer and nothing else, and a proof in 120 digits is one."""
 
+import re
 from decimal import Decimal, localcontext
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from hierarchy import Hierarchy
 from scenarios.problems import recorded
 from solvers import certificate, certify, make, problems, proof
 from solvers.proof import prove
+from solvers.qp import refinement
 
 # Not DEGEN7: some of its rows are at an angle of 2e-9, whose answer is 1e8 away or not.
 FAMILIES = ("EQ7", "EQ7over", "EQ7sing", "EQ30L8", "EQ30L10", "INEQ7", "HUM38", "DYN60")
@@ -115,15 +118,66 @@ def test_what_is_not_finite_is_never_certified(bad, where):
     assert (verdict.certified, verdict.level) == (False, 0)
 
 
+def test_a_side_that_is_no_number_is_never_certified_even_of_a_row_of_zeros():
+    h = Hierarchy.from_levels([([[1.0, 0.0], [0.0, 0.0]], [1.0, 0.0])])
+    assert certify(h, [1.0, 0.0]).certified
+    h.lower[1] = np.nan
+    assert not certify(h, [1.0, 0.0]).certified
+
+
+@pytest.mark.parametrize("unit", [1e-170, 1e-20, 1e20, 1e170])
+def test_units_of_rows_do_not_matter(unit):
+    h = Hierarchy.from_levels([(unit * np.eye(2)[:1], [-np.inf], [unit]),
+                               (unit * np.eye(2), [5.0 * unit, 2.0 * unit])])
+    assert certify(h, [1.0, 2.0]).certified
+    for wrong in ([1.0, 2.1], [0.9, 2.0], [1.1, 2.0]):
+        assert not certify(h, wrong).certified
+    if 1e-100 < unit < 1e100:  # whose squares are doubles too
+        assert prove(h, [[1.0, 2.0]]).x.tolist() == [1.0, 2.0]
+
+
 def test_its_search_for_multipliers_finds_the_least_that_scipys_finds():
     rng = np.random.default_rng(0)
     for _ in range(50):
         C, b = rng.random((9, 8)) + 0.2 * rng.normal(size=(9, 8)), rng.random(9)
         own, scipys = (certificate._non_negative(C, b, 0.0, by_scipy) for by_scipy in (False, True))
         np.testing.assert_allclose(own, scipys, atol=1e-9)
+        for small, large in ((1e-12, 1e6), (1e9, 1e-9)):  # units of rows and of what they explain
+            found = certificate._non_negative(small * C, large * b, 0.0)
+            np.testing.assert_allclose(found * small / large, own, atol=1e-9)
         with localcontext(prec=120):
             left = proof._pushed_back(*map(np.vectorize(Decimal, [object]), (C.T, b)))
         np.testing.assert_allclose(left.astype(float), b - C @ own, atol=1e-9)
+
+
+def test_a_search_of_scipys_that_gives_up_finds_nothing(monkeypatch):
+    monkeypatch.setattr("scipy.optimize.nnls", mock.Mock(side_effect=RuntimeError))
+    np.testing.assert_array_equal(certificate._by_scipy(np.eye(3)[:2], np.ones(2)), np.zeros(3))
+    for huge in (1.0, 1e51):  # too large for it
+        found, off = refinement._non_negative(huge * np.eye(3)[:2], np.ones(2))
+        assert (found.tolist(), off) == ([0.0, 0.0, 0.0], np.inf)
+
+
+@pytest.mark.parametrize("row", [0, 1, 2])
+def test_a_row_is_in_the_span_of_a_level_if_it_is_where_each_turns_by_the_angle(row):
+    """Its own turn and that of the row which it follows, whatever that weighs."""
+    view = certificate._View.of(np.eye(4)[:3], np.array([1.0, 1e-2, 1e-5]), 1e-8)
+    for beside, outside in ((0.5e-8, False), (1.9e-8, False), (2.1e-8, True)):
+        effect, _ = view.weighted(np.eye(4)[row:row + 1] + beside * np.eye(4)[3:])
+        assert np.any(effect[3]) == outside
+        assert np.any(effect[:3])
+
+
+def test_rows_that_repeat_heavier_ones_count_as_zero_and_others_keep_what_is_outside_a_span():
+    C = np.array([[1.0, 1.0], [1e15, 1e15], [1.0, -1.0], [0.0, 0.0]])
+    np.testing.assert_array_equal(certificate._unrepeated(C, np.abs(C)), [[0.0] * 2, *C[1:]])
+    alone = certificate._unrepeated(C, np.full_like(C, 1e15))  # where these are the terms of all
+    np.testing.assert_array_equal(alone, np.diag([0.0, 1.0, 0.0, 0.0]) @ C)
+    basis = np.linalg.qr(np.random.default_rng(3).normal(size=(5, 3)))[0].T
+    rows = np.vstack([basis[0] - 2.0 * basis[2], np.eye(5)])
+    left = certificate._outside(rows, basis)
+    np.testing.assert_allclose(left @ basis.T, 0.0, atol=1e-15)
+    np.testing.assert_allclose(left[1:], np.eye(5) - basis.T @ basis, atol=1e-15)
 
 
 def test_an_answer_for_rows_turned_until_they_depend_is_certified():
@@ -187,6 +241,8 @@ def test_a_residual_may_be_the_tolerance_and_no_more(stationarity, nearest, verd
                                     ("hand", "posture"))
     assert (str(found), found.certified) == (verdict, verdict.startswith("certified"))
     assert found.optimal == (not verdict.startswith("not optimal"))
+    assert re.findall(r"<td>(yes|no)", found._repr_html_()) == [
+        "yes" if one <= 1e-6 else "no" for one in (0.0, stationarity, nearest)]
 
 
 @pytest.mark.parametrize("name", [
@@ -210,6 +266,16 @@ def test_a_wrong_candidate_proves_nothing_and_a_metric_is_refused():
     np.testing.assert_array_equal(right.x, [1.0, 1.0])
     np.testing.assert_array_equal(right.least, [0.0, 1.0])
     refused("metric", lambda: prove(h.changed(metric=np.diag([1.0, 2.0])), [[1.0, 0.0]]))
+
+
+@pytest.mark.parametrize(("off", "gap"), [
+    (0.0, 1.0), (5e-9, 5e-8), (5e-8, 5e-7), (5e-7, 1.0), (0.0, 5e-9), (0.0, 5e-11)])
+def test_a_candidate_may_be_off_a_side_where_no_other_is_as_near(off, gap):
+    h = Hierarchy.from_levels([(np.eye(2), [-9.0] * 2, [1.0] * 2), (np.eye(2), [5.0, 1.0 - gap])])
+    found = prove(h, [[1.0 + off, 1.0 - gap]], unclear=1e-13)
+    assert (found.complete, found.shift, found.turn) == (True, 0.0, 0.0)
+    np.testing.assert_array_equal(found.x, [1.0, 1.0 - gap])
+    assert not prove(h, [[1.0 + 1e-5, 1.0 - gap]], unclear=1e-13).complete
 
 
 def test_optimal_but_not_nearest_to_the_reference_is_not_the_answer():

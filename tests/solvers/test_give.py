@@ -12,7 +12,7 @@ from hierarchy.paths import Still
 from hierarchy.tasks import LookAt, Position, Posture
 from solvers import Status, certify, explain, make, names
 from solvers.batch import Batch
-from solvers.give import giving
+from solvers.give import _joined, _split, giving
 from solvers.problems import generate, structured
 
 
@@ -113,6 +113,25 @@ def test_a_give_that_became_wrong_in_place_fails_with_zeros(resolver, wrong):
     h.give[3] = wrong
     res = resolver.solve(h)
     assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
+
+
+@pytest.mark.parametrize("name", ["hcod", "hqp"])
+def test_where_a_part_has_no_answer_the_whole_has_none(name):
+    h = problem(0, 0.1)
+    h.A[0, 0] = np.nan
+    res = make(name).solve(h)
+    assert (res.status, res.x.any(), res.memory) == (Status.NUMERICAL_FAILURE, False, None)
+
+
+def test_memories_of_several_solves_are_one_array_and_what_is_no_such_array_is_the_last():
+    joined = _joined([np.array([1.0, 2.0]), None, np.array([3.0])])
+    assert [part.tolist() for part in _split(joined, 3)] == [[1.0, 2.0], [], [3.0]]
+    for end in (-1.0, 0.0, 2.0, 7.0):
+        other = np.r_[joined[:-1], end]
+        assert _split(other, 3)[:2] == [None, None]
+        assert _split(other, 3)[2] is other
+    assert _split(np.zeros(3), 3)[0].size == 0
+    assert _split(np.zeros(2), 3)[0] is None
 
 
 def test_what_cannot_give_refuses_by_name():

@@ -12,7 +12,7 @@ from standing import ROBOT as HUMANOID
 from standing import WEIGHT, feet, standing_stack
 from urdf_text import LIMIT, joint, link, placed, urdf
 
-from hierarchy import HierarchyError, Robot, State, Task
+from hierarchy import Hierarchy, HierarchyError, Robot, State, Task
 from hierarchy.paths import Still, circle
 from hierarchy.tasks import (
     Along,
@@ -31,6 +31,7 @@ from hierarchy.tasks import (
 )
 from solvers import Status, certify, explain, make, solve_ik
 from solvers.ik import _of_thread
+from solvers.reaching import _above
 
 Q = np.array([0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3])
 AT = State.at(ROBOT, Q)
@@ -313,6 +314,23 @@ def test_beyond_a_curved_bound_the_nearest_point_on_it_is_found():
     found = solve_ik(ROBOT, Q, [InBall(), Position(FRAME, Still([0.7, 0.2, 0.4]))], until=1e-6)
     assert found.errors["position"] == pytest.approx(0.2, abs=1e-4)
     assert found.verdict.endswith("held back by in ball")
+
+
+@pytest.mark.parametrize(("sides", "wanted", "holds"), [
+    ((-1.0, 0.0), (1.0, 0.0), True), ((-1.0, 0.0), (-1.0, 0.0), False),
+    ((0.0, 1.0), (-3.0, 0.0), True), ((0.0, 1.0), (3.0, 0.0), False),
+    ((0.5, 0.5), (1.0, 0.0), True), ((-0.5, -0.5), (-1.0, 0.0), True),
+    ((-1.0, 1.0), (1.0, 0.0), False), ((-2e-6, 2e-6), (-1.0, 0.0), False),
+    ((-2e-6, 2e-6), (1.0, 0.0), False), ((-1e-7, 1e-7), (-1.0, 0.0), True),
+    ((-1e-7, 1e-7), (1.0, 0.0), True), ((-1e-6, 1e-6), (-1.0, 0.0), False),
+    ((-1e-6, 1e-6), (1.0, 0.0), False), ((0.0, 0.0), (1e-7, 1.0), False),
+    ((0.0, 0.0), (1e-5, 1.0), True), ((0.0, 0.0), (0.0, 0.0), False)])
+def test_a_level_above_holds_back_what_would_leave_a_side_without_room(sides, wanted, holds):
+    level = ([[2.0, 0.0], [0.0, 0.0]], *np.array([sides, (0.0, 0.0)]).T)
+    h = Hierarchy.from_levels([level, level, ([[1.0, 0.0]], [9.0])], names=["own", "box", "hand"])
+    own = Posture(tuple(Q), name="own")
+    assert _above(h, 2, np.array(wanted), [own]) == ["box"] * holds
+    assert _above(h, 1, np.array(wanted), []) == ["own"] * holds
 
 
 def test_what_holds_a_target_out_of_reach_back_is_said():

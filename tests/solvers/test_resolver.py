@@ -3,6 +3,7 @@
 import copy
 import pickle
 from dataclasses import fields
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -34,6 +35,24 @@ def test_settings_of_every_resolver_are_checked_by_name(name):
     for setting, value in [("damping", float("nan")), ("threshold", float("inf")),
                            ("rank_tolerance", True)]:  # others are in tests/helpers/computed.py
         refused(f"{name}: {setting} = ", make, name, **{setting: value})
+
+
+@pytest.mark.parametrize(("name", "kinds"), [
+    ("recursive", {"equalities"}), ("tpm", {"equalities", "bounds"}),
+    ("hcod", {"equalities", "bounds", "inequalities"}), ("smooth", {"equalities", "activations"})])
+def test_a_resolver_says_which_rows_it_can_resolve(name, kinds):
+    assert {kind for kind in ("equalities", "bounds", "inequalities", "activations")
+            if make(name).can_resolve(kind)} == kinds
+    refused("equality", make(name).can_resolve, "equality")
+
+
+def test_what_overflows_on_the_way_is_a_failure_and_says_nothing_else(monkeypatch):
+    tiny = Hierarchy.from_levels([([[1e-160, 0.0]], [1.0])])
+    monkeypatch.setattr("solvers.resolvers.hqp._Cascade.run",
+                        mock.Mock(side_effect=np.linalg.LinAlgError))
+    for resolver in (make("smooth", damping=0.0), make("hqp")):
+        res = resolver.solve(tiny)
+        assert (res.status, res.x.tolist()) == (Status.NUMERICAL_FAILURE, [0.0, 0.0])
 
 
 @pytest.mark.parametrize(("name", "settings"), [

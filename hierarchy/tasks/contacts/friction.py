@@ -202,8 +202,7 @@ def _edges(points: Array) -> Iterator[tuple[Array, Array]]:
         for end in points:
             along = end - start
             inward = np.array([-along[1], along[0]])
-            distance = (points - start) @ inward
-            beyond = (abs(distance) < 1e-9) & ((points - start) @ along > along @ along + 1e-9)
-            before = (abs(distance) < 1e-9) & ((points - start) @ along < -1e-9)
-            if along.any() and (distance >= -1e-9).all() and not (beyond | before).any():
+            distance, place = (points - start) @ inward, (points - start) @ along
+            between = (place > -1e-9) & (place < along @ along + 1e-9)
+            if along.any() and (distance >= -1e-9).all() and between[distance < 1e-9].all():
                 yield start, inward / np.linalg.norm(along)
