@@ -7,7 +7,6 @@ from types import ModuleType
 from unittest import mock
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from refusals import refused
 from urdf_text import joint, link, shape, urdf
@@ -17,7 +16,6 @@ from hierarchy.avoidance.body import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import files, names
 from hierarchy.robots.from_table import _capsule_inertia
-from hierarchy.robots.joints import _pieces
 from hierarchy.robots.table import Link
 from hierarchy.tasks.pairs import separable_pairs
 from scenarios.cell.robot import make_robot
@@ -203,14 +201,6 @@ def test_a_file_with_the_name_of_a_table_is_not_that_table(arm):
     assert (robot.name, robot.table) == ("humanoid", None)
     assert separable_pairs(Robot.load("humanoid"), 9.0), "a table says what is watched"
     assert separable_pairs(robot, 0.01) == [(0, 2)]
-
-
-def test_a_composite_joint_has_the_pieces_of_those_in_it():
-    model, both = pin.Model(), pin.JointModelComposite(3)
-    for one in (pin.JointModelRX(), pin.JointModelSpherical(), pin.JointModelPY()):
-        both.addJoint(one)
-    model.addJoint(0, both, pin.SE3.Identity(), "both")
-    assert _pieces(model.joints[1]) == [(1, "rad"), (4, "rad"), (1, "m")]
 
 
 def test_a_joint_with_more_coordinates_than_velocities_has_no_limits():
