@@ -4,9 +4,10 @@ A level A x = b of a task takes the x that, within the levels above, minimises
 
     |b - A x| + alpha |x - x0|^2 / 2,    alpha = softness T |A| / 2                         (a)
 
-x0 being the x of the levels above, and |A| counting more where these bear the pull of the residual
-and turn too: the minimum of |b - A x|^2 + mu |x - x0|^2 with mu = alpha |b - A x|, or A x = b where
-mu would be smaller. See docs/theory/settled.md. What the level reaches is its new right-hand side.
+x0 being the x of the levels above, a reference none of them, and |A| counting more where these bear
+the pull of the residual and turn too: the minimum of |b - A x|^2 + mu |x - x0|^2 with
+mu = alpha |b - A x|, or A x = b where mu would be smaller. See docs/theory/settled.md. What the
+level reaches is its new right-hand side.
 To second order the levels below disturb it although they keep A x: joint j may leave its speed by
 
     (|x - x0| (|r0| - |r|) + p |r|) / |r'| max_i |A_i| / |A_j|, r = b - A x, r0 = b - A x0    (b)
@@ -143,7 +144,7 @@ class _Above:
         self.calmed, self.status, self.names = False, Status.SOLVED, h.names
         self.levels: list[tuple[Array, Array, Array]] = []  # as they leave room
         self.asked: list[tuple[Array, Array, Array]] = []  # as `inner` resolves them
-        self.x, self._held, self._later = h.reference, np.empty((0, n)), list[Array]()
+        self.x, self._held, self._later = np.zeros(n), np.empty((0, n)), list[Array]()
         self.loose = False  # whether a level holds a direction loosely
         self.behind = False  # whether x misses a level
         self.box = np.full(n, -np.inf), np.full(n, np.inf)
@@ -296,8 +297,8 @@ class _Above:
         Directions that are held loosely keep the speed that their level found, if none below uses
         them.
         """
-        return self.stacked(self.asked, self.x if self.loose and self.inner is self.strict
-                            else h.reference)
+        keeps = self.loose and self.inner is self.strict and not h.reference.any()
+        return self.stacked(self.asked, self.x if keeps else h.reference)
 
     def _pace(self, free: Array, missed: float, most: float) -> None:
         """Let levels below change the speeds x by (b), `most` over |r'|, and no more."""

@@ -134,6 +134,9 @@ def test_levels_below_do_not_move_what_a_level_settled_on(inner):
         [limits, (A, b), (np.eye(6), np.ones(6))], names=["limits", "a", "posture"]))
     np.testing.assert_allclose(A @ both.x, A @ alone, atol=1e-5)
     assert np.linalg.norm(both.x - alone) > 1e-3
+    wanted = settled("a", inner=inner).solve(Hierarchy.from_levels(  # it counted as above all
+        [limits, (A, b)], np.ones(6), names=["limits", "a"])).x
+    np.testing.assert_allclose(wanted, both.x, atol=1e-5)
     assert inner != "hcod" or (both.holds_back == -1).all()
 
 
