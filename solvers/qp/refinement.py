@@ -62,6 +62,10 @@ class Rows:
         """Return the rows chosen by a mask."""
         return Rows(self.A[chosen], self.lower[chosen], self.upper[chosen])
 
+    def sided(self) -> Rows:
+        """Return the rows with a finite side."""
+        return self.where(np.isfinite(self.lower) | np.isfinite(self.upper))
+
     def and_(self, other: Rows) -> Rows:
         """Return these rows with the other rows below them."""
         return Rows(np.vstack([self.A, other.A]), np.concatenate([self.lower, other.lower]),

@@ -215,8 +215,11 @@ class _Cascade:
             vouched |= found
             if not kept.lower.size and not limits.lower.size:
                 return self._least_squares(z, E, e, own, lam), np.empty(0)
-            for start in (z, np.zeros_like(z)):  # at zero all rows held from above hold
-                exact = refined(start, E, e, self._seen(limits), self._seen(kept),
+            limits_seen, kept_seen = self._seen(limits), self._seen(kept)
+            rows = np.vstack([E, limits_seen.sided().A, kept_seen.sided().A])
+            visible = split(rows, lengths(rows), EXACT)[0]  # backends went 1e8 along the rest
+            for start in (visible @ (visible.T @ z), np.zeros_like(z)):  # where kept rows hold
+                exact = refined(start, E, e, limits_seen, kept_seen,
                                 self.settings.rank_tolerance)
                 if exact is not None:
                     return exact

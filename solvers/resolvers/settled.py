@@ -4,9 +4,10 @@ A level A x = b of a task takes the x that, within the levels above, minimises
 
     |b - A x| + alpha |x - x0|^2 / 2,    alpha = softness T |A| / 2                         (a)
 
-x0 being the x of the levels above, and |A| counting more where these bear the pull of the residual
-and turn too: the minimum of |b - A x|^2 + mu |x - x0|^2 with mu = alpha |b - A x|, or A x = b where
-mu would be smaller. See docs/theory/settled.md. What the level reaches is its new right-hand side.
+x0 being the x of the levels above, a reference none of them, and |A| counting more where these bear
+the pull of the residual and turn too: the minimum of |b - A x|^2 + mu |x - x0|^2 with
+mu = alpha |b - A x|, or A x = b where mu would be smaller. See docs/theory/settled.md. What the
+level reaches is its new right-hand side.
 To second order the levels below disturb it although they keep A x: joint j may leave its speed by
 
     (|x - x0| (|r0| - |r|) + p |r|) / |r'| max_i |A_i| / |A_j|, r = b - A x, r0 = b - A x0    (b)
@@ -41,6 +42,7 @@ _MOST = 20        # its steps; 4 in the mean, at most 8 seen
 _NONE = 1e-9      # of the largest column of A: a joint that a level does not use
 _TURNING = 1e-3   # weight in |x - x0| of a joint that bends nothing, such as a motor before a gear
 _AT_REST = 1e-5   # of the pull of a residual: what rows above that act do not hold of it
+_LOST = 1e-8      # of |A|: singular values up to it are left to the pace where rows have no room
 _WEAK = 1e-5      # of |A|: singular values up to it hold their directions loosely
 _PACE = 1e-5      # [rad/s or m/s] p of (b)
 
@@ -107,7 +109,7 @@ class Settled(Around):
                 lower, upper = above.eased(A, lower, upper, half, bend)
             else:
                 above.behind |= bool(((A @ above.x < lower) | (A @ above.x > upper)).any())
-            above.add(A, lower, upper)
+            above.add(A, lower, upper, rows)
             if bend >= 0.0 and equal:
                 above.curved.append((rows, max(_norm(rows), bend)))
         return above if above.calmed else None
@@ -140,8 +142,9 @@ class _Above:
         if isinstance(inner, OneLevel):
             self.strict, self.inner = inner.strictly(), inner.below_one_more(h)
         self.calmed, self.status, self.names = False, Status.SOLVED, h.names
-        self.levels: list[tuple[Array, Array, Array]] = []
-        self.x, self._held, self._later = h.reference, np.empty((0, n)), list[Array]()
+        self.levels: list[tuple[Array, Array, Array]] = []  # as they leave room
+        self.asked: list[tuple[Array, Array, Array]] = []  # as `inner` resolves them
+        self.x, self._held, self._later = np.zeros(n), np.empty((0, n)), list[Array]()
         self.loose = False  # whether a level holds a direction loosely
         self.behind = False  # whether x misses a level
         self.box = np.full(n, -np.inf), np.full(n, np.inf)
@@ -150,11 +153,14 @@ class _Above:
         self.joined = (self.paced and not inner.can_resolve("inequalities") and bool(h.sizes[:1])
                        and bool((h.lower < h.upper)[:h.sizes[0]].any()))
 
-    def add(self, A: Array, lower: Array, upper: Array) -> None:
-        """Add a level."""
+    def add(self, A: Array, lower: Array, upper: Array, rows: Array) -> None:
+        """Add a level, `rows` being those of h."""
         self.levels.append((A, lower, upper))
         if (lower == upper).all():
             self._later.append(A)
+        if A is not rows and isinstance(self.inner, OneLevel):  # its weights count them as they are
+            A, lower, upper = rows, rows @ self.x, rows @ self.x
+        self.asked.append((A, lower, upper))
 
     def held(self) -> Array:
         """Return the directions (k, n), orthonormal, that levels of equalities have taken."""
@@ -255,8 +261,6 @@ class _Above:
         missed = aim - own @ found.x
         self._pace(free, _norm(missed),
                    step * max(out - found.missed, 0.0) + _PACE * found.missed)
-        if isinstance(self.inner, OneLevel):  # its weights count the rows as they are
-            return A, A @ found.x, A @ found.x
         # The first: whether it is worth a closer look.
         if (found.mu * step < _AT_REST * found.missed * size
                 and found.mu * step < _AT_REST * _norm(missed @ free)):
@@ -268,6 +272,8 @@ class _Above:
         rows[:len(values)] = directions
         if self.inner.can_resolve("inequalities"):
             room[:len(values)] = self._room(whole, values, directions, free)
+        elif self.paced:  # held exactly, they would become rounding, and then jump
+            rows[:len(values)][values <= _LOST * whole] = 0.0
         return rows, rows @ found.x - room, rows @ found.x + room
 
     def _room(self, whole: float, values: Array, directions: Array, free: Array) -> Array:
@@ -291,7 +297,8 @@ class _Above:
         Directions that are held loosely keep the speed that their level found, if none below uses
         them.
         """
-        return self.stacked(self.levels, self.x if self.loose else h.reference)
+        keeps = self.loose and self.inner is self.strict and not h.reference.any()
+        return self.stacked(self.asked, self.x if keeps else h.reference)
 
     def _pace(self, free: Array, missed: float, most: float) -> None:
         """Let levels below change the speeds x by (b), `most` over |r'|, and no more."""

@@ -137,6 +137,20 @@ def test_what_was_solved_and_wrong_is_right_or_inaccurate(name, kind, seeds):
         assert res.status is Status.INACCURATE or is_right(h, res.x), seed
 
 
+def test_directions_that_rows_see_by_rounding_do_not_break_the_bounds_of_others():
+    """proxqp went along one by 1e8, which moved a bounded unknown by 2e-5, and that was SOLVED."""
+    E, inf = np.eye(4), np.inf
+    for seed in (26, 82, 161):
+        rng = np.random.default_rng(seed)
+        row, other = (np.r_[first, rng.normal(size=3)] for first in (1e-12 * rng.normal(), 0.0))
+        h = Hierarchy.from_levels([
+            (E[1:], -0.01 * np.abs(rng.normal(size=3)), 1e-3 * rng.normal(size=3)**2),
+            ([row], [5e-4], [inf]), ([other], [2.0])])
+        res = make("hqp").solve(h)
+        assert res.status is Status.SOLVED
+        assert h.violations(res.x)[0] < 1e-12
+
+
 @pytest.mark.parametrize(("name", "seed", "kinds"), [
     ("hqp", 10, ["chain"]),  # rows violated by a little on the way are assumed to hold nearby
     ("hqp", 5000281, []),  # |x| = 1e8

@@ -384,6 +384,14 @@ def test_an_arm_that_its_limits_keep_from_a_target_rests_with_every_tick_verifie
     assert np.abs(v[-1]).max() < 0.01
 
 
+def test_with_bounds_alone_an_arm_stretched_out_of_reach_stays_at_rest():
+    """Its bend shrank to rounding, in which a posture then moved it by 0.7 rad/s, again and again.
+    """
+    _, v = follow([Position(FRAME, Still([0.0, 0.0, 3.0])), Posture((0.5,) * 7)], 140, 0.04,
+                  resolver="tpm")
+    assert np.abs(np.diff(v[100:], axis=0)).max() < 0.05
+
+
 @pytest.mark.parametrize("faces", [4, 8])
 @pytest.mark.parametrize("shift", [  # all but the first out of reach
     (0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.6, 0.0), (0.0, 0.0, 1.0), (-2.0, 1.0, -1.0)])

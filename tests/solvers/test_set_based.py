@@ -134,6 +134,9 @@ def test_levels_below_do_not_move_what_a_level_settled_on(inner):
         [limits, (A, b), (np.eye(6), np.ones(6))], names=["limits", "a", "posture"]))
     np.testing.assert_allclose(A @ both.x, A @ alone, atol=1e-5)
     assert np.linalg.norm(both.x - alone) > 1e-3
+    wanted = settled("a", inner=inner).solve(Hierarchy.from_levels(  # it counted as above all
+        [limits, (A, b)], np.ones(6), names=["limits", "a"])).x
+    np.testing.assert_allclose(wanted, both.x, atol=1e-5)
     assert inner != "hcod" or (both.holds_back == -1).all()
 
 
@@ -211,6 +214,19 @@ def test_a_merged_level_out_of_reach_keeps_its_memory_and_strict_levels_stay_str
         np.testing.assert_array_equal(found.active[1:7], sides)
         memory = found.memory
     assert make("merged").solve(h, memory).status is found.status is Status.SOLVED
+
+
+def test_merged_levels_out_of_reach_beside_a_singular_one_are_solved():
+    """What lies above was held as the weights count it, by rows that depend on each other."""
+    E = np.eye(6)
+    for seed in (1, 2, 5, 9, 10):
+        rng = np.random.default_rng(seed)
+        A = nearly_singular(rng, 1e-8)
+        h = Hierarchy.from_levels([
+            (E, -np.ones(6), np.ones(6)), (rng.normal(size=(3, 3)) @ A, 3.0 * rng.normal(size=3)),
+            (A, 9.0 * rng.normal(size=3)), (rng.normal(size=(3, 6)), 9.0 * rng.normal(size=3))],
+            names=["limits", "a", "b", "c"])
+        assert settled("a", "b", "c", inner="merged").solve(h).status is Status.SOLVED
 
 
 LAMBDA, THRESHOLD, ETA = 1e-4, 1e-2, 10.0
