@@ -263,7 +263,7 @@ def slug(text: str) -> str:
 
     A long one ends in a digest.
     """
-    name = re.sub(r"[^\w.]", "-", text).strip("-.") or "unnamed"  # -1 is not 1
+    name = re.sub(r"[^\w.]+", "-", text.replace("=-", "=minus")).strip("-.") or "unnamed"
     digest, whole = hashlib.sha256(name.encode()).hexdigest(), name.encode()
     return name if len(whole) <= _NAME else (
         f"{whole[:_NAME - 9].decode(errors='ignore')}-{digest[:8]}")
