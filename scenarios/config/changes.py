@@ -96,7 +96,7 @@ def place(data: Any, dotted: str, add: bool = False) -> tuple[Any, Any]:
         found = _within(data, key, ".".join(path[:i]), add)
         if add and isinstance(data, dict) and data.get(key) is None:
             data[key] = {}
-        data = data[found]
+        data = data[found] if isinstance(data, list) else data.get(found)
     return data, _within(data, last, ".".join(path), add)
 
 
