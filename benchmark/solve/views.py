@@ -111,7 +111,9 @@ def lead(title: str, total: Sequence[Row], cells: Sequence[Row]) -> list[str]:
     best = [label for label, share in widely.items() if share == max(widely.values())]
     better, faster = [], []
     for family, some in by(cells, "family"):
-        own = next(row for row in some if row["entrant"] == best[0])
+        own = next((row for row in some if row["entrant"] == best[0]), None)
+        if own is None:  # added to the others later, it has not been asked
+            continue
         other = max(some, key=lambda row: (row["entrant"] in widely) * row["right"])
         if other["right"] > own["right"]:
             better.append(f"{family} ({other['entrant']}, {percent(other['right'])} against "

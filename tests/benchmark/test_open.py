@@ -17,6 +17,7 @@ from benchmark.packages import OWN, Entrant
 from benchmark.process import CRASHED, HUNG, LEFT_OUT, Field
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
+from benchmark.solve import views
 from benchmark.solve.entrants import chosen, compiled
 from benchmark.worker import Repeats
 from hierarchy import Hierarchy, HierarchyError
@@ -142,7 +143,19 @@ def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():
     assert np.isnan(whole["warm_median_us"])
 
 
+def test_the_best_may_lack_a_family_that_another_was_asked_later():
+    def row(name, family, asked, right):
+        return {"entrant": name, "family": family, "asked": asked, "right": right, "median_us": 1.0}
+
+    total = [row("best", "", 100, 1.0), row("other", "", 102, 0.5)]
+    some = [row("best", "a", 100, 1.0), row("other", "a", 100, 0.5), row("other", "b", 2, 0.5)]
+    assert "More often right than best: none." in views.lead("", total, some)
+
+
 @pytest.mark.parametrize(("call", "said"), [
+    (lambda: chosen([], more=[fake("hcod")]), "two entrants are named hcod"),
+    (lambda: chosen([f"{HELPERS / 'fake_entrants.py'}:Moody"], more=[fake("Moody")]),
+     "two entrants are named Moody"),
     (lambda: compiled([Path("a.so")], []), "1 libraries and 0 names"),
     (lambda: compiled([Path("a.so")], ["a"]), r"a\.so does not exist"),
     (lambda: chosen(["hcodd"]), "did you mean 'hcod'"),
