@@ -130,6 +130,15 @@ def test_every_output_that_is_stored_stands_in_a_page_or_is_linked():
     assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == shown | linked
 
 
+def test_a_command_runs_again_after_a_change_of_what_it_reads(tmp_path):
+    data = tmp_path / "scenarios" / "library" / "ellipse.toml"
+    data.parent.mkdir(parents=True)
+    for text in ("first", "second"):
+        data.write_text(text)
+        assert pages.run(f"python -c 'print(open(\"{data}\").read())'", tmp_path, tmp_path / "out"
+                         ) == f"{text}\n"
+
+
 BENCH = """\
 EQ7
             median  p95
