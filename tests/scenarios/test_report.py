@@ -151,6 +151,8 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order(tmp_path):
     assert speeds == [2.0, 1.0]  # the velocity level is (a)
     assert "figure-4a-joint-velocities" in dict(letter.figures([runs[2]]))
     assert "picture" in dict(letter.figures([recording(t=[0.0, 1.0])]))
+    blind = recording(minimal_distance=[2.0, np.nan, 1.0, 2.0, 2.0])
+    assert picture._nearest(blind) == 2
     letter.write_all([recording(t=[0.0])], tmp_path)  # a run of one tick has no figure
     assert timeline.timeline(recording(t=[2.0])).axes[0].get_xlim() == (2.0, 3.0)
 

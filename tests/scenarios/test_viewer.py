@@ -98,6 +98,13 @@ def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_mo
         assert browser.complaints == []
 
 
+def test_a_path_is_dragged_at_one_metre_per_second_of_the_run():
+    page = LivePage(Live(LIMITED), speed=0.1)
+    page.answer({"path": np.add(page.middle, [1.0, 0.0, 0.0]).tolist()})
+    page.step(0.1)
+    assert page.live.scenario.position.offset[0] == pytest.approx(0.01)
+
+
 def test_a_run_that_is_over_does_not_play():
     assert not LivePage(Live(load("ellipse", ["control.duration=0.001"]))).data()["playing"]
 
@@ -118,7 +125,7 @@ def test_the_command_of_a_live_run_ends_with_1_where_the_run_did_not_end(
     ({"Host": "rebound.example:8080"}, False),
     ({"Host": "127.0.0.1:8080", "Origin": "http://elsewhere.example"}, False),
     ({"Host": "127.0.0.1:8080", "Origin": "http://127.0.0.1:3000"}, False),
-    ({"Host": "127.0.0.1:8080", "Origin": "null"}, False)])
+    ({"Host": "127.0.0.1:8080", "Origin": "null"}, False), ({"Host": "["}, False)])
 def test_only_a_browser_of_this_machine_on_our_own_page_is_answered(headers, own):
     assert is_own(headers) == own
 

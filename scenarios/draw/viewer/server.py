@@ -28,8 +28,10 @@ def is_own(headers: Mapping[str, str] | Message) -> bool:
     script of another page, another Origin.
     """
     host, origin = headers.get("Host", ""), headers.get("Origin")
-    own = urlsplit(f"//{host}").hostname in NAMES
-    return own and (origin is None or urlsplit(origin).netloc == host)
+    with suppress(ValueError):  # such as "[" alone
+        own = urlsplit(f"//{host}").hostname in NAMES
+        return own and (origin is None or urlsplit(origin).netloc == host)
+    return False
 
 
 @contextmanager
