@@ -141,6 +141,7 @@ def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():
     assert whole["rough"] == pytest.approx(0.75)  # 1.5 where the proved answers move by 2
     assert (whole["median_us"], whole["most_us"]) == (2.0, 3.0)
     assert np.isnan(whole["warm_median_us"])
+    assert np.isnan(judging.summary([found(None, refused="no", start_kib=1000)])["memory_mb"])
 
 
 def test_the_best_may_lack_a_family_that_another_was_asked_later():

@@ -89,6 +89,8 @@ def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_mo
                       ("mouseReleased", x, y - 20))
         until("player.handles['obstacle 0'][2] > 0.12")
         assert page.live.obstacles.offset[0, 2] > 0.02
+        browser.run("player.ask('pointing.alpha_d', 15)")
+        until("player.runs[0].series[1].marks[0][1] === 15")
         browser.run("player.ask('avoidance.near', 0.3)")
         until("player.warning.textContent.includes('beyond far')")
         browser.run("player.ask('restart', null)")
