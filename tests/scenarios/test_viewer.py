@@ -149,6 +149,7 @@ def test_the_server_of_a_page_rejects_them():
         for others in ({"Host": "rebound.example"}, {"Origin": "http://elsewhere.example"}):
             assert status("GET", **others) == status("POST", "/now", '{"b": 2}', **others) == 403
         assert status("POST", "/now", "x" * 200_000) == 403
+        assert status("POST", "/now", "{}", **{"Content-Length": "²"}) == 403
         with closing(HTTPConnection(urlsplit(address).netloc, timeout=9.0)) as connection:
             connection.request("POST", "/now", "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n",
                                {"Host": "rebound.example"})

@@ -86,7 +86,7 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         size = self.headers.get("Content-Length", "")
         if not is_own(self.headers) or self.answer is None or not (
-                size.isdigit() and int(size) <= _LONGEST):
+                size.isdecimal() and int(size) <= _LONGEST):
             self.close_connection = True
             self._send(HTTPStatus.FORBIDDEN, "", "text/plain")
             return
