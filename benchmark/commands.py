@@ -164,7 +164,7 @@ def open_(family: Family = None,
               "Default: 1.")] = None,
           count: Annotated[int | None, typer.Option(
               "--count", min=1, metavar="N", help="Problems in the public set and in each fresh "
-              "one. Default: 50, or 200 consecutive ticks.")] = None,
+              "one. Default: that of the family.")] = None,
           public: Annotated[int | None, typer.Option(
               "--public", min=1, metavar="N", help="Problems of the public set. Default: that of "
               "--count.")] = None,
