@@ -244,6 +244,7 @@ def reproduce(names: Annotated[list[str] | None, typer.Argument(
 
     They are written into the pages of a checkout as each seed or command ends. Run the same
     command again to resume an interrupted one. Nothing else should run while timings are made.
+    Exit code 1 if a command ends with an error: its output stays as it was.
     """
     from benchmark.reproduce import whole
 

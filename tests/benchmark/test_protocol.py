@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmark.reproduce import blocks, fronts, pages, protocol, verdicts
+from benchmark.reproduce import blocks, fronts, pages, protocol, verdicts, whole
 from hierarchy.errors import HierarchyError
 from scenarios.measure.statistics import holm
 from scenarios.results.sampled import Workers
@@ -137,6 +137,12 @@ def test_a_command_runs_again_after_a_change_of_what_it_reads(tmp_path):
         data.write_text(text)
         assert pages.run(f"python -c 'print(open(\"{data}\").read())'", tmp_path, tmp_path / "out"
                          ) == f"{text}\n"
+
+
+def test_reproduce_ends_with_1_where_a_command_ends_with_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "ROOT", tmp_path)
+    (tmp_path / "README.md").write_text(page("python -c 'exit(3)'"))
+    assert whole.run(["README.md"], tmp_path / "out") == 1
 
 
 BENCH = """\
