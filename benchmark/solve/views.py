@@ -66,13 +66,13 @@ def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collectio
              f"{title}: time against miss": figures.time_against_error(
                  [row for row in some if row["family"] in chosen]),
              f"{title}: share right": figures.heat(some)}
-    if at:
-        every = {border: {row["entrant"]: row for row in summaries(rows)}
-                 for border, rows in sorted(at.items()) if rows}
+    every = {border: {row["entrant"]: row for row in summaries(rows)}
+             for border, rows in sorted(at.items()) if rows}
+    if every:
         tables.append(_at_borders(title, every))
         drawn[f"{title}: right over border"] = figures.curves(np.array([*every]), {
             row["entrant"]: np.array([one[row["entrant"]]["right"] for one in every.values()])
-            for row in total},
+            for row in total if all(row["entrant"] in one for one in every.values())},
             "angle [rad] or length from which rows are independent, sides apart")
     return Section(title, tables, NOTES, drawn, lead(title, total, some)), some
 

@@ -153,6 +153,14 @@ def test_the_best_may_lack_a_family_that_another_was_asked_later():
     assert "More often right than best: none." in views.lead("", total, some)
 
 
+@pytest.mark.parametrize("asked", [[], ["one"]])
+def test_borders_may_lack_what_was_asked_later(asked):
+    rows = [found([3.0, 1.0], entrant=name, start_kib=0) for name in ("one", "later")]
+    at = {border: [row for row in rows if row["entrant"] in asked] for border in (1e-9, 1e-8)}
+    section, _ = views.section("a", rows, {}, at)
+    assert ("a: right over border" in section.figures) == bool(asked)
+
+
 @pytest.mark.parametrize(("call", "said"), [
     (lambda: chosen([], more=[fake("hcod")]), "two entrants are named hcod"),
     (lambda: chosen([f"{HELPERS / 'fake_entrants.py'}:Moody"], more=[fake("Moody")]),
