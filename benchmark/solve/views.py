@@ -53,6 +53,8 @@ def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collectio
     of = "one family" if len(families) == 1 else f"{len(families)} families"
     tables = [Table(f"{title}: {count} problems of {of}", total, _ANSWERS),
               Table(f"{title}: quality", total, _QUALITY), _times(title, some, families)]
+    if not any(row["asked"] for row in total):  # nobody could be: nothing to draw, no best
+        return Section(title, tables, NOTES), some
     inside = [row for row in some if not isnan(row["inside_median_us"])]
     if inside:
         tables.append(Table(f"{title}: medians of compiled entrants", [

@@ -153,6 +153,12 @@ def test_the_best_may_lack_a_family_that_another_was_asked_later():
     assert "More often right than best: none." in views.lead("", total, some)
 
 
+def test_a_set_that_nobody_can_be_asked_has_its_tables():
+    section, _ = views.section("a", [found(None, refused="no", start_kib=0)], {}, {})
+    assert section.tables[0].cells()[0] == ("one", ["0", "–", "0", "0", "0", "0", "0"])
+    assert not section.figures
+
+
 @pytest.mark.parametrize("asked", [[], ["one"]])
 def test_borders_may_lack_what_was_asked_later(asked):
     rows = [found([3.0, 1.0], entrant=name, start_kib=0) for name in ("one", "later")]
