@@ -164,7 +164,7 @@ def open_(family: Family = None,
               "Default: 1.")] = None,
           count: Annotated[int | None, typer.Option(
               "--count", min=1, metavar="N", help="Problems in the public set and in each fresh "
-              "one. Default: 50, or 200 consecutive ticks.")] = None,
+              "one. Default: that of the family.")] = None,
           public: Annotated[int | None, typer.Option(
               "--public", min=1, metavar="N", help="Problems of the public set. Default: that of "
               "--count.")] = None,
@@ -244,6 +244,7 @@ def reproduce(names: Annotated[list[str] | None, typer.Argument(
 
     They are written into the pages of a checkout as each seed or command ends. Run the same
     command again to resume an interrupted one. Nothing else should run while timings are made.
+    Exit code 1 if a command ends with an error: its output stays as it was.
     """
     from benchmark.reproduce import whole
 

@@ -34,6 +34,7 @@ ROOT = Path(__file__).parents[2]
 OUTPUT = "docs/results/output"
 _COLUMNS = "100"  # of the terminal that a command writes to
 _CODE = ("hierarchy", "solvers", "scenarios", "benchmark")
+_READ = (".py", ".toml", ".npz", ".png")  # scenarios, problems and frames make the numbers too
 _MARK = re.compile(r"(?P<mark>^<!-- (?P<kind>reproduce|measured|kept): "
                    r"(?:(?P<form>table|text) of )?(?P<name>[^|\n]*?)"
                    r"(?P<ranges>(?: \| [^|\n]+? \.\. [^|\n]+?)*)"
@@ -64,7 +65,8 @@ def run(command: str, root: Path, out: Path) -> str:
     `out` stores it: the same code does not run the same command again.
     """
     code = hashlib.sha256()
-    for path in sorted(path for folder in _CODE for path in (root / folder).rglob("*.py")):
+    for path in sorted(path for folder in _CODE for path in (root / folder).rglob("*.*")
+                       if path.suffix in _READ):
         code.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
     folder = out / code.hexdigest()[:16] / slug(command)
     stored = folder / "output.txt"

@@ -29,7 +29,8 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
         as_json: bool = False) -> int:
     """Make runs and outputs, of all without names; print the verdicts.
 
-    Unless `quick`, the pages are written as each ends. Raises UnknownNameError.
+    Unless `quick`, the pages are written as each ends. Returns 1 if a command did not end well.
+    Raises UnknownNameError.
     """
     begun, known = perf_counter(), (NAME, TUNED, *pages.marked(pages.ROOT))
     for name in names:
@@ -38,20 +39,24 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
     refuse(quick and NAME not in asked, f"--quick makes runs, and {', '.join(asked)} has the "
            "output of commands; leave --quick out")
     make_folder(out)
-    rows, lacking = None, list[str]()
+    rows, lacking, failed = None, list[str](), list[str]()
     with interruptible("the same command continues from here", out):
-        for found in _made(asked, out, quick, Workers(workers)):
+        for found in _made(asked, out, quick, Workers(workers), failed):
             rows = found or rows
             lacking = [] if quick else pages.fill(pages.ROOT, Stored.read(pages.ROOT))[1]
     if rows is not None:
         _report(rows, as_json)
     tell(f"{_minutes(begun)} in all")
     refuse(lacking, "; ".join(lacking))
-    return 0
+    return int(bool(failed))
 
 
-def _made(asked: Sequence[str], out: Path, quick: bool, workers: Workers) -> Iterator[Rows | None]:
-    """Make and store rows, fronts with their figure, and outputs; yield after each, rows if any."""
+def _made(asked: Sequence[str], out: Path, quick: bool, workers: Workers, failed: list[str]
+          ) -> Iterator[Rows | None]:
+    """Make and store rows, fronts with their figure, and outputs; yield after each, rows if any.
+
+    Commands that end with an error are added to `failed`.
+    """
     root = pages.ROOT
     with bar("runs") as progress:
         for rows in protocol.run(replace(PROTOCOL, seeds=PROTOCOL.seeds[:1]) if quick else PROTOCOL,
@@ -75,6 +80,7 @@ def _made(asked: Sequence[str], out: Path, quick: bool, workers: Workers) -> Ite
             write_text(pages.file_of(command, root), pages.run(command, root, out / "output"))
         except pages.CommandError as error:
             tell(f"left as it is: {error}")
+            failed.append(command)
             continue
         tell(f"  {_minutes(begun)}")
         yield None

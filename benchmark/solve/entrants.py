@@ -1,10 +1,12 @@
 """The table of solvers: one row each."""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 from benchmark.packages import DAQP, EMBODIK, HIGHS, OWN, Entrant
 from hierarchy.errors import UnknownNameError, refuse
+from scenarios.files import slug
 from solvers import names
 from solvers.qp.backends import BACKENDS
 
@@ -82,20 +84,24 @@ def chosen(labels: Sequence[str], python: str = "", more: Sequence[Entrant] = ()
     Raises
     ------
     UnknownNameError : a label that is not in the table.
-    HierarchyError : a file that does not exist.
+    HierarchyError : a file that does not exist, or a name that another entrant has.
     """
     known = {one.label: one for one in (*ENTRANTS, *more)}
-    found = []
-    for label in labels or known:
+    found, own = [], []
+    for label in dict.fromkeys(labels or known):
         file, _, kind = label.rpartition(":")
         if file.endswith(".py"):
             refuse(not Path(file).is_file(), f"entrant {label!r}: {file} does not exist")
-            found.append(Entrant(kind, OWN, f"{Path(file).resolve()}:{kind}", {},
-                                 "Not of the table.", python))
+            own.append(Entrant(kind, OWN, f"{Path(file).resolve()}:{kind}", {},
+                               "Not of the table.", python))
+            found.append(own[-1])
         elif label not in known:
             raise UnknownNameError("entrant", label, list(known))
         else:
             found.append(known[label])
+    names = Counter(slug(one.label) for one in (*ENTRANTS, *more, *own))  # of files of rows
+    twice = [name for name, count in names.items() if count > 1]
+    refuse(twice, f"two entrants are named {', '.join(twice)}; give each a name of its own")
     return found + [one for one in more if labels and one not in found]
 
 

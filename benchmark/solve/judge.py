@@ -62,7 +62,7 @@ def judged(row: Row, h: Hierarchy, proof: Proof | None) -> Row:
 
     verdict : one of the texts above. moved : how far the last level moved the violation of one
     above, relative; NaN if not known. warm_right : whether the warm answer is right and called
-    solved; None without one. memory : growth of the process while it solved the file [KiB].
+    solved; None without one. memory : growth of the process while it solved the file [KiB], or NaN.
     """
     x, warm, without = (None if row.get(key) is None else np.array(row[key], dtype=np.float64)
                         for key in ("x", "warm_x", "without"))
@@ -71,7 +71,7 @@ def judged(row: Row, h: Hierarchy, proof: Proof | None) -> Row:
                   bool(row["warm_solved"]) and miss_of(h, proof, warm).relative <= RIGHT)
     return {**row, **miss._asdict(), "verdict": _verdict(row, miss.relative), "x": x,
             "warm_right": warm_right, "moved": _moved(h, proof, x, without),
-            "memory": (row.get("rss_kib") or 0) - (row.get("start_kib") or 0)}
+            "memory": (row.get("rss_kib") or np.nan) - (row.get("start_kib") or 0)}
 
 
 def _verdict(row: Row, relative: float) -> str:
@@ -152,7 +152,8 @@ def summary(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> Ro
         "warm_iterations": _over(np.median, (row.get("warm_iterations") for row in rows)),
         "warm_right": _over(np.mean, (row["warm_right"] for row in rows)),
         "same": all(row.get("same") is not False for row in rows),
-        "memory_mb": max(row["memory"] for row in rows) / 1024, "rough": _over(np.max, rough)}
+        "memory_mb": _over(np.max, (row["memory"] for row in rows)) / 1024,
+        "rough": _over(np.max, rough)}
     for key, prefix in _TIMES.items():
         found |= times_of([time for row in rows for time in row.get(f"{key}_ns") or ()], prefix)
     return found

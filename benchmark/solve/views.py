@@ -53,6 +53,8 @@ def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collectio
     of = "one family" if len(families) == 1 else f"{len(families)} families"
     tables = [Table(f"{title}: {count} problems of {of}", total, _ANSWERS),
               Table(f"{title}: quality", total, _QUALITY), _times(title, some, families)]
+    if not any(row["asked"] for row in total):  # nobody could be: nothing to draw, no best
+        return Section(title, tables, NOTES), some
     inside = [row for row in some if not isnan(row["inside_median_us"])]
     if inside:
         tables.append(Table(f"{title}: medians of compiled entrants", [
@@ -66,13 +68,13 @@ def section(title: str, rows: Sequence[Row], collections: Mapping[str, Collectio
              f"{title}: time against miss": figures.time_against_error(
                  [row for row in some if row["family"] in chosen]),
              f"{title}: share right": figures.heat(some)}
-    if at:
-        every = {border: {row["entrant"]: row for row in summaries(rows)}
-                 for border, rows in sorted(at.items()) if rows}
+    every = {border: {row["entrant"]: row for row in summaries(rows)}
+             for border, rows in sorted(at.items()) if rows}
+    if every:
         tables.append(_at_borders(title, every))
         drawn[f"{title}: right over border"] = figures.curves(np.array([*every]), {
             row["entrant"]: np.array([one[row["entrant"]]["right"] for one in every.values()])
-            for row in total},
+            for row in total if all(row["entrant"] in one for one in every.values())},
             "angle [rad] or length from which rows are independent, sides apart")
     return Section(title, tables, NOTES, drawn, lead(title, total, some)), some
 
@@ -111,7 +113,9 @@ def lead(title: str, total: Sequence[Row], cells: Sequence[Row]) -> list[str]:
     best = [label for label, share in widely.items() if share == max(widely.values())]
     better, faster = [], []
     for family, some in by(cells, "family"):
-        own = next(row for row in some if row["entrant"] == best[0])
+        own = next((row for row in some if row["entrant"] == best[0]), None)
+        if own is None:  # added to the others later, it has not been asked
+            continue
         other = max(some, key=lambda row: (row["entrant"] in widely) * row["right"])
         if other["right"] > own["right"]:
             better.append(f"{family} ({other['entrant']}, {percent(other['right'])} against "

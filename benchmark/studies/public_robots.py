@@ -1,8 +1,9 @@
 """Public robots against MuJoCo and pinocchio: `python -m benchmark.studies.public_robots`.
 
-Of each package that is installed, or of the folders given instead, every MJCF is compared with
-MuJoCo and every URDF with pinocchio's own parser: joints, masses and limits, and in three
-configurations the places of all bodies, sites or frames, the mass matrix and gravity.
+Of each package that is installed every MJCF, or in `example-robot-data` every URDF, is compared
+with MuJoCo or pinocchio's own parser, and of folders given instead, with a /, every MJCF: joints,
+masses and limits, and in three configurations the places of all bodies, sites or frames, the mass
+matrix and gravity.
 """
 
 import sys

@@ -103,7 +103,7 @@ def main(count: int = 400, resolver: list[str] | None = None) -> None:
 def _row(rows: Sequence[Row], levels: int) -> Row:
     """Return the summary of a resolver, and the shares by the first level that it misses."""
     found = summary(rows)
-    first = np.array([levels + 2 if row["level"] < 0 else row["level"] for row in rows])
+    first = np.array([levels + 2 if row["relative"] <= RIGHT else row["level"] for row in rows])
     return {**found, "off": len(rows) - found["answered"],
             "nearest": float((first > levels + 1).mean()), **{
                 f"optimal_{k}": float((first > k).mean()) for k in range(1, levels + 1)}}

@@ -7,6 +7,7 @@ kept in `out`: the same command continues, and folders of several machines can b
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -68,19 +69,20 @@ def _row(results: Results, label: str, step: str) -> dict[str, Any]:
 
     hands = [of(f"miss_{side}_hand") for side in ("left", "right")]
     return {"entrant": label.split()[0], "stood": f"{ended.sum()} of {len(ended)}",
-            "step": _median(of(f"{step}_max")),
-            "largest": of(f"{step}_max").max(initial=0.0),
-            "above": of(f"{step}_ticks").sum(),
-            "limits": of("miss_limits").max(initial=0.0),
-            "excess": of("joint_limit_excess").max(initial=0.0),
-            "com": _median(of("miss_centre_of_mass")),
-            "hand": _median(np.maximum(*hands)),
-            "end": 1e3 * _median(of("task_centre_of_mass_end", "position_error_median_settled")),
-            "time": _median(of("time_resolve_median"))}
+            "step": _over(np.median, of(f"{step}_max")),
+            "largest": _over(np.max, of(f"{step}_max")),
+            "above": _over(np.sum, of(f"{step}_ticks")),
+            "limits": _over(np.max, of("miss_limits")),
+            "excess": _over(np.max, of("joint_limit_excess")),
+            "com": _over(np.median, of("miss_centre_of_mass")),
+            "hand": _over(np.median, np.maximum(*hands)),
+            "end": 1e3 * _over(np.median, of("task_centre_of_mass_end",
+                                             "position_error_median_settled")),
+            "time": _over(np.median, of("time_resolve_median"))}
 
 
-def _median(values: np.ndarray) -> float:
-    return float(np.median(values)) if len(values) else float("nan")
+def _over(reduce: Callable[[np.ndarray], float], values: np.ndarray) -> float:
+    return float(reduce(values)) if len(values) else float("nan")
 
 
 if __name__ == "__main__":

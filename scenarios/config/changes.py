@@ -96,7 +96,7 @@ def place(data: Any, dotted: str, add: bool = False) -> tuple[Any, Any]:
         found = _within(data, key, ".".join(path[:i]), add)
         if add and isinstance(data, dict) and data.get(key) is None:
             data[key] = {}
-        data = data[found]
+        data = data[found] if isinstance(data, list) else data.get(found)
     return data, _within(data, last, ".".join(path), add)
 
 
@@ -104,7 +104,7 @@ def _within(data: Any, key: str, above: str, add: bool) -> Any:
     """Return the key of a table or the index of a list; raises ValueError if it has none."""
     where = f"[{above}]" if above else "the file"
     if isinstance(data, list):
-        if not (key.isdigit() and int(key) < len(data)):
+        if not (key.isdecimal() and int(key) < len(data)):
             raise ValueError(f"{where} has {len(data)} entries, numbered from 0, and no {key!r}")
         return int(key)
     if not isinstance(data, dict):

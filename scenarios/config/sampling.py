@@ -29,7 +29,8 @@ def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int,
         with naming(f"{what}.{pattern}: scenario {scenario.name!r}", of=ValueError):
             for key in matching(own, pattern):
                 table, last = place(own, key)
-                values[key] = distribution.draw(_chance(seed, index, key), table[last])
+                here = table[last] if isinstance(table, list) else table.get(last)
+                values[key] = distribution.draw(_chance(seed, index, key), here)
     return values
 
 

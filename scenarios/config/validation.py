@@ -164,9 +164,9 @@ def doubtful_units(section: Section, above: str = "") -> Iterator[str]:
 
 
 def leaves(value: Any, key: str) -> Iterator[tuple[str, Any]]:
-    """Yield a value by its key, or what is in a list, by its numbers."""
-    if isinstance(value, list | tuple):
-        for i, one in enumerate(value):
+    """Yield a value by its key, or what is in a list or a table, by its numbers or keys."""
+    if isinstance(value, list | tuple | dict):
+        for i, one in value.items() if isinstance(value, dict) else enumerate(value):
             yield from leaves(one, f"{key}.{i}")
     else:
         yield key, value

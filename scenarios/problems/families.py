@@ -211,11 +211,11 @@ def check(collection: Collection) -> dict[int, str]:
 
 def _difference(said: Proof, found: Proof) -> str:
     judged = min(said.judged, found.judged)
-    off = abs(said.least - found.least)[:judged] > _SAME * (1.0 + abs(found.least[:judged]))
+    off = ~(abs(said.least - found.least)[:judged] <= _SAME * (1.0 + abs(found.least[:judged])))
     if off.any():
         k = int(np.argmax(off))
         return f"level {k + 1}: least violation {said.least[k]:.17g}, proved {found.least[k]:.17g}"
-    off = abs(said.x - found.x) > _SAME * (1.0 + abs(found.x).max())
+    off = ~(abs(said.x - found.x) <= _SAME * (1.0 + abs(found.x).max()))
     if judged > len(said.least) and off.any():
         i = int(np.argmax(abs(said.x - found.x)))
         return f"x[{i}] is {said.x[i]:.17g}, proved {found.x[i]:.17g}"

@@ -63,7 +63,7 @@ def pushes(facts: Facts, scenario: Scenario, t: Array, placements: Array, forces
     return Pushes(*_contacts(facts.contacts, placements, forces),
                   _below(facts.robot, com, len(placements)),
                   np.concatenate([np.empty((len(placements), 0, 2, 3)), *shoves], axis=1),
-                  _table(facts, scenario, len(placements)))
+                  _table(facts, scenario, placements))
 
 
 def _contacts(points: Sequence[ContactPoint], placements: Array,
@@ -93,14 +93,17 @@ def _below(robot: RobotFacts, com: Array | None, frames: int) -> Array:
     return np.asarray(place[:, None, None] + arms)
 
 
-def _table(facts: Facts, scenario: Scenario, frames: int) -> Array:
-    """Return a grid (F, S, 2, 3) at the height of the plant's floor, below where a robot starts."""
-    height = getattr(scenario.plant, "height", None)
+def _table(facts: Facts, scenario: Scenario, placements: Array) -> Array:
+    """Return a grid (F, S, 2, 3) at the height of the plant's floor, below the first frame's hand.
+
+    Its lines are where those of other frames would be: a live run shows one frame at a time.
+    """
+    height, frames = getattr(scenario.plant, "height", None), len(placements)
     if height is None or facts.robot.base == "floating":
         return np.empty((frames, 0, 2, 3))
     point = facts.contacts[0]
-    start = facts.robot.placements(np.array(scenario.start.q or facts.robot.rest))
-    x, y, _ = placed_points(start, [point.joint], point.offset)[0]
+    hand = placed_points(placements[0], [point.joint], point.offset)[0]
+    x, y, _ = np.round(hand / _TABLE * 4) * _TABLE / 4
     at = np.linspace(-_TABLE, _TABLE, 9)
     along = np.array([[[-_TABLE, one, 0.0], [_TABLE, one, 0.0]] for one in at])
     lines = np.concatenate([along, along[..., [1, 0, 2]]])

@@ -17,6 +17,7 @@ from benchmark.packages import OWN, Entrant
 from benchmark.process import CRASHED, HUNG, LEFT_OUT, Field
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
+from benchmark.solve import views
 from benchmark.solve.entrants import chosen, compiled
 from benchmark.worker import Repeats
 from hierarchy import Hierarchy, HierarchyError
@@ -140,9 +141,36 @@ def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():
     assert whole["rough"] == pytest.approx(0.75)  # 1.5 where the proved answers move by 2
     assert (whole["median_us"], whole["most_us"]) == (2.0, 3.0)
     assert np.isnan(whole["warm_median_us"])
+    assert np.isnan(judging.summary([found(None, refused="no", start_kib=1000)])["memory_mb"])
+
+
+def test_the_best_may_lack_a_family_that_another_was_asked_later():
+    def row(name, family, asked, right):
+        return {"entrant": name, "family": family, "asked": asked, "right": right, "median_us": 1.0}
+
+    total = [row("best", "", 100, 1.0), row("other", "", 102, 0.5)]
+    some = [row("best", "a", 100, 1.0), row("other", "a", 100, 0.5), row("other", "b", 2, 0.5)]
+    assert "More often right than best: none." in views.lead("", total, some)
+
+
+def test_a_set_that_nobody_can_be_asked_has_its_tables():
+    section, _ = views.section("a", [found(None, refused="no", start_kib=0)], {}, {})
+    assert section.tables[0].cells()[0] == ("one", ["0", "–", "0", "0", "0", "0", "0"])
+    assert not section.figures
+
+
+@pytest.mark.parametrize("asked", [[], ["one"]])
+def test_borders_may_lack_what_was_asked_later(asked):
+    rows = [found([3.0, 1.0], entrant=name, start_kib=0) for name in ("one", "later")]
+    at = {border: [row for row in rows if row["entrant"] in asked] for border in (1e-9, 1e-8)}
+    section, _ = views.section("a", rows, {}, at)
+    assert ("a: right over border" in section.figures) == bool(asked)
 
 
 @pytest.mark.parametrize(("call", "said"), [
+    (lambda: chosen([], more=[fake("hcod")]), "two entrants are named hcod"),
+    (lambda: chosen([f"{HELPERS / 'fake_entrants.py'}:Moody"], more=[fake("Moody")]),
+     "two entrants are named Moody"),
     (lambda: compiled([Path("a.so")], []), "1 libraries and 0 names"),
     (lambda: compiled([Path("a.so")], ["a"]), r"a\.so does not exist"),
     (lambda: chosen(["hcodd"]), "did you mean 'hcod'"),

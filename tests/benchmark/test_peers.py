@@ -152,6 +152,21 @@ def test_everybody_is_judged_or_named_with_the_reason(tmp_path, monkeypatch):
     assert (tmp_path / "out" / "peers.csv").is_file()
 
 
+def test_a_package_without_an_answer_is_in_the_tables_of_stand(monkeypatch, capsys):
+    monkeypatch.setattr(standing, "TICKS", 1)
+    monkeypatch.setattr(standing, "measure", lambda *_: ([{"entrant": "lost", "failed": 1}], {}))
+    standing.run().say()
+    assert "lost" in capsys.readouterr().out
+
+
+def test_unreachable_poses_are_beyond_the_arm_however_few_there_are():
+    robot = Robot.named("kuka_lwr")
+    one, many = (reaching.problems(robot, ("end_effector",), count, 0, False)[0]
+                 for count in (1, 1000))
+    assert (len(one), len(many)) == (1, 1000)
+    np.testing.assert_array_equal(one[0], many[0])
+
+
 def test_wrong_answers_to_stand_are_found(tmp_path):
     scene = standing.make_scene(tmp_path)
     states = standing.followed(scene, 2)

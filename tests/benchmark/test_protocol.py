@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmark.reproduce import blocks, fronts, pages, protocol, verdicts
+from benchmark.reproduce import blocks, fronts, pages, protocol, verdicts, whole
 from hierarchy.errors import HierarchyError
 from scenarios.measure.statistics import holm
 from scenarios.results.sampled import Workers
@@ -128,6 +128,21 @@ def test_every_output_that_is_stored_stands_in_a_page_or_is_linked():
     linked = {name for text in texts for name in re.findall(r"output/([\w.-]+\.txt)\)", text)}
     assert {"README.md", "docs/results/problems.md", "docs/results/loops.md"} <= set(PAGES)
     assert {path.name for path in (ROOT / pages.OUTPUT).iterdir()} == shown | linked
+
+
+def test_a_command_runs_again_after_a_change_of_what_it_reads(tmp_path):
+    data = tmp_path / "scenarios" / "library" / "ellipse.toml"
+    data.parent.mkdir(parents=True)
+    for text in ("first", "second"):
+        data.write_text(text)
+        assert pages.run(f"python -c 'print(open(\"{data}\").read())'", tmp_path, tmp_path / "out"
+                         ) == f"{text}\n"
+
+
+def test_reproduce_ends_with_1_where_a_command_ends_with_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "ROOT", tmp_path)
+    (tmp_path / "README.md").write_text(page("python -c 'exit(3)'"))
+    assert whole.run(["README.md"], tmp_path / "out") == 1
 
 
 BENCH = """\

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +11,10 @@ import pytest
 from benchmark import start, stress
 from benchmark.solve import first_paper, resolvers
 from benchmark.solve.entrants import NUMPY
-from benchmark.solve.judge import FAILED, RIGHT, SOLVED, WRONG
+from benchmark.solve.judge import FAILED, RIGHT, SOLVED, WRONG, judged
 from benchmark.solve.ours import Ours
 from benchmark.start import Case, run
+from benchmark.studies import saturation, smooth
 from benchmark.tick import PlainTick
 from hierarchy import Hierarchy
 from scenarios import load, simulate
@@ -145,6 +147,18 @@ def test_a_warm_start_is_judged_by_its_own_answer():
                "warm_x": x + off, "warm_solved": solved}
         found = resolvers._warm(row, one)
         assert (found["verdict"], found["relative"] > RIGHT) == (expected, off > 0.0)
+
+
+def test_what_is_not_answered_is_not_the_best_in_a_study():
+    h = Hierarchy.from_levels([(np.eye(1), [-1.0], [1.0]), (np.eye(1), [1.0])])
+    row = judged({"entrant": "one", "family": "f", "raised": "not today"}, h, None)
+    found = saturation._row([row], 1)
+    assert (found["off"], found["nearest"], found["optimal_1"]) == (1, 0.0, 0.0)
+    fallen = SimpleNamespace(runs=[SimpleNamespace(label="one")], reasons=["fell"],
+                             values=["torque_step_max"], column=lambda *_: np.array([np.nan]))
+    found = smooth._row(fallen, "one", "torque_step")
+    assert found["stood"] == "0 of 1"
+    assert np.isnan([found[key] for key in ("largest", "above", "limits", "excess")]).all()
 
 
 def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():

@@ -12,6 +12,7 @@ from refusals import refused
 
 from hierarchy import Robot, plugins
 from scenarios import Scenario, load, load_run, simulate
+from scenarios.config.sections.tasks import OwnTask
 from scenarios.measure.goals import goals
 from solvers import make
 
@@ -124,6 +125,7 @@ def test_the_error_of_a_task_of_a_plugin_has_the_unit_that_its_class_says(folder
     plugins.allow("doors_of_mine")
     found = next(one for one in goals(simulate(load("own.toml"))) if one.name == "brittle")
     assert (found.unit, found.asked, found.promise) == ("m", "in its bounds", True)
+    assert OwnTask.of(type("Own", (), {"unit": property(lambda self: "m")})).unit == ""
 
 
 def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():

@@ -12,7 +12,7 @@ from scenarios.draw.replay import html
 from scenarios.draw.viewer.live import Live
 from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
-from scenarios.recording.fate import Fate, levels_at
+from scenarios.recording.fate import Fate, levels_at, row_units
 from scenarios.scene.drawn import scene
 
 
@@ -33,6 +33,19 @@ def test_every_shipped_scenario_of_torques_can_be_replayed(name):
             assert (scene(run).pushes.table[..., 2] == load(name).plant.height).all()
         if path.wanted is not None:
             np.testing.assert_allclose(now.wanted[0], path.wanted[0], atol=1e-9)
+
+
+def test_a_table_is_below_the_hand_wherever_that_starts():
+    pytest.importorskip("mujoco")
+    run = simulate(load("wipe", {"control.duration": 0.01, "start.joints": {"joint_1": 1.0}}))
+    table = scene(run).pushes.table
+    np.testing.assert_allclose(table.mean(axis=(1, 2))[:, :2], run["ee_position"][[0, -1], :2],
+                               atol=0.04)
+
+
+def test_a_wrench_has_no_unit():
+    for target, unit in (([20.0], "N"), ([20.0] * 3, "N"), ([20.0] * 6, "")):
+        assert row_units(load("wipe", {"tasks.0.target": target}), ["force"]) == (unit,)
 
 
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")

@@ -165,6 +165,8 @@ def test_the_letters_pairs_are_made_of_its_runs_in_its_order(tmp_path):
     assert speeds == [2.0, 1.0]  # the velocity level is (a)
     assert "figure-4a-joint-velocities" in dict(letter.figures([runs[2]]))
     assert "picture" in dict(letter.figures([recording(t=[0.0, 1.0])]))
+    blind = recording(minimal_distance=[2.0, np.nan, 1.0, 2.0, 2.0])
+    assert picture._nearest(blind) == 2
     letter.write_all([recording(t=[0.0])], tmp_path)  # a run of one tick has no figure
     assert timeline.timeline(recording(t=[2.0])).axes[0].get_xlim() == (2.0, 3.0)
 
@@ -181,6 +183,16 @@ def test_an_obstacle_is_drawn_as_far_as_distances_say_that_it_reaches(obstacle):
         measure_exactly(there, np.zeros(1, int), np.zeros((1, 3)), obstacle.packed()[None],
                         packed_laws(), np.zeros(2), seen.arrays)
         assert (balls @ u).max() + radius == pytest.approx(far - seen.distance[0], abs=1e-5)
+
+
+def test_a_joint_has_one_colour_in_a_figure_of_two_runs():
+    run = simulate(load("humanoid-reach", {"control.duration": 0.01}))
+    other = dataclasses.replace(run, signals={**run.signals, "v": np.roll(run["v"], 9, axis=1)})
+    fig = letter.stacked([(one, [letter.PANEL["joint-velocities"]]) for one in (run, other)], "")
+    first, second = ({line.get_label(): line.get_color() for line in ax.lines
+                      if line.get_color() in drawing.JOINTS} for ax in fig.axes)
+    assert first == second
+    assert len(first) == 8
 
 
 def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_are_to_go(

@@ -14,6 +14,7 @@ from refusals import refused
 
 from hierarchy import HierarchyError
 from scenarios import load, shipped, simulate
+from scenarios.config.distributions import Distribution
 from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
 from scenarios.results import plan as plan_of
@@ -110,6 +111,8 @@ def test_samples_are_drawn_from_what_the_file_says(tmp_path):
     assert (np.mean(damping), np.std(damping)) == pytest.approx((20.0, 1.0), abs=0.15)
     assert {one["pointing.alpha_d"] for one in found} == {5.0, 15.0}
     assert {one["plant.measurement.seed"] for one in found} == {3, 4, 5}
+    left_out = {"control.options.rank_tolerance": Distribution(uniform=(1e-9, 1e-9))}
+    assert drawn(ellipse, left_out, 0, 0) == {"control.options.rank_tolerance": 1e-9}
 
 
 def test_all_resolvers_see_the_same_samples_and_no_run_is_planned_twice(tmp_path):
@@ -148,6 +151,8 @@ def test_runs_are_made_again_after_a_file_that_a_robots_file_includes_has_change
 @pytest.mark.parametrize(("variation", "says"), [
     ({}, r"'ellipse' has no \[variation\]"),
     ({"start.p": {"around": 1.0}}, r"variation\.start\.p"),
+    ({"control.options.rank_tolerance": {"around": 1.0}}, "around = 1.0 needs a value"),
+    ({"control.options.hcod.damping": {"uniform": [0.0, 1.0]}}, "options.hcod. is missing"),
     ({"start.v": {"around": 1.0}}, "around = 1.0 needs a value in the scenario; give it one")])
 def test_a_variation_that_cannot_be_drawn_is_refused(variation, says, tmp_path):
     with pytest.raises(HierarchyError, match=says):

@@ -100,6 +100,8 @@ def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_mo
                       ("mouseReleased", x, y - 20))
         until("player.handles['obstacle 0'][2] > 0.12")
         assert page.live.obstacles.offset[0, 2] > 0.02
+        browser.run("player.ask('pointing.alpha_d', 15)")
+        until("player.runs[0].series[1].marks[0][1] === 15")
         browser.run("player.ask('avoidance.near', 0.3)")
         until("player.warning.textContent.includes('beyond far')")
         browser.run("player.ask('restart', null)")
@@ -107,6 +109,13 @@ def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_mo
         assert browser.run("player.curves === window.curves && player.stacks[0].card !== card")
         assert browser.run("document.querySelectorAll('#curves .line').length") > 4
         assert browser.complaints == []
+
+
+def test_a_path_is_dragged_at_one_metre_per_second_of_the_run():
+    page = LivePage(Live(LIMITED), speed=0.1)
+    page.answer({"path": np.add(page.middle, [1.0, 0.0, 0.0]).tolist()})
+    page.step(0.1)
+    assert page.live.scenario.position.offset[0] == pytest.approx(0.01)
 
 
 def test_a_run_that_is_over_does_not_play():
@@ -129,7 +138,7 @@ def test_the_command_of_a_live_run_ends_with_1_where_the_run_did_not_end(
     ({"Host": "rebound.example:8080"}, False),
     ({"Host": "127.0.0.1:8080", "Origin": "http://elsewhere.example"}, False),
     ({"Host": "127.0.0.1:8080", "Origin": "http://127.0.0.1:3000"}, False),
-    ({"Host": "127.0.0.1:8080", "Origin": "null"}, False)])
+    ({"Host": "127.0.0.1:8080", "Origin": "null"}, False), ({"Host": "["}, False)])
 def test_only_a_browser_of_this_machine_on_our_own_page_is_answered(headers, own):
     assert is_own(headers) == own
 
@@ -151,6 +160,7 @@ def test_the_server_of_a_page_rejects_them():
         for others in ({"Host": "rebound.example"}, {"Origin": "http://elsewhere.example"}):
             assert status("GET", **others) == status("POST", "/now", '{"b": 2}', **others) == 403
         assert status("POST", "/now", "x" * 200_000) == 403
+        assert status("POST", "/now", "{}", **{"Content-Length": "²"}) == 403
         with closing(HTTPConnection(urlsplit(address).netloc, timeout=9.0)) as connection:
             connection.request("POST", "/now", "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n",
                                {"Host": "rebound.example"})

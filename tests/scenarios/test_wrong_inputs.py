@@ -62,6 +62,9 @@ def test_a_point_far_away_that_stands_for_a_direction_is_not_taken_for_millimetr
     given |= {"kind": "position", "offset": given.pop("target")}
     assert [*doubtful_units(load("dual-arm", {"tasks": [given]}))] == [
         "tasks.0.offset.2 = -1000 m: lengths are in metres, not in millimetres"]
+    turned = load("dual-arm", {"tasks": [{"kind": "posture", "joints": {"a": 90.0}}]})
+    assert [*doubtful_units(turned)] == [
+        "tasks.0.joints.a = 90 rad or m: joint angles are in radians"]
 
 
 def test_obstacles_are_reached_by_number_or_all_at_once():

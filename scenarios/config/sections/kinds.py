@@ -26,11 +26,15 @@ if TYPE_CHECKING:
 class ListedForce(base.Listed):
     """A contact's force or wrench at a value, at level "torque"."""
 
-    unit: ClassVar[str] = "N"
     of_forces: ClassVar[bool] = True
     made_by: ClassVar[str] = "hierarchy.tasks:ContactForce"
     contact: str  #: Name of the contact.
     target: tuple[keys.Finite, ...]  #: Normal force, force or wrench [N, N m]: 1, 3 or 6 numbers.
+
+    @property
+    def unit(self) -> str:  # type: ignore[override]
+        """That of its error, none of a wrench."""
+        return "N" if len(self.target) < 6 else ""
 
 
 @register("tasks", "least-force", shipped=True)

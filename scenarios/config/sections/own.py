@@ -79,7 +79,8 @@ class OwnSection(PartSection):
             for kind in (_in_a_file(parameter.annotation),)}
         made = create_model(cls.__name__, __base__=cls, __doc__=maker.__doc__ or cls.__doc__,
                             **fields)
-        made.maker, made.unit = maker, str(getattr(maker, "unit", ""))
+        unit = getattr(maker, "unit", "")  # a property, which only a task has, says none
+        made.maker, made.unit = maker, unit if isinstance(unit, str) else ""
         made.rows = str(getattr(maker, "kind", "equality"))
         return made
 

@@ -61,11 +61,15 @@ def joints(ax: Axes, recording: Recording, colour: str, signal: str, width: floa
            named: bool = False) -> None:
     """Draw a signal of each joint, as figures 4 and 9 (b) do.
 
-    Of more joints than there are colours, the fastest have one, and the others are grey.
+    Of more joints than there are colours, the fastest have one, and the others are grey. Those of a
+    run above in the figure have theirs again: one legend is for both.
     """
     peaks = np.abs(recording["v"]).max(axis=0)
     fastest = np.sort(np.argsort(-peaks, kind="stable")[:len(drawing.JOINTS)]).tolist()
     values, names = recording[signal].T, recording.facts.robot.speed_names
+    above = dict.fromkeys(str(line.get_label()) for other in ax.figure.axes for line in other.lines)
+    if len(known := [names.index(name) for name in above if name in names]) == len(drawing.JOINTS):
+        fastest = known
     for i in {*range(len(values))} - {*fastest}:
         drawing.curve(ax, recording["t"], values[i], color=MEASURED, linewidth=0.3)
     for k, i in enumerate(fastest):

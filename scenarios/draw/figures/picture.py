@@ -123,7 +123,8 @@ def _nearest(recording: Recording) -> int:
     """
     seen = next((name for name in ("true_minimal_distance", "minimal_distance")
                  if name in recording and (name[:4] == "true" or _exact(recording))), "ee_distance")
-    return int(np.argmin(recording[seen])) if seen in recording else recording.ticks - 1
+    return (int(np.argmin(np.nan_to_num(recording[seen], nan=np.inf))) if seen in recording
+            else recording.ticks - 1)
 
 
 def _exact(recording: Recording) -> bool:

@@ -125,7 +125,8 @@ class Curves {
   plot(name, shown) {
     const drawn = shown.map(run => ({run, one: run.series.find(one => one.name === name)}))
       .filter(({one}) => one).flatMap(({run, one}) => this.channels(run, one, shown.length > 1));
-    const {one} = drawn[0], scale = new Scale(drawn, one), children = [];
+    const marks = new Map(drawn.flatMap(({one}) => one.marks).map(mark => [mark.join(), mark]));
+    const one = {...drawn[0].one, marks: [...marks.values()]}, scale = new Scale(drawn, one), children = [];
     for (const value of scale.ticks()) {
       const y = scale.y(value);
       children.push(element("line", {class: "grid", x1: this.left, x2: this.width - RIGHT, y1: y, y2: y}),

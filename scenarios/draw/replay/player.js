@@ -139,7 +139,7 @@ class Player {
     this.redraw();
   }
 
-  // By whole frames of the run that has the most frames.
+  // By whole frames of the run that lasts longest.
   step(frames) {
     const run = this.runs.reduce((a, b) => b.end > a.end ? b : a), times = run.t.values;
     this.seek(times[Math.min(Math.max(run.at(this.t).frame + frames, 0), run.frames - 1)]);

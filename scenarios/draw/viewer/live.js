@@ -34,6 +34,7 @@ class LiveRun extends Run {
       values.set(added.shift().values, (part.rows - over) * part.width);
       of[name] = {values, width: part.width, rows: part.rows + 1 - over};
     });
+    this.series.forEach((one, n) => { one.marks = next.series[n].marks; });
     this.frames += 1 - over;
     this.order.values[this.frames - 1] = index;
     this.end = this.t.values[this.frames - 1];

@@ -116,7 +116,7 @@ class LivePage:
         for what, value in asked.items():
             self._do(what, value)
         if self.playing and not self.live.over:
-            self._drag_path(seconds)
+            self._drag_path(self.speed * seconds)
             self._make_ticks(seconds)
         self.now = as_json(self.data())
 

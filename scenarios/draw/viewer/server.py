@@ -28,8 +28,10 @@ def is_own(headers: Mapping[str, str] | Message) -> bool:
     script of another page, another Origin.
     """
     host, origin = headers.get("Host", ""), headers.get("Origin")
-    own = urlsplit(f"//{host}").hostname in NAMES
-    return own and (origin is None or urlsplit(origin).netloc == host)
+    with suppress(ValueError):  # such as "[" alone
+        own = urlsplit(f"//{host}").hostname in NAMES
+        return own and (origin is None or urlsplit(origin).netloc == host)
+    return False
 
 
 @contextmanager
@@ -84,7 +86,7 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         size = self.headers.get("Content-Length", "")
         if not is_own(self.headers) or self.answer is None or not (
-                size.isdigit() and int(size) <= _LONGEST):
+                size.isdecimal() and int(size) <= _LONGEST):
             self.close_connection = True
             self._send(HTTPStatus.FORBIDDEN, "", "text/plain")
             return
