@@ -27,6 +27,7 @@ from solvers.kernels.linalg.space import (
     View,
     assign,
     carve_rows,
+    fill,
     matrix,
     shared,
     vector,
@@ -74,11 +75,18 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
     return code
 
 
+@compiled
+def solve_as_one(A, lower, upper, sizes, x, settings, work):
+    """Solve like `solve_by_staircase`, but never INACCURATE."""
+    return finish(x, climb(A, lower, upper, sizes, x, settings, work)[0])
+
+
 @internal
 def climb(A, lower, upper, sizes, x, settings, work):
-    """Solve like `solve_by_staircase`, but never INACCURATE; return the code and the least pivot.
+    """Solve like `solve_by_staircase`; return the code and the least pivot.
 
-    A pivot is the remainder of a row when its column was made, relative to its norm.
+    INACCURATE, and x = 0, only if the square of a row underflows. A pivot is the remainder of a row
+    when its column was made, relative to its norm.
     """
     m, n = A.shape
     (basis, rows, y, of_x, of_block), at = carve_staircase(work, 0, m, n)
@@ -87,7 +95,8 @@ def climb(A, lower, upper, sizes, x, settings, work):
     settings = shared(settings)
     code = load_rows(rows.W, rows.zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
-        return finish(x, code), 0.0
+        fill(x, 0.0)
+        return code, 0.0
 
     rank, first, least = 0, 0, np.inf
     for level in range(sizes.size):

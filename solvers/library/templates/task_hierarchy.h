@@ -38,7 +38,7 @@ typedef enum th_status {
   TH_SOLVED = 0,
   /* The budget max_iterations is spent. x is optimal for the levels above the unfinished one. */
   TH_ITERATION_LIMIT = 1,
-  /* The data hold NaN, an infinite entry, lower > upper, or numbers whose squares overflow. */
+  /* The data hold NaN, an infinite entry, lower > upper, or squares that over- or underflow. */
   TH_NUMERICAL_FAILURE = 2,
   /* x is an answer that could not be verified: rows are nearly parallel or differ greatly in scale.
    * th_violations says what each level still misses at x, not whether it could miss less. */
