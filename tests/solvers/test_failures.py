@@ -1,5 +1,6 @@
 """Structured problems that were once answered wrongly, with the violations that are right."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,22 @@ def test_numbers_that_overflow_when_squared_do_not_end_the_process(backend):
     res = make("hqp", backend=backend).solve(h)
     assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
     assert not certify(h, res.x).certified
+
+
+def test_an_x_that_grows_from_level_to_level_until_it_overflows_is_a_failure():
+    """It was SOLVED, |x| = 1e307: what the backend gave."""
+    E = np.eye(40)
+    h = Hierarchy.from_levels([(E[:1], [1e49]), *(((a + 1e-6 * b)[None], [0.0])
+                                                  for a, b in pairwise(E))])
+    res = make("hqp").solve(h)
+    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
+
+
+@pytest.mark.parametrize("name", ["augmented", "recursive", "reverse", "sns", "tpm-published"])
+def test_rows_whose_squares_underflow_are_a_failure_where_they_are_not_solved(name):
+    """Zero was SOLVED by `augmented` and an answer, INACCURATE, of the others."""
+    res = make(name).solve(Hierarchy.from_levels([([[1e-150]], [3e-150])]))
+    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
 
 
 @pytest.mark.parametrize(("name", "kind", "seeds"), [
