@@ -37,6 +37,8 @@ def test_lexicographic_weights_are_the_smallest_that_do():
     assert lexicographic_weights([0.0, 0.0], 0.1, regularised=1.0) == (10.0, 1.0)
     for wrong in ([[1.0, 2.0]], [1.0, -1.0], [np.nan], 1.0):
         refused("expected numbers >= 0, one per level", lexicographic_weights, wrong, 0.1)
+    refused("not an array of numbers", lexicographic_weights, ["1"], 0.1)
+    refused("tolerance = None", lexicographic_weights, [1.0], None)
 
 
 def test_the_top_level_is_strict_if_it_has_inequalities_or_as_many_as_asked_for():
