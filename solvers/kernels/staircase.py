@@ -33,7 +33,7 @@ from solvers.kernels.linalg.space import (
     vector,
 )
 from solvers.kernels.tolerances import FAR_LIGHTER, LIGHT_ROW, UNCLEAR_CUT, UNCLEAR_PIVOT
-from solvers.status import INACCURATE, SOLVED, TOO_SMALL
+from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 
 class Staircase(NamedTuple):
@@ -70,15 +70,16 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
     if a row is nearly parallel to others or far lighter, and damping is off.
     """
     code, least = climb(A, lower, upper, sizes, x, settings, work)
-    if code == SOLVED and least < UNCLEAR_PIVOT and settings[0] == 0.0:
-        return INACCURATE
-    return code
+    if settings[0] > 0.0:  # which no other kernel does
+        return NUMERICAL_FAILURE if code == INACCURATE else code
+    return INACCURATE if code == SOLVED and least < UNCLEAR_PIVOT else code
 
 
 @compiled
 def solve_as_one(A, lower, upper, sizes, x, settings, work):
     """Solve like `solve_by_staircase`, but never INACCURATE."""
-    return finish(x, climb(A, lower, upper, sizes, x, settings, work)[0])
+    code, _ = climb(A, lower, upper, sizes, x, settings, work)
+    return NUMERICAL_FAILURE if code == INACCURATE else code
 
 
 @internal
