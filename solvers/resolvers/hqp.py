@@ -72,7 +72,7 @@ class Hqp(Resolver):
         with np.errstate(all="ignore"):
             try:
                 return _Cascade(self, h, starts).run()
-            except np.linalg.LinAlgError:  # squares overflow: in an SVD, or of x
+            except (np.linalg.LinAlgError, OverflowError):  # squares, in an SVD, of x or lambda
                 return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
 
 

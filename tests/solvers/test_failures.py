@@ -108,6 +108,9 @@ def test_numbers_that_overflow_when_squared_do_not_end_the_process(backend):
     res = make("hqp", backend=backend).solve(h)
     assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
     assert not certify(h, res.x).certified
+    singular = Hierarchy.from_levels([([[1.0], [1.0]], [1.0, 1.0])])
+    res = make("hqp", backend=backend, damping=1e300).solve(singular)  # an OverflowError
+    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
 
 
 def test_an_x_that_grows_from_level_to_level_until_it_overflows_is_a_failure():
