@@ -47,6 +47,8 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     if not isinstance(resolution, ActiveSetResolution):
         raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
                              "which rows are active")
+    if h.giving and len(resolution.active) < h.m:  # a witness was not found
+        h = h.upper_part(h.giving[-1] + 1)
     shaped("explain: active", resolution.active, (h.m,))
     for i in np.flatnonzero(~(h.lower <= h.upper)).tolist():  # NaN too
         return (f"{h.names[_level_of(h, i)]} {names[i]}: no value lies between lower "

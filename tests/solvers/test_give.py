@@ -165,6 +165,14 @@ def test_explain_says_what_gives_how_much_and_for_whom():
     refused("explain: 1 units for 14 rows", lambda: explain(h, make("hcod").solve(h), units=["m"]))
 
 
+@pytest.mark.parametrize("metric", [None, np.eye(2)], ids=["one call", "in parts"])
+def test_explain_says_where_the_limit_was_before_a_witness_was_found(metric):
+    h = Hierarchy.from_levels([(np.eye(2), [-1.0] * 2, [1.0] * 2), ([[1.0, 1.0]], [9.0]),
+                               ([[1.0, 0.0]], [-5.0])], give=[0.0, 0.5, 0.0], metric=metric)
+    found = make("hcod", max_iterations=1).solve(h)
+    assert "limit was reached at 'level 2'" in explain(h, found).splitlines()[-1]
+
+
 def test_explain_does_not_say_that_rows_give_by_rounding():
     """At x = 0 rows gave 1e-16 of 0."""
     turn = np.arange(4) * np.pi / 2.0
