@@ -43,6 +43,7 @@ from numpy.linalg import norm
 from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import HierarchyError, expect, number
+from hierarchy.gate import array_of
 from hierarchy.notebook import html_table
 from hierarchy.problem import Array, Hierarchy
 
@@ -137,8 +138,8 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
 
     x counts as on a side within `tolerance` (1 + |x|) of its hyperplane, and the row as violated
     beyond it. A row on a side can push only towards that side. Residuals that rounding alone
-    explains count as zero. An x or data that are not finite, or lengths whose squares overflow, are
-    never certified.
+    explains count as zero. An x or data that are not finite, sides that cross, or lengths whose
+    squares overflow, are never certified.
 
     With a metric W all lengths and angles are those of W: in place of x it judges
     y = L^T (x - reference), with W = L L^T.
@@ -175,7 +176,7 @@ def certify(h: Hierarchy, x: ArrayLike, tolerance: float = TOLERANCE,
 
 def _certify_giving(h: Hierarchy, x: ArrayLike, tolerance: float, parallel: float,
                     witnesses: ArrayLike | None) -> Certificate:
-    giving, found = h.giving, np.empty(0) if witnesses is None else np.asarray(witnesses, float)
+    giving, found = h.giving, array_of("certify: witnesses", () if witnesses is None else witnesses)
     if found.shape != (len(giving), h.n):
         raise HierarchyError(f"certify: {len(giving)} levels give, so witnesses must be "
                              f"({len(giving)}, {h.n}), those of the resolution; got {found.shape}")
@@ -185,8 +186,9 @@ def _certify_giving(h: Hierarchy, x: ArrayLike, tolerance: float, parallel: floa
         least[:level + 1] = np.maximum(least[:level + 1], part.stationarity)
         room = room.relaxed(level, witness)
     last = certify(room, x, tolerance, parallel)
-    return Certificate(h.violations(x), np.maximum(least, last.stationarity), last.nearest,
-                       tolerance, h.names)
+    missed, least = h.slacks(x), np.maximum(least, last.stationarity)
+    return Certificate(np.array([_length(missed[level]) for level in _levels(h)]), least,
+                       last.nearest, tolerance, h.names)
 
 
 def _euclidean(h: Hierarchy, x: Array) -> tuple[Hierarchy, Array]:
@@ -284,7 +286,7 @@ class _Rows:
         value, reach = unit @ x, 1.0 + _length(x)
         t = np.maximum(value - up, 0.0) - np.maximum(low - value, 0.0)
         known = [reach, _length(x - h.reference), *np.abs(t), *np.abs(value)]
-        if not (np.array(known) < _LARGEST).all() or np.isnan([h.lower, h.upper]).any():
+        if not (np.array(known) < _LARGEST).all() or not (h.lower <= h.upper).all():
             return None
         band = tolerance * reach
         fixed = (h.lower == h.upper) | (np.abs(t) > band)

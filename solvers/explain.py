@@ -11,7 +11,7 @@ from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
 from solvers.resolver import Resolution
 from solvers.resolvers.hcod import ActiveSetResolution
-from solvers.status import EQUAL
+from solvers.status import EQUAL, Status
 
 _NAMED, _SMALL = 3, 0.1  # missed rows that are named, and the share of the largest that counts
 _AXES = ("x", "y", "z")
@@ -28,9 +28,10 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     is at most `tolerance` times the size of its terms. `rows` are names of the m rows, None for
     those of h, which a stack and the adapters give; without any rows are numbered within their
     level, with them the largest missed inequalities of a level are named too. `units` of the m rows
-    are written behind what a row gives. Rows whose sides cross are all that is said of such a
-    hierarchy. Raises a HierarchyError unless the resolution is from `hcod`, the only resolver that
-    reports the state of each row, and if its rows, names or units are not m.
+    are written behind what a row gives. Of a hierarchy with rows whose sides cross, or of a
+    numerical failure, nothing else is said. Raises a HierarchyError unless the resolution is from
+    `hcod`, the only resolver that reports the state of each row, and if its rows, names or units
+    are not m.
     """
     expect("explain: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
     number("explain: tolerance", tolerance, 0.0)
@@ -46,10 +47,14 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     if not isinstance(resolution, ActiveSetResolution):
         raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
                              "which rows are active")
+    if h.giving and len(resolution.active) < h.m:  # a witness was not found
+        h = h.upper_part(h.giving[-1] + 1)
     shaped("explain: active", resolution.active, (h.m,))
     for i in np.flatnonzero(~(h.lower <= h.upper)).tolist():  # NaN too
         return (f"{h.names[_level_of(h, i)]} {names[i]}: no value lies between lower "
                 f"{h.lower[i]:g} and upper {h.upper[i]:g}")
+    if resolution.status is Status.NUMERICAL_FAILURE:
+        return str(resolution.status)
     lines = [_level(h, resolution, k, tolerance, names, rows is not None)
              for k in range(len(h.sizes))]
     if resolution.witnesses is not None:

@@ -39,8 +39,10 @@ def in_metric(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy,
         raise HierarchyError(f"{error}. These are rows over L^T (x - reference), in which the "
                              "metric L L^T of this hierarchy is the identity: a bound on one "
                              "unknown of x is a row over several") from error
-    if not change_back(L, h.reference, found.x):
-        found.status = Status.NUMERICAL_FAILURE
+    if found.status is not Status.NUMERICAL_FAILURE:
+        found.x = found.x.copy()  # that of a plugin may be its memory, or read-only
+        if not change_back(L, h.reference, found.x):
+            found.status = Status.NUMERICAL_FAILURE
     return found
 
 

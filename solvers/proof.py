@@ -31,6 +31,8 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hierarchy.errors import expect
+from hierarchy.gate import array_of, sound_rows
 from hierarchy.problem import Array, Hierarchy
 
 DIGITS = 120
@@ -88,8 +90,10 @@ def prove(h: Hierarchy, candidates: Iterable[ArrayLike], unclear: float = UNCLEA
 
     Raises HierarchyError: h has a metric, or levels that give.
     """
+    expect("prove: h", h, Hierarchy, "make one with Hierarchy.from_levels")
     h.refuse_extras("prove: the hierarchy", "the proof")
-    points = [np.asarray(x, dtype=np.float64) for x in candidates]
+    sound = sound_rows(*h.rows[:3]) and np.isfinite(h.reference).all()
+    points = [array_of("prove: candidate", x) for x in candidates if sound]
     points = [x for x in points if x.shape == (h.n,) and np.isfinite(x).all()]
     levels = len(h.sizes)
     with localcontext() as context:
@@ -121,7 +125,7 @@ class _Rows:
     @staticmethod
     def at(h: Hierarchy, x: Array, band: float) -> _Rows:
         """Classify the rows at x; a side within `band`, relative to 1 + |x|, is reached."""
-        value, size = h.A @ x, np.linalg.norm(h.A, axis=1)
+        value, size = h.A @ x, np.hypot.reduce(h.A, axis=1, initial=0.0)  # which cannot overflow
         reach = band * (1.0 + float(np.linalg.norm(x))) * size
         seen = size > ROUNDING * size.max(initial=0.0)
         equal = seen & (h.lower == h.upper)

@@ -26,7 +26,7 @@ _REMEDIES = {
     Status.ITERATION_LIMIT: "raise max_iterations, or pass the memory of the previous tick; "
                             "x is optimal for the finished levels",
     Status.NUMERICAL_FAILURE: "x is zero; check the rows for NaN or infinite entries, or for "
-                              "entries so large that their squares overflow",
+                              "entries whose squares overflow or underflow",
     Status.BACKEND_FAILURE: "x is optimal for the finished levels; try another backend, or "
                             "scale the rows to similar norms",
     Status.INACCURATE: "an answer was found but could not be verified: some rows are nearly "

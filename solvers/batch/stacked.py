@@ -81,6 +81,7 @@ class Batch:
             raise HierarchyError("a batch of no hierarchies has no shape; pass arrays instead")
         first = hierarchies[0]
         for p, h in enumerate(hierarchies):
+            expect(f"problem {p}", h, Hierarchy, "make one with Hierarchy.from_levels")
             if h.n != first.n or h.sizes.tolist() != first.sizes.tolist():
                 raise HierarchyError(f"problem {p} is {h}, where problem 0 is {first}")
             h.refuse_extras(f"problem {p}", "a batch")

@@ -27,12 +27,13 @@ from solvers.kernels.linalg.space import (
     View,
     assign,
     carve_rows,
+    fill,
     matrix,
     shared,
     vector,
 )
 from solvers.kernels.tolerances import FAR_LIGHTER, LIGHT_ROW, UNCLEAR_CUT, UNCLEAR_PIVOT
-from solvers.status import INACCURATE, SOLVED, TOO_SMALL
+from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 
 class Staircase(NamedTuple):
@@ -69,16 +70,24 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
     if a row is nearly parallel to others or far lighter, and damping is off.
     """
     code, least = climb(A, lower, upper, sizes, x, settings, work)
-    if code == SOLVED and least < UNCLEAR_PIVOT and settings[0] == 0.0:
-        return INACCURATE
-    return code
+    if settings[0] > 0.0:  # which no other kernel does
+        return NUMERICAL_FAILURE if code == INACCURATE else code
+    return INACCURATE if code == SOLVED and least < UNCLEAR_PIVOT else code
+
+
+@compiled
+def solve_as_one(A, lower, upper, sizes, x, settings, work):
+    """Solve like `solve_by_staircase`, but never INACCURATE."""
+    code, _ = climb(A, lower, upper, sizes, x, settings, work)
+    return NUMERICAL_FAILURE if code == INACCURATE else code
 
 
 @internal
 def climb(A, lower, upper, sizes, x, settings, work):
-    """Solve like `solve_by_staircase`, but never INACCURATE; return the code and the least pivot.
+    """Solve like `solve_by_staircase`; return the code and the least pivot.
 
-    A pivot is the remainder of a row when its column was made, relative to its norm.
+    INACCURATE, and x = 0, only if the square of a row underflows. A pivot is the remainder of a row
+    when its column was made, relative to its norm.
     """
     m, n = A.shape
     (basis, rows, y, of_x, of_block), at = carve_staircase(work, 0, m, n)
@@ -87,7 +96,8 @@ def climb(A, lower, upper, sizes, x, settings, work):
     settings = shared(settings)
     code = load_rows(rows.W, rows.zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
-        return finish(x, code), 0.0
+        fill(x, 0.0)
+        return code, 0.0
 
     rank, first, least = 0, 0, np.inf
     for level in range(sizes.size):

@@ -203,8 +203,8 @@ def differs(folder: Path) -> str:
     for file in (header, code):
         if not file.is_file():
             raise HierarchyError(f"no C library in {folder}: {file.name} is missing")
-    found = re.search(r'#define TH_DIGEST "(\w+)"', header.read_text(encoding="utf-8"))
-    stated, installed = found.group(1) if found else "nothing", digest()
+    found = re.search(rb'#define TH_DIGEST "(\w+)"', header.read_bytes())
+    stated, installed = found.group(1).decode() if found else "nothing", digest()
     if f"{stated}\0".encode() not in code.read_bytes():
         return f"{header.name} has the digest {stated}, and {code.name} another"
     if stated != installed:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hierarchy.errors import check_name
+from hierarchy.errors import SEEDS, check_name, whole
 from hierarchy.problem import Array, Hierarchy
 from solvers.problems.kinds import Level, Random, equal, stacked
 
@@ -26,7 +26,7 @@ def family(name: str, seed: int) -> Hierarchy:
     Raises UnknownNameError: a name not in FAMILIES.
     """
     check_name("family of problems", name, FAMILIES)
-    rng = np.random.default_rng([seed, FAMILIES.index(name)])
+    rng = np.random.default_rng([whole("family: seed", seed, largest=SEEDS), FAMILIES.index(name)])
     return Hierarchy.from_levels(_MAKERS[name](rng))
 
 

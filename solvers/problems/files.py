@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.archives import array_in, read_members
-from hierarchy.errors import HierarchyError, naming
+from hierarchy.errors import HierarchyError, file_path, naming
 from hierarchy.problem import Hierarchy
 from solvers.proof import Proof
 
@@ -103,7 +103,7 @@ def read(path: str | Path) -> Collection:
     Raises ProblemFileError: it does not exist, has another format or version, lacks an array, or
     has one of a wrong type or length; its problems are not those that were written, or not valid.
     """
-    head, arrays = _opened(Path(path))
+    head, arrays = _opened(file_path("read", path))
     with naming(str(path), ProblemFileError, ValueError):
         problems, answers = _content(head, arrays)
     if len(problems) != head["count"]:

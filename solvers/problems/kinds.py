@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hierarchy.errors import check_name
+from hierarchy.errors import SEEDS, check_name, whole
 from hierarchy.problem import Array, Hierarchy
 
 Random = np.random.Generator
@@ -27,7 +27,7 @@ def structured(seed: int, kinds: Sequence[str] = (), equalities_only: bool = Fal
     """
     for kind in kinds:
         check_name("kind of problem", kind, _MAKERS)
-    rng = np.random.default_rng([seed, 1])
+    rng = np.random.default_rng([whole("structured: seed", seed, largest=SEEDS), 1])
     chosen = str(rng.choice(list(kinds or _MAKERS)))
     levels = _MAKERS[chosen](rng)
     if equalities_only:
@@ -43,7 +43,7 @@ def bounded(h: Hierarchy, seed: int) -> Hierarchy:
     The box lies around the x that meets the first level best. That x may be on a side or beyond it,
     and sides may coincide or be missing; rows are reversed, repeated and scaled.
     """
-    rng = np.random.default_rng([seed, 2])
+    rng = np.random.default_rng([whole("bounded: seed", seed, largest=SEEDS), 2])
     end = int(h.offsets[1]) if len(h.sizes) else 0
     middle = np.linalg.lstsq(h.A[:end], h.lower[:end], rcond=1e-6)[0] if end else h.reference
     half = float(np.abs(middle).max()) or 1.0

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, expect, whole
-from hierarchy.gate import array_of
+from hierarchy.errors import HierarchyError, expect, refuse, whole
+from hierarchy.gate import array_of, sound_rows
 from hierarchy.problem import Array, Hierarchy
 from solvers.qp.backends import Backend
 from solvers.qp.refinement import Rows, split
@@ -129,10 +129,11 @@ def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None, *,
     sparse : whether the matrices are sparse, as some backends require.
 
     Raises HierarchyError: no such level; `above` missing, of a wrong shape or not finite; a metric
-    or levels that give.
+    or levels that give; rows that are not finite, or whose sides cross.
     """
     expect("level_problem: h", h, Hierarchy, "make one with Hierarchy.from_levels")
     h.refuse_extras("the hierarchy", "level_problem")
+    refuse(not sound_rows(*h.rows[:3]), "level_problem: rows are not finite or sides cross")
     x = _checked(h, level, above)
     m = int(h.offsets[level])
     kept, F = _above(Rows(h.A[:m], h.lower[:m], h.upper[:m]), x)

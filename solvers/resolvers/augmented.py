@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.staircase import solve_by_staircase
+from solvers.kernels.staircase import solve_as_one
 from solvers.resolver import Resolution, Resolver, register
-from solvers.status import INACCURATE, SOLVED
 from solvers.workspace import WORKSPACE, entry
 
 
@@ -28,6 +27,5 @@ class Augmented(Resolver):
         """Resolve h; a direct method that ignores `memory`."""
         x, whole = h.start(), h.offsets[-1:]  # one level of m rows
         A, lower, upper, _ = h.rows
-        code = entry(solve_by_staircase)(A, lower, upper, whole, x, self._settings,
-                                         WORKSPACE.array)
-        return Resolution(x) if code in (SOLVED, INACCURATE) else self._otherwise(h, x, code)
+        code = entry(solve_as_one)(A, lower, upper, whole, x, self._settings, WORKSPACE.array)
+        return self._otherwise(h, x, code) if code else Resolution(x)

@@ -72,7 +72,7 @@ class Hqp(Resolver):
         with np.errstate(all="ignore"):
             try:
                 return _Cascade(self, h, starts).run()
-            except np.linalg.LinAlgError:  # an SVD of numbers whose squares overflow
+            except (np.linalg.LinAlgError, OverflowError):  # squares, in an SVD, of x or lambda
                 return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
 
 
@@ -131,8 +131,8 @@ class _Cascade:
 
     def _step(self, z: Array) -> None:
         x = self.x + self.N @ z
-        if not np.isfinite(x).all():
-            raise _StopError(Status.NUMERICAL_FAILURE)
+        if not np.isfinite(norm(x)):
+            raise np.linalg.LinAlgError
         self.steps.append(x - self.x)
         self.x = x
 

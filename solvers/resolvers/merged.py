@@ -161,11 +161,12 @@ class Merged(OneLevel):
         """Return the settings of the kernel for levels of these names."""
         if names not in self._known:
             scales, strict = dict(self.scales), self.strict_levels
-            self._known[names] = settings = np.array([
+            settings = np.array([
                 *self._before_weights(BY_RULE if strict is None else strict, self.regularisation,
                                       self.step), *np.empty(2 * len(names))])
             write_levels(settings, self.ratio, self.cap,
                          np.array([scales.get(name, 1.0) for name in names]))
+            self._known[names] = settings  # complete, for other threads
         return self._known[names]
 
     def _settings_of(self, h: Hierarchy) -> Array:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError
+from hierarchy.gate import sound_rows
 from hierarchy.problem import Array, Hierarchy
 from solvers.resolver import Around, Handles, Resolution, number, place_of, whole_number
-from solvers.status import EQUAL, FREE, LOWER, UPPER
+from solvers.status import EQUAL, FREE, LOWER, UPPER, Status
 
 
 @final
@@ -45,6 +46,8 @@ class SetBased(Around):
         Of the mode that was chosen `active` says EQUAL for an equality, UPPER or LOWER for a frozen
         row, FREE for one that is ignored; `iterations` is the number of modes resolved.
         """
+        if not sound_rows(*h.rows[:3]):  # NaN is no side, and would be ignored
+            return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
         active = _states(h)
         edges = np.flatnonzero((active == LOWER) | (active == UPPER))
         for count, frozen in enumerate(_modes(edges, self.most), 1):

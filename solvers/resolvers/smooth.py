@@ -22,6 +22,7 @@ from typing import ClassVar, final
 import numpy as np
 
 from hierarchy.errors import HierarchyError
+from hierarchy.gate import shaped
 from hierarchy.problem import Array, Hierarchy
 from solvers.qp.refinement import below_largest
 from solvers.resolver import (
@@ -72,16 +73,22 @@ class Smooth(Resolver):
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h with all rows fully active; HierarchyError for an inequality."""
-        for (row,) in np.argwhere(h.lower != h.upper)[:1]:
+        for (row,) in np.argwhere(h.lower < h.upper)[:1]:
             refuse_inequality(self, h, int(row))
-        return self.solve_activated(h, np.ones(h.m))
+        rate = np.where(h.lower == h.upper, h.lower, np.nan)
+        return self.solve_activated(h.changed(lower=rate), np.ones(h.m))
 
     def solve_activated(self, h: Hierarchy, activation: Array) -> Resolution:
         """Resolve the rows A x -> lower with their activations (m,), upper sides being ignored.
 
-        Raises HierarchyError, naming level, row and value, for an activation outside 0 .. 1.
+        Raises HierarchyError, naming level, row and value, for an activation outside 0 .. 1, and
+        for a metric or levels that give.
         """
-        _check(h, activation)
+        h.refuse_extras("the hierarchy", "solve_activated")
+        activation = shaped("smooth: activations", activation, (h.m,))
+        for (row,) in np.argwhere(~((activation >= 0.0) & (activation <= 1.0)))[:1]:
+            raise HierarchyError(f"{place_of(h, row)}: activation {activation[row]} is outside "
+                                 "0 .. 1")
         acting = activation > 0.0
         if not below_largest(h.A, h.lower[acting], h.reference):  # squares would overflow
             return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
@@ -132,11 +139,3 @@ class Activated(Around):
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h at the present activations."""
         return self.inner.solve_activated(h, self.activation()[:h.m])
-
-
-def _check(h: Hierarchy, activation: Array) -> None:
-    if activation.shape != (h.m,):
-        raise HierarchyError(f"smooth: activations have shape {activation.shape}, expected "
-                             f"({h.m},)")
-    for (row,) in np.argwhere(~((activation >= 0.0) & (activation <= 1.0)))[:1]:
-        raise HierarchyError(f"{place_of(h, row)}: activation {activation[row]} is outside 0 .. 1")

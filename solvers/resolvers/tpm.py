@@ -7,7 +7,7 @@ from typing import Any, ClassVar, final
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import HierarchyError, expect
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.kernels.bounds import solve_within_bounds
@@ -18,6 +18,7 @@ from solvers.resolver import (
     Handles,
     Resolution,
     Resolver,
+    make,
     one_of,
     refuse_inequality,
     register,
@@ -128,7 +129,8 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
     Raises HierarchyError: an inequality, an invalid setting, rows that are not finite, or a metric
     in the published form.
     """
-    resolver = Tpm(**settings)
+    expect("task_priority_matrix: h", h, Hierarchy, "make one with Hierarchy.from_levels")
+    resolver = make("tpm", **settings)
     if not resolver.strict:
         h.refuse_extras("the hierarchy", "the published form of tpm")
     if (h.lower < h.upper).any():  # worded as for the published form, which takes no bounds
@@ -151,5 +153,5 @@ def task_priority_matrix(h: Hierarchy, **settings: Any) -> TaskPriorityMatrix:
         null_space_term=_answer(resolver, h, np.zeros(h.m), h.reference))
 
 
-def _answer(resolver: Tpm, h: Hierarchy, b: Array, reference: Array) -> Array:
+def _answer(resolver: Resolver, h: Hierarchy, b: Array, reference: Array) -> Array:
     return resolver.solve(h.changed(lower=b, upper=b, reference=reference)).x

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, as_float, refuse
+from hierarchy.gate import array_of
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
 from solvers.kernels.merged import TOP_LIMITS, count_strict
@@ -100,10 +101,10 @@ def lexicographic_weights(violations: ArrayLike, tolerance: float, regularised: 
     Source: Sherali, Soyster, "Preemptive and nonpreemptive multi-objective programming:
     relationship and counterexamples", 1983.
     """
-    V = np.asarray(violations, dtype=float)
+    V = array_of("violations", violations)
     if V.ndim != 1 or not (np.isfinite(V) & (V >= 0.0)).all():
         raise HierarchyError(f"violations = {violations!r}, expected numbers >= 0, one per level")
-    if not 0.0 < tolerance < np.inf or not 0.0 <= regularised < np.inf:
+    if not 0.0 < as_float(tolerance) < np.inf or not 0.0 <= as_float(regularised) < np.inf:
         raise HierarchyError(f"tolerance = {tolerance!r}, regularised = {regularised!r}, expected "
                              "numbers > 0 and >= 0")
     weights, below = [1.0], np.hypot(regularised, V[-1]) if V.size else 0.0

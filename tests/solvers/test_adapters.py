@@ -328,3 +328,5 @@ def test_a_problem_needs_a_level_that_is_there_and_what_the_levels_above_reach()
                         ([2], "level 2: above must be the x (7,) of the levels"),
                         ([2, np.full(7, np.nan)], "level 2: above must be")):
         refused(said, level_problem, h, *asked)
+    h.A[0, 0] = np.nan
+    refused("rows are not finite", level_problem, h, 2, np.zeros(7))

@@ -278,6 +278,21 @@ def test_a_candidate_may_be_off_a_side_where_no_other_is_as_near(off, gap):
     assert not prove(h, [[1.0 + 1e-5, 1.0 - gap]], unclear=1e-13).complete
 
 
+@pytest.mark.parametrize(("low", "up"), [(1.0, 0.0), (np.nan, 1.0)])
+def test_sides_that_cross_or_are_no_numbers_leave_nothing_to_certify_or_prove(low, up):
+    h = Hierarchy.from_levels([([[1.0]], [0.0], [1.0])])
+    h.lower[0], h.upper[0] = low, up
+    assert not certify(h, [0.5]).certified
+    assert prove(h, [[0.5]]).proved == 0
+
+
+@pytest.mark.parametrize("size", [1e200, 1e-170])
+def test_rows_whose_squares_are_out_of_range_are_proved(size):
+    """They counted as zero: the reference was proved to be the answer."""
+    h = Hierarchy.from_levels([([[size, 0.0]], [size])], reference=[3.0, 4.0])
+    np.testing.assert_array_equal(prove(h, [[1.0, 4.0]]).x, [1.0, 4.0])
+
+
 def test_optimal_but_not_nearest_to_the_reference_is_not_the_answer():
     h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0])], reference=[0.0, 2.0])
     assert not prove(h, [[1.0, np.nan], [7.0, 7.0], [1.0]]).turn

@@ -1,5 +1,6 @@
 """Structured problems that were once answered wrongly, with the violations that are right."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,27 @@ def test_numbers_that_overflow_when_squared_do_not_end_the_process(backend):
     res = make("hqp", backend=backend).solve(h)
     assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
     assert not certify(h, res.x).certified
+    singular = Hierarchy.from_levels([([[1.0], [1.0]], [1.0, 1.0])])
+    res = make("hqp", backend=backend, damping=1e300).solve(singular)  # an OverflowError
+    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
+
+
+def test_an_x_that_grows_from_level_to_level_until_it_overflows_is_a_failure():
+    """It was SOLVED, |x| = 1e307: what the backend gave."""
+    E = np.eye(40)
+    h = Hierarchy.from_levels([(E[:1], [1e49]), *(((a + 1e-6 * b)[None], [0.0])
+                                                  for a, b in pairwise(E))])
+    res = make("hqp").solve(h)
+    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
+
+
+@pytest.mark.parametrize("resolver", [
+    *map(make, ("augmented", "recursive", "reverse", "sns", "tpm-published")),
+    make("hcod", damping=0.1), make("tpm", damping=0.1)], ids=lambda one: one.label)
+def test_rows_whose_squares_underflow_are_a_failure_where_they_are_not_solved(resolver):
+    """`augmented` called zero SOLVED, others INACCURATE; the last two were not damped."""
+    res = resolver.solve(Hierarchy.from_levels([([[1e-150]], [3e-150])]))
+    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
 
 
 @pytest.mark.parametrize(("name", "kind", "seeds"), [

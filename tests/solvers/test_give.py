@@ -10,7 +10,7 @@ from refusals import refused
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import LookAt, Position, Posture
-from solvers import Status, certify, explain, make, names
+from solvers import Resolution, Resolver, Status, certify, explain, make, names
 from solvers.batch import Batch
 from solvers.give import _joined, _split, giving
 from solvers.problems import generate, structured
@@ -184,6 +184,14 @@ def test_explain_says_what_gives_how_much_and_for_whom():
     refused("explain: 1 units for 14 rows", lambda: explain(h, make("hcod").solve(h), units=["m"]))
 
 
+@pytest.mark.parametrize("metric", [None, np.eye(2)], ids=["one call", "in parts"])
+def test_explain_says_where_the_limit_was_before_a_witness_was_found(metric):
+    h = Hierarchy.from_levels([(np.eye(2), [-1.0] * 2, [1.0] * 2), ([[1.0, 1.0]], [9.0]),
+                               ([[1.0, 0.0]], [-5.0])], give=[0.0, 0.5, 0.0], metric=metric)
+    found = make("hcod", max_iterations=1).solve(h)
+    assert "limit was reached at 'level 2'" in explain(h, found).splitlines()[-1]
+
+
 def test_explain_does_not_say_that_rows_give_by_rounding():
     """At x = 0 rows gave 1e-16 of 0."""
     turn = np.arange(4) * np.pi / 2.0
@@ -262,12 +270,26 @@ def test_resolvers_of_bounds_take_them_with_a_diagonal_metric_alone(resolver):
 
 
 @pytest.mark.parametrize("name", names())
-def test_a_metric_that_loses_definiteness_is_a_numerical_failure(name):
+@pytest.mark.parametrize(("array", "wrong"), [("metric", -1.0), ("A", np.nan)])
+def test_a_metric_that_loses_definiteness_or_rows_of_nan_are_a_numerical_failure(name, array,
+                                                                                 wrong):
     h = Hierarchy.from_levels([([[1.0, 0.3]], [1.0])], [1.0, 1.0], metric=np.eye(2))
-    h.metric[1, 1] = -1.0
+    getattr(h, array)[-1, 1] = wrong
     res = make(name).solve(h)
     assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
     assert not certify(h, [1.0, 0.0]).certified
+
+
+def test_in_a_metric_the_memory_of_a_plugin_stays_as_it_is():
+    class Own(Resolver):
+        name = "own"
+
+        def solve(self, h, memory=None):
+            x = make("tpm").solve(h).x
+            return Resolution(x, memory=x)
+
+    res = Own().solve(Hierarchy.from_levels([([[1.0, 2.0]], [1.0])], metric=np.diag([4.0, 1.0])))
+    np.testing.assert_allclose(res.memory, [2.0 * res.x[0], res.x[1]])
 
 
 @pytest.mark.parametrize("inaccurate", [None, 0, 1])

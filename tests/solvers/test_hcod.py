@@ -254,6 +254,8 @@ def test_rows_whose_sides_cross_are_all_that_is_said():
     res = HCOD.solve(h)
     assert res.status is Status.NUMERICAL_FAILURE
     assert explain(h, res) == "box row 1: no value lies between lower 2 and upper 1"
+    h.lower[1], h.A[0, 0] = 0.0, np.nan  # "box is met."
+    assert explain(h, HCOD.solve(h)) == str(Status.NUMERICAL_FAILURE)
 
 
 @pytest.mark.parametrize("name", ["hcod", "tpm"])

@@ -161,6 +161,8 @@ def test_check_compares_the_kernels(folder, tmp_path, command):
     code = other / "lib" / "libtask_hierarchy.a"
     code.write_bytes(code.read_bytes().replace(digest.encode(), b"0" * 16))
     assert f"those installed have {digest}" in command("library --check --out", other, code=1).err
+    header.write_bytes(b"\xff")
+    assert "digest nothing" in differs(other)
     with pytest.raises(HierarchyError, match=r"task_hierarchy\.h is missing"):
         differs(tmp_path)
 

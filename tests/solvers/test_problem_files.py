@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import zipfile
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -166,6 +167,13 @@ def test_what_is_no_file_of_problems_is_refused(tmp_path):
     (tmp_path / "text.npz").write_text("text")
     text = refused("not a file of problems", read, tmp_path / "text.npz", error=ProblemFileError)
     assert text.endswith(": File is not a zip file")
+    refused("read: expected a path, got int 3", read, 3)
+
+
+def test_a_seed_that_is_none_is_named():
+    for make_one in (structured, partial(problems.family, "EQ7"),
+                     partial(problems.bounded, structured(0))):
+        refused("seed = -1: expected a whole number", make_one, -1)
 
 
 @pytest.mark.parametrize(("knob", "value"), [

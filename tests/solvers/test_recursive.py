@@ -216,3 +216,13 @@ def test_bounds_that_exclude_each_other_are_named():
         BASIC.solve(h)
     touching = Hierarchy.from_levels([([[3.0], [1.0]], [-1, 0.1], [0.3, 1])])
     assert BASIC.solve(touching).x == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("scale", [1e-90, 1e90])
+def test_singular_directions_do_not_hang_on_the_unit_of_rows(scale):
+    """Squares of cosines overflowed: no rows were rotated, and x was 0.04 off."""
+    r = np.random.default_rng(3)
+    A, b = r.normal(size=(3, 5)), r.normal(size=3)
+    one, other = (make("recursive", method="selective", largest=0.3).solve(
+        Hierarchy.from_levels([(by * A, by * b)])).x for by in (1.0, scale))
+    np.testing.assert_allclose(other, one, rtol=1e-12)

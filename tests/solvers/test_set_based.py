@@ -308,11 +308,13 @@ def test_what_has_no_answer_is_refused_or_has_a_status():
             (lambda: given(h, np.array([1.5])), "walls, row 0: activation 1.5 is outside 0 .. 1"),
             (lambda: given(below, np.array([1.0, 0.5, 0.0, -1.0])),
              "tip, row 1: activation -1.0 is outside 0 .. 1"),
+            (lambda: given(h.changed(metric=np.eye(2)), np.ones(1)), "the hierarchy has a metric"),
             (lambda: given(h, np.ones(2)), "shape (2,), expected (1,)")):
         refused(said, call)
     rows = Hierarchy.from_levels([([[1.0, 0.0]], [0.0])])
     for spoilt, array, value in ((h, h.lower, np.nan), (rows, rows.A, np.nan),
                                  (rows, rows.A, np.inf)):
         array[0] = value
-        found = given(spoilt, np.ones(1))
-        assert (found.status, found.x.any()) == (Status.NUMERICAL_FAILURE, False)
+        for found in (given(spoilt, np.ones(1)), SET_BASED.solve(spoilt),
+                      SMOOTH.solve(spoilt.changed(upper=spoilt.lower))):
+            assert (found.status, found.x.any()) == (Status.NUMERICAL_FAILURE, False)

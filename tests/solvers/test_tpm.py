@@ -41,6 +41,8 @@ def test_the_contributions_in_a_metric_give_the_answer():
     refused("level 1, row 0: an inequality", task_priority_matrix, h)
     h = Hierarchy.from_levels([([[1.0, 0.0]], [0.5]), ([[2.56e-18, 1.8e-18]], [-700.0])])
     refused("not be verified: some rows are nearly parallel", task_priority_matrix, h)
+    refused("unknown setting of tpm 'shape'", task_priority_matrix, h, shape="published")
+    refused("expected a Hierarchy", task_priority_matrix, 3)
 
 
 def close(x, y):

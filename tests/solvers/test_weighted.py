@@ -12,6 +12,7 @@ from refusals import refused
 from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, certify, make
 from solvers.qp import backends, programs, refinement
+from solvers.resolvers import merged
 from solvers.resolvers.weighted import lexicographic_weights
 
 EXACT = 1e-9
@@ -37,6 +38,8 @@ def test_lexicographic_weights_are_the_smallest_that_do():
     assert lexicographic_weights([0.0, 0.0], 0.1, regularised=1.0) == (10.0, 1.0)
     for wrong in ([[1.0, 2.0]], [1.0, -1.0], [np.nan], 1.0):
         refused("expected numbers >= 0, one per level", lexicographic_weights, wrong, 0.1)
+    refused("not an array of numbers", lexicographic_weights, ["1"], 0.1)
+    refused("tolerance = None", lexicographic_weights, [1.0], None)
 
 
 def test_the_top_level_is_strict_if_it_has_inequalities_or_as_many_as_asked_for():
@@ -243,6 +246,14 @@ def test_levels_stay_strict_down_to_the_first_run_of_inequalities_and_one_is_to_
     np.testing.assert_allclose(one, [0.75, 1.0], atol=1e-5)
     h = Hierarchy.from_levels([([[1.0]], [0.0], [1.0])], names=["limits"])
     refused("all levels stay strict (limits)", make("merged").solve, h)
+
+
+def test_another_thread_never_sees_weights_that_are_not_written_yet(monkeypatch):
+    resolver, write, known = make("merged"), merged.write_levels, []
+    monkeypatch.setattr(merged, "write_levels", lambda *given: (
+        known.append(dict(resolver._known)), write(*given)))
+    resolver.solve(Hierarchy.from_levels([([[1.0]], [1.0])]))
+    assert known == [{}]
 
 
 def test_scales_divide_the_weight_of_their_level():

@@ -196,7 +196,8 @@ def _balances(s, p, reach, factored):
     left = length_of(s.number[GRADIENT, :s.x.size])
     error = (SIGN_MARGIN * (left + rounding) + level.unsure) / s.scalar[PIVOT]
     cut = SIGN_MARGIN * turned / s.scalar[PIVOT]
-    if holds and _signs_hold(s, level, error + cut if exact else 0.0, reach, allowed, met):
+    unsure = min(error + cut, KNOWN_MULTIPLIER * source) if exact else 0.0
+    if holds and _signs_hold(s, level, unsure, reach, allowed, met):
         if level.missed > CLEAR_MISS * s.scalar[TOLERANCE] * reach:
             # What is cut from a row lies beyond the columns of those that act: no pivot there
             # makes it larger.

@@ -189,8 +189,8 @@ def factor_level(rows, basis, begin, end, rank):
 
 @internal
 def finish(x, code):
-    """Return `code`, or NUMERICAL_FAILURE if x is not finite; x is zero unless SOLVED."""
-    if code == SOLVED and not all_finite(x):
+    """Return `code`, NUMERICAL_FAILURE if x is not finite or not found; x is zero unless SOLVED."""
+    if code == INACCURATE or (code == SOLVED and not all_finite(x)):
         code = NUMERICAL_FAILURE
     if code != SOLVED:
         fill(x, 0.0)

@@ -38,7 +38,7 @@ typedef enum th_status {
   TH_SOLVED = 0,
   /* The budget max_iterations is spent. x is optimal for the levels above the unfinished one. */
   TH_ITERATION_LIMIT = 1,
-  /* The data hold NaN, an infinite entry, lower > upper, or numbers whose squares overflow. */
+  /* The data hold NaN, an infinite entry, lower > upper, or squares that over- or underflow. */
   TH_NUMERICAL_FAILURE = 2,
   /* x is an answer that could not be verified: rows are nearly parallel or differ greatly in scale.
    * th_violations says what each level still misses at x, not whether it could miss less. */
@@ -87,8 +87,8 @@ typedef struct th_settings {
   double ratio;           /* merged: weight of a level over that of the level below, at least 1 */
   double cap;             /* merged: most that a target moves, times the scale of its level */
   double step;            /* merged: share of a miss by which it moves, above 0, at most 1 */
-  double regularisation;  /* merged: weight of unknowns that no merged row names alone */
-  int64_t max_iterations; /* hcod, tpm, merged: steps level by level, at least 1 */
+  double regularisation;  /* merged: weight of unknowns that no merged equality names alone */
+  int64_t max_iterations; /* hcod, tpm, merged: most of `iterations`, at least 1 */
   int64_t optimal;        /* sns: 1 for form = "optimal", 0 for "basic" */
   int64_t miss;           /* sns: 1 for scales = "miss", 0 for "target" */
   int64_t method;         /* recursive: one of th_method */

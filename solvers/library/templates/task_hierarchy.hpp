@@ -40,6 +40,8 @@ class Solver {
     work_.resize(th_work_size(n_, m_, levels));
     values_.resize(th_record_size(n_, m_, levels));
   }
+  Solver(Solver &&) = default;  // a copy's record would have the numbers of another
+  Solver &operator=(Solver &&) = default;
 
   std::int64_t n() const noexcept { return n_; }
   std::int64_t m() const noexcept { return m_; }
