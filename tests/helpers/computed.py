@@ -7,7 +7,6 @@ import inspect
 import itertools
 import pkgutil
 import re
-from collections.abc import Mapping
 from types import SimpleNamespace
 
 import numpy as np
@@ -259,7 +258,7 @@ def defaults():
                       and isinstance(one, (int, float, tuple, np.ndarray))
                       and not re.search(r"^\D*$|<|Table\(", repr(one)) and ".jit." not in name}
             found |= {f"{name} {key}": [repr(one)] for key, one in module.items() if key.isupper()
-                      and isinstance(one, Mapping) and re.search(r"[:(] ?-?\d", repr(one))
+                      and isinstance(one, dict) and re.search(r"[:(] ?-?\d", repr(one))
                       and not re.search(r"<|Table\(|Posed\(", repr(one))}
             public = [(f"{name} {key}", one) for key, one in module.items()
                       if key[0] != "_" and getattr(one, "__module__", "") == name
