@@ -259,7 +259,8 @@ def defaults():
                       and not re.search(r"^\D*$|<|Table\(", repr(one)) and ".jit." not in name}
             found |= {f"{name} {key}": [repr(one)] for key, one in module.items() if key.isupper()
                       and isinstance(one, dict) and re.search(r"[:(] ?-?\d", repr(one))
-                      and not re.search(r"<|Table\(|Posed\(", repr(one))}
+                      and not re.search(r"<|Table\(|Posed\(", repr(one))
+                      and key != "BACKENDS"}  # which entrants of a benchmark replace
             public = [(f"{name} {key}", one) for key, one in module.items()
                       if key[0] != "_" and getattr(one, "__module__", "") == name
                       and not hasattr(one, "__members__")]
