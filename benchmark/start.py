@@ -158,12 +158,11 @@ def _cases(folder: Path) -> Iterator[Case]:
         yield Case("run of ellipse, from a wheel", 1.5, ["-P", "-c", _COMMAND, *_SHORT], packed)
     for name in ("hierarchy", "solvers", "scenarios"):
         copytree(_ROOT / name, folder / "bare" / name, ignore=ignore_patterns("objects"))
-    first = (("first answer of hcod", 12.0, _SOLVE, "hcod"),
-             ("the same of inequalities", None, _SOLVE, "hcod", "upper"))
-    for what, ceiling, *arguments in first:
-        yield Case(f"{what}, another processor", ceiling, ["-c", *arguments],
-                   {"TASK_HIERARCHY_NATIVE": "1", "NUMBA_CACHE_DIR": str(folder / "to" / what)}, 0)
-    for what, ceiling, *arguments in (*first, ("ellipse", None, _COMPILE)):
+    yield Case("first answer of hcod, another processor", 12.0, ["-c", _SOLVE, "hcod"],
+               {"TASK_HIERARCHY_NATIVE": "1", "NUMBA_CACHE_DIR": str(folder / "native")}, 0)
+    for what, ceiling, *arguments in (("first answer of hcod", 12.0, _SOLVE, "hcod"),
+                                      ("the same of inequalities", None, _SOLVE, "hcod", "upper"),
+                                      ("ellipse", None, _COMPILE)):
         yield Case(f"{what}, empty cache", ceiling, ["-P", "-c", *arguments],
                    {"PYTHONPATH": str(folder / "bare"), "NUMBA_CACHE_DIR": str(folder / what)}, 0)
     yield Case("the C library, empty cache", 10.0,
