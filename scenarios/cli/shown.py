@@ -116,20 +116,17 @@ def _keep(live: Live, folder: Path) -> None:
 
 @app.command()
 def export(folder: Run,
-           format: Annotated[str, typer.Option(
-               "--format", metavar="FORMAT", help="mcap. Tables of other formats: "
-               "load_run(RUN).to_dataframe() in Python.")] = "mcap",
            out: Annotated[Path | None, output(
                "A new file. Default: run.mcap in RUN.", "FILE")] = None,
            plugin: Plugins = None, as_json: AsJson = False) -> None:
     """Export a run as MCAP, with a layout for Foxglove.
 
-    Needs the extra `export`.
+    Needs the extra `export`. Tables: load_run(RUN).to_dataframe() in Python.
     """
     from scenarios import load_run
     from scenarios.export import export as write
 
-    print_files(write(load_run(folder), out or folder / f"run.{format}"), as_json)
+    print_files(write(load_run(folder), out or folder / "run.mcap"), as_json)
 
 
 @app.command()

@@ -147,7 +147,7 @@ def test_what_cannot_be_written_says_why(run, tmp_path, name, said, monkeypatch)
 def test_the_command_exports_a_run_beside_it_or_where_it_is_told(run, tmp_path, command):
     pytest.importorskip("mcap")
     folder, other = save(run, tmp_path / "run"), tmp_path / "other.mcap"
-    command("export --format mcap", folder)
+    command("export", folder)
     assert "other.mcap" in command("export", folder, "--out", other).out
     assert other.read_bytes() == (folder / "run.mcap").read_bytes()
 
