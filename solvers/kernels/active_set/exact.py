@@ -120,7 +120,8 @@ def _by_staircase(A, lower, upper, sizes, x, record, settings, work):
     if code == INACCURATE:
         assign(x, work[:n])
         return UNPROVED
-    keep_staircase(lower, upper, record)
+    if code != TOO_SMALL:
+        keep_staircase(lower, upper, record)
     return code
 
 
