@@ -21,15 +21,13 @@ __all__ = ["Hierarchy", "HierarchyError", "Robot", "Stack", "State", "Task"]
 _PARTS = ("activation", "allocation", "avoidance", "kinematics", "limits", "loop", "paths",
           "measured", "robots", "tasks")  # modules that are public
 
-_HOME = {"Robot": "robot", "Stack": "stack", "State": "state", "Task": "task"}
-
 
 def __getattr__(name: str) -> Any:
     if name in _PARTS:
         return import_module(f"hierarchy.{name}")
-    if name not in _HOME:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(f"hierarchy.{_HOME[name]}"), name)
+    value = globals()[name] = getattr(import_module(f"hierarchy.{name.lower()}"), name)
     return value
 
 

@@ -39,12 +39,9 @@ def allocate(minimal_distance: float, end_effector_distance: float, cone_error: 
     return _ALLOCATIONS[first, second, point, last, end_effector_distance <= areas.end_effector]
 
 
-def _order(first: bool, second: bool, point: bool, last: bool) -> tuple[str, ...]:
-    return (*(AVOIDANCE,) * first, POSITION, *(AVOIDANCE,) * second, *(POINTING,) * point,
-            *(AVOIDANCE,) * last)
-
-
 # One object per case, so that the loop creates none.
-_ALLOCATIONS = {(first, second, point, last, repulsion):
-                Allocation(_order(first, second, point, last), repulsion)
-                for first, second, point, last, repulsion in product((False, True), repeat=5)}
+_ALLOCATIONS = {
+    (first, second, point, last, repulsion): Allocation(
+        (*(AVOIDANCE,) * first, POSITION, *(AVOIDANCE,) * second, *(POINTING,) * point,
+         *(AVOIDANCE,) * last), repulsion)
+    for first, second, point, last, repulsion in product((False, True), repeat=5)}

@@ -30,7 +30,7 @@ from hierarchy.errors import (
     refuse,
 )
 from hierarchy.gate import array_of, axes_along, readable, shaped
-from hierarchy.jit import compiled, internal
+from hierarchy.jit import compiled
 from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
 from hierarchy.problem import Array
 from hierarchy.records import NotNegative, Positive, check_fields, set_frozen
@@ -245,27 +245,6 @@ def corners(x: tuple[float, float], y: tuple[float, float], up: Vector = (0.0, 0
     sides = finite_numbers("sole: x [m]", x, 2), finite_numbers("sole: y [m]", y, 2)
     around = np.array([sides[0][[0, 1, 1, 0]], sides[1][[0, 0, 1, 1]]])
     return np.asarray(around.T @ axes_along("sole: up", up)[:2])
-
-
-@internal
-def write_dynamics(M, kinematics, points, A, first):
-    """Write the rows of the velocities `first`, ... of [M, -J_c^T] into A."""
-    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    n, count = M.shape[0], A.shape[0]
-    for i in range(count):
-        for c in range(n):
-            A[i, c] = M[first + i, c]
-    for k in range(len(points.joints)):
-        joint, f = points.joints[k], n + 3 * k
-        x, y, z = place(placements[joint], points.offsets[k])
-        for i in range(count):
-            c = first + i
-            if supports[joint, c]:
-                A[i, f] = J[5, c] * y - J[4, c] * z - J[0, c]
-                A[i, f + 1] = J[3, c] * z - J[5, c] * x - J[1, c]
-                A[i, f + 2] = J[4, c] * x - J[3, c] * y - J[2, c]
-            else:
-                A[i, f], A[i, f + 1], A[i, f + 2] = 0.0, 0.0, 0.0
 
 
 @compiled

@@ -269,8 +269,10 @@ class Loop:
         start, tick = self.clock(), 0
         while tick < ticks:
             planned = start + tick * self.period
-            self._wait(planned)
-            started = self.clock()
+            while (left := planned - self.clock()) > self.spin:
+                self.sleep(left - self.spin)
+            while (started := self.clock()) < planned:
+                pass
             command, why = _command(step, tick * self.period, send is not None)
             if why:
                 return f"tick {tick}: {why}"
@@ -297,12 +299,6 @@ class Loop:
             return tick + 1
         missed = tick + 1 + int(late / self.period)  # the last whose planned time has passed
         return missed + 1 if self.overrun == "skip" else max(tick + 1, missed + 1 - self.behind)
-
-    def _wait(self, until: float) -> None:
-        while (left := until - self.clock()) > self.spin:
-            self.sleep(left - self.spin)
-        while self.clock() < until:
-            pass
 
 
 def _command(step: Callable[[float], Any], t: float, needed: bool) -> tuple[Any, str]:
@@ -338,7 +334,14 @@ _TURN, _PAUSED = Lock(), list[bool]()  # whether each loop that pauses the colle
 @contextmanager
 def _quiet(pause_gc: bool, priority: int | None, notes: list[str]) -> Iterator[None]:
     """Turn the garbage collector off and raise the priority, as far as permitted."""
-    before = _raise_priority(priority, notes)
+    before = None
+    if priority is not None:
+        try:
+            before = os.sched_getscheduler(0), os.sched_getparam(0)
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+        except (OSError, AttributeError, ValueError) as error:
+            before = None
+            notes.append(f"SCHED_FIFO at priority {priority} was not given: {error}")
     with _TURN:
         collecting = pause_gc and gc.isenabled()
         if pause_gc:
@@ -354,16 +357,3 @@ def _quiet(pause_gc: bool, priority: int | None, notes: list[str]) -> Iterator[N
                 gc.enable()
         if before is not None:
             os.sched_setscheduler(0, *before)
-
-
-def _raise_priority(priority: int | None, notes: list[str]) -> tuple[int, Any] | None:
-    """Set SCHED_FIFO and return the previous setting, or None with a note on why not."""
-    if priority is None:
-        return None
-    try:
-        before = os.sched_getscheduler(0), os.sched_getparam(0)
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except (OSError, AttributeError, ValueError) as error:
-        notes.append(f"SCHED_FIFO at priority {priority} was not given: {error}")
-        return None
-    return before

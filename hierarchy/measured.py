@@ -129,10 +129,8 @@ class Measured(Task):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        function, reads = self._function(state)
-        asked = self._asked(state, level, np.zeros((8, self.dimension)))
+        (function, reads), asked, move_goal = self._asked(state, level)
         write_rows = bind(function, state.kinematics, reads, asked, *rows)
-        move_goal = self.follow(state, asked.goal)
         if move_goal is None:
             return write_rows
 
@@ -142,18 +140,15 @@ class Measured(Task):
 
         return write
 
-    def _function(self, state: State) -> Measure:
-        """Return what `measure` returns."""
-        found = self.measure(state)
+    def _asked(self, state: State, level: Level
+               ) -> tuple[Measure, _Asked, Callable[[float], object] | None]:
+        """Return what `measure` returns, what is asked, and what moves the goal."""
+        found, m = self.measure(state), self.dimension
         function = found[0] if isinstance(found, tuple) and len(found) == 2 else None
         code = getattr(getattr(function, "py_func", function), "__code__", None)
         if code is not _rows.__code__:  # the text takes longer than the rest
             self.refuse(True, f"measure returned {brief(found)}; expected a function under "
                         "@measured or @plain, and a tuple of what it reads")
-        return found
-
-    def _asked(self, state: State, level: Level, motion: Array) -> _Asked:
-        m = self.dimension
         settings, width = np.empty((5, m)), np.inf if self.kind == "inequality" else 0.0
         for row, value in zip(settings, (self.stiffness, self.damping, self.gain, width,
                                          self.columns), strict=True):
@@ -161,7 +156,8 @@ class Measured(Task):
         derivative = (_NONE if level == "velocity" else
                       _EXACT if self.exact or state.period == 0.0 else _DIFFERENCE)
         goal = np.zeros((3, 1 + int(max([2.0, *settings[4].tolist()]))))
-        return _Asked(goal, settings, derivative, motion, np.zeros((m, state.n)))
+        asked = _Asked(goal, settings, derivative, np.zeros((8, m)), np.zeros((m, state.n)))
+        return found, asked, self.follow(state, goal)
 
     def _measured(self, state: State, kinematics: Kinematics | None = None
                   ) -> tuple[Array, Motion, Array]:
@@ -174,17 +170,15 @@ class Measured(Task):
 
         It gives the goal as kernels read it.
         """
-        (function, reads), m = self._function(state), self.dimension
-        J, sides, motion = np.zeros((m, state.n)), np.zeros((2, m)), np.zeros((8, m))
-        asked = self._asked(state, "velocity", motion)
-        move_goal = self.follow(state, asked.goal)
+        (function, reads), asked, move_goal = self._asked(state, "velocity")
+        J, sides = np.zeros_like(asked.J_before), np.zeros((2, self.dimension))
 
         def read(kinematics: Kinematics) -> tuple[Array, Motion, Array]:
             if move_goal is not None:
                 move_goal(state.t)
             # Called, not bound: to bind takes longer than a call, and most read once.
             function(kinematics, reads, asked, J, *sides)
-            return J, Motion(*motion[:4]), asked.goal
+            return J, Motion(*asked.motion[:4]), asked.goal
 
         return read
 

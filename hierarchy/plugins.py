@@ -78,13 +78,11 @@ def known(group: Group) -> dict[str, Any]:
 
 def find(group: Group, name: str) -> Any | None:
     """Return what has a name in a group, or None; loads an entry point of that name."""
-    if name in _shipped[group]:
-        return _shipped[group][name]
-    if name not in _registered[group]:
+    if name not in registered(group):
         for point in _points(group):
             if point.name == name:
                 _load(point, group)
-    return _registered[group].get(name)
+    return registered(group).get(name)
 
 
 def allow(module: str) -> None:

@@ -119,7 +119,11 @@ class Stack:
         expect("a stack", task, Task, "a task says itself what it moves; see hierarchy.tasks")
         refuse(task.name in self._tasks, f"the stack already has a task {task.name!r}; "
                "give each its own name")
-        _check_forces(task, self.level, self.contacts)
+        if task.of_forces and (self.level == "torque" or task.contacts is not None):
+            refuse(self.level != "torque", f"task {task.name!r}: contact forces need the level "
+                   f"'torque', not {self.level!r}")
+            refuse(task.contacts is not self.contacts, f"task {task.name!r}: its contacts are not "
+                   "those of the stack; give both the same object")
         position = len(self._order) if index is None else index
         expect(f"task {task.name!r}: index", position, int, "0 is the most important")
         refuse(not 0 <= position <= len(self._order), f"task {task.name!r}: index {index} is "
@@ -260,16 +264,6 @@ def _crossed(lower, upper):
         if lower[i] > upper[i]:
             return i
     return -1
-
-
-def _check_forces(task: Task, level: Level, contacts: Contacts | None) -> None:
-    """Raise HierarchyError if a task's contact forces are not those of the stack."""
-    if not task.of_forces or (level != "torque" and task.contacts is None):
-        return
-    refuse(level != "torque", f"task {task.name!r}: contact forces need the level 'torque', not "
-           f"{level!r}")
-    refuse(task.contacts is not contacts, f"task {task.name!r}: its contacts are not those of the "
-           "stack; give both the same object")
 
 
 def _metric(metric: ArrayLike | Literal["mass"] | None,

@@ -211,7 +211,8 @@ class State:
             compute()
 
     def _keep_kinematics(self) -> None:
-        _copy_kinematics(self.J, self.placements, self.previous_J, self.previous_placements)
+        np.copyto(self.previous_J, self.J)
+        np.copyto(self.previous_placements, self.placements)
 
     def mass_matrix(self) -> Array:
         """Joint-space inertia matrix M(q) (n, n) [kg m^2]."""
@@ -287,16 +288,6 @@ def _square(q, start, size):
     for i in range(start, start + size):
         total += q[i] * q[i]
     return total
-
-
-@compiled
-def _copy_kinematics(J, placements, previous_J, previous_placements):
-    for c in range(J.shape[1]):
-        for i in range(6):
-            previous_J[i, c] = J[i, c]
-    for i in range(placements.shape[0]):
-        for k in range(12):
-            previous_placements[i, k] = placements[i, k]
 
 
 def _placements_view(data: Any, joints: int) -> Array:

@@ -118,7 +118,11 @@ class Task(ABC):
 
         Dataclasses call it. An override calls it too.
         """
-        check_parts(self)
+        refuse(not isinstance(self.name, str) or not self.name, f"{type(self).__name__}: name: "
+               f"expected a text, got {brief(self.name)}")
+        check_choice(f"task {self.name!r}: kind", self.kind, get_args(Kind))
+        if is_dataclass(self):
+            check_fields(self, f"task {self.name!r}", _PARTS, free=_GAINS)
         check_gains(self)
 
     def refuse(self, wrong: object, said: str) -> None:
@@ -190,24 +194,21 @@ class Task(ABC):
         bound to its arrays. A call raises HierarchyError, naming task and row, if a method returns
         the wrong shape or NaN.
         """
-        A, lower, upper = rows
+        what, (A, lower, upper) = f"task {self.name!r}", rows
 
         def write() -> None:
-            A[:] = shaped(f"task {self.name!r}: jacobian", self.jacobian(state), A.shape)
-            lower[:] = shaped(f"task {self.name!r}: reference", self._sides(state, level),
-                              lower.shape)
+            A[:] = shaped(f"{what}: jacobian", self.jacobian(state), A.shape)
+            if level == "velocity":
+                sides = self.reference_velocity(state)
+            else:
+                drift = shaped(f"{what}: jacobian_derivative", self.jacobian_derivative(state),
+                               A.shape) @ state.v
+                sides = self.reference_acceleration(state) - drift
+            lower[:] = shaped(f"{what}: reference", sides, lower.shape)
             upper[:] = lower if self.kind == "equality" else np.inf
-            check_rows(f"task {self.name!r}", *rows)
+            check_rows(what, *rows)
 
         return write
-
-    def _sides(self, state: State, level: Level) -> Array:
-        """Required value of J x (m,), x being the velocity or the acceleration."""
-        if level == "velocity":
-            return self.reference_velocity(state)
-        drift = shaped(f"task {self.name!r}: jacobian_derivative", self.jacobian_derivative(state),
-                       (self.dimension, state.n)) @ state.v
-        return self.reference_acceleration(state) - drift
 
 
 def check_gains(task: Task, rows: int | None = None) -> None:
@@ -270,15 +271,6 @@ def parts(task: Task) -> Iterator[Task]:
             if isinstance(part, Task):
                 yield part
                 yield from parts(part)
-
-
-def check_parts(task: Task) -> None:
-    """Raise a HierarchyError where a part of a task is not what its type asks for."""
-    refuse(not isinstance(task.name, str) or not task.name, f"{type(task).__name__}: name: "
-           f"expected a text, got {brief(task.name)}")
-    check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
-    if is_dataclass(task):
-        check_fields(task, f"task {task.name!r}", _PARTS, free=_GAINS)
 
 
 def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:

@@ -26,7 +26,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, final
 
@@ -172,24 +171,19 @@ def register_symbols() -> None:
 def _prepare_compilation() -> None:
     """Import numba's array functions without scipy, which takes as long as all other imports.
 
-    numba looks there for a BLAS when these functions are imported, and again when a kernel that
-    needs one is compiled; no kernel here does.
+    numba looks there for a BLAS, which a dependency has, when these functions are imported, and
+    again when a kernel that needs one is compiled; no kernel here does.
     """
     if "numba.np.arraymath" in sys.modules:
         return
     from numba.np import linalg
 
-    look, linalg.ensure_blas = linalg.ensure_blas, _expect_blas
+    look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
     try:
         from numba.np import arraymath
     finally:
         linalg.ensure_blas = look
     arraymath.ensure_blas = look
-
-
-def _expect_blas() -> None:
-    if find_spec("scipy") is None:
-        raise ImportError("scipy is not installed")
 
 
 FOLDER = Path(__file__).with_name("objects")

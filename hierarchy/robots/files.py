@@ -72,9 +72,14 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
             return robot
         geometries, missing = _geometry(path, root, model)
         capsules, left_out = capsules_of(geometries)
-    kept, of_world = _held_by(model, capsules)
-    return replace(robot, capsules=kept,
-                   missing=(*missing, *left_out, *of_world, *robot.missing))
+    # The world is no part of a robot with a free base.
+    of_world = [one.name for one in capsules if one.joint == 0 and is_floating(model)]
+    if of_world:
+        left_out += (f"collision geometry {some(of_world)} is fixed to the world, not to the "
+                     "robot; a scenario may list it as an obstacle",)
+    kept = tuple(one for one in capsules if one.name not in of_world
+                 and (one.radius > 0.0 or not np.array_equal(one.start, one.end)))
+    return replace(robot, capsules=kept, missing=(*missing, *left_out, *robot.missing))
 
 
 @contextmanager
@@ -139,16 +144,11 @@ def _urdf_shapes(path: Path, root: Element, model: Any, meshes: bool) -> tuple[A
                 missing.setdefault(urdf.name_of(link), name)
     text = ElementTree.tostring(root, encoding="unicode")
     geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
-    return geometry.geometryObjects, list(_not_there(missing))
-
-
-def _not_there(meshes: Mapping[str, str]) -> Iterator[str]:
-    """Yield one sentence for all missing meshes, each by its link."""
-    if meshes:
-        name = next(iter(meshes.values()))
-        searched = ("; packages are searched for in the folders above the robot's file"
-                    if name.startswith("package://") else "")
-        yield f"meshes of {some(list(meshes))} are not there, such as {name!r}{searched}"
+    name = next(iter(missing.values()), "")
+    searched = ("; packages are searched for in the folders above the robot's file"
+                if name.startswith("package://") else "")
+    return geometry.geometryObjects, [f"meshes of {some(list(missing))} are not there, such as "
+                                      f"{name!r}{searched}"] if missing else []
 
 
 def _in_metres(scale: str, file: Path) -> str:
@@ -172,18 +172,6 @@ def _mesh_file(name: str, path: Path) -> Path | None:
     package, _, rest = name.removeprefix("package://").partition("/")
     places = (folder / package / rest for folder in path.resolve().parents)
     return next(filter(Path.is_file, places), None)
-
-
-def _held_by(model: Any, capsules: tuple[Any, ...]) -> tuple[tuple[Any, ...], tuple[str, ...]]:
-    """Omit capsules that belong to no joint of the model or have no size.
-
-    Those beside a free base are named, for the world is no part of the robot.
-    """
-    of_world = [c.name for c in capsules if c.joint == 0 and is_floating(model)]
-    said = (f"collision geometry {some(of_world)} is fixed to the world, not to the robot; a "
-            "scenario may list it as an obstacle",) if of_world else ()
-    return tuple(c for c in capsules if 0 <= c.joint < model.njoints and c.name not in of_world
-                 and (c.radius > 0.0 or not np.array_equal(c.start, c.end))), said
 
 
 def model_of(root: Element, base: Base | None) -> Any:

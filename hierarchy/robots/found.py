@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.body import Capsule, ControlPoint
 from hierarchy.problem import Array
+from hierarchy.robots.library import pin
 from hierarchy.robots.table import Table
 from hierarchy.words import listed, some
 
@@ -190,8 +191,9 @@ def points_along_chain(model: Any, end_effector: str) -> tuple[ControlPoint, ...
     frame = next(one for one in model.frames if one.name == end_effector)
     chain = [joint for joint in model.supports[frame.parentJoint].tolist()
              if joint > 0 and model.joints[joint].nv == 1]
-    chain = chain[min(_FIRST, len(chain)) - 1:]
-    ends = [np.array(_between(model, a, b)) for a, b in pairwise(chain)]
+    chain, data = chain[min(_FIRST, len(chain)) - 1:], model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    ends = [data.oMi[a].actInv(data.oMi[b]).translation for a, b in pairwise(chain)]
     ends.append(np.array(frame.placement.translation))
     lengths = np.array([np.linalg.norm(end) for end in ends])
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -202,16 +204,6 @@ def points_along_chain(model: Any, end_effector: str) -> tuple[ControlPoint, ...
         at = k * starts[-1] / (_COUNT + 1)
         i = min(int(np.searchsorted(starts, at, side="right")) - 1, len(chain) - 1)
         offset = ends[i] * ((at - starts[i]) / lengths[i])
-        points.append(ControlPoint(f"{model.names[chain[i]]} {np.round(offset, 3).tolist()}",
-                                   chain[i], offset))
+        place = (np.round(offset, 3) + 0.0).tolist()  # no -0.0
+        points.append(ControlPoint(f"{model.names[chain[i]]} {place}", chain[i], offset))
     return tuple(points)
-
-
-def _between(model: Any, joint: int, below: int) -> Array:
-    """Origin of joint `below` in the frame of `joint`, with the joints between them at zero."""
-    placement = model.jointPlacements[below]
-    parent = model.parents[below]
-    while parent != joint:
-        placement = model.jointPlacements[parent] * placement
-        parent = model.parents[parent]
-    return np.asarray(placement.translation)

@@ -228,25 +228,21 @@ class DangerBounds(NamedRows, Written):
 @compiled
 def _tighten(kinematics, parameters, seen, lower, upper):
     """Tighten the bounds of a box of n joints."""
-    v, J, _, placements, supports, _, _, _ = kinematics
     # V are the velocity limits, T the period, or the horizon.
     joints, offsets, reach, shape, lever, V, T, acceleration = parameters
-    n = len(v)
-    danger = np.zeros((2, n))  # of moving backward, and forward
+    v, n = kinematics.v, len(kinematics.v)
+    danger, away = np.zeros((2, n)), np.empty(n)  # of moving backward, and forward; r^T J_c
     contact = repulsion(0.0, 1.0, reach, shape, 2.0)
     for k in range(len(joints)):
         joint, r = joints[k], seen.direction[k]
         f = min(repulsion(max(seen.distance[k], 0.0), 1.0, reach, shape, 2.0) / contact, 1.0)
-        x, y, z = place(placements[joint], offsets[k])
+        away[:] = 0.0
+        add_row(kinematics, joint, place(kinematics.placements[joint], offsets[k]), r, away)
         for c in range(n):
-            if supports[joint, c]:
-                away = (r[0] * (J[0, c] + J[4, c] * z - J[5, c] * y)
-                        + r[1] * (J[1, c] + J[5, c] * x - J[3, c] * z)
-                        + r[2] * (J[2, c] + J[3, c] * y - J[4, c] * x))  # column c of r^T J_c
-                if away > lever:
-                    danger[0, c] = max(danger[0, c], f)
-                elif away < -lever:
-                    danger[1, c] = max(danger[1, c], f)
+            if away[c] > lever:
+                danger[0, c] = max(danger[0, c], f)
+            elif away[c] < -lever:
+                danger[1, c] = max(danger[1, c], f)
     for c in range(n):
         low, up = -V[c] * (1.0 - danger[0, c]), V[c] * (1.0 - danger[1, c])
         if acceleration:

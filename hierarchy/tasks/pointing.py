@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy.errors import number
 from hierarchy.gate import direction, readable
-from hierarchy.jit import bind, compiled, inlined
+from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import (
     Spot,
     carried,
@@ -129,23 +129,19 @@ class LookAt(Measured):
         return _look_at, (Spot.of(self.frame), readable(self.name, self.target))
 
 
-@inlined
-def _sight(placements, frame, point):
-    """The target in the frame's axes y, its distance r, the vector d to it in world axes, and R."""
-    d = less(point, place(placements[frame.joint], frame.offset))
-    R = rotation_of(placements, frame)
+@measured
+def _look_at(kinematics, reads, goal, J, motion):
+    """The error is -2 y / D, D = r + y_z, and the target moves by R^T (-J + [d]x W) in the axes.
+
+    y is the target in the frame's axes, r its distance, and d the vector to it in world axes.
+    """
+    frame, point = reads
+    d = less(point, place(kinematics.placements[frame.joint], frame.offset))
+    R = rotation_of(kinematics.placements, frame)
     y = turned_back(R, d)
     r = max(np.sqrt(dot(y, y)), _NEAR)
     if not y[2] > (_BEHIND - 1.0) * r:
         y = times(r, _ASIDE)
-    return y, r, d, R
-
-
-@measured
-def _look_at(kinematics, reads, goal, J, motion):
-    """The error is -2 y / D, D = r + y_z, and the target moves by R^T (-J + [d]x W) in the axes."""
-    frame, point = reads
-    y, r, d, R = _sight(kinematics.placements, frame, point)
     D = r + y[2]
     linear, angular = jacobians_of(kinematics, frame)
     for c in range(J.shape[1]):

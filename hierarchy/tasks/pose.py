@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hierarchy.errors import finite_numbers
 from hierarchy.gate import Rotation, readable
-from hierarchy.jit import compiled, internal
+from hierarchy.jit import compiled
 from hierarchy.kinematics import (
     Kinematics,
     Placed,
@@ -41,16 +41,18 @@ from hierarchy.task import NamedRows
 @measured
 def _pose(kinematics, reads, goal, J, motion):
     frame, desired = reads
-    write_point_jacobian(kinematics, frame.joint, frame.offset, J)
-    write_rotation_jacobian(kinematics, frame.joint, J[3:])
-    here = place(kinematics.placements[frame.joint], frame.offset)
     v, w, a, b = motion_of(kinematics, frame)
-    motion.error[3:] = rotation_vector(times_transposed(
+    at = len(motion.error) - 3  # of an orientation alone 0
+    write_rotation_jacobian(kinematics, frame.joint, J[at:])
+    motion.error[at:] = rotation_vector(times_transposed(
         desired, rotation_of(kinematics.placements, frame)))
     for i in range(3):
-        motion.error[i] = goal[0, i] - here[i]
-        motion.rate[i], motion.rate[3 + i] = v[i], w[i]
-        motion.drift[i], motion.drift[3 + i] = a[i], b[i]
+        motion.rate[at + i], motion.drift[at + i] = w[i], b[i]
+    if at == 3:
+        write_point_jacobian(kinematics, frame.joint, frame.offset, J)
+        here = place(kinematics.placements[frame.joint], frame.offset)
+        for i in range(3):
+            motion.error[i], motion.rate[i], motion.drift[i] = goal[0, i] - here[i], v[i], a[i]
 
 
 @dataclass(frozen=True)
@@ -77,17 +79,6 @@ class Pose(Measured):
         return _pose, (Spot.of(self.frame), readable(self.name, self.rotation))
 
 
-@measured
-def _orientation(kinematics, reads, goal, J, motion):
-    frame, desired = reads
-    write_rotation_jacobian(kinematics, frame.joint, J)
-    w, b = motion_of(kinematics, frame)[1::2]
-    motion.error[:] = rotation_vector(times_transposed(
-        desired, rotation_of(kinematics.placements, frame)))
-    for i in range(3):
-        motion.rate[i], motion.drift[i] = w[i], b[i]
-
-
 @dataclass(frozen=True)
 class Orientation(Measured):
     """Turn `frame` to the constant orientation `rotation` (3, 3), wherever it is (m = 3) [rad].
@@ -107,7 +98,7 @@ class Orientation(Measured):
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""
-        return _orientation, (Spot.of(self.frame), readable(self.name, self.rotation))
+        return _pose, (Spot.of(self.frame), readable(self.name, self.rotation))
 
 
 _SERIES = 0.01   # [rad^2] squared angle below which coefficients are taken from their series
@@ -239,36 +230,28 @@ def _write_jacobian(kinematics, frame, to, R, d, J):
                 J[3 + i, c] = turned[i]
 
 
-@internal
-def _write_drift(kinematics, frame, to, R, d, drift):
-    """Write the exact dJ/dt v (3 or 6,), with dR/dt = [w]x R."""
-    v, w, a, b = motion_of(kinematics, frame)
-    v_to, w_to, a_to, b_to = motion_of(kinematics, to)
-    apart = less(v, v_to)
-    linear = plus(plus(less(a, a_to), crossed(apart, w_to)), crossed(d, b_to))
-    linear = less(linear, crossed(w_to, plus(apart, crossed(d, w_to))))
-    moved = turned_back(R, linear)
-    turned = turned_back(R, less(less(b, b_to), crossed(w_to, less(w, w_to))))
-    for i in range(3):
-        drift[i] = moved[i]
-        if len(drift) == 6:
-            drift[3 + i] = turned[i]
-
-
 @measured
 def _relative(kinematics, reads, goal, J, motion):
+    """The drift is the exact dJ/dt v, with dR/dt = [w]x R."""
     frame, to, position, rotation = reads
     placements = kinematics.placements
     R = rotation_of(placements, to)
     d = less(place(placements[frame.joint], frame.offset), place(placements[to.joint], to.offset))
     _write_jacobian(kinematics, frame, to, R, d, J)
-    _write_drift(kinematics, frame, to, R, d, motion.drift)
-    here = turned_back(R, d)
+    v, w, a, b = motion_of(kinematics, frame)
+    v_to, w_to, a_to, b_to = motion_of(kinematics, to)
+    apart = less(v, v_to)
+    linear = plus(plus(less(a, a_to), crossed(apart, w_to)), crossed(d, b_to))
+    linear = less(linear, crossed(w_to, plus(apart, crossed(d, w_to))))
+    here, moved = turned_back(R, d), turned_back(R, linear)
     for i in range(3):
-        motion.error[i] = position[i] - here[i]
+        motion.error[i], motion.drift[i] = position[i] - here[i], moved[i]
     if len(motion.error) == 6:
         there = rotation_of(placements, frame)
         motion.error[3:] = rotation_vector(times_transposed(
             times_transposed(rotation, there), R.T))  # R_d (R^T R_f)^T
+        moved = turned_back(R, less(less(b, b_to), crossed(w_to, less(w, w_to))))
+        for i in range(3):
+            motion.drift[3 + i] = moved[i]
     for i in range(len(motion.rate)):
         motion.rate[i] = row_times(J, i, kinematics.v)

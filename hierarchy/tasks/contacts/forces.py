@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from hierarchy.avoidance.body import Points
-from hierarchy.contacts import Contacts, write_dynamics, zero_while_open
+from hierarchy.contacts import Contacts, zero_while_open
 from hierarchy.errors import HierarchyError, finite_numbers, number
 from hierarchy.gate import shaped
 from hierarchy.jit import bind, compiled
@@ -53,13 +53,6 @@ class FixedRows(NamedRows, ForceTask):
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         return bind(_copy, *self.fixed, *rows)
-
-
-def required(contacts: Contacts, task: str) -> Contacts:
-    """Return contacts that are at least one; HierarchyError, naming the task, if there is none."""
-    if not contacts.contacts:
-        raise HierarchyError(f"task {task!r}: there are no contacts")
-    return contacts
 
 
 @compiled
@@ -262,9 +255,22 @@ def _efforts(contacts: Contacts, first: int, bounds: Array, state: State, rows: 
 def write_torques(parameters, bounds, A, lower, upper):
     """Write rows of M a + h - J_c^T f within bounds (2, m), of the velocities from `first` on."""
     M, h, kinematics, points, first = parameters
-    write_dynamics(M, kinematics, points, A, first)
+    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
     for i in range(len(lower)):
+        for c in range(len(h)):
+            A[i, c] = M[first + i, c]
         lower[i], upper[i] = bounds[0, i] - h[first + i], bounds[1, i] - h[first + i]
+    for k in range(len(points.joints)):
+        joint, f = points.joints[k], len(h) + 3 * k
+        x, y, z = place(placements[joint], points.offsets[k])
+        for i in range(len(lower)):
+            c = first + i
+            if supports[joint, c]:
+                A[i, f] = J[5, c] * y - J[4, c] * z - J[0, c]
+                A[i, f + 1] = J[3, c] * z - J[5, c] * x - J[1, c]
+                A[i, f + 2] = J[4, c] * x - J[3, c] * y - J[2, c]
+            else:
+                A[i, f], A[i, f + 1], A[i, f + 2] = 0.0, 0.0, 0.0
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,10 @@ from typing import Literal
 import numpy as np
 
 from hierarchy.contacts import Contact, Contacts
-from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level, Rows, Writer, in_turn
-from hierarchy.tasks.contacts.forces import FixedRows, required
+from hierarchy.tasks.contacts.forces import FixedRows
 
 _SLOW = 0.01      # [m/s] below which the friction of a sliding point falls to zero
 _NOTHING = 1e-6   # [N] of normal force that counts as none
@@ -47,7 +46,7 @@ class Friction(FixedRows):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        required(self.contacts, self.name)
+        self.refuse(not self.contacts.contacts, "there are no contacts")
         self.refuse(not 0.0 <= self.least < self.largest, "no normal force is pushing and lies "
                     f"between least {self.least} N and largest {self.largest} N")
 
@@ -158,9 +157,8 @@ class CentreOfPressure(FixedRows):
     def __post_init__(self) -> None:
         super().__post_init__()
         surfaces = self._surfaces()
-        if not surfaces:
-            required(self.contacts, self.name)
-            raise HierarchyError(f"task {self.name!r}: no contact is a surface")
+        self.refuse(not self.contacts.contacts, "there are no contacts")
+        self.refuse(not surfaces, "no contact is a surface")
         for contact in surfaces:
             widest = float(_distances(contact).mean(axis=1).min())
             self.refuse(not 0.0 <= self.margin < widest, f"margin {self.margin} m of contact "
