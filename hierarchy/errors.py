@@ -72,10 +72,10 @@ def check_name(what: str, name: object, known: Collection[str]) -> None:
         raise UnknownNameError(what, name, known)
 
 
-def refuse(wrong: object, said: str) -> None:
-    """Raise a HierarchyError with what is said if something is wrong, or return None."""
+def refuse(wrong: object, said: str, error: type[HierarchyError] = HierarchyError) -> None:
+    """Raise an error with what is said if something is wrong, or return None."""
     if wrong:
-        raise HierarchyError(said)
+        raise error(said)
 
 
 def expect(what: str, value: object, kind: type, remedy: str) -> None:

@@ -289,16 +289,10 @@ class Loop:
             late = end - (planned + self.period)
             if late > 0.0 and self.overrun == "stop":
                 return f"tick {tick} ended {1e3 * late:.3g} ms too late"
-            tick = self._next(tick, late)
+            missed = 1 + int(late / self.period) if late > 0.0 else 0  # their time has passed
+            tick += 1 + (missed if self.overrun == "skip" else max(0, missed - self.behind))
         self.log.due = ticks
         return "all other ticks were run" if self.log.skipped else "all ticks were run"
-
-    def _next(self, tick: int, late: float) -> int:
-        """Return the tick to run after one that ended `late` [s] after the start of the next."""
-        if late <= 0.0:
-            return tick + 1
-        missed = tick + 1 + int(late / self.period)  # the last whose planned time has passed
-        return missed + 1 if self.overrun == "skip" else max(tick + 1, missed + 1 - self.behind)
 
 
 def _command(step: Callable[[float], Any], t: float, needed: bool) -> tuple[Any, str]:

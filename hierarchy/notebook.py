@@ -16,8 +16,11 @@ _ENTRIES = 8    # entries of an array that are shown
 def html_table(caption: str, head: Sequence[object], rows: Sequence[Sequence[object]],
                best: Collection[tuple[int, int]] = ()) -> str:
     """Return an HTML table with at most 30 rows; cells at the (row, column) of `best` are bold."""
-    shown = [_row([_cell(value, (i, j) in best) for j, value in enumerate(row)])
-             for i, row in enumerate(rows[:_MOST])]
+    shown = []
+    for i, row in enumerate(rows[:_MOST]):
+        texts = [escape(str(value)) for value in row]
+        shown.append(_row([f"<td><b>{text}</b></td>" if (i, j) in best else f"<td>{text}</td>"
+                           for j, text in enumerate(texts)]))
     left = len(rows) - _MOST
     if left > 0:
         shown.append(_row([f'<td colspan="{max(1, len(head))}">... and {left} more</td>']))
@@ -33,8 +36,3 @@ def numbers(values: NDArray[np.float64]) -> str:
 
 def _row(cells: Sequence[str]) -> str:
     return f"<tr>{''.join(cells)}</tr>"
-
-
-def _cell(value: object, best: bool) -> str:
-    text = escape(str(value))
-    return f"<td><b>{text}</b></td>" if best else f"<td>{text}</td>"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence, Sized
 from functools import lru_cache
 from itertools import pairwise
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -64,17 +63,16 @@ class Hierarchy:
     views, sizes and offsets read-only; see docs/arrays.md.
     """
 
-    __slots__ = ("_give", "_metric", "_reference", "m", "n", "named", "names", "plain", "rows",
-                 "start")
+    __slots__ = ("_parts", "m", "n", "named", "names", "plain", "rows", "start")
 
     A: Array = _handed_out(lambda h: h.rows[0])
     lower: Array = _handed_out(lambda h: h.rows[1])
     upper: Array = _handed_out(lambda h: h.rows[2])
     sizes: Sizes = _handed_out(lambda h: _layout(h.rows[3].tobytes())[0])
     offsets: Sizes = _handed_out(lambda h: _layout(h.rows[3].tobytes())[1])
-    reference: Array = _handed_out(attrgetter("_reference"))
-    metric: Array | None = _handed_out(attrgetter("_metric"))
-    give: Array | None = _handed_out(attrgetter("_give"))
+    reference: Array = _handed_out(lambda h: h._parts["reference"])
+    metric: Array | None = _handed_out(lambda h: h._parts["metric"])
+    give: Array | None = _handed_out(lambda h: h._parts["give"])
 
     n: int
     m: int
@@ -83,9 +81,7 @@ class Hierarchy:
     plain: bool
     rows: tuple[Array, Array, Array, Sizes]
     start: Callable[[], Array]
-    _reference: Array
-    _metric: Array | None
-    _give: Array | None
+    _parts: dict[str, Any]  # arguments of `Hierarchy`
 
     def __init__(self, A: ArrayLike, lower: ArrayLike, upper: ArrayLike, sizes: ArrayLike,
                  reference: ArrayLike | None = None, names: Sequence[str] | None = None,
@@ -155,22 +151,16 @@ class Hierarchy:
         set_frozen(self, **{slot: getattr(other, slot) for slot in self.__slots__})
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Hierarchy.trusted, tuple(self._parts().values())
+        return Hierarchy.trusted, tuple(self._parts.values())
 
     def changed(self, **parts: Any) -> Hierarchy:
         """Return one with other arguments of `Hierarchy`, `trusted`; all others are shared."""
-        return self.trusted(**{"named": self.named} | self._parts() | parts)
+        return self.trusted(**{"named": self.named} | self._parts | parts)
 
     def copy(self) -> Hierarchy:
         """Return a copy with separate arrays, since a stack reuses its arrays in each tick."""
-        return self.changed(**{name: part.copy() for name, part in self._parts().items()
+        return self.changed(**{name: part.copy() for name, part in self._parts.items()
                                if isinstance(part, np.ndarray)})
-
-    def _parts(self) -> dict[str, Any]:
-        A, lower, upper, sizes = self.rows
-        return {"A": A, "lower": lower, "upper": upper, "sizes": sizes,
-                "reference": self._reference, "names": self.names, "metric": self._metric,
-                "give": self._give}
 
     def _keep(self, A: Any, lower: Any, upper: Any, sizes: Any, reference: Any = None,
               names: Sequence[str] | None = None, metric: Any = None, give: Any = None) -> None:
@@ -183,24 +173,25 @@ class Hierarchy:
         reference = (np.zeros(n).view() if reference is None
                      else gate.shaped("reference", reference, (n,)))
         sizes = gate.checked_sizes(sizes, m)
-        set_frozen(
-            self, rows=(A, lower, upper, sizes), start=reference.copy, m=m, n=n,
-            names=gate.level_names(names, len(sizes)), named=None,
-            plain=metric is None and give is None, _reference=reference,
-            _metric=None if metric is None else gate.shaped("metric", metric, (n, n)),
-            _give=None if give is None else gate.shaped("give", give, (m,)))
+        names = gate.level_names(names, len(sizes))
+        parts = {"A": A, "lower": lower, "upper": upper, "sizes": sizes, "reference": reference,
+                 "names": names,
+                 "metric": None if metric is None else gate.shaped("metric", metric, (n, n)),
+                 "give": None if give is None else gate.shaped("give", give, (m,))}
+        set_frozen(self, rows=(A, lower, upper, sizes), start=reference.copy, m=m, n=n, names=names,
+                   named=None, plain=metric is None and give is None, _parts=parts)
 
     def _check_values(self) -> None:
         """Raise a HierarchyError that names the first bad value, or return None."""
         if not gate.sound_rows(*self.rows[:3]):
             for name, level in zip(self.names, self.levels(), strict=True):
                 gate.check_rows(name, *level)
-        gate.check_finite("reference", self._reference)
-        if self._metric is not None:
-            gate.checked_metric(self._metric, self.n)
-        if self._give is not None:
+        gate.check_finite("reference", self.reference)
+        if self.metric is not None:
+            gate.checked_metric(self.metric, self.n)
+        if self.give is not None:
             for name, (first, last) in zip(self.names, self._bounds(), strict=True):
-                gate.checked_give(name, self._give[first:last], last - first)
+                gate.checked_give(name, self.give[first:last], last - first)
 
     @property
     def is_equality(self) -> bool:
@@ -217,12 +208,12 @@ class Hierarchy:
     @property
     def giving(self) -> list[int]:
         """The levels with a row that gives."""
-        give = self._give
+        give = self._parts["give"]
         return [] if give is None else list(_giving(give.tobytes(), self.rows[3].tobytes()))
 
     def refuse_extras(self, what: str, taker: str) -> None:
         """Raise a HierarchyError where `what`, this one, has what a taker would leave out."""
-        has = "has a metric" if self._metric is not None else "gives" if self.giving else ""
+        has = "has a metric" if self.metric is not None else "gives" if self.giving else ""
         refuse(has, f"{what} {has}, which {taker} does not know")
 
     def _bounds(self) -> Iterator[tuple[int, int]]:
@@ -240,10 +231,11 @@ class Hierarchy:
         if sides is not None:
             lower, upper = (gate.shaped("upper_part: sides", side, (self.m,)) for side in sides)
         m = int(_layout(sizes.tobytes())[1][count])
-        part = object.__new__(Hierarchy)
-        set_frozen(part, rows=(A[:m], lower[:m], upper[:m], sizes[:count]), start=self.start, m=m,
-                   n=self.n, names=self.names[:count], named=None, plain=self._metric is None,
-                   _reference=self._reference, _metric=self._metric, _give=None)
+        part, names = object.__new__(Hierarchy), self.names[:count]
+        rows = {"A": A[:m], "lower": lower[:m], "upper": upper[:m], "sizes": sizes[:count]}
+        set_frozen(part, rows=tuple(rows.values()), start=self.start, m=m, n=self.n, names=names,
+                   named=None, plain=self._parts["metric"] is None,
+                   _parts=self._parts | rows | {"names": names, "give": None})
         return part
 
     def relaxed(self, level: int, x: ArrayLike) -> Hierarchy:
@@ -253,16 +245,16 @@ class Hierarchy:
         |s_i| + give_i at either side, where s_i is its violation at the least norm of its level. x
         (n,) is optimal for the levels down to this one, which do not give any more.
         """
-        if self._give is None:
+        if (give := self.give) is None:
             raise HierarchyError("relaxed: no level of the hierarchy gives")
         rows = slice(*self.offsets[level:level + 2])
         slack, lower, upper = self.slacks(x)[rows], self.lower.copy(), self.upper.copy()
         reach = np.linalg.norm(self.A[rows], axis=1) * (1.0 + float(np.linalg.norm(x)))
         slack[np.abs(slack) <= _ROUNDING * reach] = 0.0
-        room = np.abs(slack) + self._give[rows]
+        room = np.abs(slack) + give[rows]
         lower[rows] -= room
         upper[rows] += room
-        give = self._give.copy()
+        give = give.copy()
         give[:rows.stop] = 0.0
         return self.changed(lower=lower, upper=upper, give=give)
 

@@ -23,6 +23,7 @@ from hierarchy.errors import (
     finite_numbers,
     is_one_of,
     naming,
+    refuse,
     whole,
 )
 from hierarchy.gate import array_of, check_rotation
@@ -127,9 +128,8 @@ class Robot:
         expect("Robot: name", name, str, "give a text")
         self.model, self.name = model, name
         self.n, self.nq = int(model.nv), int(model.nq)
-        if self.n == 0:
-            raise RobotError(f"robot {name!r} has no joint that moves; with base = 'floating' it "
-                             "moves as a whole")
+        refuse(self.n == 0, f"robot {name!r} has no joint that moves; with base = 'floating' it "
+               "moves as a whole", RobotError)
         check_size(model, f"robot {name!r}")
         self.base: Base = "floating" if is_floating(model) else "fixed"
         self.actuated = 6 if self.base == "floating" else 0
@@ -227,19 +227,17 @@ class Robot:
         may download files. `locked` and `root` are those of `from_file`. Raises RobotError and
         UnknownNameError.
         """
-        if base is not None and not is_one_of(base, get_args(Base)):
-            raise RobotError(f"robot {str(model)!r}: base must be one of {get_args(Base)}, got "
-                             f"{base!r}")
         model = str(model)
+        refuse(base is not None and not is_one_of(base, get_args(Base)), f"robot {model!r}: base "
+               f"must be one of {get_args(Base)}, got {base!r}", RobotError)
         if in_package(model):
             robot = cls.from_file(file_of(model), end_effector, base, locked=locked, root=root)
             robot.name = model.partition(":")[2]
             return robot
         if is_file_name(model):
             return cls.from_file(model, end_effector, base, locked=locked, root=root)
-        if any(map(len, _part(locked, root))):
-            raise RobotError(f"robot {model!r} is a table; its joints cannot be locked, and it has "
-                             "no other root")
+        refuse(any(map(len, _part(locked, root))), f"robot {model!r} is a table; its joints cannot "
+               "be locked, and it has no other root", RobotError)
         robot = cls.named(model, base)
         if end_effector is not None:
             robot.end_effector = robot.frame(end_effector, "end_effector frame").name
@@ -315,12 +313,11 @@ class Robot:
         Each of its first six velocities is limited by itself. `solve_ik` and limits of joints that
         include the base keep to it; by default `BASE_SPEED`, which no file says.
         """
-        if self.base != "floating":
-            raise RobotError(f"robot {self.name!r}: its base is fixed and has no speed")
+        refuse(self.base != "floating", f"robot {self.name!r}: its base is fixed and has no speed",
+               RobotError)
         for what, speed in (("linear", linear), ("angular", angular)):
-            if not isinstance(speed, int | float) or not speed > 0.0:
-                raise RobotError(f"robot {self.name!r}: {what} speed of the base = {speed}, "
-                                 "expected a number > 0")
+            refuse(not isinstance(speed, int | float) or not speed > 0.0, f"robot {self.name!r}: "
+                   f"{what} speed of the base = {speed}, expected a number > 0", RobotError)
         self.velocity_limit[:6] = np.repeat([linear, angular], 3)
 
     def frame(self, name: str, what: str = "frame") -> Frame:

@@ -15,9 +15,9 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.records import Vector3, check_fields
 
-# One obstacle is one row of the packed table: shape, size, centre, rotation.
-# The number of a shape is also how many sizes it has.
-SHAPES = {"point": 0, "sphere": 1, "capsule": 2, "box": 3}
+# One obstacle is one row of the packed table: a box of half lengths, which may be zero, and thicker
+# by a radius; its centre and rotation.
+SHAPES = {"point": 0, "sphere": 1, "capsule": 2, "box": 3}  # how many sizes each has
 _WIDTH = 1 + 3 + 3 + 9
 _CENTRE = slice(4, 7)
 
@@ -51,9 +51,9 @@ class Obstacle:
 
     def packed(self) -> Array:
         """The obstacle as one row (16,) of the table for the kernels."""
-        size = (*self.size, 0.0, 0.0, 0.0)[:3]
-        return np.array([SHAPES[self.shape], *size, *self.centre,
-                         *np.asarray(self.rotation, dtype=float).ravel()])
+        radius, half = (*self.size, 0.0, 0.0)[:2]
+        size = (0.0, *self.size) if self.shape == "box" else (radius, 0.0, 0.0, half)
+        return np.array([*size, *self.centre, *np.asarray(self.rotation, dtype=float).ravel()])
 
 
 class Obstacles:
@@ -110,18 +110,18 @@ def distance_to_obstacle(obstacle, p):
     The distance is negative inside. Where the direction is undefined (on a point, at a centre or
     on an axis) it is the obstacle's z axis.
     """
-    x, y, z = _in_axes(obstacle, p)
-    shape, u = int(obstacle[0]), (0.0, 0.0, 1.0)
-    if shape == 3:
-        D, u = _off_box(obstacle[1:4], x, y, z)
-    else:
-        if shape == 2:  # nearest point of the capsule's segment
-            z -= min(max(z, -obstacle[2]), obstacle[2])
-        length = sqrt(x * x + y * y + z * z)
-        D = length - obstacle[1]
-        if length > 1e-12:
-            u = (x / length, y / length, z / length)
-    return D, (dot(obstacle[7:10], u), dot(obstacle[10:13], u), dot(obstacle[13:16], u))
+    (x, y, z), h, u = _in_axes(obstacle, p), obstacle[1:4], (0.0, 0.0, 1.0)
+    dx, dy, dz = abs(x) - h[0], abs(y) - h[1], abs(z) - h[2]
+    sx, sy, sz = (1.0 if x >= 0 else -1.0), (1.0 if y >= 0 else -1.0), (1.0 if z >= 0 else -1.0)
+    ex, ey, ez = max(dx, 0.0), max(dy, 0.0), max(dz, 0.0)
+    D = sqrt(ex * ex + ey * ey + ez * ez)
+    if D > 1e-12:
+        u = (sx * ex / D, sy * ey / D, sz * ez / D)
+    elif h[0] > 0.0:  # inside a box: leave through the nearest face
+        D = max(dx, dy, dz)
+        u = (sx, 0.0, 0.0) if D == dx else (0.0, sy, 0.0) if D == dy else (0.0, 0.0, sz)
+    return D - obstacle[0], (dot(obstacle[7:10], u), dot(obstacle[10:13], u),
+                             dot(obstacle[13:16], u))
 
 
 @internal
@@ -132,37 +132,14 @@ def turning_off_obstacle(obstacle, p, D):
     (I - r r^T - e e^T) / radius; e is the axis of a capsule beside its cylinder, the direction of
     an edge of a box beside that edge, and zero elsewhere. At a flat face the radius is infinite.
     """
-    shape, beyond, axis = int(obstacle[0]), 0, -1
-    if shape < 2:
-        return D + obstacle[1], (0.0, 0.0, 0.0)
-    q = _in_axes(obstacle, p)
-    if shape == 2:
-        return D + obstacle[1], _axis(obstacle, 2 if abs(q[2]) < obstacle[2] else -1)
+    q, beyond, axis = _in_axes(obstacle, p), 0, -1
     for i in range(3):  # outside one pair of faces: flat; two: an edge; three: a corner
-        if abs(q[i]) > obstacle[1 + i]:
+        if abs(q[i]) > obstacle[1 + i] or obstacle[1 + i] == 0.0:
             beyond += 1
         else:
             axis = i
-    return (np.inf, (0.0, 0.0, 0.0)) if beyond < 2 else (D, _axis(obstacle, axis))
-
-
-@inlined
-def _axis(obstacle, axis):
-    """An axis of an obstacle in the world, or zero for -1."""
+    if beyond < 2:
+        return np.inf, (0.0, 0.0, 0.0)
     if axis < 0:
-        return 0.0, 0.0, 0.0
-    return obstacle[7 + axis], obstacle[10 + axis], obstacle[13 + axis]
-
-
-@inlined
-def _off_box(h, px, py, pz):
-    """The same of a box of half lengths h at the origin."""
-    dx, dy, dz = abs(px) - h[0], abs(py) - h[1], abs(pz) - h[2]
-    sx, sy, sz = (1.0 if px >= 0 else -1.0), (1.0 if py >= 0 else -1.0), (1.0 if pz >= 0 else -1.0)
-    if dx <= 0.0 and dy <= 0.0 and dz <= 0.0:  # inside: leave through the nearest face
-        if dx >= dy and dx >= dz:
-            return dx, (sx, 0.0, 0.0)
-        return (dy, (0.0, sy, 0.0)) if dy >= dz else (dz, (0.0, 0.0, sz))
-    ex, ey, ez = max(dx, 0.0), max(dy, 0.0), max(dz, 0.0)
-    D = sqrt(ex * ex + ey * ey + ez * ez)
-    return D, (sx * ex / D, sy * ey / D, sz * ez / D)
+        return D + obstacle[0], (0.0, 0.0, 0.0)
+    return D + obstacle[0], (obstacle[7 + axis], obstacle[10 + axis], obstacle[13 + axis])

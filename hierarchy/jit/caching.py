@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import llvmlite
 import numba
@@ -193,9 +193,7 @@ _FEATURES = ("avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movb
              "sahf", "sse3", "sse4.1", "sse4.2", "ssse3", "xsave")  # of x86-64-v3
 
 
-@final
-@dataclass(frozen=True)
-class Code:
+class Code(NamedTuple):
     """Code for one list of types: names in the object file, and what its environment holds.
 
     digest : of the sources that the code was made of.
@@ -238,7 +236,7 @@ class Part:
         self.file.parent.mkdir(parents=True, exist_ok=True)
         self.file.write_bytes(code)
         index = {"calls": self.calls, "externals": self.externals,
-                 "entries": {call: vars(entry) for call, entry in self.entries.items()}}
+                 "entries": {call: entry._asdict() for call, entry in self.entries.items()}}
         self.file.with_suffix(".json").write_text(json.dumps(index, indent=1))
 
     @cached_property

@@ -84,24 +84,20 @@ def _digest(entries: Mapping[str, Entry]) -> bytes:
 
 def _library(entries: Mapping[str, Entry]) -> Any:
     """Return a library of numba's with these entries, for which there is no machine code here."""
-    library = registry.cpu_target.target_context.codegen().create_library("entries")
+    target = registry.cpu_target
+    library = target.target_context.codegen().create_library("entries")
     library.runs = False
     with naming():
         for name, entry in entries.items():
-            _add(library, name, entry)
+            flags = compiler.Flags()
+            target.options.parse_as_flags(flags, _OPTIONS)
+            flags.no_compile = True  # not yet: the entry is still to come
+            compiled = compiler.compile_extra(
+                target.typing_context, target.target_context, entry.function,
+                args=(INTEGER,) * entry.arguments, return_type=entry.result, flags=flags,
+                locals={}, library=library)
+            library.add_ir_module(_c_entry(name, compiled.fndesc, entry.failed))
     return library
-
-
-def _add(library: Any, name: str, entry: Entry) -> None:
-    """Add a function with its C entry to a library of numba's."""
-    target, flags = registry.cpu_target, compiler.Flags()
-    target.options.parse_as_flags(flags, _OPTIONS)
-    flags.no_compile = True  # not yet: the entry is still to come
-    compiled = compiler.compile_extra(
-        target.typing_context, target.target_context, entry.function,
-        args=(INTEGER,) * entry.arguments, return_type=entry.result, flags=flags, locals={},
-        library=library)
-    library.add_ir_module(_c_entry(name, compiled.fndesc, entry.failed))
 
 
 def _c_entry(name: str, about: Any, failed: int) -> Any:

@@ -284,8 +284,12 @@ class Recorded(Path):
 
         Raises HierarchyError, naming the file and the line, if it is not that.
         """
+        with naming(f"{file} cannot be read", of=(OSError, UnicodeDecodeError)):
+            text = file_path("recorded path: file", file).read_text(encoding="utf-8-sig")
         rows: list[list[float]] = []
-        for count, line_ in _lines(file):
+        for count, line_ in enumerate(map(str.strip, text.splitlines()), 1):
+            if not line_:
+                continue
             try:
                 numbers = [float(part) for part in line_.split(",")]
             except ValueError:
@@ -319,14 +323,6 @@ def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: A
         return i, end - start, (t - start) / (end - start)
     out[0], out[1:] = points[min(i, len(times) - 1)], 0.0
     return 0, 0.0, 0.0
-
-
-def _lines(file: str | File) -> list[tuple[int, str]]:
-    """Return the lines of a file that have text, with their numbers; it may begin with a mark."""
-    with naming(f"{file} cannot be read", of=(OSError, UnicodeDecodeError)):
-        text = file_path("recorded path: file", file).read_text(encoding="utf-8-sig")
-    lines = enumerate(map(str.strip, text.splitlines()), 1)
-    return [(count, line_) for count, line_ in lines if line_]
 
 
 def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -> None:

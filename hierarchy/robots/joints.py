@@ -6,7 +6,8 @@ coordinates are (cos, sin), and the rotation vector of a ball, whose coordinates
 rotation vector.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,32 +75,24 @@ def _pieces(joint: Any) -> Sequence[tuple[int, str]]:
 
 def values_of(parts: Iterable[Part], q: Array) -> Array:
     """Return the values (n,) [rad or m] of a configuration q (nq,)."""
-    found: list[float] = []
-    for part in parts:
-        own = q[part.q:part.q + part.size]
-        if part.size == 1:
-            found.append(float(own[0]))
-        elif part.size == 2:
-            found.append(float(np.arctan2(own[1], own[0])))
-        else:
-            found += pin.log3(pin.Quaternion(own.copy()).toRotationMatrix()).tolist()
-    return np.array(found)
+    return np.hstack([np.empty(0), *(
+        _VALUE[part.size](q[part.q:part.q + part.size]) for part in parts)])
 
 
-def coordinates_of(parts: Iterable[Part], values: Array) -> Array:
+def coordinates_of(parts: Sequence[Part], values: Array) -> Array:
     """Return the coordinates (nq,) of the parts that have these values, one after the other."""
-    found: list[float] = []
-    at = 0
-    for part in parts:
-        own = values[at:at + part.velocities]
-        at += part.velocities
-        if part.size == 1:
-            found.append(float(own[0]))
-        elif part.size == 2:
-            found += [float(np.cos(own[0])), float(np.sin(own[0]))]
-        else:
-            found += pin.Quaternion(pin.exp3(own)).coeffs().tolist()
-    return np.array(found)
+    ends = np.cumsum([0, *(part.velocities for part in parts)])
+    return np.hstack([_COORDINATES[part.size](values[first:end])
+                      for part, (first, end) in zip(parts, pairwise(ends), strict=True)])
+
+
+# By the number of coordinates.
+_VALUE: dict[int, Callable[[Array], Array]] = {
+    1: np.copy, 2: lambda own: np.arctan2(own[1], own[0]),
+    4: lambda own: pin.log3(pin.Quaternion(own.copy()).toRotationMatrix())}
+_COORDINATES: dict[int, Callable[[Array], Array]] = {
+    1: np.copy, 2: lambda own: np.array([np.cos(own[0]), np.sin(own[0])]),
+    4: lambda own: pin.Quaternion(pin.exp3(own)).coeffs()}
 
 
 def set_joint(parts: Sequence[Part], q: Array, joint: int, name: str, value: ArrayLike) -> None:

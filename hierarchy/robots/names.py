@@ -42,21 +42,13 @@ def elsewhere(name: str) -> str:
             "example_robot_data:ur5_robot.")
 
 
-def _example_files() -> dict[str, Any]:
-    """Return the URDF files of example_robot_data by name; raises PackageNotFoundError."""
-    files = distribution("example-robot-data").files or []
-    return {file.name.removesuffix(".urdf"): file for file in sorted(files, reverse=True)
-            if file.name.endswith(".urdf")}
-
-
-def _descriptions() -> dict[str, Any]:
-    """Return the modules of robot_descriptions by name; raises ImportError."""
-    known: dict[str, Any] = import_module("robot_descriptions._descriptions").DESCRIPTIONS
-    return known
-
-
+# URDF files and modules by name; these raise PackageNotFoundError and ImportError.
 _NAMES: dict[str, Callable[[], dict[str, Any]]] = {
-    "example_robot_data": _example_files, "robot_descriptions": _descriptions}
+    "example_robot_data": lambda: {
+        file.name.removesuffix(".urdf"): file
+        for file in sorted(distribution("example-robot-data").files or [], reverse=True)
+        if file.name.endswith(".urdf")},
+    "robot_descriptions": lambda: import_module("robot_descriptions._descriptions").DESCRIPTIONS}
 
 
 def file_of(model: str) -> Path:

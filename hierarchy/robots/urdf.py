@@ -290,27 +290,25 @@ def remarks(root: Element) -> Iterator[str]:
     """Yield a sentence for each thing that a URDF has and the robot made from it lacks."""
     if macros := left_over(root):
         yield (f"what the macros {some(macros, _MACROS)} stand for is not in the robot; {EXPAND}")
-    ignored = [name_of(joint) for joint in root.findall("joint") if joint.find("limit") is not None
-               and joint.get("type") in ("floating", "planar")]
-    if ignored:
-        yield f"limits of {some(ignored)}: a floating or planar joint has none"
-    endless = [name_of(joint) for joint in root.findall("joint[@type='continuous']")
-               if any(numbers_in(attribute_of(joint, "limit", side) or "0", 1) != [0.0]
-                      for side in ("lower", "upper"))]
-    if endless:
-        yield f"position limits of {some(endless)}: a continuous joint has none"
-    soft = [name_of(joint) for joint in root.findall("joint")
-            if joint.find("safety_controller") is not None]
-    if soft:
-        yield f"soft limits of {some(soft)}: those of <limit> count"
-    plain = [name_of(joint) for joint in root.findall("joint")
-             if joint.get("type") == "planar" and joint.find("axis") is None]
-    if plain:
-        yield f"axes of the planar joints {some(plain)}: their planes are normal to x by default"
-    flaws = {name_of(link): _flaw(link) for link in root.findall("link")}
-    for what in (_NEGATIVE, _ZERO, _LARGE):
-        if names := [name for name, flaw in flaws.items() if flaw == what]:
-            yield f"inertias of {some(names)}: a principal moment is {what}"
+    joints, flaws = root.findall("joint"), [(_flaw(link), link) for link in root.findall("link")]
+    for what, why, found in (
+            ("limits of", "a floating or planar joint has none", [
+                joint for joint in joints if joint.find("limit") is not None
+                and joint.get("type") in ("floating", "planar")]),
+            ("position limits of", "a continuous joint has none", [
+                joint for joint in joints if joint.get("type") == "continuous"
+                and any(numbers_in(attribute_of(joint, "limit", side) or "0", 1) != [0.0]
+                        for side in ("lower", "upper"))]),
+            ("soft limits of", "those of <limit> count", [
+                joint for joint in joints if joint.find("safety_controller") is not None]),
+            ("axes of the planar joints", "their planes are normal to x by default", [
+                joint for joint in joints
+                if joint.get("type") == "planar" and joint.find("axis") is None]),
+            *(("inertias of", f"a principal moment is {kind}", [
+                link for flaw, link in flaws if flaw == kind])
+              for kind in (_NEGATIVE, _ZERO, _LARGE))):
+        if found:
+            yield f"{what} {some([name_of(one) for one in found])}: {why}"
     passive = [key for key in ("damping", "friction") for joint in root.findall("joint")
                if numbers_in(attribute_of(joint, "dynamics", key) or "0", 1) not in ([0.0], None)]
     if passive:

@@ -23,15 +23,13 @@ from hierarchy.tasks.position import Along, Position
 from hierarchy.tasks.separation import SelfSeparation, Separation
 from hierarchy.tasks.together import Together
 
-TASKS: dict[str, type[Task]] = {kind.name: kind for kind in (
-    Along, Avoidance, BaseDynamics, CentreOfMass, CentreOfPressure, ContactForce, ContactMotion,
-    JointCoupling, CumulatedRepulsion, JointDamping, DangerBounds, FrameLog, Friction, JointLimits,
-    LeastForce, LookAt, Manipulability, Momentum, Orientation, Pointing, Pose, Position, Posture,
-    RelativePose, SelfSeparation, Separation, Together, TorqueLimits, TorqueStep)}
-
 __all__ = ["TASKS", "Along", "Avoidance", "BaseDynamics", "CentreOfMass", "CentreOfPressure",
            "ContactForce", "ContactMotion", "CumulatedRepulsion", "DangerBounds", "FrameLog",
            "Friction", "JointCoupling", "JointDamping", "JointLimits", "LeastForce", "LookAt",
            "Manipulability", "Mechanism", "Momentum", "Orientation", "Pointing", "Pose", "Position",
            "Posture", "RelativePose", "SelfSeparation", "Separation", "Together", "TorqueLimits",
            "TorqueStep", "model_rows"]
+
+TASKS: dict[str, type[Task]] = dict(sorted(
+    (kind.name, kind) for kind in map(globals().get, __all__)
+    if isinstance(kind, type) and issubclass(kind, Task)))

@@ -204,9 +204,7 @@ class DangerBounds(NamedRows, Written):
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
-        lower, upper = self.limits.box(state, level)
-        self._tighten(state, level, lower, upper)()
-        return lower, upper
+        return self.rows(state, level)[1:]
 
     def error(self, state: State) -> Array:
         """Distance of each joint from its range (n,) [rad or m], zero inside it."""
@@ -214,15 +212,12 @@ class DangerBounds(NamedRows, Written):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; the rows have two sides."""
-        return in_turn(self.limits.writer(state, level, rows),
-                       self._tighten(state, level, rows.lower, rows.upper))
-
-    def _tighten(self, state: State, level: Level, lower: Array, upper: Array) -> Writer:
         seen = seen_by(self, state, self.points)
         parameters = (*pack_points(self.points), self.reach, self.shape, self.lever,
                       self.limits.limits.packed[2], max(self.limits.period, self.limits.horizon),
                       level == "acceleration")
-        return bind(_tighten, state.kinematics, parameters, seen.arrays, lower, upper)
+        return in_turn(self.limits.writer(state, level, rows), bind(
+            _tighten, state.kinematics, parameters, seen.arrays, rows.lower, rows.upper))
 
 
 @compiled

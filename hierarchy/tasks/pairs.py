@@ -1,11 +1,8 @@
 """Pairs of capsules of a robot that can be kept apart."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from hierarchy.avoidance.body import measure_capsules, pack_capsules, pairs_of_tree
-from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
 
@@ -25,9 +22,13 @@ def separable_pairs(robot: Robot, distance: float) -> Pairs:
     if robot.table is not None or not pairs:
         return pairs
     packed, at = pack_capsules(robot.capsules), State(robot)
-    postures = (robot.rest, *_postures(robot))
+    lower, upper = (np.where(np.isfinite(side), side, turn) for side, turn in
+                    zip(robot.position_limits(), (-np.pi, np.pi), strict=True))
+    postures = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, robot.n))
+    steps = (np.zeros(robot.n), *(postures - robot.vector(robot.rest)))
     seen = np.array([measure_capsules(at.placements, *packed, np.array(pairs))[:, 0]
-                     for q in postures if at.move(0.0, q, np.zeros(robot.n))])
+                     for step in steps
+                     if at.move(0.0, robot.integrate(robot.rest, step), np.zeros(robot.n))])
     apart = (seen[0] > 0.0) & (seen.max(axis=0) >= distance)
     return [pair for pair, kept in zip(pairs, apart.tolist(), strict=True) if kept]
 
@@ -45,12 +46,3 @@ def _watched(robot: Robot) -> Pairs:
     apart = {frozenset(pair) for pair in robot.apart}
     return [(i, j) for i, j in pairs_of_tree(robot.capsules, robot.parents)
             if frozenset(names[robot.capsules[k].joint] for k in (i, j)) not in apart]
-
-
-def _postures(robot: Robot) -> Iterator[Array]:
-    """Yield postures (nq,) spread evenly within the limits, a turn where there are none."""
-    generator, start = np.random.default_rng(0), robot.vector(robot.rest)
-    lower, upper = (np.where(np.isfinite(side), side, turn) for side, turn in
-                    zip(robot.position_limits(), (-np.pi, np.pi), strict=True))
-    for _ in range(_POSTURES):
-        yield robot.integrate(robot.rest, generator.uniform(lower, upper) - start)

@@ -206,11 +206,6 @@ class SelfSeparation(NamedRows, Written):
         return cls(robot.capsules, barrier, separable_pairs(robot, barrier.distance))
 
     @property
-    def dimension(self) -> int:
-        """One row per pair."""
-        return len(self.indices)
-
-    @property
     def row_names(self) -> tuple[str, ...]:
         """The two capsules of each row."""
         return tuple(f"{self.capsules[i].name} to {self.capsules[j].name}"
@@ -238,33 +233,22 @@ def _write_capsules(kinematics, parameters, A, lower, upper):
         i, j = pairs[row, 0], pairs[row, 1]
         a, b = capsules[i], capsules[j]
         T_a, T_b = kinematics.placements[joints[i]], kinematics.placements[joints[j]]
-        seen = nearest_of_capsules(T_a, a, T_b, b)
-        D, r, s, t = seen
+        D, r, s, t = nearest_of_capsules(T_a, a, T_b, b)
+        on_a, on_b = on_axis(a, s), on_axis(b, t)
         A[row, :] = 0.0
-        add_row(kinematics, joints[i], place(T_a, on_axis(a, s)), r, A[row])
-        add_row(kinematics, joints[j], place(T_b, on_axis(b, t)), times(-1.0, r), A[row])
+        add_row(kinematics, joints[i], place(T_a, on_a), r, A[row])
+        add_row(kinematics, joints[j], place(T_b, on_b), times(-1.0, r), A[row])
         drop_rounding(A[row])
         lower[row], upper[row] = -np.inf, np.inf
-        if D <= settings[2]:
-            if acceleration:
-                rate, drift, bend = _motion(kinematics, joints, capsules, i, j, seen)
-                lower[row] = least_acceleration(D - settings[0], rate, bend, settings) - drift
-            else:
-                lower[row] = least_rate(D - settings[0], settings)
-
-
-@compiled
-def _motion(kinematics, joints, capsules, i, j, seen):
-    """dd/dt, r^T (dJ_a/dt - dJ_b/dt) v and bend of one pair."""
-    D, r, s, t = seen
-    a, b = capsules[i], capsules[j]
-    v_a, drift_a, w_a = moving_point(kinematics, joints[i], on_axis(a, s))
-    v_b, drift_b, w_b = moving_point(kinematics, joints[j], on_axis(b, t))
-    v, length = less(v_a, v_b), D + a[6] + b[6]
-    rate, drift = dot(r, v), dot(r, less(drift_a, drift_b))
-    if length < ON_AXIS:
-        return rate, drift, 0.0
-    u = turned(kinematics.placements[joints[i]], a[3:6])
-    w = turned(kinematics.placements[joints[j]], b[3:6])
-    return rate, drift, bend_of_nearest(length, r, v, (u, crossed(w_a, u), s),
-                                        (w, crossed(w_b, w), t))
+        if D <= settings[2] and acceleration:
+            v_a, drift_a, w_a = moving_point(kinematics, joints[i], on_a)
+            v_b, drift_b, w_b = moving_point(kinematics, joints[j], on_b)
+            v, length, bend = less(v_a, v_b), D + a[6] + b[6], 0.0
+            if length >= ON_AXIS:
+                u, w = turned(T_a, a[3:6]), turned(T_b, b[3:6])
+                bend = bend_of_nearest(length, r, v, (u, crossed(w_a, u), s),
+                                       (w, crossed(w_b, w), t))
+            lower[row] = (least_acceleration(D - settings[0], dot(r, v), bend, settings)
+                          - dot(r, less(drift_a, drift_b)))
+        elif D <= settings[2]:
+            lower[row] = least_rate(D - settings[0], settings)

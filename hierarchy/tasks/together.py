@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hierarchy.contacts import Contacts
-from hierarchy.errors import HierarchyError, expect_each
+from hierarchy.errors import expect_each
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
@@ -111,9 +111,8 @@ class TangentCone(NamedRows, Written):
     kind: Kind = field(init=False, repr=False, compare=False, default="inequality")
 
     def __post_init__(self) -> None:
-        if self.task.kind != "inequality":
-            raise HierarchyError(f"task {self.task.name!r}: a set-based task has inequalities, got "
-                                 f"kind = {self.task.kind!r}")
+        self.task.refuse(self.task.kind != "inequality", "a set-based task has inequalities, got "
+                         f"kind = {self.task.kind!r}")
         set_frozen(self, name=self.task.name)
 
     @property

@@ -203,9 +203,10 @@ def loops(built: Built) -> tuple[tuple[Loop, ...], list[str]]:
     mj, found, said = built.part.compiled.model, [], []
     for kind in (_CONNECT, _WELD):
         for name, i in _active(mj, kind):
-            one, other = _bodies(mj, i)
-            joints = {built.placed[body][0] for body in (one, other)}
-            if all(_is_of_robot(built, body) for body in (one, other)):
+            bodies = _bodies(mj, i)
+            joints = {built.placed[body][0] for body in bodies}
+            if built.part.bodies.issuperset({*bodies} - {WORLD}) and all(  # no mocap places it
+                    mj.body_mocapid[mj.body_rootid[body]] < 0 for body in bodies):
                 if len(joints) == 2:  # else nothing moves between its ends
                     ends = (_anchor(built, i, 0, name), _anchor(built, i, 1, name))
                     found.append(Loop(name, ends, kind == _WELD))
@@ -236,13 +237,6 @@ def _name(mj: Any, i: int) -> str:
 def _bodies(mj: Any, i: int) -> list[int]:
     ids = [int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i])]
     return [int(mj.site_bodyid[one]) for one in ids] if mj.eq_objtype[i] == _SITE else ids
-
-
-def _is_of_robot(built: Built, body: int) -> bool:
-    """Whether a body is of the robot or the world, and no mocap places it."""
-    mj = built.part.compiled.model
-    return bool(mj.body_mocapid[mj.body_rootid[body]] < 0) and (
-        body == WORLD or body in built.part.bodies)
 
 
 def _anchor(built: Built, i: int, end: int, name: str) -> str:

@@ -86,8 +86,9 @@ def _place(built: Built, body: int) -> None:
         if j in part.joints:
             reference = _motion(kind, axis, -mj.qpos0[here:here + 1]) if kind in _ALONG else (
                 pin.SE3.Identity())
-            parent = built.joints[j] = _add(built.model, parent, _model(kind, axis),
-                                            place * at * reference, part.compiled.joints[j])
+            joint = _MODELS[kind](*([axis] if kind in _ALONG else []))
+            parent = built.joints[j] = _add(built.model, parent, joint, place * at * reference,
+                                            part.compiled.joints[j])
             place = at.inverse()
         else:
             q = part.held[here:here + sum(SIZES[kind])]
@@ -100,12 +101,8 @@ def _place(built: Built, body: int) -> None:
 _ALONG = ("slide", "hinge")
 
 
-def _model(kind: str, axis: Array) -> Any:
-    if kind in _ALONG:
-        make = pin.JointModelPrismaticUnaligned if kind == "slide" else (
-            pin.JointModelRevoluteUnaligned)
-        return make(axis)
-    return pin.JointModelFreeFlyer() if kind == "free" else pin.JointModelSpherical()
+_MODELS = {"slide": pin.JointModelPrismaticUnaligned, "hinge": pin.JointModelRevoluteUnaligned,
+           "free": pin.JointModelFreeFlyer, "ball": pin.JointModelSpherical}
 
 
 def _motion(kind: str, axis: Array, q: Array) -> Any:
@@ -191,15 +188,6 @@ def configuration(built: Built, qpos: Array) -> Array:
     return np.asarray(pin.normalize(built.model, q))
 
 
-def to_mujoco(built: Built, q: Array) -> Array:
-    """Return the qpos (nq,) of MuJoCo for q (nq,), with all other joints as they are held."""
-    mj, qpos = built.part.compiled.model, built.part.held.copy()
-    for j, joint in built.pairs():
-        here = mj.jnt_qposadr[j]
-        qpos[here:here + joint.nq] = rolled(q[joint.idx_q:joint.idx_q + joint.nq], 1)
-    return qpos
-
-
 _SAME = 1e-9       # relative to the robot's size, and to the inertias of the two joints of an entry
 _ROUNDING = 1e-13  # of M, relative to its largest entry
 _SAMPLES = 2       # besides the reference configuration
@@ -213,8 +201,15 @@ def compare(built: Built) -> None:
     file, model = built.part.compiled, built.model
     check_size(model, f"robot file {file.file!r}")
     mj, data, own = file.model, mujoco.MjData(file.model), model.createData()
-    for q in _configurations(built):
-        data.qpos[:] = to_mujoco(built, q)
+    steps = np.random.default_rng(0).uniform(-_REACH, _REACH, (_SAMPLES, model.nv))
+    if built.part.on_base:  # which MuJoCo has not
+        steps[:, :6] = 0.0
+    for step in (np.zeros(model.nv), *steps):
+        q = np.asarray(pin.integrate(model, configuration(built, mj.qpos0), step))
+        data.qpos[:] = built.part.held
+        for j, joint in built.pairs():
+            here = mj.jnt_qposadr[j]
+            data.qpos[here:here + joint.nq] = rolled(q[joint.idx_q:joint.idx_q + joint.nq], 1)
         for step in ("mj_kinematics", "mj_comPos", "mj_tendon", "mj_transmission", "mj_makeM"):
             getattr(mujoco, step)(mj, data)
         pin.framesForwardKinematics(model, own, q)
@@ -225,18 +220,6 @@ def compare(built: Built) -> None:
             if not off <= _SAME * max(1.0, np.abs(expected).max()):
                 raise file.error(f"{what} is {off:.2g} from where MuJoCo has it")
         _compare_inertia(built, q, pin.crba(model, own, q), data, mujoco.mj_mulM)
-
-
-def _configurations(built: Built) -> Iterator[Array]:
-    """Yield the reference configuration, and others around it."""
-    q = configuration(built, built.part.compiled.model.qpos0)
-    yield q
-    generator = np.random.default_rng(0)
-    for _ in range(_SAMPLES):
-        step = generator.uniform(-_REACH, _REACH, built.model.nv)
-        if built.part.on_base:  # which MuJoCo has not
-            step[:6] = 0.0
-        yield np.asarray(pin.integrate(built.model, q, step))
 
 
 def _frames(built: Built, own: Any, kind: str, frames: dict[int, str], positions: Array,

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hierarchy.contacts import Contact, Contacts, zero_while_open
-from hierarchy.errors import HierarchyError
 from hierarchy.gate import array_of
 from hierarchy.paths import Still
 from hierarchy.problem import Array
@@ -52,10 +51,10 @@ class ContactMotion(NamedRows, Written):
         for contact in self.of.contacts:
             self.refuse(contact.open and stiff, f"contact {contact.name!r} opens, so its "
                         f"stiffness must be 0, not {self.stiffness}")
-        if self.anchors is not None and array_of(f"task {self.name!r}: anchors", self.anchors
-                                                 ).shape != (len(self.of.contacts), 4, 3):
-            raise HierarchyError(f"task {self.name!r}: anchors are not (4, 3) for each of "
-                                 f"{len(self.of.contacts)} contacts")
+        count = len(self.of.contacts)
+        self.refuse(self.anchors is not None and array_of(
+            f"task {self.name!r}: anchors", self.anchors).shape != (count, 4, 3),
+            f"anchors are not (4, 3) for each of {count} contacts")
 
     @classmethod
     def at(cls, state: State, of: Contacts, stiffness: float = 100.0, damping: float = 20.0,

@@ -11,7 +11,7 @@ import numpy as np
 
 from hierarchy.avoidance.body import Points
 from hierarchy.contacts import Contacts, zero_while_open
-from hierarchy.errors import HierarchyError, finite_numbers, number
+from hierarchy.errors import finite_numbers, number
 from hierarchy.gate import shaped
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import less, place
@@ -82,9 +82,8 @@ class ContactForce(NamedRows, ForceTask):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.contacts[self.contact]
-        if len(finite_numbers(f"task {self.name!r}: target", self.target)) not in (1, 3, 6):
-            raise HierarchyError(f"task {self.name!r}: target {self.target!r} is not 1, 3 or 6 "
-                                 "numbers")
+        count = len(finite_numbers(f"task {self.name!r}: target", self.target))
+        self.refuse(count not in (1, 3, 6), f"target {self.target!r} is not 1, 3 or 6 numbers")
 
     @property
     def row_names(self) -> tuple[str, ...]:

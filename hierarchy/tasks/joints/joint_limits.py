@@ -104,9 +104,7 @@ class JointLimits(JointRows):
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
-        lower, upper = np.empty((2, self.dimension))
-        self._write_box(state, level, lower, upper)
-        return lower, upper
+        return self.rows(state, level)[1:]
 
     def clamp(self, state: State, level: Level, x: ArrayLike) -> Array:
         """Return the command x, including the base, clamped to the box; finite even if x is not.
@@ -129,22 +127,17 @@ class JointLimits(JointRows):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; the rows have two sides."""
-        write_rows = bind(write_identity, rows.A)
+        write_rows, acceleration = bind(write_identity, rows.A), level == "acceleration"
 
         def write() -> None:
             write_rows()
-            self._write_box(state, level, rows.lower, rows.upper)
+            rates = self._rates(state, level)
+            if not isinstance(rates, np.ndarray) or not write_box(
+                    self._positions(state), rates, self.limits.packed, acceleration, *rows[1:]):
+                raise HierarchyError(f"task {self.name!r}: state.commanded = "
+                                     f"{brief(state.commanded)}: expected {state.n} finite numbers")
 
         return write
-
-    def _write_box(self, state: State, level: Level, lower: Array, upper: Array) -> None:
-        """Raise a HierarchyError for a `State.commanded` that is no velocity of the robot."""
-        rates = self._rates(state, level)
-        if not isinstance(rates, np.ndarray) or not write_box(
-                self._positions(state), rates, self.limits.packed, level == "acceleration", lower,
-                upper):
-            raise HierarchyError(f"task {self.name!r}: state.commanded = {brief(state.commanded)}: "
-                                 f"expected {state.n} finite numbers")
 
     def _positions(self, state: State) -> Array:
         robot = self.robot

@@ -4,7 +4,7 @@ A model of a robot is a tree. What its file says beyond that holds whatever the 
 these rows stand at the top of a stack.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, final
@@ -117,22 +117,17 @@ class ClosedChains(NamedRows, Written):
 
     def parts(self, J: Array, side: Array) -> _Parts:
         """Return the independent part of rows J x = side, (m, n) and (m,)."""
-        scale = np.ones(len(J))
-        for rows in self._kinds():
-            largest = np.sqrt((J[rows]**2).sum(axis=1).max())
-            scale[rows] = 1.0 / largest if largest > _EXACT else 1.0
+        scale, at = np.ones(len(J)), 0
+        for task in self.whole.tasks:
+            size = 3 if isinstance(task, RelativePose) else 1  # of one unit: places, or turns
+            for first in range(at, at + task.dimension, size):
+                rows = slice(first, first + size)
+                largest = np.sqrt((J[rows]**2).sum(axis=1).max())
+                scale[rows] = 1.0 / largest if largest > _EXACT else 1.0
+            at += task.dimension
         U, sizes, V = np.linalg.svd(J * scale[:, None], full_matrices=False)
         kept = sizes > _INDEPENDENT * sizes[0]
         return _Parts(V[kept], sizes[kept], (U.T @ (scale * side))[kept])
-
-    def _kinds(self) -> Iterator[slice]:
-        """Yield rows of one unit: a coupling, or the places or the turns of a loop."""
-        at = 0
-        for task in self.whole.tasks:
-            size = 3 if isinstance(task, RelativePose) else 1
-            for first in range(at, at + task.dimension, size):
-                yield slice(first, first + size)
-            at += task.dimension
 
 
 @final
@@ -156,7 +151,9 @@ class Mechanism:
         here = self._robot.normalised(q)
         if not self:
             return here
-        moved, damping = self._free(held), 0.0
+        fixed = {self._robot.joint(name) for name in held}
+        moved, damping = np.array([float(part.joint not in fixed) for part in self._robot.parts
+                                   for _ in range(part.velocities)]), 0.0
         J, error = self._rows(here)
         for _ in range(_MOST_STEPS if np.abs(error).max() > _EXACT else 0):
             step = self._solved(J * moved, error, damping)
@@ -204,14 +201,6 @@ class Mechanism:
         side = (after - error) / period + J @ v
         part = self._tasks[0].parts(J, side)
         return part.side / part.sizes if self._robot.loops else side
-
-    def _free(self, held: Iterable[str]) -> Array:
-        """Return 1 for each velocity (n,), 0 for those of joints that stay where they are."""
-        free, fixed = np.ones(self._robot.n), {self._robot.joint(name) for name in held}
-        for part in self._robot.parts:
-            if part.joint in fixed:
-                free[part.v:part.v + part.velocities] = 0.0
-        return free
 
     def _rows(self, q: Array) -> tuple[Array, Array]:
         """Jacobian (m, n) and error (m,) at q."""

@@ -26,12 +26,10 @@ def draw_scene(depth, eye, backdrop, obstacles, point_radius, placements, joints
     depth[:, :] = backdrop
     for h in range(obstacles.shape[0]):
         row = obstacles[h]
-        shape = int(row[0])
-        if shape == 3:
+        if row[1] > 0.0:
             _draw_box(depth, eye, row)
             continue
-        radius = row[1] if shape > 0 else point_radius
-        half = row[2] if shape == 2 else 0.0
+        radius, half = row[0] if row[0] > 0.0 else point_radius, row[3]
         x, y, z = in_camera(eye, row[4], row[5], row[6])
         ax, ay, az = turned_into_camera(eye, half * row[9], half * row[12], half * row[15])
         _draw_capsule(depth, eye, (x - ax, y - ay, z - az), (2 * ax, 2 * ay, 2 * az), radius)
