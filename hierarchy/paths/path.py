@@ -188,32 +188,55 @@ def line(start: Vector, end: Vector, duration: float, begin: float = 0.0) -> Way
 
 
 @dataclass(frozen=True)
-class Waypoints(Path):
+class _Pieces(Path):
+    """One polynomial after another, at rest before the first. Abstract: needs `_keep`."""
+
+    times: Sequence[float]
+    points: Sequence[Vector]
+    _starts: list[float] = field(init=False, repr=False, compare=False)
+    _spans: list[float] = field(init=False, repr=False, compare=False)
+    _powers: Array = field(init=False, repr=False, compare=False)  # (K, d + 1, 3)
+
+    def _keep(self, starts: Array, *powers: Array) -> None:
+        """Keep K polynomials of the share of a piece, (K, 3) for each power; the last rests."""
+        set_frozen(self, _starts=starts.tolist(), _spans=[*np.diff(starts).tolist(), 1.0],
+                   _powers=np.stack(powers, axis=1))
+
+    def write(self, t: float, out: Array) -> None:
+        """See `Path.write`."""
+        k = max(bisect_right(self._starts, t) - 1, 0)
+        _write_piece(self._powers[k], self._spans[k], float(t - self._starts[k]), out)
+
+
+@compiled
+def _write_piece(powers, span, since, out):
+    s = max(since, 0.0) / span
+    for i in range(3):
+        value, slope, bend = 0.0, 0.0, 0.0
+        for k in range(len(powers) - 1, -1, -1):
+            bend = bend * s + 2.0 * slope
+            slope = slope * s + value
+            value = value * s + powers[k, i]
+        out[0, i], out[1, i], out[2, i] = value, 0.0, 0.0
+        if since >= 0.0:
+            out[1, i], out[2, i] = slope / span, bend / (span * span)
+
+
+@dataclass(frozen=True)
+class Waypoints(_Pieces):
     """Straight lines between points, quintic in time, at rest at every point.
 
     `times` (N,) [s] increasing, `points` (N, 3) [m]; before the first and after the last it rests.
     """
 
-    times: Sequence[float]
-    points: Sequence[Vector]
-
     def __post_init__(self) -> None:
-        _check_points("waypoints", self.times, self.points)
-
-    def write(self, t: float, out: Array) -> None:
-        """See `Path.write`."""
-        i, span, s = _interval(self.times, self.points, t, out)
-        if i == 0:
-            return
-        start = np.asarray(self.points[i - 1], dtype=float)
-        step = np.asarray(self.points[i], dtype=float) - start
-        out[0] = start + step * (s**3 * (10 - 15 * s + 6 * s * s))
-        out[1] = step * (30 * s * s * (1 - s) ** 2 / span)
-        out[2] = step * (60 * s * (1 - s) * (1 - 2 * s) / span**2)
+        times, points = _checked("waypoints", self.times, self.points)
+        step = np.diff(points, axis=0, append=points[-1:])
+        self._keep(times, points, 0.0 * step, 0.0 * step, 10.0 * step, -15.0 * step, 6.0 * step)
 
 
 @dataclass(frozen=True)
-class Blended(Path):
+class Blended(_Pieces):
     """Straight lines at constant speed between points, blended at each: it does not stop there.
 
     `times` (N,) [s] increasing, `points` (N, 3) [m]. Within `blend` [s] the velocity of one line
@@ -224,59 +247,43 @@ class Blended(Path):
     Raises HierarchyError for points and times that do not fit, or a blend longer than an interval.
     """
 
-    times: Sequence[float]
-    points: Sequence[Vector]
     blend: float
-    _velocities: Array = field(init=False, repr=False, compare=False)  # (N + 1, 3), of the lines
 
     def __post_init__(self) -> None:
-        _check_points("blended waypoints", self.times, self.points)
-        shortest = min(np.diff(self.times), default=inf)
-        blend = number("blended waypoints: blend [s]", self.blend)
-        refuse(not 0.0 < blend <= shortest, f"blended waypoints: blend {blend} s must be positive "
+        times, points = _checked("blended waypoints", self.times, self.points)
+        shortest = min(np.diff(times), default=inf)
+        T = number("blended waypoints: blend [s]", self.blend)
+        refuse(not 0.0 < T <= shortest, f"blended waypoints: blend {T} s must be positive "
                f"and at most {shortest:g} s, the shortest interval")
-        points = np.array(self.points, dtype=float)
-        lines = np.diff(points, axis=0) / np.diff(self.times)[:, None]
-        set_frozen(self, _velocities=np.vstack([np.zeros(3), lines, np.zeros(3)]))
-
-    def write(self, t: float, out: Array) -> None:
-        """See `Path.write`."""
-        i = int(np.searchsorted(self.times, t, side="right"))  # blends that have begun
-        out[1:] = 0.0
-        if i == 0:
-            out[0] = self.points[0]
-            return
-        before, after = self._velocities[i - 1], self._velocities[i]
-        T, since = self.blend, t - float(self.times[i - 1])
-        s = min(since / T, 1.0)
-        change, past = after - before, max(since - T, 0.0)
-        # On the old line up to the middle of the blend, on the new one from there.
-        out[0] = (np.asarray(self.points[i - 1]) - before * T / 2 + before * min(since, T)
-                  + change * T * (2.5 * s**4 - 3 * s**5 + s**6) + after * past)
-        out[1] = before + change * (10 * s**3 - 15 * s**4 + 6 * s**5)
-        out[2] = change * (30 * s * s * (1 - s) ** 2 / T)
+        spans = np.diff(times, append=times[-1] + T + 1.0)[:, None]
+        after = np.diff(points, axis=0, append=points[-1:]) / spans
+        before, none = np.vstack([np.zeros(3), after[:-1]]), np.zeros_like(points)
+        change = (after - before) * T
+        # Of each point the blend around it, then the line to the next.
+        blends = (points - before * T / 2, before * T, none, none, 2.5 * change, -3.0 * change,
+                  change)
+        lines = (points + after * T / 2, after * (spans - T), *[none] * 5)
+        self._keep(np.column_stack([times, times + T]).ravel(),
+                   *(np.hstack(pair).reshape(-1, 3) for pair in zip(blends, lines, strict=True)))
 
 
 @dataclass(frozen=True)
-class Recorded(Path):
+class Recorded(_Pieces):
     """A recorded motion: the cubic spline through points, at rest at both ends.
 
     `times` (N,) [s] increasing, N >= 2, `points` (N, 3) [m]; before the first and after the last it
     rests. Position and velocity are continuous, the acceleration too but at the ends.
     """
 
-    times: Sequence[float]
-    points: Sequence[Vector]
-    _slopes: Array = field(init=False, repr=False, compare=False)  # (N, 3) [m/s]
-
     def __post_init__(self) -> None:
-        _check_points("recorded path", self.times, self.points)
-        refuse(len(self.times) < 2, "recorded path: one point is no motion; use a path of kind "
-               "still")
+        times, points = _checked("recorded path", self.times, self.points)
+        refuse(len(times) < 2, "recorded path: one point is no motion; use a path of kind still")
         from scipy.interpolate import CubicSpline
 
-        spline = CubicSpline(self.times, np.array(self.points, dtype=float), bc_type="clamped")
-        set_frozen(self, _slopes=spline(self.times, 1))
+        spans, ends = np.diff(times)[:, None], [points[-1], *np.zeros((3, 3))]
+        powers = CubicSpline(times, points, bc_type="clamped").c[::-1]
+        self._keep(times, *(np.vstack([power * spans**k, ends[k]])
+                            for k, power in enumerate(powers)))
 
     @classmethod
     def from_csv(cls, file: str | File) -> Recorded:
@@ -301,31 +308,8 @@ class Recorded(Path):
         with naming(str(file)):
             return cls([row[0] for row in rows], [row[1:] for row in rows])
 
-    def write(self, t: float, out: Array) -> None:
-        """See `Path.write`."""
-        i, h, s = _interval(self.times, self.points, t, out)
-        if i == 0:
-            return
-        p0, p1 = np.asarray(self.points[i - 1:i + 1], dtype=float)
-        m0, m1 = h * self._slopes[i - 1], h * self._slopes[i]
-        c2, c3 = 3 * (p1 - p0) - 2 * m0 - m1, 2 * (p0 - p1) + m0 + m1
-        out[0] = p0 + s * (m0 + s * (c2 + s * c3))
-        out[1] = (m0 + s * (2 * c2 + s * 3 * c3)) / h
-        out[2] = (2 * c2 + s * 6 * c3) / h**2
 
-
-def _interval(times: Sequence[float], points: Sequence[Vector], t: float, out: Array
-              ) -> tuple[int, float, float]:
-    """Return where the interval around t ends, its length, and t's share; outside, write and 0."""
-    i = bisect_right(times, t)
-    if 0 < i < len(times):
-        start, end = float(times[i - 1]), float(times[i])  # of float32, t would become one
-        return i, end - start, (t - start) / (end - start)
-    out[0], out[1:] = points[min(i, len(times) - 1)], 0.0
-    return 0, 0.0, 0.0
-
-
-def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -> None:
+def _checked(what: str, times: Sequence[float], points: Sequence[Vector]) -> tuple[Array, Array]:
     for name, given in (("times", times), ("points", points)):
         refuse(isinstance(given, str) or not isinstance(given, Sequence | np.ndarray)
                or getattr(given, "shape", None) == (),
@@ -338,3 +322,4 @@ def _check_points(what: str, times: Sequence[float], points: Sequence[Vector]) -
                f"got {a} and then {b}")
     for i, point in enumerate(points):
         finite_numbers(f"points[{i}] [m]", point, 3)
+    return np.array(times, dtype=float), np.array(points, dtype=float)

@@ -37,12 +37,9 @@ def _from_chain(table: DHTable, base: Base) -> Found:
         c, s = np.round([np.cos(alpha), np.sin(alpha)], 15)  # exact for multiples of 90 degrees
         placement = pin.SE3(np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]),
                             np.array([table.a[i], 0.0, d]))
-        end = (table.a[i], 0.0, d)
-        rod = max(float(np.linalg.norm(end)), 2 * table.radius)
-        model.appendBodyToJoint(joint, _inertia(Link(end, table.radius, table.mass[i]), rod),
-                                pin.SE3.Identity())
+        model.appendBodyToJoint(joint, _rod(table, i), pin.SE3.Identity())
         model.addJointFrame(joint, -1)
-        if end != _HERE:  # neighbours cover a link of length zero
+        if (end := (table.a[i], 0.0, d)) != _HERE:  # neighbours cover a link of length zero
             links.append(Capsule(f"link {i + 1}", joint, _HERE, end, table.radius))
     model.addFrame(pin.Frame(END_EFFECTOR, joint, placement, pin.FrameType.OP_FRAME))
     return Found(model, END_EFFECTOR, tuple(links), _points(model, table.control_points, root),
@@ -62,7 +59,7 @@ def _from_tree(table: TreeTable, base: Base) -> Found:
     seen, capsules = Counter[str](), list[Capsule]()
     for name, link in (*((joint.name, joint.link) for joint in table.joints), *table.links):
         index = _index(model, name, root)
-        model.appendBodyToJoint(index, _inertia(link), pin.SE3.Identity())
+        model.appendBodyToJoint(index, _capsule_inertia(link), pin.SE3.Identity())
         if link.radius > 0.0:
             seen[name] += 1
             number = f" {seen[name]}" if seen[name] > 1 else ""
@@ -104,17 +101,16 @@ def _index(model: Any, name: str, root: int) -> int:
 _REVOLUTE = {"x": pin.JointModelRX, "y": pin.JointModelRY, "z": pin.JointModelRZ}
 
 
-def _inertia(link: Link, length: float | None = None) -> Any:
-    """Inertia about its centre of a uniform cylinder as long as the capsule, or of this length."""
+def _capsule_inertia(link: Link) -> Any:
+    """Inertia of a uniform cylinder of the capsule's whole length about its own centre."""
     if link.mass == 0.0:
         return pin.Inertia.Zero()
     start, end = np.array(link.start), np.array(link.end)
     segment = end - start
-    between = float(np.linalg.norm(segment))
-    length = between + 2 * link.radius if length is None else length
-    across = link.mass * (3 * link.radius**2 + length**2) / 12
+    length = float(np.linalg.norm(segment))
+    across = link.mass * (3 * link.radius**2 + (length + 2 * link.radius) ** 2) / 12
     along = link.mass * link.radius**2 / 2
-    axis = segment / between if between > 0.0 else np.array([0.0, 0.0, 1.0])
+    axis = segment / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
     inertia = across * np.eye(3) + (along - across) * np.outer(axis, axis)
     return pin.Inertia(link.mass, (start + end) / 2, inertia)
 
@@ -128,3 +124,14 @@ def _axes_with_z(z_axis: Vector) -> Array:
     x = np.cross(y, z)
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
+
+
+def _rod(table: DHTable, i: int) -> Any:
+    """Inertia of a uniform cylinder from the joint to the next origin."""
+    length = max(float(np.hypot(table.a[i], table.d[i])), 2 * table.radius)
+    across = table.mass[i] * (3 * table.radius**2 + length**2) / 12
+    along = table.mass[i] * table.radius**2 / 2
+    end = table.a[i], 0.0, table.d[i]
+    R = np.eye(3) if end == _HERE else _axes_with_z(end)
+    return pin.Inertia(table.mass[i], np.array(end) / 2,
+                       R @ np.diag([across, across, along]) @ R.T)

@@ -15,7 +15,7 @@ from hierarchy import Robot
 from hierarchy.avoidance.body import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import files, names
-from hierarchy.robots.from_table import _inertia
+from hierarchy.robots.from_table import _capsule_inertia
 from hierarchy.robots.table import Link
 from hierarchy.tasks.pairs import separable_pairs
 from scenarios.cell.robot import make_robot
@@ -222,13 +222,13 @@ def test_a_name_is_looked_for_in_the_installed_packages(monkeypatch):
 @pytest.mark.parametrize("end", [
     (0.4, 0.0, 0.0), (0.0, -0.3, 0.0), (0.3, 0.0, 0.4), (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)])
 def test_the_inertia_of_a_link_of_a_table_is_that_of_a_cylinder_along_it(end):
-    found, length = _inertia(Link(end, 0.05, 3.0)), np.linalg.norm(end)
+    found, length = _capsule_inertia(Link(end, 0.05, 3.0)), np.linalg.norm(end)
     axis = np.array(end) / length if length else np.eye(3)[2]
     along, across = 3.0 * 0.05**2 / 2, 3.0 * (3 * 0.05**2 + (length + 0.1)**2) / 12
     expected = across * np.eye(3) + (along - across) * np.outer(axis, axis)
     np.testing.assert_allclose(found.inertia, expected, atol=1e-15)
     np.testing.assert_allclose(found.lever, np.array(end) / 2)
-    assert (found.mass, _inertia(Link(end, 0.05)).mass) == (3.0, 0.0)
+    assert (found.mass, _capsule_inertia(Link(end, 0.05)).mass) == (3.0, 0.0)
 
 
 def test_a_robot_whose_shapes_cannot_be_read_has_none_and_says_so(arm, monkeypatch):
