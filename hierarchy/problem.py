@@ -247,6 +247,7 @@ class Hierarchy:
         """
         if (give := self.give) is None:
             raise HierarchyError("relaxed: no level of the hierarchy gives")
+        whole("relaxed: level", level, largest=len(self.names) - 1)
         rows = slice(*self.offsets[level:level + 2])
         slack, lower, upper = self.slacks(x)[rows], self.lower.copy(), self.upper.copy()
         reach = np.linalg.norm(self.A[rows], axis=1) * (1.0 + float(np.linalg.norm(x)))

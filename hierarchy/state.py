@@ -224,7 +224,10 @@ class State:
 
     def centre_of_mass(self) -> Array:
         """World position (3,) [m] of the centre of mass of the bodies that joints move."""
-        return np.array(pin.centerOfMass(*self._with_masses(), self.q, False))
+        self._with_masses()
+        R = self.placements[:, :9].reshape(-1, 3, 3)  # column by column
+        points = self.placements[:, 9:] + np.einsum("jki,jk->ji", R, self.robot.centres)
+        return np.asarray(self.robot.shares @ points)
 
     def position(self, frame: Frame | str) -> Array:
         """World position (3,) [m] of the origin of a frame, or of the frame of that name."""

@@ -7,7 +7,6 @@ rotation vector.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,24 +74,29 @@ def _pieces(joint: Any) -> Sequence[tuple[int, str]]:
 
 def values_of(parts: Iterable[Part], q: Array) -> Array:
     """Return the values (n,) [rad or m] of a configuration q (nq,)."""
-    return np.hstack([np.empty(0), *(
-        _VALUE[part.size](q[part.q:part.q + part.size]) for part in parts)])
+    found: list[float] = []
+    for part in parts:
+        found += _VALUE[part.size](q[part.q:part.q + part.size])
+    return np.array(found)
 
 
-def coordinates_of(parts: Sequence[Part], values: Array) -> Array:
+def coordinates_of(parts: Iterable[Part], values: Array) -> Array:
     """Return the coordinates (nq,) of the parts that have these values, one after the other."""
-    ends = np.cumsum([0, *(part.velocities for part in parts)])
-    return np.hstack([_COORDINATES[part.size](values[first:end])
-                      for part, (first, end) in zip(parts, pairwise(ends), strict=True)])
+    found: list[float] = []
+    at = 0
+    for part in parts:
+        found += _COORDINATES[part.size](values[at:at + part.velocities])
+        at += part.velocities
+    return np.array(found)
 
 
 # By the number of coordinates.
-_VALUE: dict[int, Callable[[Array], Array]] = {
-    1: np.copy, 2: lambda own: np.arctan2(own[1], own[0]),
-    4: lambda own: pin.log3(pin.Quaternion(own.copy()).toRotationMatrix())}
-_COORDINATES: dict[int, Callable[[Array], Array]] = {
-    1: np.copy, 2: lambda own: np.array([np.cos(own[0]), np.sin(own[0])]),
-    4: lambda own: pin.Quaternion(pin.exp3(own)).coeffs()}
+_VALUE: dict[int, Callable[[Array], list[float]]] = {
+    1: np.ndarray.tolist, 2: lambda own: [float(np.arctan2(own[1], own[0]))],
+    4: lambda own: pin.log3(pin.Quaternion(own.copy()).toRotationMatrix()).tolist()}
+_COORDINATES: dict[int, Callable[[Array], list[float]]] = {
+    1: np.ndarray.tolist, 2: lambda own: [float(np.cos(own[0])), float(np.sin(own[0]))],
+    4: lambda own: pin.Quaternion(pin.exp3(own)).coeffs().tolist()}
 
 
 def set_joint(parts: Sequence[Part], q: Array, joint: int, name: str, value: ArrayLike) -> None:

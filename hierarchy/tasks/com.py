@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import finite_numbers
-from hierarchy.jit import compiled
 from hierarchy.kinematics import carried, moving_point, place, plus, row_times, times
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.paths import Path
@@ -57,30 +56,25 @@ class CentreOfMass(Measured):
         return np.array(self.axes, dtype=np.int64)
 
 
-@compiled
-def _write_jacobian(kinematics, shares, centres, axes, A):
+@measured
+def _centre_of_mass(kinematics, reads, goal, J, motion):
     """Column c is s J_v + J_w x m, with s and m the mass and moment (as shares) that c moves."""
-    J, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
-    for c in range(A.shape[1]):
+    shares, centres, axes = reads
+    columns, placements, supports = kinematics.J, kinematics.placements, kinematics.supports
+    for c in range(J.shape[1]):
         s, m = 0.0, (0.0, 0.0, 0.0)
         for joint in range(1, len(shares)):
             if supports[joint, c] and shares[joint] > 0.0:
                 s += shares[joint]
                 m = plus(m, times(shares[joint], place(placements[joint], centres[joint])))
-        moved = carried(times(s, J[:3, c]), J[3:, c], m)
+        moved = carried(times(s, columns[:3, c]), columns[3:, c], m)
         for i in range(len(axes)):
-            A[i, c] = moved[axes[i]]
-
-
-@measured
-def _centre_of_mass(kinematics, reads, goal, J, motion):
-    shares, centres, axes = reads
-    _write_jacobian(kinematics, shares, centres, axes, J)
+            J[i, c] = moved[axes[i]]
     p, drift = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for joint in range(1, len(shares)):
         if shares[joint] > 0.0:
             _, bend, _ = moving_point(kinematics, joint, centres[joint])
-            p = plus(p, times(shares[joint], place(kinematics.placements[joint], centres[joint])))
+            p = plus(p, times(shares[joint], place(placements[joint], centres[joint])))
             drift = plus(drift, times(shares[joint], bend))
     for i in range(len(axes)):
         motion.error[i] = goal[0, axes[i]] - p[axes[i]]

@@ -172,6 +172,8 @@ def limits(**settings):
     (lambda: Hierarchy.from_levels([(A, B)], names=3), "names: expected a list of texts, got int"),
     (lambda: Hierarchy.from_levels([(A, B)], give=0.1), "give: expected a Sized, got float 0.1"),
     (lambda: Hierarchy.from_levels([(A, B)]).relaxed(0, B), "no level of the hierarchy gives"),
+    (lambda: Hierarchy.from_levels([(A, B)], give=[0.1]).relaxed(1, B),
+     "relaxed: level = 1: expected a whole number from 0 to 0"),
     (lambda: Hierarchy.from_levels([(A, B)]).upper_part(2), "2: expected a whole number fr"),
     (lambda: Hierarchy.from_levels([(A, B)]).upper_part(1, (B, B[:1])), "sides has shape (1,), e"),
     (lambda: Robot.load("kuka_lwr", locked=B), "Robot: locked: expected a Mapping, got ndarray"),
