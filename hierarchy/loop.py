@@ -36,15 +36,24 @@ class Watchdog:
     """Context manager that calls `stop` once, in a thread, if not fed for `limit` [s].
 
     The thread belongs to this process: it cannot act while compiled code holds the interpreter.
+    `ended` is whether `stop` has come to its end.
     """
 
     def __init__(self, limit: float, stop: Callable[[], object],
                  clock: Callable[[], float] = time.monotonic) -> None:
-        self.limit, self.fired = limit, False
+        self.limit, self.fired, self.ended = limit, False, False
         self.error: BaseException | None = None
         self._stop, self._clock, self._over, self._stopped = stop, clock, Event(), Event()
-        self._fed = clock()
+        self._lock, self._begun, self._fed = Lock(), False, clock()
         self._thread = Thread(target=self._watch, name="watchdog", daemon=True)
+
+    def stop(self) -> None:
+        """Call `stop` unless it has already been called, from any thread."""
+        with self._lock:
+            first, self._begun = not self._begun, True
+        if first:
+            self._stop()
+            self.ended = True
 
     def feed(self) -> None:
         """Reset the timer."""
@@ -55,7 +64,7 @@ class Watchdog:
         if not self.fired and self._clock() - self._fed > self.limit:
             self.fired = True
             try:
-                self._stop()
+                self.stop()
             except BaseException as error:
                 self.error = error
             self._stopped.set()
@@ -77,24 +86,6 @@ class Watchdog:
     def _watch(self) -> None:
         while not self._over.wait(self.limit / 4) and not self.check():
             pass
-
-
-class Once:
-    """A function that runs only the first time it is called, from any thread.
-
-    `ended` is whether it has come to its end.
-    """
-
-    def __init__(self, function: Callable[[], object]) -> None:
-        self._function, self._lock, self._begun, self.ended = function, Lock(), False, False
-
-    def __call__(self) -> None:
-        """Call the function unless it has already been called."""
-        with self._lock:
-            first, self._begun = not self._begun, True
-        if first:
-            self._function()
-            self.ended = True
 
 
 PERCENTILES = {"median": 50.0, "p95": 95.0, "p99.9": 99.9, "max": 100.0}
@@ -240,8 +231,7 @@ class Loop:
         ticks = max(1, round(duration / self.period))
         with naming(f"loop: a log of {ticks:g} ticks", of=(MemoryError, ValueError)):
             self.log = log = Log(self.period, ticks, record)
-        stop = Once(safe_stop)
-        dog = Watchdog(self.watchdog or np.inf, stop, self.clock)
+        dog = Watchdog(self.watchdog or np.inf, safe_stop, self.clock)
         watched = dog if self.watchdog else nullcontext()
         with _quiet(self.pause_gc, self.priority, log.notes), watched:
             try:
@@ -252,11 +242,11 @@ class Loop:
                     _stop_again(dog, safe_stop)
                     raise
                 finally:
-                    stop()
+                    dog.stop()
                     if dog.error is not None:
                         log.notes.append(f"safe_stop failed in the watchdog: {dog.error!r}")
             except KeyboardInterrupt:
-                if not stop.ended:  # the second of two, while the robot was being stopped
+                if not dog.ended:  # the second of two, while the robot was being stopped
                     safe_stop()
                 raise
         if dog.error is not None:

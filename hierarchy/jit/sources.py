@@ -73,7 +73,10 @@ def digest_of(file: str) -> str:
 
 def described(kinds: tuple[Any, ...]) -> str:
     """Return types of arguments as text; classes of named tuples with their modules."""
-    return ", ".join(map(_described, kinds))
+    classes = [getattr(kind, "instance_class", tuple) for kind in kinds]
+    return ", ".join(f"{of.__module__}.{of.__qualname__}({described(tuple(kind))})"
+                     if isinstance(kind, BaseTuple) else str(kind)
+                     for kind, of in zip(kinds, classes, strict=True))
 
 
 def kinds_in(text: str) -> tuple[Any, ...]:
@@ -94,10 +97,3 @@ def kinds_in(text: str) -> tuple[Any, ...]:
     if described(tuple(stack[0])) != text:
         raise ValueError(f"no types of arguments: {text}")
     return tuple(stack[0])
-
-
-def _described(kind: Any) -> str:
-    if not isinstance(kind, BaseTuple):
-        return str(kind)
-    of = getattr(kind, "instance_class", tuple)
-    return f"{of.__module__}.{of.__qualname__}({described(tuple(kind))})"

@@ -22,7 +22,7 @@ from hierarchy.robots.found import Found, is_floating, neutral_within_limits
 from hierarchy.robots.from_table import ROOT
 from hierarchy.robots.joints import held, without
 from hierarchy.robots.library import pin
-from hierarchy.robots.shapes import capsules_of
+from hierarchy.robots.shapes import capsules_of, of_coal
 from hierarchy.robots.table import Base
 from hierarchy.words import some
 
@@ -71,7 +71,7 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
         if not shapes:
             return robot
         geometries, missing = _geometry(path, root, model)
-        capsules, left_out = capsules_of(geometries)
+        capsules, left_out = capsules_of(of_coal(geometries))
     # The world is no part of a robot with a free base.
     of_world = [one.name for one in capsules if one.joint == 0 and is_floating(model)]
     if of_world:

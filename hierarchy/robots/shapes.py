@@ -1,5 +1,6 @@
 """Capsules around collision geometry."""
 
+from collections.abc import Iterable, Iterator
 from itertools import product
 from typing import Any
 
@@ -9,29 +10,30 @@ from hierarchy.avoidance.body import Capsule, Vector
 from hierarchy.problem import Array
 
 Ends = tuple[Array, Array, float]  # start (3,) [m], end (3,) [m] and radius [m] of a capsule
+Shape = tuple[str, str, int, Any, Ends | None]  # name, kind, joint, placement on it, capsule there
 CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
 _MOST = 2000  # vertices of a mesh that are used to choose the axis
 
 
-def capsules_of(geometries: Any) -> tuple[tuple[Capsule, ...], tuple[str, ...]]:
-    """Return a capsule around each collision geometry, and sentences on those without one."""
+def capsules_of(shapes: Iterable[Shape]) -> tuple[tuple[Capsule, ...], tuple[str, ...]]:
+    """Return the capsules around collision geometry, and sentences on what has none."""
     capsules, left_out = [], []
-    for geometry in geometries:
-        name, kind = str(geometry.name), type(geometry.geometry).__name__
-        found = _capsule_of(geometry.geometry, kind)
-        if found is None:
+    for name, kind, joint, placement, ends in shapes:
+        if ends is None:
             left_out.append(f"collision geometry {name!r} is a {kind}, for which there is no "
                             "capsule")
             continue
-        capsules.append(placed(name, int(geometry.parentJoint), geometry.placement, found))
+        start, end = (_vector(placement.act(end)) for end in ends[:2])
+        capsules.append(Capsule(name, joint, start, end, float(ends[2])))
     return tuple(capsules), tuple(left_out)
 
 
-def placed(name: str, joint: int, placement: Any, ends: Ends) -> Capsule:
-    """Return a capsule that is at a placement on the body of a joint."""
-    start, end, radius = ends
-    return Capsule(name, joint, _vector(placement.act(start)), _vector(placement.act(end)),
-                   float(radius))
+def of_coal(geometries: Any) -> Iterator[Shape]:
+    """Yield the shapes of collision geometry as pinocchio reads it."""
+    for one in geometries:
+        kind = type(one.geometry).__name__
+        yield (str(one.name), kind, int(one.parentJoint), one.placement,
+               _capsule_of(one.geometry, kind))
 
 
 def around_z(half: float, radius: float) -> Ends:

@@ -1,6 +1,6 @@
 """Robots of MJCF files: compiled by MuJoCo (extra `sim`), rebuilt for pinocchio, and compared."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,13 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.avoidance.body import Capsule
 from hierarchy.errors import RobotError, naming
 from hierarchy.robots.found import Found, neutral_within_limits, proposed_end_effector
 from hierarchy.robots.mjcf import constraints
 from hierarchy.robots.mjcf.model import Built, build, compare, configuration, pose
 from hierarchy.robots.mjcf.part import compiled, part_of
-from hierarchy.robots.shapes import CORNERS, Ends, around_z, bounding_capsule, placed
+from hierarchy.robots.shapes import (
+    CORNERS,
+    Ends,
+    Shape,
+    around_z,
+    bounding_capsule,
+    capsules_of,
+)
 from hierarchy.robots.table import Base
 
 _PLANE, _HEIGHTS, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX = range(7)  # mjtGeom
@@ -49,34 +55,28 @@ def read(path: Path, base: Base | None, shapes: bool, locked: Mapping[str, Array
         missing=(*file.missing, *said, *unkept, *unclosed, *constraints.left_out(built)))
     if not shapes:
         return found
-    capsules, without = _capsules(built)
-    return replace(found, capsules=tuple(capsules), missing=(*found.missing, *without))
+    capsules, without = capsules_of(_shapes(built))
+    return replace(found, capsules=capsules, missing=(*found.missing, *without))
 
 
-def _capsules(built: Built) -> tuple[list[Capsule], list[str]]:
-    """Return capsules around the geoms that collide, and sentences on those without one."""
-    mj, capsules, said = built.part.compiled.model, [], []
+def _shapes(built: Built) -> Iterator[Shape]:
+    """Yield the geoms that collide."""
+    mj = built.part.compiled.model
     paired = {*mj.pair_geom1.tolist(), *mj.pair_geom2.tolist()}
     for geom in range(mj.ngeom):
-        body = int(mj.geom_bodyid[geom])
+        body, kind = int(mj.geom_bodyid[geom]), int(mj.geom_type[geom])
         collides = mj.geom_contype[geom] or mj.geom_conaffinity[geom] or geom in paired
-        if not collides or body not in built.part.bodies:
-            continue
-        kind = int(mj.geom_type[geom])
-        name = mj.geom(geom).name or (
-            f"{built.part.compiled.bodies[body]} {_KINDS[kind]} {geom}")
-        if kind in (_PLANE, _HEIGHTS):
-            said.append(f"collision geometry {name!r} is a {_KINDS[kind]}, for which there is no "
-                        "capsule")
-            continue
-        joint, place = built.placed[body]
-        capsules.append(placed(name, joint, place * pose(mj.geom_pos[geom], mj.geom_quat[geom]),
-                               _ends(mj, geom, kind)))
-    return capsules, said
+        if collides and body in built.part.bodies:
+            (joint, place), named = built.placed[body], _KINDS[kind]
+            name = mj.geom(geom).name or f"{built.part.compiled.bodies[body]} {named} {geom}"
+            yield (name, named, joint, place * pose(mj.geom_pos[geom], mj.geom_quat[geom]),
+                   _ends(mj, geom, kind))
 
 
-def _ends(mj: Any, geom: int, kind: int) -> Ends:
+def _ends(mj: Any, geom: int, kind: int) -> Ends | None:
     size = mj.geom_size[geom]
+    if kind in (_PLANE, _HEIGHTS):
+        return None
     if kind in (_SPHERE, _CAPSULE, _CYLINDER):
         return around_z(0.0 if kind == _SPHERE else size[1], size[0])
     if kind in (_ELLIPSOID, _BOX):  # of an ellipsoid the box around it
