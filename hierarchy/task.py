@@ -215,8 +215,6 @@ def check_gains(task: Task, rows: int | None = None) -> None:
     """Raise a HierarchyError for a gain that is not a number >= 0, or one for each of `rows`."""
     for gain in _GAINS:
         value = getattr(task, gain)
-        if isinstance(value, float) and 0.0 <= value < np.inf:  # as most, and without arrays
-            continue
         try:
             sides = np.asarray(value)
             sound = bool(sides.dtype.kind in "iuf" and ((sides >= 0.0) & (sides < np.inf)).all())

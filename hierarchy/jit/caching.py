@@ -79,7 +79,6 @@ class KernelCache(NullCache):  # type: ignore[misc]
                     loaded = CompileResult._rebuild(context, *state)
                     loaded.library.calls = {one.library: None for one in made}
                     return loaded
-        _prepare_compilation()
         return None
 
     def save_overload(self, signature: Any, made: Any) -> None:
@@ -165,25 +164,6 @@ def register_symbols() -> None:
     import_module("numba.cpython.hashing")
     for name, address in nrt_helpers.items():
         llvm.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
-
-
-@cache
-def _prepare_compilation() -> None:
-    """Import numba's array functions without scipy, which takes as long as all other imports.
-
-    numba looks there for a BLAS, which a dependency has, when these functions are imported, and
-    again when a kernel that needs one is compiled; no kernel here does.
-    """
-    if "numba.np.arraymath" in sys.modules:
-        return
-    from numba.np import linalg
-
-    look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
-    try:
-        from numba.np import arraymath
-    finally:
-        linalg.ensure_blas = look
-    arraymath.ensure_blas = look
 
 
 FOLDER = Path(__file__).with_name("objects")

@@ -172,7 +172,10 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
 
 def _compiled(calls: Sequence[str], say: Callable[[int], None]
               ) -> tuple[dict[str, Code], list[Any]]:
-    """Return how to find each call in an object file, and numba's libraries with their code."""
+    """Return how to find each call in an object file, and numba's libraries with their code.
+
+    A call whose environment holds other than types of numbers is left out.
+    """
     entries: dict[str, Code] = {}
     libraries: list[Any] = []
     for count, call in enumerate(calls):
@@ -181,9 +184,11 @@ def _compiled(calls: Sequence[str], say: Callable[[int], None]
         kernel, kinds = found(name), kinds_in(text)
         kernel.compile(kinds)
         made = kernel.overloads[kinds]
-        if (entry := _entry(made, source_digest(kernel))) is not None:
+        constants = made.environment.consts
+        if all(isinstance(one, np.dtype) and one.fields is None for one in constants):
             libraries.append(made.library)
-            entries[call] = entry
+            entries[call] = Code(source_digest(kernel), made.fndesc.llvm_cpython_wrapper_name,
+                                 made.fndesc.env_name, tuple(one.str for one in constants))
     return entries, libraries
 
 
@@ -193,12 +198,3 @@ def is_current(file: Path, of: str) -> bool:
     return part is not None and part.calls == of and all(
         entry.digest == source_digest(found(call.partition("(")[0]))
         for call, entry in part.entries.items())
-
-
-def _entry(made: Any, digest: str) -> Code | None:
-    """Return how to find a compiled call; None if its environment holds other than number types."""
-    constants = made.environment.consts
-    if not all(isinstance(one, np.dtype) and one.fields is None for one in constants):
-        return None
-    return Code(digest, made.fndesc.llvm_cpython_wrapper_name, made.fndesc.env_name,
-                tuple(one.str for one in constants))

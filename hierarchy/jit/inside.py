@@ -21,21 +21,19 @@ try:
     from numba.core.runtime._nrt_python import c_helpers as nrt_helpers
     from numba.core.runtime.nrtdynmod import compile_nrt_functions
     from numba.core.serialize import dumps
-    from numba.core.targetconfig import ConfigStack
     from numba.core.types.containers import BaseTuple
-    from numba.core.types.functions import BaseFunction
     from numba.extending import intrinsic
 
-    _ = (BaseFunction.get_call_type, CPUDispatcher._insert, CPUDispatcher._compile_for_args,
-         CPUDispatcher.add_overload, CompileResult._reduce, CompileResult._rebuild,
-         CPUContext.get_executable, Codegen._library_class, Codegen._module_pass_manager,
-         Codegen.set_env, CodeLibrary.finalize, CodeLibrary._get_module_for_linking)
+    _ = (CPUDispatcher._insert, CPUDispatcher._compile_for_args, CPUDispatcher.add_overload,
+         CompileResult._reduce, CompileResult._rebuild, CPUContext.get_executable,
+         Codegen._library_class, Codegen._module_pass_manager, Codegen.set_env,
+         CodeLibrary.finalize, CodeLibrary._get_module_for_linking)
 except (ImportError, AttributeError) as error:
     raise ImportError(f"task-hierarchy works inside numba {_KNOWN}, not {numba.__version__}: "
                       f"{error}") from error
 
-__all__ = ["BaseFunction", "BaseTuple", "CPUContext", "CPUDispatcher", "CodeLibrary", "Codegen",
-           "CompileResult", "ConfigStack", "Environment", "NullCache", "NumbaError", "cgutils",
+__all__ = ["BaseTuple", "CPUContext", "CPUDispatcher", "CodeLibrary", "Codegen",
+           "CompileResult", "Environment", "NullCache", "NumbaError", "cgutils",
            "compile_nrt_functions", "compiler", "dumps", "event", "global_compiler_lock",
            "intrinsic", "llvm", "load_helpers", "make_function", "nrt_helpers", "registry", "rtsys",
            "types"]

@@ -9,17 +9,9 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, ClassVar, final
+from typing import Any, final
 
-from hierarchy.jit.inside import (
-    BaseFunction,
-    Codegen,
-    CodeLibrary,
-    ConfigStack,
-    CPUContext,
-    llvm,
-    registry,
-)
+from hierarchy.jit.inside import Codegen, CodeLibrary, CPUContext, llvm, registry
 
 
 @final
@@ -48,7 +40,6 @@ class Library(CodeLibrary):  # type: ignore[misc]
     naming = False  # while a kernel compiles; numba's own cache knows no names
     linked_only: Any = None  # the function that compiles now, if it does not run
     running = True  # whether others do
-    inferred: ClassVar[dict[Any, Any]] = {}  # calls, since the first of these kernels began
 
     def __init__(self, *about: Any) -> None:
         super().__init__(*about)
@@ -94,24 +85,8 @@ def _executable(context: Any, library: Any, about: Any, environment: Any) -> Any
     return made
 
 
-def _call_type(function: Any, context: Any, kinds: Any, named: Any) -> Any:
-    """Return what numba infers a call from, looked for once while kernels compile.
-
-    numba asks in each of many rounds, and looks through all that the function can be.
-    """
-    if not Library.naming:
-        return _looked_for(function, context, kinds, named)
-    call = ConfigStack.top_or_none(), function, kinds, tuple(named.items())
-    found = Library.inferred.get(call)
-    if found is None:
-        found = Library.inferred[call] = _looked_for(function, context, kinds, named)
-    return found
-
-
 Codegen._library_class = Library
 _made, CPUContext.get_executable = CPUContext.get_executable, _executable
-_looked_for: Any = BaseFunction.get_call_type
-BaseFunction.get_call_type = _call_type  # type: ignore[assignment, method-assign]
 
 
 @contextmanager
@@ -120,14 +95,13 @@ def naming(linked_only: Any = None) -> Iterator[None]:
 
     linked_only : the function that is compiled, if its code is only linked into callers.
     """
-    before, collecting = (Library.naming, Library.linked_only, Library.inferred), gc.isenabled()
-    Library.inferred = Library.inferred if Library.naming else {}
+    before, collecting = (Library.naming, Library.linked_only), gc.isenabled()
     Library.naming, Library.linked_only = True, linked_only
     gc.disable()  # looking through what numba keeps takes a seventh of the time
     try:
         yield
     finally:
-        Library.naming, Library.linked_only, Library.inferred = before
+        Library.naming, Library.linked_only = before
         if collecting:
             gc.enable()
 

@@ -7,7 +7,7 @@ these rows stand at the top of a stack.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,14 +67,6 @@ def above(rows: Sequence[Task], limits: Sequence[Task], anywhere: bool) -> list[
     return [*rows, *limits] if anywhere else [*limits, *rows]
 
 
-class _Parts(NamedTuple):
-    """Independent rows V x = side / sizes of a mechanism: V (r, n) is orthonormal."""
-
-    V: Array
-    sizes: Array
-    side: Array
-
-
 @final
 @dataclass(frozen=True)
 class ClosedChains(NamedRows, Written):
@@ -115,8 +107,11 @@ class ClosedChains(NamedRows, Written):
 
         return write
 
-    def parts(self, J: Array, side: Array) -> _Parts:
-        """Return the independent part of rows J x = side, (m, n) and (m,)."""
+    def parts(self, J: Array, side: Array) -> tuple[Array, Array, Array]:
+        """Return the independent part of rows J x = side, (m, n) and (m,): V, sizes and c.
+
+        It is V x = c / sizes, with V (r, n) orthonormal.
+        """
         scale, at = np.ones(len(J)), 0
         for task in self.whole.tasks:
             size = 3 if isinstance(task, RelativePose) else 1  # of one unit: places, or turns
@@ -127,7 +122,7 @@ class ClosedChains(NamedRows, Written):
             at += task.dimension
         U, sizes, V = np.linalg.svd(J * scale[:, None], full_matrices=False)
         kept = sizes > _INDEPENDENT * sizes[0]
-        return _Parts(V[kept], sizes[kept], (U.T @ (scale * side))[kept])
+        return V[kept], sizes[kept], (U.T @ (scale * side))[kept]
 
 
 @final
@@ -186,7 +181,7 @@ class Mechanism:
             return v
         if drives is None:
             return v - self._solved(J, beside, 0.0)
-        V = self._tasks[0].parts(J, beside).V
+        V, _, _ = self._tasks[0].parts(J, beside)
         given = np.linalg.solve(self._state.mass_matrix() + np.diag(drives), V.T)
         return np.asarray(v - given @ np.linalg.solve(V @ given, V @ v))
 
@@ -199,8 +194,8 @@ class Mechanism:
         J, error = self._rows(self._robot.normalised(q))
         after = self._rows(self._robot.integrate(q, v * period))[1]
         side = (after - error) / period + J @ v
-        part = self._tasks[0].parts(J, side)
-        return part.side / part.sizes if self._robot.loops else side
+        _, sizes, c = self._tasks[0].parts(J, side)
+        return c / sizes if self._robot.loops else side
 
     def _rows(self, q: Array) -> tuple[Array, Array]:
         """Jacobian (m, n) and error (m,) at q."""
