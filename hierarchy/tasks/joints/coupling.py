@@ -1,6 +1,6 @@
 """Couplings of joints: gears, mimic joints, fingers that close together."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import zip_longest
@@ -122,22 +122,19 @@ class FollowedJoints(_Coupling):
 
 
 def _terms(robot: Robot, rows: int,
-           terms: Iterable[tuple[int, str, tuple[float, ...]]]) -> Terms:
+           terms: Sequence[tuple[int, str, tuple[float, ...]]]) -> Terms:
     """Return terms given by row, joint and coefficients; RobotError for several velocities."""
     found, factors = [], [list[float]() for _ in range(rows)]
     for row, name, coefficients in terms:
         part = _part(robot, name)
-        continuous = part.size == 2
         slope, *bends = (*coefficients[1:], 0.0)
-        if continuous and slope and not any(bends):
+        if part.size == 2 and slope and not any(bends):
             factors[row].append(abs(slope))
-        found.append((row, part.q, part.v, continuous, coefficients))
-    rows_of, positions, velocities, around, polynomials = zip(*found, strict=True)
-    padded = np.array(list(zip_longest(*polynomials, fillvalue=0.0))).T
+        found.append((row, part.q, part.v, part.size == 2))
+    rows_of, positions, velocities, continuous = np.array(found, dtype=np.int64).T.copy()
+    padded = np.array(list(zip_longest(*(one for _, _, one in terms), fillvalue=0.0))).T
     turns = np.array([2.0 * pi * _part_of(own) if own else np.inf for own in factors])
-    return Terms(np.array(rows_of, dtype=np.int64), np.array(positions, dtype=np.int64),
-                 np.array(velocities, dtype=np.int64), np.array(around, dtype=np.bool_),
-                 np.ascontiguousarray(padded), turns)
+    return Terms(rows_of, positions, velocities, continuous.astype(np.bool_), padded.copy(), turns)
 
 
 _LARGEST = 12   # denominator of the ratio of two factors
