@@ -210,8 +210,8 @@ def compare(built: Built) -> None:
         for j, joint in built.pairs():
             here = mj.jnt_qposadr[j]
             data.qpos[here:here + joint.nq] = rolled(q[joint.idx_q:joint.idx_q + joint.nq], 1)
-        for step in ("mj_kinematics", "mj_comPos", "mj_tendon", "mj_transmission", "mj_makeM"):
-            getattr(mujoco, step)(mj, data)
+        for stage in ("mj_kinematics", "mj_comPos", "mj_tendon", "mj_transmission", "mj_makeM"):
+            getattr(mujoco, stage)(mj, data)
         pin.framesForwardKinematics(model, own, q)
         for what, found, expected in (
                 *_frames(built, own, "body", built.bodies, data.xpos, data.xmat),
