@@ -27,7 +27,7 @@ from hierarchy.errors import (
     whole,
 )
 from hierarchy.gate import axes_along
-from hierarchy.jit import bind, compiled
+from hierarchy.jit import bind, compiled, inlined
 from hierarchy.problem import Array
 from hierarchy.records import NotNegative, Positive, Vector3, check_fields, set_frozen
 
@@ -210,16 +210,22 @@ class _Pieces(Path):
 
 @compiled
 def _write_piece(powers, span, since, out):
-    s = max(since, 0.0) / span
     for i in range(3):
-        value, slope, bend = 0.0, 0.0, 0.0
-        for k in range(len(powers) - 1, -1, -1):
-            bend = bend * s + 2.0 * slope
-            slope = slope * s + value
-            value = value * s + powers[k, i]
+        value, slope, bend = polynomial(powers[:, i], max(since, 0.0) / span)
         out[0, i], out[1, i], out[2, i] = value, 0.0, 0.0
         if since >= 0.0:
             out[1, i], out[2, i] = slope / span, bend / (span * span)
+
+
+@inlined
+def polynomial(c, x):
+    """Value, derivative and second derivative of sum_i c_i x^i."""
+    value, slope, bend = 0.0, 0.0, 0.0
+    for i in range(len(c) - 1, -1, -1):
+        bend = bend * x + 2.0 * slope
+        slope = slope * x + value
+        value = value * x + c[i]
+    return value, slope, bend
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError, expect, number
-from hierarchy.jit import internal
 from hierarchy.measured import Measure, Measured, measured
+from hierarchy.paths.path import polynomial
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
@@ -167,17 +167,6 @@ def _part(robot: Robot, name: str) -> Part:
                          f"coupled{''.join(turn)}")
 
 
-@internal
-def _polynomial(c, x):
-    """Value, derivative and second derivative of sum_i c_i x^i."""
-    value, slope, bend = 0.0, 0.0, 0.0
-    for i in range(len(c) - 1, -1, -1):
-        bend = bend * x + 2.0 * slope
-        slope = slope * x + value
-        value = value * x + c[i]
-    return value, slope, bend
-
-
 @measured
 def _coupling(kinematics, reads, goal, J, motion):
     q, terms = reads
@@ -186,7 +175,7 @@ def _coupling(kinematics, reads, goal, J, motion):
         i, of = terms.rows[t], terms.velocities[t]
         at = terms.positions[t]
         x = np.arctan2(q[at + 1], q[at]) if terms.continuous[t] else q[at]
-        value, slope, bend = _polynomial(terms.coefficients[t], x)
+        value, slope, bend = polynomial(terms.coefficients[t], x)
         J[i, of] += slope
         error[i] -= value
         motion.rate[i] += slope * v[of]
