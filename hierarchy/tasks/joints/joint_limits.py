@@ -76,12 +76,13 @@ class JointLimits(JointRows):
                                  f"{robot.velocity_names[i]} no room between {lower[i]:.4g} and "
                                  f"{upper[i]:.4g}")
         speed = robot.velocity_limit.copy()
-        rate = np.append(np.zeros(robot.actuated), np.broadcast_to(acceleration, n))
+        rate = np.append(np.full(robot.actuated, acceleration.max(initial=-np.inf)),
+                         np.broadcast_to(acceleration, n))
         self.refuse(self._limits_base and robot.base == "fixed", f"robot {robot.name!r} has a "
                     "fixed base, which has no speed to limit")
-        if self.first < robot.actuated:
-            speed[:6] = self._of_base("base_speed", speed[:6])
-            rate[:6] = self._of_base("base_acceleration", np.full(6, acceleration.max()))
+        for what, limit in (("base_speed", speed), ("base_acceleration", rate)):
+            if (given := getattr(self, what)) is not None:
+                limit[:6] = np.repeat(finite_numbers(f"task {self.name!r}: {what}", given, 2), 3)
         of = slice(self.first, robot.n)
         with naming(f"task {self.name!r}"):
             set_frozen(self, limits=Limits(lower[of] + self.margin, upper[of] - self.margin,
@@ -95,12 +96,6 @@ class JointLimits(JointRows):
     @property
     def _limits_base(self) -> bool:
         return self.base_speed is not None or self.base_acceleration is not None
-
-    def _of_base(self, what: str, otherwise: Array) -> Array:
-        """Return a limit of the base (6,)."""
-        value = getattr(self, what)
-        return otherwise if value is None else np.repeat(
-            finite_numbers(f"task {self.name!r}: {what}", value, 2), 3)
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
