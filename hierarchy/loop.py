@@ -70,9 +70,14 @@ class Watchdog:
             self._stopped.set()
         return self.fired
 
-    def settle(self) -> None:
-        """Wait until `stop` has returned, for at most the limit."""
-        self._stopped.wait(self.limit)
+    def stop_again(self) -> None:
+        """Stop motion that a command may have started after the watchdog stopped the robot.
+
+        Before that, wait until it has, for at most the limit.
+        """
+        if self.fired:
+            self._stopped.wait(self.limit)
+            self._stop()
 
     def __enter__(self) -> Watchdog:
         self.feed()
@@ -236,10 +241,10 @@ class Loop:
         with _quiet(self.pause_gc, self.priority, log.notes), watched:
             try:
                 try:
-                    log.ended = self._run(step, safe_stop, send, ticks, dog)
+                    log.ended = self._run(step, send, ticks, dog)
                 except BaseException as error:
                     log.ended = f"{type(error).__name__} after {log.count} ticks: {error}"
-                    _stop_again(dog, safe_stop)
+                    dog.stop_again()
                     raise
                 finally:
                     dog.stop()
@@ -253,8 +258,8 @@ class Loop:
             raise dog.error
         return log
 
-    def _run(self, step: Callable[[float], Any], safe_stop: Callable[[], object],
-             send: Callable[[Any], object] | None, ticks: int, dog: Watchdog) -> str:
+    def _run(self, step: Callable[[float], Any], send: Callable[[Any], object] | None, ticks: int,
+             dog: Watchdog) -> str:
         """Run the ticks; return why the loop ended."""
         start, tick = self.clock(), 0
         while tick < ticks:
@@ -273,7 +278,7 @@ class Loop:
             end = self.clock()
             self.log.write(tick, started - planned, end - started, command)
             if dog.fired:
-                _stop_again(dog, safe_stop)
+                dog.stop_again()
                 return f"the watchdog fired in tick {tick}"
             dog.feed()
             late = end - (planned + self.period)
@@ -303,13 +308,6 @@ def _command(step: Callable[[float], Any], t: float, needed: bool) -> tuple[Any,
     except (TypeError, ValueError):  # a message of the robot's own
         finite = True
     return found, "" if finite else f"the command is not finite: {brief(found)}"
-
-
-def _stop_again(dog: Watchdog, safe_stop: Callable[[], object]) -> None:
-    """Stop motion that a command may have started after the watchdog stopped the robot."""
-    if dog.fired:
-        dog.settle()
-        safe_stop()
 
 
 _TURN, _PAUSED = Lock(), list[bool]()  # whether each loop that pauses the collector turned it off

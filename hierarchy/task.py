@@ -47,12 +47,9 @@ def _made(kind: type, remedy: str) -> Check:
     return check
 
 
-def _some_points(what: str, value: Sequence[ControlPoint]) -> None:
-    refuse(not len(pack_points(value)[0]), f"{what}: expected at least one control point")
-
-
 _PARTS: dict[Any, Check] = {  # of a task, by the type of the field
-    **NUMBERS, Sequence[ControlPoint]: _some_points,
+    **NUMBERS, Sequence[ControlPoint]: lambda what, value: refuse(
+        not len(pack_points(value).joints), f"{what}: expected at least one control point"),
     Robot: _made(Robot, "Robot.load(NAME)"), Frame: _made(Frame, "robot.frame(NAME)"),
     Path: _made(Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
     Contacts: _made(Contacts, "Contacts(robot, ...) of hierarchy.contacts"),
