@@ -84,9 +84,10 @@ def judge(answers: list[Row], robot: Robot, frames: tuple[str, ...], poses: Arra
     errors = np.array([error(robot, frames, np.array(one["q"]), pose) for one, pose in pairs])
     inside = ((q >= robot.lower - 1e-9) & (q <= robot.upper + 1e-9)).all(axis=1)
     times = times_of([1e9 * one["seconds"] for one, _ in pairs])
+    known = len(pairs) > 0  # else each answer ended the process
     return {"reached %": 100.0 * float(((errors <= 2.0 * TOLERANCE) & inside).sum()) / len(poses),
-            "beyond limits %": 100.0 * float((~inside).mean()),
-            "error, median": float(np.median(errors)), "ms, median": times["median_us"] / 1e3,
+            "beyond limits %": 100.0 * float((~inside).mean()) if known else np.nan,
+            "error, median": float(np.median(errors)) if known else np.nan, "ms, median": times["median_us"] / 1e3,
             "ms, p95": times["p95_us"] / 1e3}
 
 

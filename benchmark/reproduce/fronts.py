@@ -165,6 +165,8 @@ def table(points: Sequence[Point], name: str) -> list[str]:
     test, and in one line how many failed.
     """
     own = [one for one in points if one.front == name]
+    if not own:
+        return ["Not run yet: `hierarchy reproduce fronts`."]
     units = [Metric("", "", None, unit).shown_unit for unit in own[0].units]
     heads = [f"{metric} [{unit}]" if unit else metric
              for metric, unit in zip(FRONTS[name].minimised, units, strict=True)]

@@ -181,7 +181,7 @@ def _with_medians(table: str, said: str) -> str:
 def _median(said: str, family: str, name: str) -> str:
     try:
         median = float(cell(said, {"table": family, "row": name, "place": "1"}))
-    except HierarchyError:
+    except ValueError:  # no such row, or it has a dash there
         return "–"
     return f"{median:.0f}" if median >= 10.0 else f"{median:.1f}"
 

@@ -87,7 +87,7 @@ def miss_of(h: Hierarchy, proof: Proof | None, x: Array | None) -> Miss:
     """Return by how much x misses the proved levels; the distance to the reference is one more."""
     if x is None:
         return Miss()
-    if len(x) != h.n or not np.isfinite(x).all():
+    if not _is_answer(h, x):
         return Miss(np.inf, np.inf, 0)
     if proof is None:
         found = certify(h, x, RIGHT)
@@ -108,12 +108,16 @@ def miss_of(h: Hierarchy, proof: Proof | None, x: Array | None) -> Miss:
 
 def _moved(h: Hierarchy, proof: Proof | None, x: Array | None, without: Array | None) -> float:
     """Return the largest change of a violation above by the last level that has rows."""
-    if x is None or without is None or not (np.isfinite(x).all() and np.isfinite(without).all()):
+    if x is None or without is None or not (_is_answer(h, x) and _is_answer(h, without)):
         return np.nan
     above = int(np.flatnonzero(h.sizes)[-1])
     count = above if proof is None else min(above, proof.judged)
     change = abs(h.violations(x) - h.violations(without))[:count] / _sizes(h, proof)[:count]
     return float(change.max(initial=0.0))
+
+
+def _is_answer(h: Hierarchy, x: Array) -> bool:
+    return x.shape == (h.n,) and bool(np.isfinite(x).all())
 
 
 def _sizes(h: Hierarchy, proof: Proof | None) -> Array:
@@ -188,7 +192,7 @@ def steps_of(collections: Mapping[str, Collection]) -> dict[str, float]:
 def _step(points: Sequence[Array | None]) -> float:
     """Return the largest distance of two successive points of one length; NaN if there is none."""
     steps = [float(np.linalg.norm(one - other)) for one, other in pairwise(points)
-             if one is not None and other is not None and len(one) == len(other)]
+             if one is not None and other is not None and one.shape == other.shape]
     return max(steps, default=np.nan)
 
 

@@ -156,7 +156,8 @@ def _spread(results: Results, metric: Metric) -> Figure:
         seen = values[(values >= low) & (values <= high)]
         ax.plot([seen.min(), seen.max()], [y, y], ".", color=colours[label], ms=4.5)
         if beyond := values.size - seen.size:
-            ax.text(1.0, y, f"{beyond} beyond, to {max(values, key=abs):.3g}", fontsize=7.5,
+            farthest = max(values, key=lambda value: max(low - value, value - high))
+            ax.text(1.0, y, f"{beyond} beyond, to {farthest:.3g}", fontsize=7.5,
                     ha="right", va="bottom", transform=ax.get_yaxis_transform())
     ax.set_yticks(range(len(known)), names)
     ax.set_ylim(len(known) - 0.5, -0.5)

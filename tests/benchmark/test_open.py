@@ -124,6 +124,15 @@ def test_only_x_decides_whether_an_answer_is_right(x, solved, verdict, level):
         assert (one["absolute"], one["relative"]) == pytest.approx((1.0, 0.5 / (1.0 + 10.0**0.5)))
 
 
+@pytest.mark.parametrize("x", [[3.0], [[3.0], [1.0]], 3.0])
+def test_an_answer_of_another_shape_is_wrong_and_stops_no_report(x):
+    one = collection([simple(3.0)] * 2, sequence=True)
+    rows = [{**raw(None, one, p), "x": x, "without": [3.0]} for p in (0, 1)]
+    rows = judging.judge(rows, {one.digest: one})
+    assert [row["verdict"] for row in rows] == [judging.WRONG] * 2
+    assert np.isnan(judging.summary(rows, {"simple": 2.0})["moved"])
+
+
 @pytest.mark.parametrize(("more", "verdict"), [
     ({"ended": CRASHED}, judging.CRASHED), ({"ended": HUNG}, judging.HUNG),
     ({"ended": LEFT_OUT}, judging.CRASHED), ({"refused": "no"}, judging.REFUSED),

@@ -158,6 +158,14 @@ Times of one call
 """
 
 
+def test_what_is_not_there_yet_is_named_and_ends_no_filling():
+    asked = {"table": "EQ7", "row": "hcod", "place": "3"}
+    with pytest.raises(HierarchyError, match="row 'hcod' below 'EQ7' of the output has no number"):
+        blocks.cell("EQ7\nhcod 1.0 2.0\n", asked)
+    assert pages._median("EQ7\nhcod – –\n", "EQ7", "hcod") == "–"
+    assert "hierarchy reproduce fronts" in fronts.table([], next(iter(fronts.FRONTS)))[0]
+
+
 def page(mark, inside=""):
     return f"before\n<!-- measured: {mark} -->\n{inside}<!-- end -->\nafter\n"
 
