@@ -80,14 +80,16 @@ def run(count: int = 1000, seed: int = 0) -> Report:
 def judge(answers: list[Row], robot: Robot, frames: tuple[str, ...], poses: Array) -> Row:
     """Return the shares reached and beyond a limit, the median error, and times [ms]."""
     pairs = [(one, pose) for one, pose in zip(answers, poses, strict=True) if "q" in one]
-    q = np.array([one["q"] for one, _ in pairs]).reshape(len(pairs), robot.nq)
-    errors = np.array([error(robot, frames, np.array(one["q"]), pose) for one, pose in pairs])
+    if not pairs:  # each answer ended the process
+        return {"reached %": 0.0}
+    q = np.array([one["q"] for one, _ in pairs])
+    errors = np.array([error(robot, frames, at, pose)
+                       for at, (_, pose) in zip(q, pairs, strict=True)])
     inside = ((q >= robot.lower - 1e-9) & (q <= robot.upper + 1e-9)).all(axis=1)
     times = times_of([1e9 * one["seconds"] for one, _ in pairs])
-    known = len(pairs) > 0  # else each answer ended the process
     return {"reached %": 100.0 * float(((errors <= 2.0 * TOLERANCE) & inside).sum()) / len(poses),
-            "beyond limits %": 100.0 * float((~inside).mean()) if known else np.nan,
-            "error, median": float(np.median(errors)) if known else np.nan, "ms, median": times["median_us"] / 1e3,
+            "beyond limits %": 100.0 * float((~inside).mean()),
+            "error, median": float(np.median(errors)), "ms, median": times["median_us"] / 1e3,
             "ms, p95": times["p95_us"] / 1e3}
 
 

@@ -18,8 +18,7 @@ from benchmark.packages import OWN, Entrant
 from benchmark.report import Column, Report, Row, Section, Table, percent, power, short, whole, wide
 from benchmark.solve import oracle
 from benchmark.solve.entrants import ENTRANTS, NUMPY
-from benchmark.solve.interface import Problem, Solver
-from benchmark.solve.resolvers import as_problem
+from benchmark.solve.interface import Solver
 from benchmark.timing import take_turns
 from benchmark.worker import load
 from hierarchy.problem import Array, Hierarchy
@@ -204,7 +203,7 @@ def hierarchies(case: Case, count: int) -> tuple[list[Hierarchy], Array]:
 def _errors(solver: Solver, case: Case, problems: Sequence[Hierarchy], least: Array,
             right: Sequence[Array]) -> Row:
     """Solve every problem; return errors of tasks and x, and the shares certified and failed."""
-    answered = [solver.read(solver.solve(solver.prepare(as_problem(h)))) for h in problems]
+    answered = [solver.read(solver.solve(solver.prepare(h))) for h in problems]
     solved = np.array([one.solved for one in answered])
     errors = np.array([abs(h.violations(one.x) - lowest) for h, one, lowest in zip(
         problems, answered, least, strict=True)])[solved]
@@ -267,10 +266,9 @@ def _field(figure: str, sizes: Sequence[Size], seed: int) -> list[tuple[Row, Cal
     for i, (joints, tasks, each) in enumerate(sizes):
         rng = np.random.default_rng(seed + i)  # almost surely of full rank, with joints enough
         b = rng.normal(size=each * tasks)
-        problem = Problem(rng.normal(size=(each * tasks, joints)), b, b, np.full(tasks, each),
-                          np.zeros(joints))
+        h = Hierarchy(rng.normal(size=(each * tasks, joints)), b, b, np.full(tasks, each))
         found += [({"figure": figure, "entrant": label, "joints": joints, "tasks": tasks,
                     "rows": each if figure == "rows" else each * tasks},
-                   partial(solver.solve, solver.prepare(problem)))
+                   partial(solver.solve, solver.prepare(h)))
                   for label, solver in solvers.items()]
     return found
