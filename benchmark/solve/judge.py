@@ -184,9 +184,8 @@ def cells(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> list
 
 def steps_of(collections: Mapping[str, Collection]) -> dict[str, float]:
     """Return the largest step of the proved answers along each sequence, by family."""
-    found = {name: _step([proof.x if proof.complete else None for proof in one.answers or ()])
-             for name, one in collections.items() if one.head.sequence}
-    return {name: step for name, step in found.items() if not np.isnan(step)}
+    return {name: _step([proof.x if proof.complete else None for proof in one.answers or ()])
+            for name, one in collections.items() if one.head.sequence}
 
 
 def _step(points: Sequence[Array | None]) -> float:
