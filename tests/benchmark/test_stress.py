@@ -88,6 +88,7 @@ def test_failing_problems_are_listed_and_saved(tmp_path, monkeypatch):
     told = stress.report("wrong", {stress.RECIPE: found}, tmp_path)
     assert told.failed
     assert f"recipe, seed {found.failing[0][0]}, {stress.WRONG}" in told.sections[0].text
+    assert told.sections[0].tables[0].cells()[0][1][:4] == ["1", "0", "1", "0"]  # 0 certified
     kept = problems.load(next(tmp_path.glob("wrong-*.npz")))
     assert stress.outcome(Wrong(stress.WRONG), kept)[0] == stress.WRONG
 
