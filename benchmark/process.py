@@ -59,7 +59,6 @@ class Process:
             self._begin()
             self._more = 2.0 * limit
         more, self._more = self._more, 0.0
-        assert self._process.stdin is not None
         with suppress(OSError):  # it has ended; why, the log says
             self._process.stdin.write(json.dumps(question) + "\n")
             self._process.stdin.flush()
@@ -74,7 +73,7 @@ class Process:
         core = str(max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0)
         self._log = tempfile.TemporaryFile("w+", errors="replace")  # noqa: SIM115
         try:
-            self._process = subprocess.Popen(
+            self._process: Any = subprocess.Popen(
                 [python, "-m", "benchmark.worker", self.questions, entrant.adapter,
                  json.dumps(dict(entrant.options)), entrant.package.name, core],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True,
@@ -91,7 +90,6 @@ class Process:
         timer in the process itself would make its clock of processor time a coarse one.
         """
         process, left, kind = self._process, limit, CRASHED
-        assert process.stdout is not None
         begin, until = _busy(process.pid), monotonic() + wait
         while kind == CRASHED and not select([process.stdout], [], [], left)[0]:
             left = min(begin + limit - _busy(process.pid), until - monotonic())

@@ -76,6 +76,12 @@ def shifted(h: Hierarchy) -> Hierarchy:
     return h.changed(lower=h.lower - by, upper=h.upper - by, reference=None)
 
 
+def moved(h: Hierarchy, rng: np.random.Generator) -> Hierarchy:
+    """Return the problem with both sides of each row changed by a factor within 1 % of 1."""
+    factor = 1.0 + _MOVED * rng.uniform(-1.0, 1.0, h.m)
+    return h.changed(lower=h.lower * factor, upper=h.upper * factor)
+
+
 def read_problems(file: Path) -> list[Hierarchy]:
     """Return the problems of a file; docs/problem-files.md describes it."""
     with np.load(file, allow_pickle=False) as kept:
@@ -153,7 +159,7 @@ class Questions:
             asked, raw = self._answer
             raw = raw if asked == p - 1 else None
         else:
-            earlier = self.before[p] or _moved(self.problems[p], p)
+            earlier = self.before[p] or moved(self.problems[p], np.random.default_rng(p))
             raw = self.solver.solve(self.solver.prepare(earlier))
         return None if getattr(raw, "memory", raw) is None else raw
 
@@ -170,12 +176,6 @@ class Questions:
         return {f"{prefix}solved": bool(solved), f"{prefix}x": np.asarray(x, dtype=float).tolist(),
                 f"{prefix}iterations": iterations, f"{start}_ns": times[1:] or times,
                 f"{start}_inside_ns": solver.inside(prepared, before, self.repeats)}, raw
-
-
-def _moved(h: Hierarchy, seed: int) -> Hierarchy:
-    """Return the problem with both sides of each row changed by a factor within 1 % of 1."""
-    factor = 1.0 + _MOVED * np.random.default_rng(seed).uniform(-1.0, 1.0, h.m)
-    return h.changed(lower=h.lower * factor, upper=h.upper * factor)
 
 
 def resident() -> int:
