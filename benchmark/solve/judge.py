@@ -189,10 +189,10 @@ def steps_of(collections: Mapping[str, Collection]) -> dict[str, float]:
 
 
 def _step(points: Sequence[Array | None]) -> float:
-    """Return the largest distance of two successive points of one length; NaN if there is none."""
-    steps = [float(np.linalg.norm(one - other)) for one, other in pairwise(points)
-             if one is not None and other is not None and one.shape == other.shape]
-    return max(steps, default=np.nan)
+    """Return the largest distance of two successive finite points of one shape; NaN without."""
+    known = [x if x is not None and np.isfinite(x).all() else np.empty(0) for x in points]
+    return max((float(np.linalg.norm(one - other)) for one, other in pairwise(known)
+                if one.size and one.shape == other.shape), default=np.nan)
 
 
 def profile(rows: Sequence[Row], ratios: Array) -> dict[str, Array]:

@@ -153,13 +153,20 @@ def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():
     assert np.isnan(judging.summary([found(None, refused="no", start_kib=1000)])["memory_mb"])
 
 
+def test_steps_to_an_answer_that_is_not_finite_are_no_steps():
+    points = [np.array([np.inf]), np.array([np.inf]), None, np.zeros(1), np.ones(1), np.ones(2)]
+    assert judging._step(points) == judging._step(points[::-1]) == 1.0
+    assert np.isnan(judging._step(points[:4]))
+
+
 def test_the_best_may_lack_a_family_that_another_was_asked_later():
     def row(name, family, asked, right):
         return {"entrant": name, "family": family, "asked": asked, "right": right, "median_us": 1.0}
 
     total = [row("best", "", 100, 1.0), row("other", "", 102, 0.5)]
     some = [row("best", "a", 100, 1.0), row("other", "a", 100, 0.5), row("other", "b", 2, 0.5)]
-    assert "More often right than best: none." in views.lead("", total, some)
+    for refused in ([], [row("best", "b", 0, np.nan)]):
+        assert "More often right than best: none." in views.lead("", total, [*some, *refused])
 
 
 def test_a_set_that_nobody_can_be_asked_has_its_tables():
