@@ -218,5 +218,6 @@ def figure(points: Sequence[Point]) -> Figure:
         ax.title.set_fontsize(9)
         ax.locator_params(nbins=4)
         ax.ticklabel_format(useOffset=False, scilimits=(-3, 4))
-        ax.legend(title=f"size: {third}", fontsize=7, title_fontsize=7)
+        if any(shares):
+            ax.legend(title=f"size: {third}", fontsize=7, title_fontsize=7)
     return fig
