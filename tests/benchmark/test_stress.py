@@ -194,3 +194,5 @@ def test_a_process_is_measured_and_one_that_fails_is_named():
     assert 0.0 < processor
     with pytest.raises(RuntimeError, match="no such thing"):
         start._measured(Case("a fault", None, ["-c", "raise SystemExit('no such thing')"]))
+    with pytest.raises(RuntimeError, match="unknown scenario 'elipse'"):
+        start._measured(Case("a run", None, ["-c", start._COMMAND, "run", "elipse"]))
