@@ -194,7 +194,7 @@ def shrunk(h: Hierarchy, fails: Callable[[Hierarchy], bool]) -> Hierarchy:
 
 def _smaller(h: Hierarchy) -> Iterator[Hierarchy]:
     """Yield the hierarchy without one of its parts, the largest parts first."""
-    levels = [tuple(part.copy() for part in level) for level in h.levels()]
+    levels: list[tuple[Array, ...]] = list(h.levels())
     for k in range(len(levels)):
         yield Hierarchy.from_levels(levels[:k] + levels[k + 1:], h.reference)
     for k, level in enumerate(levels):

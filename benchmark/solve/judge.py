@@ -122,8 +122,7 @@ def _is_answer(h: Hierarchy, x: Array) -> bool:
 
 def _sizes(h: Hierarchy, proof: Proof | None) -> Array:
     """Return the norm of the largest row of each level times 1 + |x|: (L,), never zero."""
-    norms = np.linalg.norm(h.A, axis=1)
-    largest = np.array([norms[first:last].max(initial=0.0) for first, last in pairwise(h.offsets)])
+    largest = np.array([np.linalg.norm(A, axis=1).max(initial=0.0) for A, _, _ in h.levels()])
     reach = 1.0 + (float(np.linalg.norm(proof.x)) if proof is not None and proof.complete else 0.0)
     return np.where(largest > 0.0, largest, 1.0) * reach
 
