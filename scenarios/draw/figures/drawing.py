@@ -139,12 +139,9 @@ def envelope(y: Array) -> NDArray[np.int64]:
         return np.arange(len(y))
     edges = np.linspace(0, len(y), _BUCKETS + 1).astype(int)
     kept = {0, len(y) - 1}
-    for first, last in itertools.pairwise(edges):
-        part = y[first:last]
-        if np.isnan(part).all():
-            kept.add(first)
-        else:
-            kept.update((first + int(np.nanargmin(part)), first + int(np.nanargmax(part))))
+    for first, last in itertools.pairwise(edges.tolist()):
+        known = first + np.flatnonzero(~np.isnan(y[first:last]))
+        kept.update([known[y[known].argmin()], known[y[known].argmax()]] if known.size else [first])
     return np.array(sorted(kept))
 
 
