@@ -143,7 +143,7 @@ def filled(text: str, root: Path, page: str, stored: Stored) -> str:
         inside = part if found["form"] == "text" else ["```", *part, "```"]
         return "\n".join([found["mark"].rstrip(), *inside, found["end"]])
 
-    with naming(page):
+    with naming(page, of=(ValueError, re.error)):
         return _MARK.sub(made, text)
 
 

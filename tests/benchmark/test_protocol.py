@@ -190,6 +190,8 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
     assert fill(page(mark)) == page(mark, f"```\n{head}\n\n{head}\nplain numpy   55.3 83.4\n```\n")
     for text, says in ((page("python b.py"), r"page\.md: no output of 'python b\.py' is stored"),
                        (page("python a.py | EQ8 .. EQ9"), "has no line that starts with 'EQ8'"),
+                       (page("table of python a.py"), r"page\.md: not enough values"),
+                       (page("python a.py | without ("), r"page\.md: missing \)"),
                        ("<!-- reproduce: other -->\n<!-- end -->", r"page\.md: block 'other'")):
         with pytest.raises(HierarchyError, match=says):
             fill(text)
