@@ -9,14 +9,15 @@ from a CPU.
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.util import find_spec
+from itertools import cycle, islice
 from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
 
 from benchmark.report import Report, Row, Section, Table, wide
+from benchmark.solve.interface import moved
 from benchmark.timing import machine
-from hierarchy.problem import Hierarchy
 from scenarios.problems.recorded import family
 from solvers import Resolver, make
 from solvers.batch import Batch, cores, solve
@@ -51,13 +52,8 @@ def problems_like(name: str, count: int) -> Batch:
     """Return `count` problems of a family, with targets varied by 1 % and random references."""
     r = np.random.default_rng(0)
     originals = [problem.h for problem in family(name)]
-
-    def like(h: Hierarchy) -> Hierarchy:
-        factor = 1.0 + 0.01 * r.uniform(-1.0, 1.0, h.m)
-        return h.changed(lower=h.lower * factor, upper=h.upper * factor,
-                         reference=r.normal(size=h.n))
-
-    return Batch.of([like(originals[p % len(originals)]) for p in range(count)])
+    return Batch.of([moved(h, r).changed(reference=r.normal(size=h.n))
+                     for h in islice(cycle(originals), count)])
 
 
 def _timed(batch: Batch, resolver: Resolver, seconds: float) -> list[Row]:

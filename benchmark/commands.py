@@ -4,14 +4,11 @@ import os
 from importlib import import_module
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from scenarios.cli.options import AsJson, Out, Workers, output
-
-if TYPE_CHECKING:
-    from benchmark.packages import Package
 from scenarios.cli.terminal import shown
 
 _ACCURACY, _GROWTH = "solve.first_paper:accuracy", "solve.first_paper:growth"
@@ -56,7 +53,7 @@ def _run(out: Path | None, *names: str, **options: Any) -> int:
     return int(failed)
 
 
-def _installed(packages: "tuple[Package, ...]") -> int:
+def _installed(packages: tuple[Any, ...]) -> int:
     from benchmark.packages import install
 
     said = {package.name: install(package) for package in packages}

@@ -32,7 +32,7 @@ _DASHES = defaultdict(lambda: "-", {"defaults": ":", "tight": "--", "as hqp": "-
 
 @contextmanager
 def _figure(width: float, height: float, style: Any = ()) -> Iterator[Figure]:
-    with matplotlib.rc_context({**drawing.style(), **dict(style)}):
+    with matplotlib.rc_context({**drawing.present().settings, **dict(style)}):
         yield Figure(figsize=(max(width, _NARROWEST), height), layout="constrained")
 
 

@@ -10,7 +10,7 @@ from contextlib import ExitStack, closing, suppress
 from itertools import product
 from math import inf
 from pathlib import Path
-from threading import Event, Thread
+from select import select
 from time import monotonic
 from typing import Any, final
 
@@ -39,7 +39,7 @@ class Process:
     """
 
     def __init__(self, entrant: Entrant, questions: str) -> None:
-        self.entrant, self.questions, self._starts, self._fresh = entrant, questions, 0, True
+        self.entrant, self.questions, self._more = entrant, questions, START_LIMIT
         self._begin()
 
     def close(self) -> None:
@@ -57,9 +57,8 @@ class Process:
         """
         if self._log.closed:
             self._begin()
-        more = START_LIMIT if self._starts == 1 else 2.0 * limit
-        more, self._fresh = more * self._fresh, False
-        assert self._process.stdin is not None
+            self._more = 2.0 * limit
+        more, self._more = self._more, 0.0
         with suppress(OSError):  # it has ended; why, the log says
             self._process.stdin.write(json.dumps(question) + "\n")
             self._process.stdin.flush()
@@ -74,7 +73,7 @@ class Process:
         core = str(max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0)
         self._log = tempfile.TemporaryFile("w+", errors="replace")  # noqa: SIM115
         try:
-            self._process = subprocess.Popen(
+            self._process: Any = subprocess.Popen(
                 [python, "-m", "benchmark.worker", self.questions, entrant.adapter,
                  json.dumps(dict(entrant.options)), entrant.package.name, core],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True,
@@ -82,40 +81,29 @@ class Process:
         except OSError as error:
             self._log.close()
             raise MissingError(f"{python}: {error.strerror}") from error
-        self._starts, self._fresh = self._starts + 1, True
         self.about: dict[str, Any] = self._next(START_LIMIT, START_LIMIT)
 
     def _next(self, limit: float, wait: float) -> Any:
-        """Return the next line; EndedError, with the last words, if none comes in time."""
-        assert self._process.stdout is not None
-        self._hung, done = False, Event()
-        Thread(target=self._watch, args=(done, limit, wait)).start()
-        try:
-            line = self._process.stdout.readline()
-        finally:
-            done.set()
+        """Return the next line; EndedError, with the last words, if none comes in time.
+
+        That is before the process has worked for `limit` [s] and before `wait` [s] have passed. A
+        timer in the process itself would make its clock of processor time a coarse one.
+        """
+        process, left, kind = self._process, limit, CRASHED
+        begin, until = _busy(process.pid), monotonic() + wait
+        while kind == CRASHED and not select([process.stdout], [], [], left)[0]:
+            left = min(begin + limit - _busy(process.pid), until - monotonic())
+            if left <= 0.0:
+                kind = HUNG
+                process.kill()
+        line = process.stdout.readline()
         if line.endswith("\n"):
             return json.loads(line)
-        code = self._process.wait()
+        code = process.wait()
         self._log.seek(0)
         words = self._log.read().strip().splitlines()[-1:]
         self.close()
-        raise EndedError(HUNG if self._hung else CRASHED,
-                         ": ".join([f"ended with code {code}", *words]))
-
-    def _watch(self, done: Event, limit: float, wait: float) -> None:
-        """End a process that works for `limit` [s], or for which `wait` [s] pass, before `done`.
-
-        A timer in the process itself would make its clock of processor time a coarse one.
-        """
-        process, left = self._process, limit
-        begin, until = _busy(process.pid), monotonic() + wait
-        while not done.wait(left):
-            left = min(begin + limit - _busy(process.pid), until - monotonic())
-            if left <= 0.0:
-                self._hung = True
-                process.kill()
-                return
+        raise EndedError(kind, ": ".join([f"ended with code {code}", *words]))
 
 
 def _busy(process: int) -> float:

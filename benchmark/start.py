@@ -67,7 +67,8 @@ _COMMAND = """\
 import sys, tempfile
 from scenarios.cli.main import run_command
 with tempfile.TemporaryDirectory() as folder:
-    code = run_command([*sys.argv[1:], "--out", folder + "/run"])"""
+    if run_command([*sys.argv[1:], "--out", folder + "/run"]):
+        sys.exit(1)"""
 _MEMORY = f"""\
 {_COMMAND}
 from benchmark.solve.interface import resident

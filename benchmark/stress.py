@@ -160,9 +160,9 @@ def report(name: str, found: Mapping[str, Tally], out: Path) -> Report:
     rows = [one.row(kind) for kind, one in {
         **found, **({ALL: total} if len(found) > 1 else {})}.items()]
     others = sorted(set(total.counts) - {CERTIFIED, CRASHED, RAISED, NOT_FINITE})
-    columns = [*(Column(key, key, whole) for key in ("problems", CERTIFIED, "failed", "lost")),
-               *(Column(what.lower().replace("_", "\n").replace(" ", "\n"), what,
-                        lambda n: whole(n or 0)) for what in others),
+    columns = [*(Column(what.lower().replace("_", "\n").replace(" ", "\n"), what,
+                        lambda n: whole(n or 0))
+                 for what in ("problems", CERTIFIED, "failed", "lost", *others)),
                *(Column(f"steps\n/ row\n{key}", key) for key in ("median", "most"))]
     return Report(f"{name} on generated problems", [Section("", [Table(
         f"{name}: outcomes, each answer certified", rows, columns, "kind")], "\n".join(lines))],
@@ -194,7 +194,7 @@ def shrunk(h: Hierarchy, fails: Callable[[Hierarchy], bool]) -> Hierarchy:
 
 def _smaller(h: Hierarchy) -> Iterator[Hierarchy]:
     """Yield the hierarchy without one of its parts, the largest parts first."""
-    levels = [tuple(part.copy() for part in level) for level in h.levels()]
+    levels: list[tuple[Array, ...]] = list(h.levels())
     for k in range(len(levels)):
         yield Hierarchy.from_levels(levels[:k] + levels[k + 1:], h.reference)
     for k, level in enumerate(levels):

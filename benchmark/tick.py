@@ -1,6 +1,5 @@
 """Time of a whole tick of `ellipse`: sense, allocate, rows, resolve, integrate, record."""
 
-from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
@@ -35,8 +34,11 @@ def run() -> Report:
     The plain tick is asked at the states of the run, and must command the same.
     """
     scenario, rows = load("ellipse"), list[Row]()
-    path = uninterrupted(scenario)
-    for spec, times in _in_turns({spec: scenario.with_resolver(spec) for spec in SPECS}).items():
+    path, specs = uninterrupted(scenario), [scenario.with_resolver(spec) for spec in SPECS]
+    with one_core():
+        runs = [[_times(uninterrupted(one)) for one in specs] for _ in range(_ROUNDS + 1)]
+    for spec, *own in zip(SPECS, *runs[1:], strict=True):  # the first compiles and fills caches
+        times = np.concatenate(own)
         parts = {f"{part}_us": float(np.nanmedian(some)) for part, some in zip(
             PARTS, times.T, strict=False)}
         rows.append({"tick": spec, **parts, **_of_ticks(times[:, -1])})
@@ -48,18 +50,6 @@ def run() -> Report:
                   {"tick": rows})
 
 
-def _in_turns(scenarios: Mapping[str, Scenario]) -> dict[str, Array]:
-    """Return the times [us] of ticks of runs, which take turns on one core: (T, 5) by label.
-
-    The columns are PARTS and the whole tick; NaN where there is no answer. One run of each before
-    them is not counted: it compiles and fills caches.
-    """
-    with one_core():
-        runs = [[_times(uninterrupted(one)) for one in scenarios.values()]
-                for _ in range(_ROUNDS + 1)]
-    return {label: np.concatenate(own) for label, *own in zip(scenarios, *runs[1:], strict=True)}
-
-
 def _of_ticks(times: Array) -> Row:
     """Return the row of times [us] of ticks: those answered, and how many are not."""
     answered = times[~np.isnan(times)]
@@ -67,6 +57,7 @@ def _of_ticks(times: Array) -> Row:
 
 
 def _times(run: Recording) -> Array:
+    """Return the times [us] of PARTS and the whole tick, (T, 5); NaN without an answer."""
     parts = [run[f"time_{part}"] for part in ("kinematics", "rows", "resolve", "tick")]
     times = 1e6 * np.column_stack([*parts[:3], parts[3] - sum(parts[:3]), parts[3]])
     times[run["status"] != 0] = np.nan

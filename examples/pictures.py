@@ -21,7 +21,7 @@ from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacles
 from scenarios import load, simulate
 from scenarios.cell.sensors.sensor import make_obstacles
-from scenarios.draw.figures.drawing import ALERT, INK, project, style
+from scenarios.draw.figures.drawing import ALERT, INK, present, project
 from scenarios.draw.figures.picture import outline
 from scenarios.recording.facts import capsules, ends
 
@@ -155,7 +155,7 @@ def main(names):
     OUT.mkdir(parents=True, exist_ok=True)
     for name in names or VIEWS:
         drawn = io.BytesIO()
-        with matplotlib.rc_context(style()):
+        with matplotlib.rc_context(present().settings):
             draw(name).savefig(drawn, format="png", dpi=120, facecolor="white")
         with Image.open(drawn) as image:
             image.convert("RGB").quantize(128).save(OUT / f"{name}.png", optimize=True)

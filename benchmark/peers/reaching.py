@@ -80,8 +80,11 @@ def run(count: int = 1000, seed: int = 0) -> Report:
 def judge(answers: list[Row], robot: Robot, frames: tuple[str, ...], poses: Array) -> Row:
     """Return the shares reached and beyond a limit, the median error, and times [ms]."""
     pairs = [(one, pose) for one, pose in zip(answers, poses, strict=True) if "q" in one]
-    q = np.array([one["q"] for one, _ in pairs]).reshape(len(pairs), robot.nq)
-    errors = np.array([error(robot, frames, np.array(one["q"]), pose) for one, pose in pairs])
+    if not pairs:  # each answer ended the process
+        return {"reached %": 0.0}
+    q = np.array([one["q"] for one, _ in pairs])
+    errors = np.array([error(robot, frames, at, pose)
+                       for at, (_, pose) in zip(q, pairs, strict=True)])
     inside = ((q >= robot.lower - 1e-9) & (q <= robot.upper + 1e-9)).all(axis=1)
     times = times_of([1e9 * one["seconds"] for one, _ in pairs])
     return {"reached %": 100.0 * float(((errors <= 2.0 * TOLERANCE) & inside).sum()) / len(poses),

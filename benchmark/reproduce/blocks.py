@@ -104,7 +104,10 @@ def cell(output: str, asked: Mapping[str, str]) -> str:
     found = [line[len(asked["row"]):].split() for line in takewhile(str.strip, below)
              if line.startswith(f"{asked['row']} ")]
     refuse(not found, f"the output has no row {asked['row']!r} below {asked['table']!r}")
-    return min(found, key=len)[int(asked["place"]) - 1]
+    row, place = min(found, key=len), int(asked["place"])
+    refuse(len(row) < place, f"row {asked['row']!r} below {asked['table']!r} of the output has no "
+           f"number {place}")
+    return row[place - 1]
 
 
 def _asked(rows: Rows | None) -> list[str]:

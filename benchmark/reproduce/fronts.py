@@ -165,6 +165,8 @@ def table(points: Sequence[Point], name: str) -> list[str]:
     test, and in one line how many failed.
     """
     own = [one for one in points if one.front == name]
+    if not own:
+        return ["Not run yet: `hierarchy reproduce fronts`."]
     units = [Metric("", "", None, unit).shown_unit for unit in own[0].units]
     heads = [f"{metric} [{unit}]" if unit else metric
              for metric, unit in zip(FRONTS[name].minimised, units, strict=True)]
@@ -216,5 +218,6 @@ def figure(points: Sequence[Point]) -> Figure:
         ax.title.set_fontsize(9)
         ax.locator_params(nbins=4)
         ax.ticklabel_format(useOffset=False, scilimits=(-3, 4))
-        ax.legend(title=f"size: {third}", fontsize=7, title_fontsize=7)
+        if any(shares):
+            ax.legend(title=f"size: {third}", fontsize=7, title_fontsize=7)
     return fig

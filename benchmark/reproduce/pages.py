@@ -143,7 +143,7 @@ def filled(text: str, root: Path, page: str, stored: Stored) -> str:
         inside = part if found["form"] == "text" else ["```", *part, "```"]
         return "\n".join([found["mark"].rstrip(), *inside, found["end"]])
 
-    with naming(page):
+    with naming(page, of=(ValueError, re.error)):
         return _MARK.sub(made, text)
 
 
@@ -181,7 +181,7 @@ def _with_medians(table: str, said: str) -> str:
 def _median(said: str, family: str, name: str) -> str:
     try:
         median = float(cell(said, {"table": family, "row": name, "place": "1"}))
-    except HierarchyError:
+    except ValueError:  # no such row, or it has a dash there
         return "–"
     return f"{median:.0f}" if median >= 10.0 else f"{median:.1f}"
 

@@ -110,10 +110,10 @@ def shown(claim: Claim, rows: Rows, effect: Effect) -> str:
     if claim.percent:
         middle, low, high = (100.0 * np.expm1(one) for one in numbers)
         return f"{_signed(middle)} [{_signed(low)}, {_signed(high)}] %"
-    known = rows.metrics[claim.metric]
-    metric = [Metric(claim.metric, "", one, known["unit"]) for one in numbers]
-    middle, low, high = ("∞" if np.isinf(one.value or 0.0) else one.shown() for one in metric)
-    return f"{middle} [{low}, {high}] {metric[0].shown_unit}".strip()
+    metric = Metric(claim.metric, "", None, rows.metrics[claim.metric]["unit"])
+    middle, low, high = (replace(metric, value=one).shown() if np.isfinite(one) else
+                         "∞" if one > 0.0 else "-∞" for one in numbers)
+    return f"{middle} [{low}, {high}] {metric.shown_unit}".strip()
 
 
 def _signed(percent: float) -> str:
@@ -145,4 +145,6 @@ def blocked(differences: Array, blocks: NDArray[np.int64]) -> Effect:
     above = (ordered > 0.0).sum() + (ordered == 0.0).sum() / 2.0
     p = erfc(max(abs(above - middle) - 0.5, 0.0) / deviation / sqrt(2.0))
     k = max(int(middle - 1.96 * deviation), 0)
-    return Effect(float(np.median(ordered)), float(ordered[k]), float(ordered[-1 - k]), p)
+    with np.errstate(invalid="ignore"):
+        estimate = np.nan_to_num(np.median(ordered), nan=0.0, posinf=np.inf, neginf=-np.inf)
+    return Effect(float(estimate), float(ordered[k]), float(ordered[-1 - k]), p)

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from qpsolvers import solve_qp
 
-from benchmark.solve.interface import Answer, Array, Problem, Solver
+from benchmark.solve.interface import Answer, Solver
+from hierarchy.problem import Array, Hierarchy
 
 _TINY = 1e-9  # weight of |x - reference|^2 beside |w|^2, for solvers that need a definite Hessian
 
@@ -29,34 +30,30 @@ class Cascade(Solver):
         package = {"proxqp": "proxsuite", "highs": "highspy"}.get(self.backend, self.backend)
         return f"qpsolvers {version('qpsolvers')}, {package} {version(package)}"
 
-    def solve(self, prepared: Problem) -> tuple[Array, bool]:
+    def solve(self, prepared: Hierarchy) -> tuple[Array, bool]:
         """Solve level by level; False from the first program without a solution."""
-        x, n, begin = prepared.reference, len(prepared.reference), 0
+        x, n, end = prepared.reference, prepared.n, 0
         lower, upper = prepared.lower.copy(), prepared.upper.copy()
-        for end in [int(end) for end in prepared.ends]:
-            own, m = slice(begin, end), end - begin
-            if m:
-                P = np.diag(np.concatenate([np.full(n, _TINY), np.ones(m)]))
-                q = np.concatenate([-_TINY * prepared.reference, np.zeros(m)])
-                A = np.zeros((end, n + m))
-                A[:, :n] = prepared.A[:end]
-                A[begin:, n:] = -np.eye(m)
-                found = self._solve(P, q, A, lower[:end], upper[:end])
-                if found is None:
-                    return x, False
-                x = found[:n]
-                self._freeze(prepared, lower, upper, own, prepared.A[own] @ x)
-            begin = end
+        for rows, low, high in prepared.levels():
+            begin, m = end, len(low)
+            end += m
+            if not m:
+                continue
+            P = np.diag(np.concatenate([np.full(n, _TINY), np.ones(m)]))
+            q = np.concatenate([-_TINY * prepared.reference, np.zeros(m)])
+            A = np.zeros((end, n + m))
+            A[:, :n] = prepared.A[:end]
+            A[begin:, n:] = -np.eye(m)
+            found = self._solve(P, q, A, lower[:end], upper[:end])
+            if found is None:
+                return x, False
+            x = found[:n]
+            reached = rows @ x  # what is equal or violated stays there; others keep their sides
+            fixed = (low == high) | (reached > high) | (reached < low)
+            lower[begin:end] = np.where(fixed, reached - self.slack, low)
+            upper[begin:end] = np.where(fixed, reached + self.slack, high)
         found = self._solve(np.eye(n), -prepared.reference, prepared.A, lower, upper)
         return (x, False) if found is None else (found, True)
-
-    def _freeze(self, problem: Problem, lower: Array, upper: Array, own: slice, reached: Array
-                ) -> None:
-        """Fix equalities and violated rows at what they have reached; others keep their sides."""
-        low, high = problem.lower[own], problem.upper[own]
-        fixed = (low == high) | (reached > high) | (reached < low)
-        lower[own] = np.where(fixed, reached - self.slack, low)
-        upper[own] = np.where(fixed, reached + self.slack, high)
 
     def _solve(self, P: Array, q: Array, A: Array, lower: Array, upper: Array) -> Array | None:
         equal = lower == upper

@@ -10,8 +10,9 @@ from weakref import finalize
 import numba
 import numpy as np
 
-from benchmark.solve.interface import Answer, Array, Problem, Solver
+from benchmark.solve.interface import Answer, Solver
 from benchmark.worker import Repeats
+from hierarchy.problem import Array, Hierarchy
 
 _VOID = ctypes.c_void_p
 _PASSED, _BUSY = 1, 2  # clocks of Linux: monotonic, and processor time of this process
@@ -21,7 +22,7 @@ _PASSED, _BUSY = 1, 2  # clocks of Linux: monotonic, and processor time of this 
 class _Handle:
     """A prepared problem, released with the object, and what its last solve has said."""
 
-    def __init__(self, library: ctypes.CDLL, problem: Problem) -> None:
+    def __init__(self, library: ctypes.CDLL, problem: Hierarchy) -> None:
         kept = [np.ascontiguousarray(values) for values in (
             problem.sizes, problem.A, problem.lower, problem.upper, problem.reference)]
         self.x, self.iterations = np.zeros(len(problem.reference)), np.array([-1])
@@ -51,11 +52,11 @@ class Compiled(Solver):
         """Return the name that was given, and what the file is: archives have no version."""
         return self.name
 
-    def refuses(self, problem: Problem) -> str:
+    def refuses(self, problem: Hierarchy) -> str:
         """`prepare` returns no handle."""
         return "" if _Handle(self.library, problem).address else "not for this solver"
 
-    def prepare(self, problem: Problem) -> _Handle:
+    def prepare(self, problem: Hierarchy) -> _Handle:
         """Let the library copy the data into its own form."""
         return _Handle(self.library, problem)
 

@@ -18,8 +18,7 @@ from benchmark.packages import OWN, Entrant
 from benchmark.report import Column, Report, Row, Section, Table, percent, power, short, whole, wide
 from benchmark.solve import oracle
 from benchmark.solve.entrants import ENTRANTS, NUMPY
-from benchmark.solve.interface import Problem, Solver
-from benchmark.solve.resolvers import as_problem
+from benchmark.solve.interface import Solver
 from benchmark.timing import take_turns
 from benchmark.worker import load
 from hierarchy.problem import Array, Hierarchy
@@ -61,36 +60,34 @@ def jacobians(arms: Array, q: Array) -> Array:
     return np.concatenate([np.cross(axes, p[:, None] - origins), axes], axis=2).swapaxes(1, 2)
 
 
-def regular(count: int, seed: int = 0) -> Array:
-    """Return Jacobians (count, 6, 6) with no singular value below REGULAR."""
-    def some(rng: np.random.Generator) -> Array:
-        J = jacobians(draw(count, rng), _configurations(count, rng))
-        return J[np.linalg.svdvals(J)[:, -1] >= REGULAR]
-
-    return _collect(some, count, seed)
+def regular(count: int, rng: np.random.Generator) -> Array:
+    """Return Jacobians (N <= count, 6, 6) with no singular value below REGULAR."""
+    J = jacobians(draw(count, rng), rng.uniform(-np.pi, np.pi, (count, 6)))
+    return J[np.linalg.svdvals(J)[:, -1] >= REGULAR]
 
 
-def near_singular(count: int, seed: int = 0) -> Array:
-    """Return Jacobians (count, 6, 6) between 1e-6 and 1e-2 rad away from a singular configuration.
+def near_singular(count: int, rng: np.random.Generator) -> Array:
+    """Return Jacobians (N <= count, 6, 6) between 1e-6 and 1e-2 rad from a singular configuration.
 
     Bisection finds a singular configuration between two whose determinants differ in sign; a step
     of log-uniform length leads away from it. The smallest singular value stays above NEAREST, the
     others above REGULAR.
     """
-    def some(rng: np.random.Generator) -> Array:
-        arms, low, high = draw(count, rng), _configurations(count, rng), _configurations(count, rng)
-        J_low, J_high = jacobians(arms, low), jacobians(arms, high)
-        apart = np.linalg.det(J_low) * np.linalg.det(J_high) < 0.0
-        apart &= np.linalg.svdvals(J_low)[:, -1] >= REGULAR  # some arms are singular everywhere
-        arms, low, high = arms[apart], low[apart], high[apart]
-        along = (high - low) / np.linalg.norm(high - low, axis=1, keepdims=True)
-        singular = _bisected(arms, low, high)
-        step = np.exp(rng.uniform(np.log(_STEPS[0]), np.log(_STEPS[1]), (len(singular), 1)))
-        J = jacobians(arms, singular + step * along)
-        s = np.linalg.svdvals(J)
-        return J[(s[:, -2] >= REGULAR) & (s[:, -1] >= NEAREST)]
-
-    return _collect(some, count, seed)
+    arms, (low, high) = draw(count, rng), rng.uniform(-np.pi, np.pi, (2, count, 6))
+    J = jacobians(arms, low)
+    begin = np.linalg.det(J)
+    apart = begin * np.linalg.det(jacobians(arms, high)) < 0.0
+    apart &= np.linalg.svdvals(J)[:, -1] >= REGULAR  # some arms are singular everywhere
+    arms, low, high, begin = arms[apart], low[apart], high[apart], begin[apart]
+    along = (high - low) / np.linalg.norm(high - low, axis=1, keepdims=True)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        before = (np.sign(np.linalg.det(jacobians(arms, middle))) == np.sign(begin))[:, None]
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    step = np.exp(rng.uniform(np.log(_STEPS[0]), np.log(_STEPS[1]), (len(low), 1)))
+    J = jacobians(arms, low + step * along)
+    s = np.linalg.svdvals(J)
+    return J[(s[:, -2] >= REGULAR) & (s[:, -1] >= NEAREST)]
 
 
 def draw(count: int, rng: np.random.Generator) -> Array:
@@ -101,29 +98,6 @@ def draw(count: int, rng: np.random.Generator) -> Array:
     return np.stack([a, d, alpha], axis=1)
 
 
-def _configurations(count: int, rng: np.random.Generator) -> Array:
-    return rng.uniform(-np.pi, np.pi, (count, 6))
-
-
-def _bisected(arms: Array, low: Array, high: Array) -> Array:
-    """Return configurations (N, 6) between low and high at which the determinant changes sign."""
-    sign = np.sign(np.linalg.det(jacobians(arms, low)))
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        before = (np.sign(np.linalg.det(jacobians(arms, middle))) == sign)[:, None]
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    return low
-
-
-def _collect(some: Callable[[np.random.Generator], Array], count: int, seed: int) -> Array:
-    rng, found = np.random.default_rng(seed), np.empty((0, 6, 6))
-    for _ in range(_BATCHES):
-        if len(found) >= count:
-            break
-        found = np.concatenate([found, some(rng)])
-    return found[:count]
-
-
 @final
 @dataclass(frozen=True)
 class Case:
@@ -131,13 +105,13 @@ class Case:
 
     tasks : for each task, rows of the end effector's Jacobian: 0 to 2 position, 3 to 5 rotation. A
         row that an upper task has too conflicts with it, since the targets differ.
-    jacobians : returns Jacobians (N, 6, 6) for a count N and a seed.
+    jacobians : draws Jacobians (N, 6, 6), up to a count.
     """
 
     name: str
     title: str
     tasks: tuple[tuple[int, ...], ...]
-    jacobians: Callable[[int, int], Array]
+    jacobians: Callable[[int, np.random.Generator], Array]
     damping: float = 0.0
 
 
@@ -194,7 +168,12 @@ def hierarchies(case: Case, count: int) -> tuple[list[Hierarchy], Array]:
     """
     order = [row for task in case.tasks for row in task]
     sizes = np.array([len(task) for task in case.tasks])
-    A = np.ascontiguousarray(case.jacobians(count, _SEED)[:, order])
+    rng, J = np.random.default_rng(_SEED), np.empty((0, 6, 6))
+    for _ in range(_BATCHES):
+        J = np.concatenate([J, case.jacobians(count, rng)])
+        if len(J) >= count:
+            break
+    A = np.ascontiguousarray(J[:count, order])
     b = np.random.default_rng(_SEED + 1).uniform(-_TARGETS, _TARGETS, (count, len(order)))
     off = b - b[:, [order.index(row) for row in order]]
     least = np.sqrt(np.add.reduceat(off**2, np.cumsum(sizes) - sizes, axis=1))
@@ -204,7 +183,7 @@ def hierarchies(case: Case, count: int) -> tuple[list[Hierarchy], Array]:
 def _errors(solver: Solver, case: Case, problems: Sequence[Hierarchy], least: Array,
             right: Sequence[Array]) -> Row:
     """Solve every problem; return errors of tasks and x, and the shares certified and failed."""
-    answered = [solver.read(solver.solve(solver.prepare(as_problem(h)))) for h in problems]
+    answered = [solver.read(solver.solve(solver.prepare(h))) for h in problems]
     solved = np.array([one.solved for one in answered])
     errors = np.array([abs(h.violations(one.x) - lowest) for h, one, lowest in zip(
         problems, answered, least, strict=True)])[solved]
@@ -267,10 +246,9 @@ def _field(figure: str, sizes: Sequence[Size], seed: int) -> list[tuple[Row, Cal
     for i, (joints, tasks, each) in enumerate(sizes):
         rng = np.random.default_rng(seed + i)  # almost surely of full rank, with joints enough
         b = rng.normal(size=each * tasks)
-        problem = Problem(rng.normal(size=(each * tasks, joints)), b, b, np.full(tasks, each),
-                          np.zeros(joints))
+        h = Hierarchy(rng.normal(size=(each * tasks, joints)), b, b, np.full(tasks, each))
         found += [({"figure": figure, "entrant": label, "joints": joints, "tasks": tasks,
                     "rows": each if figure == "rows" else each * tasks},
-                   partial(solver.solve, solver.prepare(problem)))
+                   partial(solver.solve, solver.prepare(h)))
                   for label, solver in solvers.items()]
     return found

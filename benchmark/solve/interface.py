@@ -1,70 +1,24 @@
 """What a solver is to the benchmark, and what it is asked about a problem.
 
 A solver is one class in one file: docs/extending/entrant.md shows one. It is asked for answers cold
-and warm, times, and the same bits twice. Needs only numpy, since any environment may run it.
+and warm, times, and the same bits twice. Needs only numpy, as `hierarchy.problem` does, since any
+environment may run it.
 """
 
 import json
-from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from time import process_time
-from typing import Any, NamedTuple, Self, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmark.worker import Repeats, reason, timed
+from hierarchy.problem import Array, Hierarchy
 
-Array = NDArray[np.float64]
 _MOVED = 0.01  # relative change of the sides between a problem and the one solved before it
-
-
-@final
-@dataclass(frozen=True)
-class Problem:
-    """Levels of rows lower <= A x <= upper, most important first; missing sides are infinite.
-
-    A : (m, n), C-contiguous. lower, upper : (m,). sizes : (L,) rows of each level. reference : (n,)
-    the x preferred where the levels leave freedom.
-    """
-
-    A: Array
-    lower: Array
-    upper: Array
-    sizes: NDArray[np.int64]
-    reference: Array
-
-    @property
-    def is_equality(self) -> bool:
-        """Whether every row is an equality."""
-        return bool((self.lower == self.upper).all())
-
-    @property
-    def ends(self) -> NDArray[np.int64]:
-        """Row after the last of each level: (L,)."""
-        return np.cumsum(self.sizes)
-
-    def without_last(self) -> Self | None:
-        """Return the problem without its last level that has rows; None if there is only one."""
-        full = np.flatnonzero(self.sizes)
-        if len(full) < 2:
-            return None
-        m = int(self.ends[full[-1] - 1])
-        return replace(self, A=self.A[:m].copy(), lower=self.lower[:m].copy(),
-                       upper=self.upper[:m].copy(), sizes=self.sizes[:full[-1]].copy())
-
-    def shifted(self) -> Self:
-        """Return the problem of x - reference, for solvers that know no reference."""
-        by = self.A @ self.reference
-        return replace(self, lower=self.lower - by, upper=self.upper - by,
-                       reference=np.zeros(len(self.reference)))
-
-    def moved(self, seed: int) -> Self:
-        """Return the problem with both sides of each row changed by a factor within 1 % of 1."""
-        factor = 1.0 + _MOVED * np.random.default_rng(seed).uniform(-1.0, 1.0, len(self.A))
-        return replace(self, lower=self.lower * factor, upper=self.upper * factor)
 
 
 class Answer(NamedTuple):
@@ -88,11 +42,11 @@ class Solver:
         """Return name and version of the package."""
         return f"{self.package} {version(self.package)}"
 
-    def refuses(self, problem: Problem) -> str:
+    def refuses(self, problem: Hierarchy) -> str:
         """Return why a problem is not of the class that the solver can be asked, or ""."""
         return ""
 
-    def prepare(self, problem: Problem) -> Any:
+    def prepare(self, problem: Hierarchy) -> Any:
         """Return the problem in the solver's own form."""
         return problem
 
@@ -116,14 +70,25 @@ class Solver:
         raise NotImplementedError
 
 
-def read_problems(file: Path) -> list[Problem]:
+def shifted(h: Hierarchy) -> Hierarchy:
+    """Return the problem of x - reference, for solvers that know no reference."""
+    by = h.A @ h.reference
+    return h.changed(lower=h.lower - by, upper=h.upper - by, reference=None)
+
+
+def moved(h: Hierarchy, rng: np.random.Generator) -> Hierarchy:
+    """Return the problem with both sides of each row changed by a factor within 1 % of 1."""
+    factor = 1.0 + _MOVED * rng.uniform(-1.0, 1.0, h.m)
+    return h.changed(lower=h.lower * factor, upper=h.upper * factor)
+
+
+def read_problems(file: Path) -> list[Hierarchy]:
     """Return the problems of a file; docs/problem-files.md describes it."""
     with np.load(file, allow_pickle=False) as kept:
         n = kept["n"]
         sizes = _parts(kept["sizes"], kept["levels"])
         m = np.array([own.sum() for own in sizes], dtype=np.int64)
-        return [Problem(A.reshape(len(lower), -1 if len(lower) else len(reference)), lower, upper,
-                        own, reference)
+        return [Hierarchy(A.reshape(-1, len(reference)), lower, upper, own, reference)
                 for A, lower, upper, own, reference in zip(
                     _parts(kept["A"], m * n), _parts(kept["lower"], m), _parts(kept["upper"], m),
                     sizes, _parts(kept["reference"], n), strict=True)]
@@ -145,7 +110,7 @@ class Questions:
         self._file, self._ready = "", dict[str, Any]()
         self.take([])
 
-    def take(self, problems: list[Problem], before: list[Problem | None] | None = None,
+    def take(self, problems: list[Hierarchy], before: list[Hierarchy | None] | None = None,
              sequence: bool = False) -> None:
         """Take problems, each with that of the tick before, if there is one and none is asked."""
         self.problems, self._sequence = problems, sequence
@@ -175,8 +140,9 @@ class Questions:
             said, raw = self._timed(problem)
             x, again = said["x"], self._solved(problem)
             said["same"] = bool(np.array_equal(x, again.x, equal_nan=True))
-            shorter = problem.without_last()
-            if shorter is not None and not self.solver.refuses(shorter):
+            full = np.flatnonzero(problem.sizes)
+            if len(full) > 1 and not self.solver.refuses(
+                    shorter := problem.upper_part(int(full[-1]))):
                 answer = self._solved(shorter)
                 said["without"] = answer.x.tolist() if answer.solved else None
             if self.solver.warm and (start := self._start(p)) is not None:
@@ -193,14 +159,14 @@ class Questions:
             asked, raw = self._answer
             raw = raw if asked == p - 1 else None
         else:
-            earlier = self.before[p] or self.problems[p].moved(p)
+            earlier = self.before[p] or moved(self.problems[p], np.random.default_rng(p))
             raw = self.solver.solve(self.solver.prepare(earlier))
         return None if getattr(raw, "memory", raw) is None else raw
 
-    def _solved(self, problem: Problem) -> Answer:
+    def _solved(self, problem: Hierarchy) -> Answer:
         return self.solver.read(self.solver.solve(self.solver.prepare(problem)))
 
-    def _timed(self, problem: Problem, before: Any = None) -> tuple[dict[str, Any], Any]:
+    def _timed(self, problem: Hierarchy, before: Any = None) -> tuple[dict[str, Any], Any]:
         """Solve from a cold start, or an earlier answer; return the row, and the solver's own."""
         solver, prepared = self.solver, self.solver.prepare(problem)
         start, prefix = ("cold", "") if before is None else ("warm", "warm_")

@@ -87,7 +87,7 @@ def miss_of(h: Hierarchy, proof: Proof | None, x: Array | None) -> Miss:
     """Return by how much x misses the proved levels; the distance to the reference is one more."""
     if x is None:
         return Miss()
-    if len(x) != h.n or not np.isfinite(x).all():
+    if not _is_answer(h, x):
         return Miss(np.inf, np.inf, 0)
     if proof is None:
         found = certify(h, x, RIGHT)
@@ -108,7 +108,7 @@ def miss_of(h: Hierarchy, proof: Proof | None, x: Array | None) -> Miss:
 
 def _moved(h: Hierarchy, proof: Proof | None, x: Array | None, without: Array | None) -> float:
     """Return the largest change of a violation above by the last level that has rows."""
-    if x is None or without is None or not (np.isfinite(x).all() and np.isfinite(without).all()):
+    if x is None or without is None or not (_is_answer(h, x) and _is_answer(h, without)):
         return np.nan
     above = int(np.flatnonzero(h.sizes)[-1])
     count = above if proof is None else min(above, proof.judged)
@@ -116,10 +116,13 @@ def _moved(h: Hierarchy, proof: Proof | None, x: Array | None, without: Array | 
     return float(change.max(initial=0.0))
 
 
+def _is_answer(h: Hierarchy, x: Array) -> bool:
+    return x.shape == (h.n,) and bool(np.isfinite(x).all())
+
+
 def _sizes(h: Hierarchy, proof: Proof | None) -> Array:
     """Return the norm of the largest row of each level times 1 + |x|: (L,), never zero."""
-    norms = np.linalg.norm(h.A, axis=1)
-    largest = np.array([norms[first:last].max(initial=0.0) for first, last in pairwise(h.offsets)])
+    largest = np.array([np.linalg.norm(A, axis=1).max(initial=0.0) for A, _, _ in h.levels()])
     reach = 1.0 + (float(np.linalg.norm(proof.x)) if proof is not None and proof.complete else 0.0)
     return np.where(largest > 0.0, largest, 1.0) * reach
 
@@ -180,16 +183,15 @@ def cells(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> list
 
 def steps_of(collections: Mapping[str, Collection]) -> dict[str, float]:
     """Return the largest step of the proved answers along each sequence, by family."""
-    found = {name: _step([proof.x if proof.complete else None for proof in one.answers or ()])
-             for name, one in collections.items() if one.head.sequence}
-    return {name: step for name, step in found.items() if not np.isnan(step)}
+    return {name: _step([proof.x if proof.complete else None for proof in one.answers or ()])
+            for name, one in collections.items() if one.head.sequence}
 
 
 def _step(points: Sequence[Array | None]) -> float:
-    """Return the largest distance of two successive points of one length; NaN if there is none."""
-    steps = [float(np.linalg.norm(one - other)) for one, other in pairwise(points)
-             if one is not None and other is not None and len(one) == len(other)]
-    return max(steps, default=np.nan)
+    """Return the largest distance of two successive finite points of one shape; NaN without."""
+    known = [x if x is not None and np.isfinite(x).all() else np.empty(0) for x in points]
+    return max((float(np.linalg.norm(one - other)) for one, other in pairwise(known)
+                if one.size and one.shape == other.shape), default=np.nan)
 
 
 def profile(rows: Sequence[Row], ratios: Array) -> dict[str, Array]:

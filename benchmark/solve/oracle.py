@@ -8,9 +8,11 @@ import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
 
+_RANK = 1e-9  # of rows of length 1
+_THRESHOLD = 0.1
 
-def solve(h: Hierarchy, damping: float = 0.0, threshold: float = 0.1,
-          rank_tolerance: float = 1e-9) -> Array:
+
+def solve(h: Hierarchy, damping: float = 0.0, threshold: float = _THRESHOLD) -> Array:
     """Return x (n,) of a hierarchy of equalities, with the damping that `Resolver` describes."""
     x, N = np.zeros(h.n), np.eye(h.n)
     for A, b, _ in h.levels():
@@ -19,12 +21,13 @@ def solve(h: Hierarchy, damping: float = 0.0, threshold: float = 0.1,
         B = A @ N
         size = np.linalg.norm(A, axis=1)
         _, s, Vt = np.linalg.svd(B / np.where(size > 0, size, 1.0)[:, None])
-        rank = int(np.count_nonzero(s > rank_tolerance))
+        rank = int(np.count_nonzero(s > _RANK))
         V = Vt[:rank].T  # directions of the null space that these rows can see
         M, missing = B @ V, b - A @ x
-        lam = damping_of(B, rank, damping, threshold)
-        if lam > 0:
-            y = np.linalg.solve(M.T @ M + lam**2 * np.eye(rank), M.T @ missing)
+        smallest = np.linalg.svd(B, compute_uv=False)[-1] if rank == len(B) else 0.0
+        lam2 = damping**2 * max(0.0, 1.0 - (smallest / threshold) ** 2)
+        if lam2 > 0.0:
+            y = np.linalg.solve(M.T @ M + lam2 * np.eye(rank), M.T @ missing)
         else:
             y = np.linalg.pinv(M) @ missing
         x = x + N @ V @ y
@@ -32,28 +35,16 @@ def solve(h: Hierarchy, damping: float = 0.0, threshold: float = 0.1,
     return np.asarray(x + N @ (N.T @ h.reference))
 
 
-def damping_of(B: Array, rank: int, damping: float, threshold: float) -> float:
-    """Return lambda of one level, from the smallest singular value counted over its rows."""
-    smallest = np.linalg.svd(B, compute_uv=False)[-1] if rank == len(B) else 0.0
-    return float(damping * np.sqrt(max(0.0, 1.0 - (smallest / threshold) ** 2)))
-
-
-def published(h: Hierarchy, rank_tolerance: float = 1e-9, damping: float = 0.0,
-              threshold: float = 0.1) -> tuple[Array, Array]:
+def published(h: Hierarchy, damping: float = 0.0) -> tuple[Array, Array]:
     """Return x and F of the published Task Priority Matrix: eqs. (8)-(10), (14)."""
-    A, b = h.A, h.lower
-    m, n = A.shape
+    A, b, (m, n) = h.A, h.lower, h.A.shape
     F = np.linalg.qr(np.hstack([A, np.zeros((m, max(0, m - n)))]).T)[1]
-    tolerance = rank_tolerance * np.linalg.norm(A, axis=1).max()
+    tolerance = _RANK * np.linalg.norm(A, axis=1).max()
     for i, j in zip(h.offsets[:-1], h.offsets[1:], strict=True):
-        F[i:j] = _pivot(F[i:j, i:j], tolerance, damping, threshold) @ F[i:j]
+        U, s, Vt = np.linalg.svd(F[i:j, i:j])
+        lam2 = damping**2 * max(0.0, 1.0 - (s.min(initial=np.inf) / _THRESHOLD) ** 2)
+        gain = [v / (v * v + lam2) if lam2 > 0.0 or v > tolerance else 0.0 for v in s]
+        F[i:j] = Vt.T @ np.diag(gain) @ U.T @ F[i:j]
         F[:i] -= F[:i, i:j] @ F[i:j]
     F = F.T
-    return np.linalg.pinv(A, rcond=rank_tolerance) @ (F @ b - A @ h.reference) + h.reference, F
-
-
-def _pivot(R: Array, tolerance: float, damping: float, threshold: float) -> Array:
-    U, s, Vt = np.linalg.svd(R)
-    lam2 = damping**2 * max(0.0, 1.0 - (s[-1] / threshold) ** 2) if len(s) else 0.0
-    gain = [v / (v * v + lam2) if lam2 > 0 or v > tolerance else 0.0 for v in s]
-    return np.asarray(Vt.T @ np.diag(gain) @ U.T)
+    return np.linalg.pinv(A, rcond=_RANK) @ (F @ b - A @ h.reference) + h.reference, F

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmark.solve.interface import Answer, Array, Problem, Solver
+from benchmark.solve.interface import Answer, Solver
 from hierarchy.errors import HierarchyError
-from hierarchy.problem import Hierarchy
+from hierarchy.problem import Array, Hierarchy
 from solvers import Resolution, Status, make
 from solvers.qp import backends
 
@@ -21,19 +21,15 @@ class Ours(Solver):
     def __init__(self, resolver: str, **settings: Any) -> None:
         self.resolver = make(resolver, **settings)
 
-    def refuses(self, problem: Problem) -> str:
+    def refuses(self, problem: Hierarchy) -> str:
         """Return what the resolver says of a problem that it cannot handle, or ""."""
         if self.resolver.strict and self.resolver.can_resolve("inequalities"):
             return ""
         try:
-            self.resolver.solve(self.prepare(problem))
+            self.resolver.solve(problem)
         except HierarchyError as refusal:
             return str(refusal)
         return ""
-
-    def prepare(self, problem: Problem) -> Hierarchy:
-        """Wrap the arrays."""
-        return Hierarchy(problem.A, problem.lower, problem.upper, problem.sizes, problem.reference)
 
     def solve(self, prepared: Hierarchy) -> Resolution:
         """Solve without memory."""
@@ -62,18 +58,16 @@ class Plain(Solver):
 
     package = "numpy"
 
-    def refuses(self, problem: Problem) -> str:
+    def refuses(self, problem: Hierarchy) -> str:
         """Equalities only."""
         return "" if problem.is_equality else "equalities only"
 
-    def solve(self, prepared: Problem) -> Array:
+    def solve(self, prepared: Hierarchy) -> Array:
         """Solve level by level."""
-        n, begin = len(prepared.reference), 0
-        x, P = np.zeros(n), np.eye(n)
-        for end in prepared.ends.tolist():
-            J, b = prepared.A[begin:end], prepared.lower[begin:end]
+        x, P = np.zeros(prepared.n), np.eye(prepared.n)
+        for J, b, _ in prepared.levels():
             inverse = np.linalg.pinv(J @ P, rcond=1e-9)
-            x, P, begin = x + inverse @ (b - J @ x), P - inverse @ (J @ P), end
+            x, P = x + inverse @ (b - J @ x), P - inverse @ (J @ P)
         return np.asarray(x + P @ prepared.reference)
 
     def read(self, raw: Array) -> Answer:

@@ -8,18 +8,15 @@ from collections.abc import Sequence
 from math import nan
 from typing import Any
 
-import numpy as np
-
 from benchmark import figures
 from benchmark.packages import Entrant
 from benchmark.report import TIMES, Column, Report, Row, Section, Table, percent, power, tell, whole
 from benchmark.solve.entrants import ENTRANTS, HIERARCHICAL, NUMPY
-from benchmark.solve.interface import Problem, Questions
+from benchmark.solve.interface import Questions
 from benchmark.solve.judge import RIGHT, by, judged, summary
 from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
 from hierarchy.errors import check_name
-from hierarchy.problem import Hierarchy
 from scenarios.problems import recorded
 from scenarios.problems.recorded import FAMILIES
 from solvers import certify, names
@@ -115,25 +112,19 @@ def asked(name: str, problems: Sequence[recorded.Problem], entrants: Sequence[En
 
     name : of the family.
     """
-    plain = [as_problem(one.h) for one in problems]
-    before = [None if one.before is None else as_problem(one.before) for one in problems]
-    turn = Repeats(most=_MOST, turn=int(1e9 * seconds / len(plain)))
+    hierarchies, before = [one.h for one in problems], [one.before for one in problems]
+    turn = Repeats(most=_MOST, turn=int(1e9 * seconds / len(problems)))
     running: dict[str, Questions] = {}
     with one_core():
         for one in entrants:
             own = Questions(load(one.adapter), dict(one.options), turn)
-            if not own.solver.refuses(plain[0]):
-                own.take(plain, before)
+            if not own.solver.refuses(hierarchies[0]):
+                own.take(hierarchies, before)
                 own.asked(0)  # loads and compiles
                 running[one.label] = own
         return [judged({"entrant": label, "family": name, "problem": p, **own.asked(p)}, problem.h,
                        problem.proof)
                 for p, problem in enumerate(problems) for label, own in running.items()]
-
-
-def as_problem(h: Hierarchy) -> Problem:
-    """Return a hierarchy as entrants have it."""
-    return Problem(h.A, h.lower, h.upper, np.asarray(h.sizes), h.reference)
 
 
 def _warm(row: Row, problem: recorded.Problem) -> Row:

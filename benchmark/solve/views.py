@@ -114,7 +114,7 @@ def lead(title: str, total: Sequence[Row], cells: Sequence[Row]) -> list[str]:
     better, faster = [], []
     for family, some in by(cells, "family"):
         own = next((row for row in some if row["entrant"] == best[0]), None)
-        if own is None:  # added to the others later, it has not been asked
+        if own is None or not own["asked"]:  # it refuses the family, or others were added later
             continue
         other = max(some, key=lambda row: (row["entrant"] in widely) * row["right"])
         if other["right"] > own["right"]:

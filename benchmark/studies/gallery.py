@@ -41,7 +41,7 @@ def main(scenarios: Annotated[list[str] | None, typer.Argument()] = None, out: P
     """Run the given scenarios, by default all, and write their pictures."""
     for name in () if documents else scenarios or shipped():
         recording, drawn = uninterrupted(load(name)), io.BytesIO()
-        with matplotlib.rc_context(drawing.style()):
+        with matplotlib.rc_context(drawing.present().settings):
             picture({name: recording}).savefig(drawn, format="png", dpi=130, facecolor="white")
         _write(drawn, make_folder(out) / f"{name}.png")
         print(f"{name}: {'; '.join(_main_numbers(recording))}", flush=True)

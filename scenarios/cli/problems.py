@@ -116,10 +116,10 @@ def _about(collection: Collection) -> dict[str, Any]:
             "half": head.half + (f", seed {head.seed}" if head.seed else ""),
             "problems": len(found),
             "sequence": f"ticks of {1e3 * head.period:g} ms" if head.sequence else "no",
-            **{what: str(min(of)) if len(set(of)) == 1 else f"{min(of)} to {max(of)}"
+            **{what: " to ".join(dict.fromkeys(map(str, (min(of), max(of))))) if of else "none"
                for what, of in (("unknowns", [h.n for h in found]), ("rows", [h.m for h in found]),
                                 ("levels", [len(h.sizes) for h in found]))},
-            "usual sizes": usual + (", and others" if len(sizes) > 2 else ""),
+            "usual sizes": (usual or "none") + (", and others" if len(sizes) > 2 else ""),
             "equalities": f"{100.0 * equal / max(rows, 1):.0f} % of the rows",
             "sha256": collection.digest}
     if collection.answers is not None:
@@ -127,6 +127,6 @@ def _about(collection: Collection) -> dict[str, Any]:
         said |= {"proved": f"{sum(one.complete for one in answers)} completely",
                  "ill-posed": sum(one.posed <= len(h.sizes)
                                   for one, h in zip(answers, found, strict=True)),
-                 "largest shift, turn": f"{max(one.shift for one in answers):.1e}, "
-                                        f"{max(one.turn for one in answers):.1e}"}
+                 "largest shift, turn": f"{max((one.shift for one in answers), default=0.0):.1e}, "
+                                        f"{max((one.turn for one in answers), default=0.0):.1e}"}
     return said

@@ -134,7 +134,7 @@ def _why(one: Labelled, other: Labelled, tick: int, accuracy: float) -> str:
         return ("while limits act, sns scales what it cannot meet"
                 if "sns" in (mine.resolver.name, theirs.resolver.name) else
                 "while limits act, they agree only without damping")
-    stacks = [np.array([*run.orders, ""])[run["order"][:tick + 1]] for _, run in (one, other)]
+    stacks = [run.stacks()[:tick + 1] for _, run in (one, other)]
     switched = np.flatnonzero(stacks[0] != stacks[1])
     if switched.size:
         return (f"the stack is another one at tick {switched[0]}, where a switch came earlier or "

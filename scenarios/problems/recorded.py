@@ -59,11 +59,8 @@ def ticks(seed: int) -> Iterator[tuple[Hierarchy, Array]]:
 
 def _without(h: Hierarchy, name: str) -> Hierarchy:
     """Return a copy of h without a level."""
-    level = h.names.index(name)
-    kept = np.delete(np.arange(h.m), np.arange(h.offsets[level], h.offsets[level + 1]))
-    names = tuple(other for other in h.names if other != name)
-    return h.changed(A=h.A[kept], lower=h.lower[kept], upper=h.upper[kept],
-                     sizes=np.delete(h.sizes, level), reference=h.start(), names=names)
+    kept = {own: level for own, level in zip(h.names, h.levels(), strict=True) if own != name}
+    return Hierarchy.from_levels([*kept.values()], h.reference, [*kept])
 
 
 def answer(h: Hierarchy) -> Array | None:

@@ -10,17 +10,9 @@ from typing import final
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, brief, expect, file_path, whole
+from scenarios import files
 from scenarios.config import Scenario, load, members, shipped_groups
 from scenarios.config.scenario import OWN
-from scenarios.files import (
-    OutputError,
-    claim,
-    make_folder,
-    remove_empty,
-    unlock,
-    write_json,
-    write_text,
-)
 from scenarios.loop.simulation import simulate, uninterrupted
 from scenarios.measure.run_folder import kept, versions
 from scenarios.measure.runs import Run
@@ -63,7 +55,7 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     """
     whole("compare: workers", workers, 1)
     planned, refused = _plan(scenarios, resolvers)
-    folder = None if out is None else make_folder(claim(file_path("compare: out", out)))
+    folder = None if out is None else files.make_folder(files.claim(file_path("compare: out", out)))
     where = [] if out is None else ["--out", str(out)]
     said = command or Comparison(tuple(planned), "", {}).asked(*where)
     empty = Comparison((), said, versions(), refused, None if out is None else str(out))
@@ -79,8 +71,8 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
         raise
     finally:
         if folder is not None:
-            remove_empty(folder)
-            unlock(folder)
+            files.remove_empty(folder)
+            files.unlock(folder)
 
 
 class PageError(RuntimeError):
@@ -139,8 +131,8 @@ class _Written:
     def _write(self, folder: Path, found: Comparison) -> None:
         from scenarios.results.page import comparison_page
 
-        write_json(folder / "comparison.json", found.as_plain_data())
-        write_text(folder / "index.html", comparison_page(found, self._count))
+        files.write_json(folder / "comparison.json", found.as_plain_data())
+        files.write_text(folder / "index.html", comparison_page(found, self._count))
 
 
 def _write_table(folder: Path, found: Comparison) -> None:
@@ -223,11 +215,11 @@ def _recorded(scenario: Scenario, folder: Path | None,
         return None, "interrupted"
     except Exception as error:  # a failure is a result too, and must not affect the other runs
         if folder is not None:
-            write_text(make_folder(folder) / "scenario.toml", scenario.to_toml())
+            files.write_text(files.make_folder(folder) / "scenario.toml", scenario.to_toml())
         return None, f"{type(error).__name__}: {error}"
     try:
         return recording, None if folder is None else kept(recording, folder)
-    except (OSError, OutputError) as error:
+    except (OSError, files.OutputError) as error:
         return recording, f"not saved: {error}"
 
 

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from hierarchy.problem import Array
 from hierarchy.words import counted, in_words, listed
 from scenarios.config import Scenario
-from scenarios.config.distributions import Parameters
 from scenarios.config.validation import unit_at
 from scenarios.draw.figures import drawing
 from scenarios.draw.figures.drawing import INK, svg
@@ -43,7 +42,9 @@ def sampled_page(plan: Plan, found: Mapping[str, Results], folder: Path, command
     labels = listed(list(dict.fromkeys(run.label for run in plan.runs)))
     count = (f"{counted(len(plan.runs), 'run')}: {counted(sweep.samples, 'sample')}, each under "
              f"{labels}")
-    each = {one.name: _sampled((one.variation if sweep.variation else {}) | sweep.parameters)
+    each = {one.name: [  # key, distribution and unit of each parameter
+        (key, str(how), unit_at(Scenario, key.split("."))) for key, how in (
+            (one.variation if sweep.variation else {}) | sweep.parameters).items()]
             for one in plan.scenarios}
     first, *others = each.values()
     with drawing.styled(drawing.SCREEN):
@@ -54,11 +55,6 @@ def sampled_page(plan: Plan, found: Mapping[str, Results], folder: Path, command
         refused=plan.refused, made_by=made_by, unfinished="",
         style=resource("results/style.css"), script=resource("results/page.js"), counted=count,
         scenarios=shown, about_rows=_ABOUT_ROWS, command=command, file=file, versions=versions()))
-
-
-def _sampled(parameters: Parameters) -> list[tuple[str, str, str]]:
-    """Return key, distribution and unit of each parameter."""
-    return [(key, str(how), unit_at(Scenario, key.split("."))) for key, how in parameters.items()]
 
 
 def worst_runs(found: Mapping[str, Results]) -> list[Job]:
@@ -156,7 +152,8 @@ def _spread(results: Results, metric: Metric) -> Figure:
         seen = values[(values >= low) & (values <= high)]
         ax.plot([seen.min(), seen.max()], [y, y], ".", color=colours[label], ms=4.5)
         if beyond := values.size - seen.size:
-            ax.text(1.0, y, f"{beyond} beyond, to {max(values, key=abs):.3g}", fontsize=7.5,
+            farthest = max(values, key=lambda value: max(low - value, value - high))
+            ax.text(1.0, y, f"{beyond} beyond, to {farthest:.3g}", fontsize=7.5,
                     ha="right", va="bottom", transform=ax.get_yaxis_transform())
     ax.set_yticks(range(len(known)), names)
     ax.set_ylim(len(known) - 0.5, -0.5)

@@ -124,6 +124,15 @@ def test_only_x_decides_whether_an_answer_is_right(x, solved, verdict, level):
         assert (one["absolute"], one["relative"]) == pytest.approx((1.0, 0.5 / (1.0 + 10.0**0.5)))
 
 
+@pytest.mark.parametrize("x", [[3.0], [[3.0], [1.0]], 3.0])
+def test_an_answer_of_another_shape_is_wrong_and_stops_no_report(x):
+    one = collection([simple(3.0)] * 2, sequence=True)
+    rows = [{**raw(None, one, p), "x": x, "without": [3.0]} for p in (0, 1)]
+    rows = judging.judge(rows, {one.digest: one})
+    assert [row["verdict"] for row in rows] == [judging.WRONG] * 2
+    assert np.isnan(judging.summary(rows, {"simple": 2.0})["moved"])
+
+
 @pytest.mark.parametrize(("more", "verdict"), [
     ({"ended": CRASHED}, judging.CRASHED), ({"ended": HUNG}, judging.HUNG),
     ({"ended": LEFT_OUT}, judging.CRASHED), ({"refused": "no"}, judging.REFUSED),
@@ -144,13 +153,20 @@ def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():
     assert np.isnan(judging.summary([found(None, refused="no", start_kib=1000)])["memory_mb"])
 
 
+def test_steps_to_an_answer_that_is_not_finite_are_no_steps():
+    points = [np.array([np.inf]), np.array([np.inf]), None, np.zeros(1), np.ones(1), np.ones(2)]
+    assert judging._step(points) == judging._step(points[::-1]) == 1.0
+    assert np.isnan(judging._step(points[:4]))
+
+
 def test_the_best_may_lack_a_family_that_another_was_asked_later():
     def row(name, family, asked, right):
         return {"entrant": name, "family": family, "asked": asked, "right": right, "median_us": 1.0}
 
     total = [row("best", "", 100, 1.0), row("other", "", 102, 0.5)]
     some = [row("best", "a", 100, 1.0), row("other", "a", 100, 0.5), row("other", "b", 2, 0.5)]
-    assert "More often right than best: none." in views.lead("", total, some)
+    for refused in ([], [row("best", "b", 0, np.nan)]):
+        assert "More often right than best: none." in views.lead("", total, [*some, *refused])
 
 
 def test_a_set_that_nobody_can_be_asked_has_its_tables():

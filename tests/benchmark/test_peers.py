@@ -159,6 +159,12 @@ def test_a_package_without_an_answer_is_in_the_tables_of_stand(monkeypatch, caps
     assert "lost" in capsys.readouterr().out
 
 
+def test_a_package_that_ends_at_every_pose_has_a_row_without_numbers():
+    row = reaching.judge([{"ended": "crashed"}], Robot.named("kuka_lwr"), ("end_effector",),
+                         np.zeros((1, 1, 4, 4)))
+    assert row == {"reached %": 0.0}
+
+
 def test_unreachable_poses_are_beyond_the_arm_however_few_there_are():
     robot = Robot.named("kuka_lwr")
     one, many = (reaching.problems(robot, ("end_effector",), count, 0, False)[0]

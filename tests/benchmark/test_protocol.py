@@ -45,7 +45,9 @@ def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters():
 
 def test_a_run_that_ends_in_a_fault_has_the_worst_value():
     y, x = np.ones(SIZE), np.full(SIZE, np.inf)
-    assert verdict(rows(x=x, y=y), above="y", matters=0.1).decided == "supported"
+    found = verdict(rows(x=x, y=y), above="y", matters=0.1)
+    assert found.decided == "supported"
+    assert verdicts.shown(found.claim, rows(x=x, y=y), found.effect) == "∞ [∞, ∞] rad/s"
     assert verdict(rows(x=x, y=x), above="y", matters=0.1).decided == "no effect that matters"
     assert verdict(rows(x=x), most=5.0).decided == "contradicted"
     assert verdict(rows(x=y), most=5.0).decided == "supported"
@@ -60,6 +62,12 @@ def test_the_blocked_test_is_wilcoxons_in_one_block_and_ignores_shifts_between_b
     shifted = verdicts.blocked(apart - found.low - 1e-9, np.zeros(40, dtype=int))
     assert shifted.p == pytest.approx(0.05, abs=0.01)
     assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+
+
+def test_an_effect_between_infinite_ones_of_both_signs_is_none():
+    apart = np.array([-np.inf, -np.inf, np.inf, np.inf])
+    found = verdicts.blocked(apart, np.zeros(4, dtype=int))
+    assert (found.estimate, found.low, found.high) == (0.0, -np.inf, np.inf)
 
 
 def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
@@ -158,6 +166,14 @@ Times of one call
 """
 
 
+def test_what_is_not_there_yet_is_named_and_ends_no_filling():
+    asked = {"table": "EQ7", "row": "hcod", "place": "3"}
+    with pytest.raises(HierarchyError, match="row 'hcod' below 'EQ7' of the output has no number"):
+        blocks.cell("EQ7\nhcod 1.0 2.0\n", asked)
+    assert pages._median("EQ7\nhcod – –\n", "EQ7", "hcod") == "–"
+    assert "hierarchy reproduce fronts" in fronts.table([], next(iter(fronts.FRONTS)))[0]
+
+
 def page(mark, inside=""):
     return f"before\n<!-- measured: {mark} -->\n{inside}<!-- end -->\nafter\n"
 
@@ -174,6 +190,8 @@ def test_a_page_gets_the_whole_output_or_the_lines_between_two(tmp_path):
     assert fill(page(mark)) == page(mark, f"```\n{head}\n\n{head}\nplain numpy   55.3 83.4\n```\n")
     for text, says in ((page("python b.py"), r"page\.md: no output of 'python b\.py' is stored"),
                        (page("python a.py | EQ8 .. EQ9"), "has no line that starts with 'EQ8'"),
+                       (page("table of python a.py"), r"page\.md: not enough values"),
+                       (page("python a.py | without ("), r"page\.md: missing \)"),
                        ("<!-- reproduce: other -->\n<!-- end -->", r"page\.md: block 'other'")):
         with pytest.raises(HierarchyError, match=says):
             fill(text)

@@ -88,6 +88,7 @@ def test_failing_problems_are_listed_and_saved(tmp_path, monkeypatch):
     told = stress.report("wrong", {stress.RECIPE: found}, tmp_path)
     assert told.failed
     assert f"recipe, seed {found.failing[0][0]}, {stress.WRONG}" in told.sections[0].text
+    assert told.sections[0].tables[0].cells()[0][1][:4] == ["1", "0", "1", "0"]  # 0 certified
     kept = problems.load(next(tmp_path.glob("wrong-*.npz")))
     assert stress.outcome(Wrong(stress.WRONG), kept)[0] == stress.WRONG
 
@@ -193,3 +194,5 @@ def test_a_process_is_measured_and_one_that_fails_is_named():
     assert 0.0 < processor
     with pytest.raises(RuntimeError, match="no such thing"):
         start._measured(Case("a fault", None, ["-c", "raise SystemExit('no such thing')"]))
+    with pytest.raises(RuntimeError, match="unknown scenario 'elipse'"):
+        start._measured(Case("a run", None, ["-c", start._COMMAND, "run", "elipse"]))

@@ -1,5 +1,7 @@
 """`hierarchy problems`, and whether fresh problems are like the stored ones of their family."""
 
+import re
+
 import numpy as np
 import pytest
 from rank_cases import solved
@@ -9,7 +11,7 @@ from scenarios.problems import recorded
 from scenarios.problems.families import FAMILIES, available, export, family, save
 from scenarios.problems.made import posed
 from solvers import Status, certify, make, problems
-from solvers.problems.files import read
+from solvers.problems.files import Collection, Head, read
 
 
 def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, command, tmp_path):
@@ -24,6 +26,12 @@ def test_a_family_without_its_package_is_left_out_and_said(monkeypatch, command,
     said = command("problems export all --count 1 --no-answers --out", tmp_path).err
     assert ("left out: singular-panda, which needs example-robot-data: pip install "
             "'task-hierarchy[descriptions]'") in said
+
+
+def test_a_file_without_problems_is_described(command, tmp_path):
+    Collection(Head("none", "", "fresh", 1), (), ()).save(tmp_path / "none.npz")
+    said = command("problems show", tmp_path / "none.npz").out
+    assert re.search(r"^unknowns +none$", said, re.MULTILINE)
 
 
 @pytest.mark.parametrize("name", ["EQ7", "INEQ7", "DEGEN7", *problems.KINDS, "recipe"])

@@ -239,6 +239,14 @@ def test_an_axis_shows_values_up_to_twice_the_width_of_their_middle_away(outlier
         assert sampled_page._limits([np.full(9, same)]) == pytest.approx((same - room, same + room))
 
 
+def test_the_farthest_of_the_values_beyond_an_axis_is_named_not_the_largest():
+    values = np.append(np.linspace(-100.0, -99.0, 100), 50.0)
+    metric = metrics.Metric("margin", "Margin", 1.0, "N")
+    jobs = tuple(Job("", "", "", sample=i, label="a") for i in range(101))
+    fig = sampled_page._spread(Results(jobs, (None,) * 101, {}, {"margin": values}), metric)
+    assert [text.get_text() for text in fig.axes[0].texts] == ["1 beyond, to 50"]
+
+
 @pytest.mark.parametrize(("speed", "stopped", "same", "best"), [
     (1.0, 0, True, "none"), (1.0, 3, False, "none"), (np.nan, 16, False, "none"),
     (0.1, 0, False, "Joint speed: b"), (0.1, 3, False, "none"), (0.1, 16, False, "none"),

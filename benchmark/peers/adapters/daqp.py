@@ -7,7 +7,8 @@ import numpy as np
 import pinocchio as pin
 
 from benchmark.peers.scenes import Arm, Array, RefusedError
-from benchmark.solve.interface import Answer, Problem, Solver
+from benchmark.solve.interface import Answer, Solver
+from hierarchy.problem import Hierarchy
 
 _UNBOUNDED = 1e30  # how it writes a missing side
 
@@ -45,14 +46,14 @@ class Daqp(Solver):
     def __init__(self, **settings: float) -> None:
         self.settings = settings
 
-    def prepare(self, problem: Problem) -> tuple[Any, ...]:
+    def prepare(self, problem: Hierarchy) -> tuple[Any, ...]:
         """Convert, with a unit Hessian for the distance to the reference."""
-        n = len(problem.reference)
+        n = problem.n
         leading = len(problem.sizes) and problem.sizes[0] == n
         bounds = n if leading and (problem.A[:n] == np.eye(n)).all() else 0
         return (np.eye(n), -problem.reference, np.ascontiguousarray(problem.A[bounds:]),
                 np.minimum(problem.upper, _UNBOUNDED), np.maximum(problem.lower, -_UNBOUNDED),
-                np.zeros(len(problem.A), dtype=np.int32), problem.ends.astype(np.int32))
+                np.zeros(problem.m, dtype=np.int32), problem.offsets[1:].astype(np.int32))
 
     def solve(self, prepared: tuple[Any, ...]) -> Any:
         """Call it."""

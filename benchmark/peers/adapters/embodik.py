@@ -10,7 +10,8 @@ import embodik
 import numpy as np
 
 from benchmark.peers.scenes import Arm, Array
-from benchmark.solve.interface import Answer, Problem, Solver
+from benchmark.solve.interface import Answer, Solver, shifted
+from hierarchy.problem import Hierarchy
 
 _UNBOUNDED = 1e10  # how it writes a missing side
 
@@ -50,21 +51,20 @@ class Embodik(Solver):
     def __init__(self, refine: bool = False) -> None:
         self.refine = refine
 
-    def refuses(self, problem: Problem) -> str:
+    def refuses(self, problem: Hierarchy) -> str:
         """Inequalities belong in the first level."""
         equal = problem.lower == problem.upper
         first = int(problem.sizes[0]) if len(problem.sizes) else 0
         if not equal[first:].all():
             return "inequalities in the first level only"
-        return "" if (len(problem.A) > first or not equal.all()) else "no task"
+        return "" if (problem.m > first or not equal.all()) else "no task"
 
-    def prepare(self, problem: Problem) -> tuple[Array, tuple[Any, ...]]:
+    def prepare(self, problem: Hierarchy) -> tuple[Array, tuple[Any, ...]]:
         """Split limits and tasks, of x - reference; a first level of equalities is a task."""
-        reference, problem = problem.reference, problem.shifted()
-        n, first = len(problem.reference), int(problem.sizes[0])
+        reference, problem = problem.reference, shifted(problem)
+        n, first = problem.n, int(problem.sizes[0])
         limits = 0 if (problem.lower[:first] == problem.upper[:first]).all() else first
-        begins = np.concatenate([[0], problem.ends])
-        levels = [slice(begin, end) for begin, end in itertools.pairwise(begins)
+        levels = [slice(begin, end) for begin, end in itertools.pairwise(problem.offsets)
                   if end > begin >= limits]
         C = problem.A[:limits] if limits else np.eye(n)
         lower = problem.lower[:limits] if limits else np.full(n, -_UNBOUNDED)

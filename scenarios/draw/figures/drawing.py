@@ -3,7 +3,7 @@
 import io
 import itertools
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -77,7 +77,7 @@ class Style:
     of the files; lines: line styles of the joints in turn.
     """
 
-    settings: Mapping[Any, Any]
+    settings: dict[Any, Any]
     width: float | None
     titled: bool
     formats: tuple[str, ...]
@@ -98,7 +98,7 @@ def styled(style: Style) -> Iterator[None]:
     """Draw and write all figures in a style within the context, whatever the user's own is."""
     token = _present.set(style)
     try:
-        with matplotlib.style.context(["default", dict(style.settings)]):
+        with matplotlib.style.context(["default", style.settings]):
             yield
     finally:
         _present.reset(token)
@@ -120,16 +120,11 @@ def joint_line(joint: int) -> dict[str, Any]:
     return {"color": JOINTS[joint % len(JOINTS)], "linestyle": lines[joint % len(lines)]}
 
 
-def style() -> dict[Any, Any]:
-    """Return matplotlib's settings of the present style."""
-    return dict(present().settings)
-
-
 def figure(rows: int = 1, width: float = 3.3, height: float = 2.1) -> tuple[Figure, list[Axes]]:
     """Return a figure of `rows` axes one below the other, in the present style; sizes in inches."""
     if (fixed := present().width) is not None:
         width, height = fixed, height * min(max(fixed / width, _LEAST_HEIGHT), 1.0)
-    with matplotlib.rc_context(style()):
+    with matplotlib.rc_context(present().settings):
         fig = Figure(figsize=(width, height), layout="constrained")
         axes = fig.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     return fig, list(axes)
@@ -144,12 +139,9 @@ def envelope(y: Array) -> NDArray[np.int64]:
         return np.arange(len(y))
     edges = np.linspace(0, len(y), _BUCKETS + 1).astype(int)
     kept = {0, len(y) - 1}
-    for first, last in itertools.pairwise(edges):
-        part = y[first:last]
-        if np.isnan(part).all():
-            kept.add(first)
-        else:
-            kept.update((first + int(np.nanargmin(part)), first + int(np.nanargmax(part))))
+    for first, last in itertools.pairwise(edges.tolist()):
+        known = first + np.flatnonzero(~np.isnan(y[first:last]))
+        kept.update([known[y[known].argmin()], known[y[known].argmax()]] if known.size else [first])
     return np.array(sorted(kept))
 
 
@@ -176,7 +168,7 @@ def project(points: Array, azimuth: float = 150.0, elevation: float = 30.0) -> A
 def svg(fig: Figure, title: str) -> Markup:
     """Return a figure as a scalable inline `<svg>` with a title, in the colours of the page."""
     text = io.StringIO()
-    with matplotlib.rc_context({**style(), "svg.hashsalt": title}):
+    with matplotlib.rc_context({**present().settings, "svg.hashsalt": title}):
         fig.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     body = text.getvalue()[text.getvalue().index("<svg"):]
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
@@ -195,7 +187,7 @@ def write(fig: Figure, stem: str) -> None:
     The same figure gives the same bytes: no file has a date.
     """
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    with matplotlib.rc_context({**style(), "svg.hashsalt": "task-hierarchy"}):
+    with matplotlib.rc_context({**present().settings, "svg.hashsalt": "task-hierarchy"}):
         fig.draw_without_rendering()  # arranges the figure, once for all formats
         fig.set_layout_engine("none")
         for kind in present().formats:

@@ -214,9 +214,7 @@ def _flat(points: Array) -> Array:
 
 def _extent(robot: RobotFacts, recording: Recording, ticks: Array) -> tuple[float, float, float]:
     """Return the greatest width [m] of the drawn bodies, and their lowest and highest point."""
-    links = robot.capsules
-    radii = np.array([[link.radius] for link in links])
-    flat = [_flat(ends(links, robot.placements(q))) for q in recording["q"][ticks]]
-    low = np.array([(body - radii[..., None]).min(axis=(0, 1)) for body in flat])
-    high = np.array([(body + radii[..., None]).max(axis=(0, 1)) for body in flat])
+    flat = _flat(ends(robot.capsules, robot.placements(recording["q"][ticks])))
+    radii = np.array([link.radius for link in robot.capsules])[:, None, None]
+    low, high = (flat - radii).min(axis=(1, 2)), (flat + radii).max(axis=(1, 2))
     return float((high - low)[:, 0].max()), float(low[:, 1].min()), float(high[:, 1].max())
