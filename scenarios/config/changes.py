@@ -117,10 +117,14 @@ def _within(data: Any, key: str, above: str, add: bool) -> Any:
 def lay_over(below: dict[str, Any], above: Mapping[str, Any], root: type[Section]) -> None:
     """Lay a file's tables over those of the file that it extends, in place.
 
-    A section of another kind replaces the one below it, and what varies there goes with it.
+    A section of another kind replaces the one below it, and what varied there goes with it. So does
+    [variation], whose keys belong together.
     """
+    if "variation" in above:
+        below.pop("variation", None)
     for section in list(_lay(below, above, root, ())):
-        _vary_no_more(below, section)
+        if "variation" not in above:
+            _vary_no_more(below, section)
 
 
 def _lay(below: dict[str, Any], above: Mapping[str, Any], root: type[Section],
