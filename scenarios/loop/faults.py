@@ -84,12 +84,11 @@ class Faults:
         """Place the obstacles of faults for this time."""
         spheres = [fault for fault in self._sections if fault.kind == "obstacle"]
         for i, fault in enumerate(spheres, -len(spheres)):
-            if self._on(fault) == (i in self._standing):
-                continue
-            self._standing ^= {i}
-            assert self._sensor is not None
-            self._sensor.obstacles.centres[i] = (
-                _place(fault, self._robot, self._plant.q) if i in self._standing else _AWAY)
+            if self._on(fault) != (i in self._standing):
+                self._standing ^= {i}
+                assert self._sensor is not None
+                self._sensor.obstacles.centres[i] = (
+                    _place(fault, self._robot, self._plant.q) if i in self._standing else _AWAY)
 
 
 class FaultySensor:
@@ -129,11 +128,12 @@ class _FaultyResolver(Around):
         """Solve h with the inner resolver and apply the active faults."""
         resolution = self.inner.solve(h, memory)
         self.faults.overrun()
-        for fault in self.faults.now("status"):
-            status = Status[str(fault.status).upper()]
-            x = np.zeros(h.n) if status is Status.NUMERICAL_FAILURE else resolution.x
-            return Resolution(x, status, resolution.iterations, resolution.memory)
-        return resolution
+        fault = next(self.faults.now("status"), None)
+        if fault is None:
+            return resolution
+        status = Status[str(fault.status).upper()]
+        x = np.zeros(h.n) if status is Status.NUMERICAL_FAILURE else resolution.x
+        return Resolution(x, status, resolution.iterations, resolution.memory)
 
 
 def with_room(scenario: Scenario) -> Scenario:

@@ -39,7 +39,7 @@ class Policy:
                  torques: Callable[[Array, Array | None], Array] | None = None) -> None:
         self.events: Sequence[tuple[str, str]] = ()
         self.fault: str | None = None
-        self.stopped, self.slowing = False, 0.0
+        self.stopped, self.slowing, self._held = False, 0.0, 0
         self._section, self._clamp, self._period = section, clamp, period
         self._acceleration, self._torques = level == "acceleration", torques
         self._good: Array | None = None
@@ -63,23 +63,20 @@ class Policy:
     def _otherwise(self, t: float, troubles: Sequence[str], x: Array, v: Array) -> Array:
         if not finite(x):  # no resolver should
             troubles, x = [*troubles, "numerical_failure"], np.zeros_like(x)
-        action = self._action(troubles)
+        action = "stop" if self.fault is not None else max(
+            (getattr(self._section, kind) for kind in troubles), key=_ORDER.index)
+        held = self._good if self._held < self._section.patience else None
+        if action == "hold" and held is None:
+            action = "brake"
         self.events = [(kind, action) for kind in troubles]
         if action == "use":
             return self._within_limits(x)
-        if action == "hold" and self._good is not None:
+        if action == "hold" and held is not None:
             self._held += 1
-            return self._within_limits(self._good)
+            return self._within_limits(held)
         if action == "stop" and self.fault is None:
             self.fault = f"stopped by its policy at t = {t:.3f} s: {', '.join(troubles)}"
         return self._slower(action, v)
-
-    def _action(self, troubles: Sequence[str]) -> str:
-        if self.fault is not None:
-            return "stop"
-        action = max((getattr(self._section, kind) for kind in troubles), key=_ORDER.index)
-        spent = self._good is None or self._held >= self._section.patience
-        return "brake" if action == "hold" and spent else action
 
     def _slower(self, action: str, v: Array) -> Array:
         """Return the command that brings v toward zero: at once for "stop", else at `_BRAKE`.

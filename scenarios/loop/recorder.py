@@ -81,7 +81,7 @@ class Recorder:
         self._always: tuple[Audit, ...] = (Truth(cell),)
         self._audits: tuple[Audit, ...] = (*self._always, ActiveSets(), *audits)
         self._audited: dict[str, NDArray[Any]] = {}
-        self.facts = facts_of(cell.scenario, robot)
+        self.facts = facts_of(cell.scenario, robot, cell.contacts)
         self.follow(controller)
 
     def follow(self, controller: Controller) -> None:

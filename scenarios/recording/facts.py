@@ -12,10 +12,11 @@ import numpy as np
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule
+from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 from hierarchy.robots import DHTable
 from hierarchy.robots.table import Base
-from scenarios.cell.robot import contacts_of, on_column, sensed_points
+from scenarios.cell.robot import on_column, sensed_points
 from scenarios.config import Scenario
 from scenarios.config.sections.plant import TorqueSection
 from solvers.resolver import Handles
@@ -147,17 +148,16 @@ class Facts:
     contacts: tuple[ContactPoint, ...] = ()
 
 
-def facts_of(scenario: Scenario, robot: Robot) -> Facts:
-    """Return the facts of a scenario on its robot."""
+def facts_of(scenario: Scenario, robot: Robot, contacts: Contacts | None = None) -> Facts:
+    """Return the facts of a scenario on its robot; `contacts` as in a Cell."""
     facts, plant = robot_facts(robot, scenario.sensor.foot), scenario.plant
     if isinstance(plant, TorqueSection) and facts.base == "floating":
         facts = replace(facts, floor=plant.height)
-    contacts = contacts_of(scenario, robot)
-    of = [contact for contact in contacts.contacts for _ in contact.points] if contacts else []
-    points = tuple(ContactPoint(contact.name, int(joint), _vector(offset),
-                                _vector(contact.axes[2]), contact.friction)
-                   for contact, joint, offset in zip(
-                       of, *(contacts.points if contacts else ((), ())), strict=True))
+    points = tuple(ContactPoint(contact.name, contact.frame.joint,
+                                _vector(contact.frame.placed(point)), _vector(contact.axes[2]),
+                                contact.friction)
+                   for contact in (contacts.contacts if contacts else ())
+                   for point in contact.points)
     return Facts(facts, resolver_facts(scenario), scenario.asks, scenario.limits_in_stack, points)
 
 
