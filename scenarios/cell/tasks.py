@@ -106,27 +106,21 @@ def _joint_limits(section: LimitsSection, control: ControlSection,
 def _avoidance(scenario: Scenario,
                at: References) -> tuple[SurveillanceAreas | None, list[Task]]:
     """Return the areas of Algorithm 1 if it places avoidance, and the tasks that avoid."""
-    section = scenario.avoidance
+    section, tasks = scenario.avoidance, list[Task]()
+    if isinstance(section, AvoidanceSection) and section.place == "stack":
+        kind = PublishedAvoidance if section.jacobian == "published" else kinds.Avoidance
+        return (SurveillanceAreas(section.near, section.far, section.end_effector),
+                [kind(at.robot.control_points, section.dimension)])
     if isinstance(section, SeparationSection):
-        return None, _separation(section, at, scenario.sensor.kind == "exact")
-    if section is None or section.place == "null-space":
-        return None, []
-    kind = PublishedAvoidance if section.jacobian == "published" else kinds.Avoidance
-    return (SurveillanceAreas(section.near, section.far, section.end_effector),
-            [kind(at.robot.control_points, section.dimension)])
-
-
-def _separation(section: SeparationSection, at: References, exact: bool) -> list[Task]:
-    """Return the tasks that keep clear of obstacles, and of the robot itself."""
-    tasks: list[Task] = []
-    if section.obstacles or not exact:
-        tasks.append(kinds.Separation(sensed_points(at.robot), section.barrier(section.distance),
-                                      len(section.obstacles) if exact else None))
-    if (distance := section.self_collision) is not None:
-        with naming("avoidance.self_collision"):
-            tasks.append(kinds.SelfSeparation(at.robot.capsules, section.barrier(distance),
-                                              at.pairs(distance)))
-    return tasks
+        count = len(section.obstacles) if scenario.sensor.kind == "exact" else None
+        if count != 0:
+            tasks.append(kinds.Separation(sensed_points(at.robot),
+                                          section.barrier(section.distance), count))
+        if (distance := section.self_collision) is not None:
+            with naming("avoidance.self_collision"):
+                tasks.append(kinds.SelfSeparation(at.robot.capsules, section.barrier(distance),
+                                                  at.pairs(distance)))
+    return None, tasks
 
 
 def _reference(scenario: Scenario, at: References, posture: Task | None) -> Task | None:

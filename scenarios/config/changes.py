@@ -56,16 +56,12 @@ def change_all(data: dict[str, Any], changes: Mapping[str, Any], root: type[Sect
         tags[key] = tag if tag is not None and tag.key == last else None
     for key in sorted(changes, key=lambda key: tags[key] is None):  # kinds first, else as given
         with naming(key, of=ValueError):
-            _change(data, key, changes[key], tags[key])
-
-
-def _change(data: dict[str, Any], dotted: str, value: Any, tag: Tag | None) -> None:
-    for key in matching(data, dotted):
-        table, last = place(data, key, add=True)
-        if table and _is_another_kind(table, {last: value}, tag):
-            table.clear()
-            _vary_no_more(data, key.rpartition(".")[0])
-        table[last] = value
+            for one in matching(data, key):
+                table, last = place(data, one, add=True)
+                if table and _is_another_kind(table, {last: changes[key]}, tags[key]):
+                    table.clear()
+                    _vary_no_more(data, one.rpartition(".")[0])
+                table[last] = changes[key]
 
 
 def matching(data: Any, pattern: str) -> Iterator[str]:

@@ -132,17 +132,13 @@ class Controller:
             troubles.append("not_finite")
         elif t - stamp > self._stale_after + _ROUNDING:
             troubles.append("stale")
-        state.move(t, *self._carried_on(t - state.t))
-
-    def _carried_on(self, dt: float) -> tuple[Array, Array]:
-        """Return q (nq,), v (n,) after `dt` [s] under the last command sent."""
-        state, x = self.cell.state, self.sent
+        dt, x = t - state.t, self.sent  # on under the last command
         if self.level == "torque":
             slowing = self.policy.slowing
             x = -slowing * state.v if slowing else self.resolution.x[:state.n]
-        if self.level == "velocity":
-            return state.robot.integrate(state.q, x * dt), x
-        return state.robot.integrate(state.q, state.v * dt + x * (dt * dt / 2)), state.v + x * dt
+        moved, after = (x * dt, x) if self.level == "velocity" else (
+            state.v * dt + x * (dt * dt / 2), state.v + x * dt)
+        state.move(t, state.robot.integrate(state.q, moved), after)
 
     def _sense(self, troubles: list[str]) -> None:
         cell = self.cell

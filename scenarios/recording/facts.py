@@ -209,17 +209,14 @@ def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
 
     With `foot` > 0 [m] the first is a column of that height below the base.
     """
-    return on_column(robot, robot.capsules or _sticks(robot), foot)
-
-
-def _sticks(robot: Robot) -> tuple[Capsule, ...]:
     end = robot.frame(robot.end_effector)
     sticks = [(body.name, body.parent, body.position) for body in robot.bodies()]
     sticks = [stick for stick in (*sticks, (end.name, end.joint, end.offset))
               if np.linalg.norm(stick[2]) > 0.0]
     radius = _STICK * max((float(np.linalg.norm(stick[2])) for stick in sticks), default=0.0)
-    return tuple(Capsule(name, joint, (0.0, 0.0, 0.0), (float(x), float(y), float(z)), radius)
-                 for name, joint, (x, y, z) in sticks)
+    return on_column(robot, robot.capsules or tuple(
+        Capsule(name, joint, (0.0, 0.0, 0.0), _vector(way), radius)
+        for name, joint, way in sticks), foot)
 
 
 def lowest(robot: Robot, links: Sequence[Capsule]) -> float:

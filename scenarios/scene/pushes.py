@@ -119,18 +119,15 @@ def _shove(robot: RobotFacts, push: PushSection, t: Array, placements: Array) ->
     body = [(np.array(one.start) + one.end) / 2 for one in robot.capsules if one.joint == joint]
     middle = np.mean(body, axis=0) if body else np.zeros(3)
     tip = placed_points(placements, [joint], middle)
-    arrow: Array = tip[:, :, None] + _arrow(_LENGTH * push.vector)
-    arrow[~push.acts(t)] = np.nan
-    return arrow
-
-
-def _arrow(way: Array) -> Array:
-    """Return shaft and head (5, 2, 3) of an arrow along `way` (3,) [m] to the origin."""
+    way = _LENGTH * push.vector
     length = float(np.linalg.norm(way))
     along = way / (length or 1.0)
     across = 0.4 * np.linalg.svd(along[None])[2][1:]
     barbs = min(_HEAD, length) * (np.concatenate([across, -across]) - along)
-    return np.stack([np.array([-way, *barbs]), np.zeros((5, 3))], axis=1)
+    shaft_and_head = np.stack([np.array([-way, *barbs]), np.zeros((5, 3))], axis=1)
+    arrow: Array = tip[:, :, None] + shaft_and_head
+    arrow[~push.acts(t)] = np.nan
+    return arrow
 
 
 def _cone(point: ContactPoint) -> Array:

@@ -139,11 +139,18 @@ class JointSensor:
 
     def __call__(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Return the measurement (n,), (n,) when the joints are at q (n,), v (n,)."""
-        position = self._position(q)
-        velocity = (self._differenced(position, v) if self._section.velocity == "differenced"
-                    else v + self._noise(self._section.velocity_noise, len(v)))
+        section, position = self._section, self._position(q)
+        if section.velocity == "measured":
+            velocity = v + self._noise(section.velocity_noise, len(v))
+        elif self._last is None:
+            velocity = v.copy()
+        else:
+            before, velocity = self._last
+            share = self._period / (self._period + section.filter_time)
+            moved = self._robot.difference(before, position)
+            velocity = velocity + share * (moved / self._period - velocity)
         self._last = position, velocity
-        self._behind.append((position, velocity))
+        self._behind.append(self._last)
         return self._behind[0]
 
     def _position(self, q: Array) -> Array:
@@ -159,14 +166,6 @@ class JointSensor:
 
     def _noise(self, deviation: float, n: int) -> Array:
         return deviation * self._random.standard_normal(n)
-
-    def _differenced(self, position: Array, v: Array) -> Array:
-        if self._last is None:
-            return v.copy()
-        before, velocity = self._last
-        share = self._period / (self._period + self._section.filter_time)
-        return velocity + share * (
-            self._robot.difference(before, position) / self._period - velocity)
 
 
 def plant_of(scenario: Scenario, start: State, obstacles: Obstacles,

@@ -198,16 +198,13 @@ class Touch:
             force = contact.frame.reshape(3, 3).T @ self._wrench[:3]
             self.force[c] += force if first is None else -force
             self._moment[c] += self._wrench[0] * contact.pos
-        self.balance[...] = inside(self._support(data), data.subtree_com[0][:2])
+        loaded = [np.empty((0, 3))]  # points of the contacts that carry
         for c, geom in enumerate(self._geoms):
-            self._note(c, data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3))
-
-    def _support(self, data: Any) -> Array:
-        """Return the points (k, 2) of the loaded contacts from above."""
-        points = [data.geom_xpos[geom] + own @ data.geom_xmat[geom].reshape(3, 3).T
-                  for geom, own, force in zip(self._geoms, self._points, self.force, strict=True)
-                  if force[2] > _LOADED]
-        return np.concatenate([np.empty((0, 3)), *points])[:, :2]
+            place, axes = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
+            self._note(c, place, axes)
+            if self.force[c, 2] > _LOADED:
+                loaded.append(place + self._points[c] @ axes.T)
+        self.balance[...] = inside(np.concatenate(loaded)[:, :2], data.subtree_com[0][:2])
 
     def _note(self, c: int, place: Array, axes: Array) -> None:
         """Note slip and margin of a contact whose geometry is at `place`, with these axes."""

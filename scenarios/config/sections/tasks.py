@@ -280,4 +280,4 @@ class OwnTask(Listed, OwnSection):
         return task
 
 
-ListedTask = Annotated[Listed, keys.Registered(None, OwnTask)]
+ListedTask = Annotated[Listed, keys.OneOf(None, OwnTask)]
