@@ -190,8 +190,13 @@ def no_scenario(text: str) -> HierarchyError:
 
 def _something_else(path: Path) -> str:
     """Return what a file or folder is, and what to do with it; "" if there is none."""
+    if (path / "run.npz").is_file():
+        return (f"a folder of a finished run: `hierarchy view {path}` shows it, and `hierarchy run "
+                f"{path / 'scenario.toml'}` runs it again")
     if path.is_dir():
-        return f"a folder{_of_folder(path)}"
+        files = sorted(path.glob("*.toml"))
+        return (f"a folder with {', '.join(map(str, files[:5]))}: give one of them" if files
+                else f"a folder. {WANTED}")
     if path.suffix.lower() in _ROBOTS or in_package(str(path)):
         return (f"a robot, not a scenario. `hierarchy check {path}` shows it, with its [robot] "
                 f"section for a scenario file. {WANTED}")
@@ -199,15 +204,6 @@ def _something_else(path: Path) -> str:
         return (f"a program, to be run by `python {path}`; a module of kinds of your own goes "
                 f"with --plugin {path.stem}. {WANTED}")
     return f"a file of another kind than .toml. {WANTED}" if path.is_file() else ""
-
-
-def _of_folder(path: Path) -> str:
-    if (path / "run.npz").is_file():
-        return (f" of a finished run: `hierarchy view {path}` shows it, and `hierarchy run "
-                f"{path / 'scenario.toml'}` runs it again")
-    if files := sorted(path.glob("*.toml")):
-        return f" with {', '.join(map(str, files[:5]))}: give one of them"
-    return f". {WANTED}"
 
 
 def _other_name(name: str) -> str:

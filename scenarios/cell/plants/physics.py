@@ -1,5 +1,6 @@
 """An arm in MuJoCo with position servos, commanded in joint positions as through KUKA's FRI."""
 
+from collections.abc import Mapping
 from math import ceil
 from typing import Any, NamedTuple
 
@@ -86,7 +87,7 @@ class PhysicsArm:
         self._follow = bind(
             _follow, self._command, self.q, self._servo,
             _Reference(self.reference_q, self.reference_v, self.a, self._references))
-        self.extra: dict[str, NDArray[Any]] = {
+        self.extra: Mapping[str, NDArray[Any]] = {
             "contacts": np.zeros((), np.int16), "contact_depth": np.zeros(()),
             "contact_force": np.zeros(())}
         self._place(0.0)

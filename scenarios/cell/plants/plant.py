@@ -30,17 +30,10 @@ class Plant(Protocol):
     as a fall, and is None before.
     """
 
-    @property
-    def q(self) -> Array: ...  # noqa: D102
-
-    @property
-    def v(self) -> Array: ...  # noqa: D102
-
-    @property
-    def a(self) -> Array: ...  # noqa: D102
-
-    @property
-    def extra(self) -> Mapping[str, NDArray[Any]]: ...  # noqa: D102
+    q: Array
+    v: Array
+    a: Array
+    extra: Mapping[str, NDArray[Any]]
 
     def act(self, command: Array) -> None:
         """Apply a command for one period: velocities or accelerations (n,), or joint torques."""
@@ -56,7 +49,7 @@ class KinematicArm:
 
     def __init__(self, robot: Robot, q: Array, v: Array, period: float, level: Level) -> None:
         self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(robot.n)
-        self.extra: dict[str, NDArray[Any]] = {}
+        self.extra: Mapping[str, NDArray[Any]] = {}
         self._robot, self._period = robot, period
         self._acceleration = int(level == "acceleration")
         self._step = np.zeros(robot.n)
@@ -87,12 +80,7 @@ class Apart:
         self._true_q, self._true_v = plant.q.copy(), plant.v.copy()
         self.extra: Mapping[str, NDArray[Any]] = {
             "true_q": self._true_q, "true_v": self._true_v, **plant.extra}
-        self.q, self.v = sensed(plant.q, plant.v)
-
-    @property
-    def a(self) -> Array:
-        """The acceleration (n,) [rad/s^2] of the last command."""
-        return self.true.a
+        self.a, (self.q, self.v) = plant.a, sensed(plant.q, plant.v)
 
     @property
     def fault(self) -> str | None:
@@ -105,7 +93,7 @@ class Apart:
         plant = self.true
         self._true_q[:], self._true_v[:] = plant.q, plant.v
         plant.act(command)
-        self.q, self.v = self._sensed(plant.q, plant.v)
+        self.a, (self.q, self.v) = plant.a, self._sensed(plant.q, plant.v)
 
 
 def whole_periods(delay: float, period: float, key: str) -> int:
