@@ -74,7 +74,7 @@ def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
         if frame and (frame % every == 0 or frame == len(scene.t) - 1):
             first = (frame - 1) // every * every
             entities.append(_line(t, f"path taken {first // every + 1}",
-                                 scene.traced[first:frame + 1], _TRACE))
+                                 scene.points[first:frame + 1, -1], _TRACE))
         if entities:
             yield frame, {"deletions": [], "entities": entities}
 

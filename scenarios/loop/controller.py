@@ -14,7 +14,7 @@ from scenarios.config import Scenario
 from scenarios.loop.faults import Faults
 from scenarios.loop.policy import policy_of, smallest
 from scenarios.loop.transition import Blend
-from solvers import Resolution, Resolver, Status
+from solvers import Resolution, Status
 
 _REHEARSALS = 20
 _ROUNDING = 1e-9  # [s] of times that are compared
@@ -35,11 +35,9 @@ class Controller:
     hierarchy: Hierarchy
 
     def __init__(self, scenario: Scenario, cell: Cell | None = None,
-                 resolver: Resolver | None = None, faults: Faults | None = None) -> None:
+                 faults: Faults | None = None) -> None:
         cell = build(scenario) if cell is None else cell
-        if resolver is None:
-            resolver = stack_resolver(scenario, cell)
-        self.clock = perf_counter
+        resolver, self.clock = stack_resolver(scenario, cell), perf_counter
         if faults is not None:
             cell, resolver, self.clock = faults.around(cell, resolver)
         self.cell, self.resolver, control = cell, resolver, scenario.control

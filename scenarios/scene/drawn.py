@@ -79,11 +79,6 @@ class Scene:
         return radians(135.0 if self.robot.is_chain else 40.0)
 
     @property
-    def traced(self) -> Array:
-        """The path of the end effector: (F, 3) [m]."""
-        return np.asarray(self.points[:, -1])
-
-    @property
     def links(self) -> Array:
         """Start and end of each capsule of the arm in the world: (F, C, 2, 3) [m]."""
         return ends(self.robot.capsules, self.placements)

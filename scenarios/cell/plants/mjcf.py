@@ -257,8 +257,7 @@ class Stops:
     """
 
     def __init__(self, robot: Robot, q: Array, beyond: float) -> None:
-        self._names, self._units = robot.velocity_names, robot.velocity_units
-        self._of, self._beyond = robot.coordinates, beyond
+        self._robot, self._of, self._beyond = robot, robot.coordinates, beyond
         lower, upper = robot.position_limits()
         self._lower, self._upper = np.minimum(lower, q[self._of]), np.maximum(upper, q[self._of])
 
@@ -269,6 +268,7 @@ class Stops:
         i = int(over.argmax())
         if not over[i] > self._beyond:
             return None
-        stop, unit = self._upper[i] if here[i] > self._upper[i] else self._lower[i], self._units[i]
-        return (f"joint {self._names[i]} is {over[i]:.2g} {unit} beyond its stop at {stop:.4g} "
+        stop = self._upper[i] if here[i] > self._upper[i] else self._lower[i]
+        name, unit = self._robot.velocity_names[i], self._robot.velocity_units[i]
+        return (f"joint {name} is {over[i]:.2g} {unit} beyond its stop at {stop:.4g} "
                 f"{unit} (plant.beyond_stop = {self._beyond:g}),")

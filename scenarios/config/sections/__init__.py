@@ -64,22 +64,21 @@ Force = Annotated[NotNegative, Unit("N")]
 Point = Annotated[Vector3, Unit("m")]
 
 
-def _named(text: str) -> str:
-    if not re.fullmatch(r"[^\W_][\w.-]*", text):
-        raise ValueError("a name has letters, digits, \".\", \"_\" and \"-\", and begins with a "
-                         "letter or a digit")
-    return text
+def _spelt(pattern: str, rule: str) -> AfterValidator:
+    def check(text: str) -> str:
+        if not re.fullmatch(pattern, text):
+            raise ValueError(rule)
+        return text
+
+    return AfterValidator(check)
 
 
-def _titled(text: str) -> str:
-    if not re.fullmatch(r"[^\W\d_][\w -]*", text):
-        raise ValueError("a task's name has letters, digits, spaces, \"_\" and \"-\", and begins "
-                         "with a letter")
-    return text
-
-
-Name = Annotated[str, Field(max_length=100), AfterValidator(_named)]
-TaskName = Annotated[str, AfterValidator(_titled)]
+Name = Annotated[str, Field(max_length=100), _spelt(
+    r"[^\W_][\w.-]*", "a name has letters, digits, \".\", \"_\" and \"-\", and begins with a "
+                      "letter or a digit")]
+TaskName = Annotated[str, _spelt(
+    r"[^\W\d_][\w -]*", "a task's name has letters, digits, spaces, \"_\" and \"-\", and begins "
+                        "with a letter")]
 
 
 class Section(BaseModel):
