@@ -43,6 +43,14 @@ def test_a_table_is_below_the_hand_wherever_that_starts():
                                atol=0.04)
 
 
+def test_a_cone_and_a_direction_have_no_unit():
+    """Their levels were said to be missed by so many m/s²."""
+    tasks = [{"kind": "look-at", "frame": "tool", "target": [1.0, 0.0, 0.0]},
+             {"kind": "pointing", "frame": "tool", "axis": [0.0, 0.0, 1.0], "alpha_d": 20.0}]
+    scenario = load("ellipse-hqp", {"tasks": tasks, "pointing": None})
+    assert row_units(scenario, ["look-at", "pointing", "position"]) == ("", "", "m/s²")
+
+
 def test_a_wrench_has_no_unit():
     for target, unit in (([20.0], "N"), ([20.0] * 3, "N"), ([20.0] * 6, "")):
         assert row_units(load("wipe", {"tasks.0.target": target}), ["force"]) == (unit,)

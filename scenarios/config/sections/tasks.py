@@ -33,10 +33,12 @@ Axes = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
 class Made(PartSection):
     """What every section of a task has: a title, and the task that it makes.
 
+    Unless `made_by` says another, that is the class of hierarchy.tasks with the section's name.
     `unit` is that of its error, "m", "rad" or "", and `shown` has the rows that are shown in
     another one; `of_forces` says that its rows are over contact forces, at level "torque".
     """
 
+    made_by: ClassVar[str] = ""
     title: ClassVar[str]
     unit: ClassVar[str] = "m"
     shown: ClassVar[dict[str, slice]] = {}
@@ -151,6 +153,7 @@ class PointingTask(TaskSection):
     damping: keys.Gain = 2.0
     gain: keys.Gain = 5.0
     made_by: ClassVar[str] = "hierarchy.tasks:Pointing"
+    unit: ClassVar[str] = ""
     frame: ClassVar[str | None]
 
     def asked(self, at: References) -> dict[str, Any]:
