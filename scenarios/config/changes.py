@@ -10,7 +10,7 @@ from typing import Any
 from hierarchy.errors import UnknownNameError, brief, expect
 from scenarios.config.distributions import flat
 from scenarios.config.sections import ScenarioError, Section, naming
-from scenarios.config.validation import Tag, tag_at
+from scenarios.config.validation import tag_at
 from scenarios.toml_text import parse
 
 
@@ -53,7 +53,7 @@ def change_all(data: dict[str, Any], changes: Mapping[str, Any], root: type[Sect
         expect("changes: a key", key, str, "such as \"control.period\"")
         *path, last = key.split(".")
         tag = tag_at(root, path)
-        tags[key] = tag if tag is not None and tag.key == last else None
+        tags[key] = tag if tag is not None and tag[0] == last else None
     for key in sorted(changes, key=lambda key: tags[key] is None):  # kinds first, else as given
         with naming(key, of=ValueError):
             for one in matching(data, key):
@@ -137,9 +137,9 @@ def _lay(below: dict[str, Any], above: Mapping[str, Any], root: type[Section],
             yield from _lay(under, value, root, where)
 
 
-def _is_another_kind(below: Mapping[str, Any], above: Mapping[str, Any], tag: Tag | None) -> bool:
-    return tag is not None and tag.key in above and (
-        above[tag.key] != below.get(tag.key, tag.default))
+def _is_another_kind(below: Mapping[str, Any], above: Mapping[str, Any],
+                     tag: tuple[str, str | None] | None) -> bool:
+    return tag is not None and tag[0] in above and above[tag[0]] != below.get(*tag)
 
 
 def _vary_no_more(data: dict[str, Any], section: str) -> None:

@@ -86,9 +86,15 @@ class Faults:
         for i, fault in enumerate(spheres, -len(spheres)):
             if self._on(fault) != (i in self._standing):
                 self._standing ^= {i}
+                centre = np.array(fault.centre or _AWAY)
+                if i not in self._standing:
+                    centre[:] = _AWAY
+                elif fault.place is not None:
+                    point = point_of(self._robot, fault.place, "place")
+                    centre = State.at(self._robot, self._plant.q).position(
+                        Frame("", point.joint, np.array(point.offset), np.eye(3)))
                 assert self._sensor is not None
-                self._sensor.obstacles.centres[i] = (
-                    _place(fault, self._robot, self._plant.q) if i in self._standing else _AWAY)
+                self._sensor.obstacles.centres[i] = centre
 
 
 class FaultySensor:
@@ -156,13 +162,6 @@ def check(faults: Iterable[FaultSection], robot: Robot) -> None:
                 raise ScenarioError(f"faults.{i}.{key} = {value}: robot {robot.name!r} has {most}")
         if fault.place is not None:
             point_of(robot, fault.place, f"faults.{i}.place")
-
-
-def _place(fault: FaultSection, robot: Robot, q: Array) -> Array:
-    if fault.place is None:
-        return np.array(fault.centre)
-    point = point_of(robot, fault.place, "place")
-    return State.at(robot, q).position(Frame("", point.joint, np.array(point.offset), np.eye(3)))
 
 
 def _spoil(values: Array, numbers: list[int | None]) -> None:
