@@ -22,7 +22,7 @@ from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.rendering import draw_robot
-from scenarios.cell.sensors.sensor import Asked, ExactDistances
+from scenarios.cell.sensors.sensor import ExactDistances
 from scenarios.config.sections.sensor import CameraSection, ImageSection
 
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
@@ -164,7 +164,9 @@ SIDE = Pinhole(320, 240, 262.0, 262.0, position=(0.3, 2.2, 0.8),
 
 def space_of(pinhole, points, capsules, region, mean_within=(inf, inf), pairs=False, **settings):
     section = ImageSection(kind="camera", region=region, **settings)
-    return DepthSpace(section, pinhole, points, capsules, Asked(region, mean_within), pairs)
+    exact = ExactDistances(ROBOT, Obstacles(), mean_within=mean_within, pairs=pairs)
+    exact.points = points
+    return DepthSpace(section, pinhole, exact, capsules, region)
 
 
 def seen_in(image, *places, thin=inf, **settings):
