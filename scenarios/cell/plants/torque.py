@@ -164,13 +164,12 @@ class Touch:
     """
 
     def __init__(self, mujoco: Any, model: Any, contacts: Contacts) -> None:
-        self.names = contacts.names
         self._force_of, self._model = mujoco.mj_contactForce, model
-        self._geoms = [model.geom(name).id for name in self.names]
+        self._geoms = [model.geom(name).id for name in contacts.names]
         self._sole = [contact.is_surface for contact in contacts.contacts]
         self._slides = [contact.slides for contact in contacts.contacts]
         self._of_geom = {geom: c for c, geom in enumerate(self._geoms)}
-        count = len(self.names)
+        count = len(self._geoms)
         self.force, self.slip = np.zeros((count, 3)), np.zeros(count)
         self.margin, self.balance = np.full(count, np.nan), np.full((), np.nan)
         self.signals: dict[str, NDArray[Any]] = {

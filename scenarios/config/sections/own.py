@@ -94,7 +94,6 @@ class OwnSection(PartSection):
 
         Raises ScenarioError, naming the kind, for whatever goes wrong in it: it is the user's code.
         """
-        what = f"{self.group[:-1]} of kind {self.kind!r}"
         keys = {name.removeprefix(_KEY): value for name, value in self
                 if name.startswith(_KEY) and value is not None}
         provided = {name: value for name, value in given.items() if name in GIVEN[self.group]}
@@ -102,7 +101,8 @@ class OwnSection(PartSection):
             return _called(type(self).maker, {"robot": robot, **keys, **provided})
         except Exception as error:
             kind = "" if isinstance(error, HierarchyError) else f"{type(error).__name__}: "
-            raise ScenarioError(f"{what}: {kind}{error}") from error
+            raise ScenarioError(f"{self.group[:-1]} of kind {self.kind!r}: {kind}{error}"
+                                ) from error
 
 
 def _again(own: type[OwnSection], kind: str, data: dict[str, Any]) -> OwnSection:
