@@ -117,7 +117,8 @@ class PhysicsArm:
     def _place(self, t: float) -> None:
         """Move the obstacles to their positions at time t [s]."""
         self._obstacles.at(t)
-        self.data.mocap_pos[:] = self._obstacles.centres[self._solid]
+        if self._solid:
+            self.data.mocap_pos[:] = self._obstacles.centres[self._solid]
 
     def _look_at_contacts(self) -> None:
         """Record the contacts of one step; all are between the arm and an obstacle."""
