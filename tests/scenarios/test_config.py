@@ -68,6 +68,11 @@ def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a
         assert [found.robot.model, found.avoidance.obstacles[0].path.file,
                 found.position.path.file] == [f"{tmp_path}/base/{file}" for file in (
                     "arm.urdf", "motion.csv", "path.csv")]
+    (tmp_path / "base" / "moved.toml").write_text(
+        'extends = "ellipse"\nname = "moved"\nposition.path = {kind = "recorded", file = "a"}\n')
+    (tmp_path / "other.toml").write_text(
+        'extends = "base/moved.toml"\nname = "other"\nposition.path.file = "b.csv"\n')
+    assert load("../other.toml").position.path.file == f"{tmp_path}/b.csv"  # was beside the caller
     varied = '{robot.model = {choice = ["a.urdf", "kuka_lwr"]}, "a.path.file" = {choice = ["b"]}}'
     (tmp_path / "varied.toml").write_text(f'extends = "ellipse"\nvariation = {varied}\n')
     (tmp_path / "sweep.toml").write_text(
