@@ -110,15 +110,18 @@ def _within(data: Any, key: str, above: str, add: bool) -> Any:
     return key
 
 
-def lay_over(below: dict[str, Any], above: Mapping[str, Any], root: type[Section]) -> None:
+def lay_over(below: dict[str, Any], above: Mapping[str, Any], root: type[Section],
+             replaced: Sequence[str] = ()) -> None:
     """Lay a file's tables over those of the file that it extends, in place.
 
-    A section of another kind replaces the one below it, and what varied there goes with it. So does
-    [variation], whose keys belong together.
+    Sections that are `replaced` go first. A section of another kind replaces the one below it, and
+    what varied there goes with it, as with one that has no successor. So does [variation], whose
+    keys belong together.
     """
-    if "variation" in above:
-        below.pop("variation", None)
-    for section in list(_lay(below, above, root, ())):
+    for section in (*replaced, *(("variation",) if "variation" in above else ())):
+        below.pop(section, None)
+    gone = [section for section in replaced if section not in above]
+    for section in [*gone, *_lay(below, above, root, ())]:
         if "variation" not in above:
             _vary_no_more(below, section)
 

@@ -135,19 +135,14 @@ def _read_extended(source: Source, below: tuple[Source, ...] = ()) -> dict[str, 
         raise ScenarioError(f"{path}: extends: {base!r} extends this file in turn")
     if len(below) >= _DEEPEST:
         raise ScenarioError(f"{path}: extends: more than {_DEEPEST} files, one over the other")
-    found = _without(_read_extended(under, here), replaced or [], path)
-    lay_over(found, data, Scenario)
+    found, replaced = _read_extended(under, here), replaced or []
+    if not isinstance(replaced, list):
+        raise ScenarioError(f"{path}: replaces: expected a list of sections, got {replaced!r}")
+    with naming(f"{path}: replaces"):
+        for section in replaced:
+            check_name("section", section, found)
+    lay_over(found, data, Scenario, replaced)
     return found
-
-
-def _without(below: dict[str, Any], sections: Any, path: Path) -> dict[str, Any]:
-    """Return the tables of a file without some sections; `path` is the file that replaces them."""
-    if not isinstance(sections, list):
-        raise ScenarioError(f"{path}: replaces: expected a list of sections, got {sections!r}")
-    for section in sections:
-        with naming(f"{path}: replaces"):
-            check_name("section", section, below)
-    return {key: value for key, value in below.items() if key not in sections}
 
 
 def _list_points_as_tables(data: dict[str, Any]) -> None:

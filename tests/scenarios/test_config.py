@@ -53,6 +53,8 @@ def test_what_varies_of_a_section_of_another_kind_is_what_the_file_itself_says(t
     for given, kept in ((text, []), (text + own, ["avoidance.distance"])):
         file.write_text(given)
         assert [key for key in load(file).variation if key.startswith("avoidance")] == kept
+    file.write_text('extends = "ellipse"\nname = "mine"\nreplaces = ["avoidance"]\n')
+    assert list(load(file).variation) == ["start.q"]  # nothing could be drawn for the other key
 
 
 def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a_change(
