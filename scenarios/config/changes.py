@@ -111,7 +111,7 @@ def _within(data: Any, key: str, above: str, add: bool) -> Any:
 
 
 def lay_over(below: dict[str, Any], above: Mapping[str, Any], root: type[Section],
-             replaced: Sequence[str] = ()) -> None:
+             replaced: Sequence[str]) -> None:
     """Lay a file's tables over those of the file that it extends, in place.
 
     Sections that are `replaced` go first. A section of another kind replaces the one below it, and

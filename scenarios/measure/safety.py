@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.config.sections.kinds import ContactForce
+from scenarios.config.sections.kinds import ListedForce
 from scenarios.measure.metric import (
     Criteria,
     Metric,
@@ -181,11 +181,11 @@ def _wanted(recording: Recording, settle: float) -> Iterator[Metric]:
                      float(np.mean(force[after] > 0.0)), "share", False, "Contacts")
 
 
-def wanted_forces(recording: Recording) -> Iterator[tuple[ContactForce, Array]]:
+def wanted_forces(recording: Recording) -> Iterator[tuple[ListedForce, Array]]:
     """Yield each task of a normal force with that force (T,) [N]; floors are horizontal."""
     names = [contact.name or contact.frame for contact in recording.scenario.contacts]
     for task in recording.scenario.tasks if "floor_force" in recording else ():
-        if isinstance(task, ContactForce) and len(task.target) == 1:
+        if isinstance(task, ListedForce) and len(task.target) == 1:
             yield task, recording["floor_force"][:, names.index(task.contact), 2]
 
 

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 
 
 @register("tasks", "contact-force", shipped=True)
-class ContactForce(base.Listed):
+class ListedForce(base.Listed):
     """A contact's force or wrench at a value, at level "torque"."""
 
     of_forces: ClassVar[bool] = True
+    made_by: ClassVar[str] = "hierarchy.tasks:ContactForce"
     contact: str  #: Name of the contact.
     target: tuple[keys.Finite, ...]  #: Normal force, force or wrench [N, N m]: 1, 3 or 6 numbers.
 
@@ -37,11 +38,12 @@ class ContactForce(base.Listed):
 
 
 @register("tasks", "least-force", shipped=True)
-class LeastForce(base.Listed):
+class ListedLeastForce(base.Listed):
     """The smallest contact forces, as last level, at level "torque"."""
 
     unit: ClassVar[str] = "N"
     of_forces: ClassVar[bool] = True
+    made_by: ClassVar[str] = "hierarchy.tasks:LeastForce"
 
 
 @register("tasks", "position", shipped=True)
@@ -66,9 +68,10 @@ class _Turned(base.Listed):
 
 
 @register("tasks", "orientation", shipped=True)
-class Orientation(_Turned, base.TaskSection):
+class ListedOrientation(_Turned, base.TaskSection):
     """The axes of a frame, wherever it is (3 rows)."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:Orientation"
     shown: ClassVar[dict[str, slice]] = {"deg": slice(None)}
 
 
@@ -83,13 +86,17 @@ class _AlongPose(_Turned, base.AlongSection):
 
 
 @register("tasks", "pose", shipped=True)
-class Pose(_AlongPose):
+class ListedPose(_AlongPose):
     """Origin and axes of a frame (6 rows)."""
+
+    made_by: ClassVar[str] = "hierarchy.tasks:Pose"
 
 
 @register("tasks", "frame", shipped=True)
-class FrameLog(_AlongPose):
+class ListedFrame(_AlongPose):
     """As `pose`, with the error log(T^-1 T_d) of SE(3) in the axes of `frame` (6 rows)."""
+
+    made_by: ClassVar[str] = "hierarchy.tasks:FrameLog"
 
     def wanted(self, position: Array, error: Array) -> Array | None:
         """Return None: its error is in axes that turn."""
@@ -104,9 +111,10 @@ class ListedPointing(base.PointingTask, base.Listed):
 
 
 @register("tasks", "look-at", shipped=True)
-class LookAt(base.Listed, base.TaskSection):
+class ListedLookAt(base.Listed, base.TaskSection):
     """The z axis of a frame toward a point (2 rows)."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:LookAt"
     unit: ClassVar[str] = ""
     frame: str  #: Frame of the robot.
     target: Annotated[keys.Vector3, keys.Unit("m", doubted=False)]
@@ -121,9 +129,10 @@ class LookAt(base.Listed, base.TaskSection):
 
 
 @register("tasks", "relative", shipped=True)
-class RelativePose(base.Listed, base.TaskSection):
+class ListedRelative(base.Listed, base.TaskSection):
     """The pose of a frame in another one (6 rows, or 3)."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:RelativePose"
     shown: ClassVar[dict[str, slice]] = base.POSE
     frame: str  #: Frame of the robot.
     to: str  #: The other frame.
@@ -148,9 +157,10 @@ class RelativePose(base.Listed, base.TaskSection):
 
 
 @register("tasks", "manipulability", shipped=True)
-class Manipulability(base.Listed, base.TaskSection):
+class ListedManipulability(base.Listed, base.TaskSection):
     """The manipulability of a frame (1 row)."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:Manipulability"
     unit: ClassVar[str] = ""
     frame: str  #: Frame of the robot.
     least: keys.NotNegative  #: The value, in the unit of det(J J^T)^(1/2).
@@ -174,19 +184,21 @@ class ListedPosture(base.Listed, base.PostureTask):
 
 
 @register("tasks", "coupling", shipped=True)
-class JointCoupling(base.Listed, base.TaskSection):
+class ListedCoupling(base.Listed, base.TaskSection):
     """A weighted sum of joint positions (1 row)."""
 
     unit: ClassVar[str] = "rad"
+    made_by: ClassVar[str] = "hierarchy.tasks:JointCoupling"
     joints: Annotated[dict[str, keys.Finite], Field(min_length=1)]  #: Factors of joints, by name.
     value: keys.JointPosition = 0.0  #: The value of the sum.
     stiffness: keys.Stiffness = 100.0
 
 
 @register("tasks", "com", shipped=True)
-class CentreOfMass(base.Listed, base.AlongSection):
+class ListedCentreOfMass(base.Listed, base.AlongSection):
     """The centre of mass along a path."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:CentreOfMass"
     axes: base.Axes = "xyz"  #: Axes of the world that count.
 
     def asked(self, at: References) -> dict[str, Any]:
@@ -195,9 +207,10 @@ class CentreOfMass(base.Listed, base.AlongSection):
 
 
 @register("tasks", "momentum", shipped=True)
-class Momentum(base.Listed):
+class ListedMomentum(base.Listed):
     """The momentum of the whole robot to zero."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:Momentum"
     part: Literal["linear", "angular"] = "angular"  #: Which of the two.
     damping: keys.Gain = 10.0  #: Gain of the momentum.
 
@@ -208,9 +221,10 @@ class Momentum(base.Listed):
 
 
 @register("tasks", "self-collision", shipped=True)
-class SelfSeparation(base.Listed, BarrierSection):
+class ListedSelfCollision(base.Listed, BarrierSection):
     """Links kept apart, except neighbours."""
 
+    made_by: ClassVar[str] = "hierarchy.tasks:SelfSeparation"
     rows: ClassVar[base.Rows] = "inequality"
 
     def asked(self, at: References) -> dict[str, Any]:

@@ -46,7 +46,7 @@ class PartSection(Section):
     def made(self, robot: Robot, **given: Any) -> Any:
         """Call the maker with those of the keys, this `section`, `robot` and `given` it takes."""
         keys = {key: getattr(self, key) for key in type(self).model_fields if key != "kind"}
-        return _called(resolve_name(self.made_by or f"hierarchy.tasks:{type(self).__name__}"),
+        return _called(resolve_name(self.made_by),
                        {"section": self, "robot": robot, **keys, **given})
 
 

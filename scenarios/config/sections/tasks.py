@@ -33,12 +33,10 @@ Axes = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
 class Made(PartSection):
     """What every section of a task has: a title, and the task that it makes.
 
-    Unless `made_by` says another, that is the class of hierarchy.tasks with the section's name.
     `unit` is that of its error, "m", "rad" or "", and `shown` has the rows that are shown in
     another one; `of_forces` says that its rows are over contact forces, at level "torque".
     """
 
-    made_by: ClassVar[str] = ""
     title: ClassVar[str]
     unit: ClassVar[str] = "m"
     shown: ClassVar[dict[str, slice]] = {}
