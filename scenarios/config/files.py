@@ -12,16 +12,15 @@ LIBRARY = Path(__file__).parents[1] / "library"
 _CHOICE = re.compile(r"(?:variation|parameters)\.(.+)\.choice\.\d+")
 
 
-def files_in(data: Any, above: str = "") -> Iterator[tuple[Any, Any]]:
-    """Yield the table and the key, or the list and the index, of each name of a file or folder.
-
-    `above` is the dotted key of the data, with a dot.
-    """
-    for key, value in data.items() if isinstance(data, dict) else enumerate(data):
-        if isinstance(value, dict | list):
-            yield from files_in(value, f"{above}{key}.")
-        elif isinstance(value, str) and _is_file(data, f"{above}{key}", value):
-            yield data, key
+def files_in(data: dict[str, Any]) -> Iterator[tuple[Any, Any]]:
+    """Yield the table and the key, or the list and the index, of each name of a file or folder."""
+    waiting: list[tuple[str, Any]] = [("", data)]
+    for above, table in waiting:  # grows on the way
+        for key, value in table.items() if isinstance(table, dict) else enumerate(table):
+            if isinstance(value, dict | list):
+                waiting.append((f"{above}{key}.", value))
+            elif isinstance(value, str) and _is_file(table, f"{above}{key}", value):
+                yield table, key
 
 
 def make_absolute(data: dict[str, Any], here: Path) -> None:
