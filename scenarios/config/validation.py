@@ -61,7 +61,9 @@ def _said(root: type[Section], data: Any, error: Any) -> str:
     if error["type"] == "extra_forbidden":
         return _unknown(root, keys, _table(data, error["loc"][:-1]))
     text = _worded(error)
-    if not isinstance(found, dict) and _is_table(error, sections_at(root, keys)):
+    if not isinstance(found, dict) and (
+            error["type"] in ("model_type", "model_attributes_type") or (
+                error["type"] == "kind" and isinstance(found, list) and sections_at(root, keys))):
         return f"{where}: expected one table, as below [{where}], got {brief(found)}"
     if isinstance(found, dict) and error["type"] in ("tuple_type", "list_type"):
         return f"{where}: expected a list: for tables write [[{where}]] above each, not [{where}]"
@@ -83,12 +85,6 @@ def _worded(error: Any) -> str:
     if error["type"] == "too_long" and error["ctx"]["field_type"] == "Tuple":
         return f"expected {error['ctx']['max_length']} entries, not {error['ctx']['actual_length']}"
     return str(error["msg"]).removeprefix("Value error, ")
-
-
-def _is_table(error: Any, sections: Sequence[type[Section]]) -> bool:
-    """Whether an error is of something that should be a table, and is none."""
-    return error["type"] in ("model_type", "model_attributes_type") or (
-        error["type"] == "kind" and isinstance(error["input"], list) and bool(sections))
 
 
 def _unknown(root: type[Section], keys: list[str], table: dict[str, Any]) -> str:

@@ -169,14 +169,16 @@ def robot_facts(robot: Robot, foot: float = 0.0) -> RobotFacts:
                    for point in sensed_points(robot))
     x, y, z = (_vector(row) for row in tip.rotation)
     units, chain = tuple(robot.velocity_units), tuple(range(len(robot.joint_names)))
-    model = robot.model.saveToString()
+    model, radii = robot.model.saveToString(), [link.radius for link in links]
+    # The lowest point of the robot at rest, at most as high as its base.
+    low = ends(links, State.at(robot, robot.rest).placements)[..., 2].min(axis=-1) - radii
     return RobotFacts(
         robot.name, robot.base, model, sha256(model.encode()).hexdigest(), robot.joint_names,
         robot.base == "fixed" and robot.parents[1:] == chain, tuple(robot.rest.tolist()),
         tuple(robot.velocity_names),
         tuple(unit for part in robot.parts
               for unit in ((part.unit,) if part.size == 1 else ("1",) * part.size)),
-        units, points, (x, y, z), links, -foot if foot else lowest(robot, links))
+        units, points, (x, y, z), links, -foot if foot else float(low.min(initial=0.0)))
 
 
 def resolver_facts(scenario: Scenario) -> ResolverFacts:
@@ -217,12 +219,6 @@ def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
     return on_column(robot, robot.capsules or tuple(
         Capsule(name, joint, (0.0, 0.0, 0.0), _vector(way), radius)
         for name, joint, way in sticks), foot)
-
-
-def lowest(robot: Robot, links: Sequence[Capsule]) -> float:
-    """Height [m] of the lowest point of a robot at rest, at most that of its base."""
-    low = ends(links, State.at(robot, robot.rest).placements)[..., 2].min(axis=-1)
-    return float((low - [link.radius for link in links]).min(initial=0.0))
 
 
 def ends(links: Sequence[Capsule], placements: Array) -> Array:

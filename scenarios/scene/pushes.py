@@ -47,7 +47,8 @@ def key(facts: Facts, scenario: Scenario) -> dict[str, str]:
     if not facts.contacts:
         return {}
     drawn = {"force": True, "cone": True, "support": len(facts.contacts) > 2,
-             "centre": facts.robot.base == "floating", "push": bool(_shoves(scenario)),
+             "centre": facts.robot.base == "floating",
+             "push": bool(getattr(scenario.plant, "pushes", ())),
              "table": facts.robot.base == "fixed"}
     return {name: _WORDS[name] for name, it_is in drawn.items() if it_is}
 
@@ -60,7 +61,8 @@ def pushes(facts: Facts, scenario: Scenario, t: Array, placements: Array, forces
     centre of mass.
     """
     none = np.empty((len(placements), 0, 2, 3))
-    shoves = [_shove(facts.robot, push, t, placements) for push in _shoves(scenario)]
+    shoves = [_shove(facts.robot, push, t, placements)
+              for push in getattr(scenario.plant, "pushes", ())]  # none of a plugin's plant
     height = getattr(scenario.plant, "height", None)
     fixed = facts.robot.base == "fixed"
     return Pushes(*_contacts(facts.contacts, placements, forces),
@@ -106,11 +108,6 @@ def _table(point: ContactPoint, height: float, placements: Array) -> Array:
     along = np.array([[[-_TABLE, one, 0.0], [_TABLE, one, 0.0]] for one in at])
     lines = np.concatenate([along, along[..., [1, 0, 2]]])
     return np.tile(lines + np.array([x, y, height]), (len(placements), 1, 1, 1))
-
-
-def _shoves(scenario: Scenario) -> tuple[PushSection, ...]:
-    """Return the pushes of the plant, none for one of a plugin."""
-    return getattr(scenario.plant, "pushes", ())
 
 
 def _shove(robot: RobotFacts, push: PushSection, t: Array, placements: Array) -> Array:
