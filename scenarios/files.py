@@ -79,24 +79,23 @@ def lock(path: Path) -> None:
     The system holds the lock and releases it however the process ends, in containers that share the
     folder too. The hidden file beside the path only says whose it is.
     """
-    if path in _HELD:
-        return
-    file = _lock_file(path)
-    stream = file.open("a+", encoding="utf-8")
-    if not _locked(stream):
-        with stream:
-            stream.seek(0)
-            owner = stream.read().strip() or "another process"
-        raise TakenError(f"output folder {path} is going to be written by {owner}; choose "
-                         "another, or wait for it to end")
-    if not file.exists() or file.stat().st_ino != os.fstat(stream.fileno()).st_ino:
-        stream.close()
-        return lock(path)  # whoever held it has just removed the file
-    stream.truncate(0)
-    stream.write(f"process {os.getpid()} on {platform.node()}")
-    stream.flush()
-    _HELD[path] = stream
-    atexit.register(unlock, path)
+    while path not in _HELD:
+        file = _lock_file(path)
+        stream = file.open("a+", encoding="utf-8")
+        if not _locked(stream):
+            with stream:
+                stream.seek(0)
+                owner = stream.read().strip() or "another process"
+            raise TakenError(f"output folder {path} is going to be written by {owner}; choose "
+                             "another, or wait for it to end")
+        if file.exists() and file.stat().st_ino == os.fstat(stream.fileno()).st_ino:
+            stream.truncate(0)
+            stream.write(f"process {os.getpid()} on {platform.node()}")
+            stream.flush()
+            _HELD[path] = stream
+            atexit.register(unlock, path)
+        else:  # whoever held it has just removed the file
+            stream.close()
 
 
 def unlock(path: Path) -> None:

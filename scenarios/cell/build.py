@@ -10,7 +10,7 @@ import numpy as np
 
 from hierarchy import Robot, Stack, State, Task
 from hierarchy.activation import Activation
-from hierarchy.allocation import POINTING, POSITION, Allocation, allocate
+from hierarchy.allocation import AVOIDANCE, POINTING, POSITION, Allocation, allocate
 from hierarchy.avoidance import Measurement, Obstacles
 from hierarchy.contacts import Contacts
 from hierarchy.jit import announce_compilation
@@ -112,7 +112,8 @@ def _order(scenario: Scenario, tasks: Tasks) -> tuple[Order, Collection[tuple[st
         fixed = Allocation(tuple(task.name for task in tasks.all), repulsion=False)
         return lambda seen, cone_error: fixed, [fixed.order]
     areas, section = tasks.areas, scenario.avoidance
-    first = tuple(task.name for task in tasks.always)
+    first = tuple(task.name for task in tasks.all
+                  if task.name not in (AVOIDANCE, POSITION, POINTING))
     always_point = bool(scenario.pointing and scenario.pointing.rows == "equality")
     tip = section.end_effector if isinstance(section, AvoidanceSection) else -inf
 

@@ -36,12 +36,30 @@ _ON_EDGE, _TURNED_OVER = 45.0, 135.0  # [deg] from which another plane of its fr
 
 
 def placed(scenario: Scenario) -> References:
-    """Return the robot of a scenario at its start, with its contacts.
+    """Return the robot of a scenario at its start, with its contacts at level "torque".
 
-    Raises ScenarioError if a section does not fit the robot, or contacts do not touch the floor.
+    With start.on_floor the base is raised or lowered so that the lowest contact touches the floor.
+    Raises a ScenarioError for a fixed base then, if a section does not fit the robot, for a contact
+    that does not stand on the plant's floor, or for a floating base with its centre of mass below
+    it. A contact that is open at the start may be anywhere, one that slides above the floor.
     """
-    robot = make_robot(scenario.robot)
-    return References(*on_contacts(scenario, State.at(robot, *start_of(robot, scenario.start))))
+    robot, plant = make_robot(scenario.robot), scenario.plant
+    start = State.at(robot, *start_of(robot, scenario.start))
+    if scenario.control.level != "torque":
+        return References(start)
+    contacts = _contacts(scenario.contacts, robot)
+    floor = plant.height if isinstance(plant, TorqueSection) else 0.0
+    if scenario.start.on_floor:
+        start = _lowered(contacts, start, floor)
+    if isinstance(plant, TorqueSection):
+        if found := list(_astray(contacts, start, floor)):
+            raise ScenarioError(min(found)[1])
+        above = float(start.centre_of_mass()[2]) - floor
+        if robot.base == "floating" and above < 0.0:  # it hangs from its contacts
+            raise ScenarioError(f"start: the centre of mass is {-1e3 * above:.3g} mm below the "
+                                "floor. Is the base upside down? Its quaternion in start.q is "
+                                "x, y, z, w")
+    return References(start, contacts)
 
 
 @naming("robot")
@@ -92,19 +110,15 @@ def start_of(robot: Robot, section: StartSection) -> tuple[Array, Array]:
     q, v = state.q.copy(), state.v.copy()
     if section.end_effector is not None:
         q = _reach(robot, q, np.array(section.end_effector))
-    if not section.allow_outside_limits:
-        _check_limits(robot, q)
-    return q, v
-
-
-def _check_limits(robot: Robot, q: Array) -> None:
-    """Raise a ScenarioError that names the first joint beyond its limits, or far out of range."""
-    for i in np.flatnonzero((q < robot.lower - _ON_LIMIT) | (q > robot.upper + _ON_LIMIT))[:1]:
+    beyond = (q < robot.lower - _ON_LIMIT) | (q > robot.upper + _ON_LIMIT)
+    if beyond.any() and not section.allow_outside_limits:
+        i = int(beyond.argmax())
         degrees = " Are these degrees?" if abs(q[i]) > 2.0 * np.pi else ""
         raise ScenarioError(
             f"start: {robot.coordinate_names[i]} at {q[i]:g} is beyond its limits, "
             f"{robot.lower[i]:.4g} to {robot.upper[i]:.4g} (rad or m).{degrees} "
             "start.allow_outside_limits = true allows it")
+    return q, v
 
 
 def _state(robot: Robot, section: StartSection) -> State:
@@ -141,48 +155,19 @@ def _reach(robot: Robot, q: Array, point: Array) -> Array:
                         f"{robot.name!r} came no nearer than {nearest:.3g} m")
 
 
-def contacts_of(scenario: Scenario, robot: Robot) -> Contacts | None:
-    """Return the contacts at level "torque", None at the others; raises ScenarioError."""
-    if scenario.control.level != "torque":
-        return None
-    contacts = []
-    for i, section in enumerate(scenario.contacts):
+def _contacts(sections: Sequence[ContactSection], robot: Robot) -> Contacts:
+    made = []
+    for i, one in enumerate(sections):
         with naming(f"contacts.{i}"):
-            contacts.append(_contact(section, robot))
+            with naming("frame"):
+                frame = robot.frame(one.frame)
+            points: Sequence[Sequence[float]] = (one.offset,)
+            if one.x is not None and one.y is not None:
+                points = (np.array(one.offset) + corners(one.x, one.y, one.up)).tolist()
+            made.append(Contact(frame, points, one.friction, one.normal, one.name or "", one.open,
+                                one.ramp, one.slides, one.up))
     with naming("contacts"):
-        return Contacts(robot, contacts)
-
-
-def _contact(section: ContactSection, robot: Robot) -> Contact:
-    with naming("frame"):
-        frame = robot.frame(section.frame)
-    points: Sequence[Sequence[float]] = (section.offset,)
-    if section.x is not None and section.y is not None:
-        points = (np.array(section.offset) + corners(section.x, section.y, section.up)).tolist()
-    return Contact(frame, points, section.friction, section.normal, section.name or "",
-                   section.open, section.ramp, section.slides, section.up)
-
-
-def on_contacts(scenario: Scenario, start: State) -> tuple[State, Contacts | None]:
-    """Return the start on its contacts, and those; see `contacts_of`.
-
-    With start.on_floor the base is raised or lowered so that the lowest contact touches the floor.
-    Raises a ScenarioError for a fixed base then, for a contact that does not stand on the plant's
-    floor, or for a floating base with its centre of mass below it. A contact that is open at the
-    start may be anywhere, one that slides above the floor.
-    """
-    contacts = contacts_of(scenario, start.robot)
-    if contacts is None:
-        return start, None
-    plant = scenario.plant
-    floor = plant.height if isinstance(plant, TorqueSection) else 0.0
-    if scenario.start.on_floor:
-        start = _lowered(contacts, start, floor)
-    if isinstance(plant, TorqueSection):
-        if found := list(_astray(contacts, start, floor)):
-            raise ScenarioError(min(found)[1])
-        _refuse_buried(start, floor)
-    return start, contacts
+        return Contacts(robot, made)
 
 
 def _lowered(contacts: Contacts, start: State, floor: float) -> State:
@@ -200,16 +185,6 @@ def _astray(contacts: Contacts, start: State, floor: float) -> Iterator[tuple[fl
         waits = contact.load(0.0) == 0.0 or (contact.slides and above[0] > 0.0)
         if not waits and (wrong := _wrong(contact, above, start.rotation(contact.frame))):
             yield -np.abs(above).max(), f"contacts.{i}: at the start {wrong}"
-
-
-def _refuse_buried(start: State, floor: float) -> None:
-    """Raise a ScenarioError for a floating base that hangs from its contacts below the floor."""
-    if start.robot.base != "floating":
-        return
-    above = float(start.centre_of_mass()[2]) - floor
-    if above < 0.0:
-        raise ScenarioError(f"start: the centre of mass is {-1e3 * above:.3g} mm below the floor. "
-                            "Is the base upside down? Its quaternion in start.q is x, y, z, w")
 
 
 def doubts(scenario: Scenario, contacts: Contacts) -> Iterator[str]:

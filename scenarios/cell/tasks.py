@@ -20,10 +20,9 @@ from scenarios.config.sections.tasks import LimitsSection, Made
 
 
 class Tasks(NamedTuple):
-    """The tasks of a scenario, see `Cell`; Algorithm 1 leaves `always` at the top."""
+    """The tasks of a scenario, see `Cell`."""
 
     all: list[Task]
-    always: list[Task]
     position: kinds.Position | None
     pointing: kinds.Pointing | None
     limits: kinds.JointLimits | None
@@ -66,7 +65,7 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
     for task in (*tasks, *((reference,) if reference else ())):
         if not (frozen and task.kind == "inequality"):
             check_period(task, scenario.control.period, scenario.control.level)
-    return Tasks(tasks, first if areas else [*first, *avoiding], position, pointing, limits,
+    return Tasks(tasks, position, pointing, limits,
                  tuple(task for task in listed if task not in moved), areas,
                  reference, {task.name: section.give for section, made in of_section
                              for task in made if section.give})
@@ -74,29 +73,20 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
 
 def _first(scenario: Scenario, at: References) -> tuple[kinds.JointLimits | None, list[Task]]:
     """Return the joint limits, and all tasks at the top: mechanism, physics, limits."""
+    section, control, first = scenario.limits, scenario.control, list[Task]()
+    bounded = section is not None and section.place == "bounds"
     with naming("limits"):
-        limits, first = _limits(scenario, at.robot)
-    bounded = scenario.limits is not None and scenario.limits.place == "bounds"
+        limits = None if section is None else _joint_limits(section, control, at.robot)
+        if section and limits and scenario.limits_in_stack:
+            first.append(limits if section.danger_reach is None else kinds.DangerBounds(
+                limits, sensed_points(at.robot), section.danger_reach, name=limits.name))
+            if section.torque and not bounded and control.level != "torque":  # see `_physics`
+                first.append(kinds.TorqueLimits(at.robot, section.torque))
     if at.contacts is not None:
         physics = _physics(scenario, at.contacts)
         first = [*first, *physics] if bounded else [*physics, *first]
-    return limits, above(model_rows(at.robot, scenario.control.period), first,
+    return limits, above(model_rows(at.robot, control.period), first,
                          not bounded and scenario.make_resolver().can_resolve("inequalities"))
-
-
-def _limits(scenario: Scenario, robot: Robot) -> tuple[kinds.JointLimits | None, list[Task]]:
-    """Return the joint limits, and the levels that they are in the stack."""
-    section = scenario.limits
-    if section is None:
-        return None, []
-    limits = _joint_limits(section, scenario.control, robot)
-    box = limits if section.danger_reach is None else kinds.DangerBounds(
-        limits, sensed_points(robot), section.danger_reach, name=limits.name)
-    if not scenario.limits_in_stack:
-        return limits, []
-    if section.torque is None or section.place == "bounds" or scenario.control.level == "torque":
-        return limits, [box]  # with contact forces torques are limited by `_physics`
-    return limits, [box, kinds.TorqueLimits(robot, section.torque)]
 
 
 def _joint_limits(section: LimitsSection, control: ControlSection,
@@ -116,27 +106,21 @@ def _joint_limits(section: LimitsSection, control: ControlSection,
 def _avoidance(scenario: Scenario,
                at: References) -> tuple[SurveillanceAreas | None, list[Task]]:
     """Return the areas of Algorithm 1 if it places avoidance, and the tasks that avoid."""
-    section = scenario.avoidance
+    section, tasks = scenario.avoidance, list[Task]()
+    if isinstance(section, AvoidanceSection) and section.place == "stack":
+        kind = PublishedAvoidance if section.jacobian == "published" else kinds.Avoidance
+        return (SurveillanceAreas(section.near, section.far, section.end_effector),
+                [kind(at.robot.control_points, section.dimension)])
     if isinstance(section, SeparationSection):
-        return None, _separation(section, at, scenario.sensor.kind == "exact")
-    if section is None or section.place == "null-space":
-        return None, []
-    kind = PublishedAvoidance if section.jacobian == "published" else kinds.Avoidance
-    return (SurveillanceAreas(section.near, section.far, section.end_effector),
-            [kind(at.robot.control_points, section.dimension)])
-
-
-def _separation(section: SeparationSection, at: References, exact: bool) -> list[Task]:
-    """Return the tasks that keep clear of obstacles, and of the robot itself."""
-    tasks: list[Task] = []
-    if section.obstacles or not exact:
-        tasks.append(kinds.Separation(sensed_points(at.robot), section.barrier(section.distance),
-                                      len(section.obstacles) if exact else None))
-    if (distance := section.self_collision) is not None:
-        with naming("avoidance.self_collision"):
-            tasks.append(kinds.SelfSeparation(at.robot.capsules, section.barrier(distance),
-                                              at.pairs(distance)))
-    return tasks
+        count = len(section.obstacles) if scenario.sensor.kind == "exact" else None
+        if count != 0:
+            tasks.append(kinds.Separation(sensed_points(at.robot),
+                                          section.barrier(section.distance), count))
+        if (distance := section.self_collision) is not None:
+            with naming("avoidance.self_collision"):
+                tasks.append(kinds.SelfSeparation(at.robot.capsules, section.barrier(distance),
+                                                  at.pairs(distance)))
+    return None, tasks
 
 
 def _reference(scenario: Scenario, at: References, posture: Task | None) -> Task | None:
@@ -164,26 +148,23 @@ def _physics(scenario: Scenario, contacts: Contacts) -> list[Task]:
     torque limits and the forces that contacts can transmit, the last the largest change of a
     torque. One that would be empty is left out.
     """
+    robot, limits, forces = contacts.robot, scenario.limits, scenario.forces
+    physics, bounds = list[Task](), list[Task]()
     with naming("forces"):
-        motion = [kinds.ContactMotion(contacts, damping=scenario.forces.damping)] \
-            if contacts.contacts else []
-        dynamics = [kinds.BaseDynamics(contacts)] if contacts.robot.base == "floating" else []
-        limits = _force_limits(scenario, contacts) if scenario.forces_in_stack else []
+        if robot.base == "floating":
+            physics.append(kinds.BaseDynamics(contacts))
+        if contacts.contacts:
+            physics.append(kinds.ContactMotion(contacts, damping=forces.damping))
+        if scenario.forces_in_stack:
+            if limits and limits.torque:
+                bounds.append(kinds.TorqueLimits(robot, limits.torque, contacts=contacts))
+            if contacts.contacts:
+                bounds.append(kinds.Friction(contacts, forces.faces, forces.least,
+                                             forces.largest or inf))
+            if forces.edge is not None:
+                bounds.append(kinds.CentreOfPressure(contacts, forces.edge))
     levels: list[Task] = [kinds.Together(tasks, name) for tasks, name in (
-        ([*dynamics, *motion], "physics"), (limits, "limits")) if tasks]
-    if scenario.forces_in_stack and scenario.limits and scenario.limits.torque_step:
-        levels.append(kinds.TorqueStep(contacts.robot, scenario.limits.torque_step,
-                                       contacts=contacts))
+        (physics, "physics"), (bounds, "limits")) if tasks]
+    if scenario.forces_in_stack and limits and limits.torque_step:
+        levels.append(kinds.TorqueStep(robot, limits.torque_step, contacts=contacts))
     return levels
-
-
-def _force_limits(scenario: Scenario, contacts: Contacts) -> list[Task]:
-    limits, forces = scenario.limits, scenario.forces
-    found: list[Task] = []
-    if limits and limits.torque:
-        found.append(kinds.TorqueLimits(contacts.robot, limits.torque, contacts=contacts))
-    if contacts.contacts:
-        found.append(kinds.Friction(contacts, forces.faces, forces.least, forces.largest or inf))
-    if forces.edge is not None:
-        found.append(kinds.CentreOfPressure(contacts, forces.edge))
-    return found

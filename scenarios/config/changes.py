@@ -10,7 +10,7 @@ from typing import Any
 from hierarchy.errors import UnknownNameError, brief, expect
 from scenarios.config.distributions import flat
 from scenarios.config.sections import ScenarioError, Section, naming
-from scenarios.config.validation import Tag, tag_at
+from scenarios.config.validation import tag_at
 from scenarios.toml_text import parse
 
 
@@ -53,19 +53,15 @@ def change_all(data: dict[str, Any], changes: Mapping[str, Any], root: type[Sect
         expect("changes: a key", key, str, "such as \"control.period\"")
         *path, last = key.split(".")
         tag = tag_at(root, path)
-        tags[key] = tag if tag is not None and tag.key == last else None
+        tags[key] = tag if tag is not None and tag[0] == last else None
     for key in sorted(changes, key=lambda key: tags[key] is None):  # kinds first, else as given
         with naming(key, of=ValueError):
-            _change(data, key, changes[key], tags[key])
-
-
-def _change(data: dict[str, Any], dotted: str, value: Any, tag: Tag | None) -> None:
-    for key in matching(data, dotted):
-        table, last = place(data, key, add=True)
-        if table and _is_another_kind(table, {last: value}, tag):
-            table.clear()
-            _vary_no_more(data, key.rpartition(".")[0])
-        table[last] = value
+            for one in matching(data, key):
+                table, last = place(data, one, add=True)
+                if table and _is_another_kind(table, {last: changes[key]}, tags[key]):
+                    table.clear()
+                    _vary_no_more(data, one.rpartition(".")[0])
+                table[last] = changes[key]
 
 
 def matching(data: Any, pattern: str) -> Iterator[str]:
@@ -114,13 +110,20 @@ def _within(data: Any, key: str, above: str, add: bool) -> Any:
     return key
 
 
-def lay_over(below: dict[str, Any], above: Mapping[str, Any], root: type[Section]) -> None:
+def lay_over(below: dict[str, Any], above: Mapping[str, Any], root: type[Section],
+             replaced: Sequence[str]) -> None:
     """Lay a file's tables over those of the file that it extends, in place.
 
-    A section of another kind replaces the one below it, and what varies there goes with it.
+    Sections that are `replaced` go first. A section of another kind replaces the one below it, and
+    what varied there goes with it, as with one that has no successor. So does [variation], whose
+    keys belong together.
     """
-    for section in list(_lay(below, above, root, ())):
-        _vary_no_more(below, section)
+    for section in (*replaced, *(("variation",) if "variation" in above else ())):
+        below.pop(section, None)
+    gone = [section for section in replaced if section not in above]
+    for section in [*gone, *_lay(below, above, root, ())]:
+        if "variation" not in above:
+            _vary_no_more(below, section)
 
 
 def _lay(below: dict[str, Any], above: Mapping[str, Any], root: type[Section],
@@ -137,9 +140,9 @@ def _lay(below: dict[str, Any], above: Mapping[str, Any], root: type[Section],
             yield from _lay(under, value, root, where)
 
 
-def _is_another_kind(below: Mapping[str, Any], above: Mapping[str, Any], tag: Tag | None) -> bool:
-    return tag is not None and tag.key in above and (
-        above[tag.key] != below.get(tag.key, tag.default))
+def _is_another_kind(below: Mapping[str, Any], above: Mapping[str, Any],
+                     tag: tuple[str, str | None] | None) -> bool:
+    return tag is not None and tag[0] in above and above[tag[0]] != below.get(*tag)
 
 
 def _vary_no_more(data: dict[str, Any], section: str) -> None:

@@ -1,29 +1,26 @@
 """The files and folders that the data of a scenario or a sweep name, wherever they stand."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from hierarchy.errors import refuse
 from hierarchy.robots.names import in_package, is_file_name
-from scenarios.config.distributions import flat
 
 LIBRARY = Path(__file__).parents[1] / "library"
+_CHOICE = re.compile(r"(?:variation|parameters)\.(.+)\.choice\.\d+")
 
 
 def files_in(data: dict[str, Any]) -> Iterator[tuple[Any, Any]]:
     """Yield the table and the key, or the list and the index, of each name of a file or folder."""
-    for section, key in (("robot", "model"), ("sensor", "folder")):
-        table = data.get(section)
-        if isinstance(table, dict) and _is_file(f"{section}.{key}", table.get(key)):
-            yield table, key
-    yield from _recorded(data)
-    for parameters in map(data.get, ("variation", "parameters")):
-        for at, one in flat(parameters).items() if isinstance(parameters, dict) else ():
-            choices = one.get("choice") if isinstance(one, dict) else None
-            for i, choice in enumerate(choices if isinstance(choices, list) else ()):
-                if _is_file(at, choice):
-                    yield choices, i
+    waiting: list[tuple[str, Any]] = [("", data)]
+    for above, table in waiting:  # grows on the way
+        for key, value in table.items() if isinstance(table, dict) else enumerate(table):
+            if isinstance(value, dict | list):
+                waiting.append((f"{above}{key}.", value))
+            elif isinstance(value, str) and _is_file(table, f"{above}{key}", value):
+                yield table, key
 
 
 def make_absolute(data: dict[str, Any], here: Path) -> None:
@@ -33,22 +30,15 @@ def make_absolute(data: dict[str, Any], here: Path) -> None:
         refuse(path.encode(errors="ignore").decode() != path, f"{path!r} is not UTF-8: rename it")
 
 
-def _recorded(data: Any) -> Iterator[tuple[Any, Any]]:
-    """Yield the files of recorded motions, wherever a scenario has them."""
-    inside = data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
-    for one in inside:
-        yield from _recorded(one)
-    if isinstance(data, dict) and data.get("kind") == "recorded" and (
-            isinstance(data.get("file"), str)):
-        yield data, "file"
+def _is_file(table: Any, dotted: str, value: str) -> bool:
+    """Whether the text at a dotted key, which is in this table or list, names a file or a folder.
 
-
-def _is_file(key: str, value: Any) -> bool:
-    """Whether the value at a dotted key names a file or a folder."""
-    if not isinstance(value, str):
-        return False
+    A recorded motion may have its kind from the file that its own one extends.
+    """
+    key = _CHOICE.sub(r"\1", dotted)
     if key == "robot.model":
         return not in_package(value) and is_file_name(value)
     if key == "sensor.folder":
         return not (LIBRARY / "frames" / value).is_dir()
-    return key.endswith("path.file")
+    kind = table.get("kind") if isinstance(table, dict) else None
+    return key.endswith("path.file" if kind is None else ".file") and kind in (None, "recorded")

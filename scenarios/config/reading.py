@@ -66,7 +66,7 @@ def load(name_or_path: str | Path, changes: Sequence[str] | Mapping[str, Any] = 
     or a mapping of dotted keys, see scenarios.config.changes. Raises ScenarioError, naming the file
     and the key, and UnknownNameError for an unknown name.
     """
-    source = _found(file_path("load", name_or_path))
+    source = _found(str(file_path("load", name_or_path)))
     path, what = source.path, str(source)
     data = _read_extended(source)
     if "samples" in data:
@@ -91,14 +91,13 @@ def _require_plugins(data: dict[str, Any], what: str) -> None:
         data["plugins"] = list(dict.fromkeys(named))
 
 
-def _found(path: Path) -> Source:
-    """Return where a scenario is, given by name or file; raises ScenarioError if it is none."""
-    file, colon, variant = str(path).rpartition(".toml:")
+def _found(name: str, here: Path = Path()) -> Source:
+    """Return where a scenario is, by its name or its file in the folder `here`."""
+    file, colon, variant = name.rpartition(".toml:")
     if colon:
-        return Source(Path(f"{file}.toml"), variant)
-    if path.suffix == ".toml":
-        return Source(path)
-    name = str(path)
+        return Source(here / f"{file}.toml", variant)
+    if Path(name).suffix == ".toml":
+        return Source(here / name)
     if is_shipped(name):
         return _library()[name.replace(":", "-", 1)]
     raise no_scenario(name)
@@ -127,38 +126,23 @@ def _read_extended(source: Source, below: tuple[Source, ...] = ()) -> dict[str, 
         if replaced is not None:
             raise ScenarioError(f"{path}: replaces: goes with extends")
         return data
-    under = base if isinstance(base, Source) else _extended(base, path)
+    if not isinstance(base, str | Source):
+        raise ScenarioError(f"{path}: extends: expected a name or a path, got {base!r}")
+    with naming(f"{path}: extends"):
+        under = base if isinstance(base, Source) else _found(base, path.parent)
     here = (*below, Source(path.resolve(), source.variant))
     if Source(under.path.resolve(), under.variant) in here:
         raise ScenarioError(f"{path}: extends: {base!r} extends this file in turn")
     if len(below) >= _DEEPEST:
         raise ScenarioError(f"{path}: extends: more than {_DEEPEST} files, one over the other")
-    found = _read_extended(under, here)
-    if "variation" in data:  # its keys belong together
-        found.pop("variation", None)
-    lay_over(found := _without(found, replaced or [], path), data, Scenario)
+    found, replaced = _read_extended(under, here), replaced or []
+    if not isinstance(replaced, list):
+        raise ScenarioError(f"{path}: replaces: expected a list of sections, got {replaced!r}")
+    with naming(f"{path}: replaces"):
+        for section in replaced:
+            check_name("section", section, found)
+    lay_over(found, data, Scenario, replaced)
     return found
-
-
-def _extended(base: Any, path: Path) -> Source:
-    """Return the scenario that `extends` names in the file at `path`."""
-    if not isinstance(base, str):
-        raise ScenarioError(f"{path}: extends: expected a name or a path, got {base!r}")
-    if is_shipped(base):
-        return _found(Path(base))
-    if Path(base).suffix != ".toml" and ".toml:" not in base:
-        raise ScenarioError(f"{path}: extends: {no_scenario(base)}")
-    return _found(path.parent / base)
-
-
-def _without(below: dict[str, Any], sections: Any, path: Path) -> dict[str, Any]:
-    """Return the tables of a file without some sections; `path` is the file that replaces them."""
-    if not isinstance(sections, list):
-        raise ScenarioError(f"{path}: replaces: expected a list of sections, got {sections!r}")
-    for section in sections:
-        with naming(f"{path}: replaces"):
-            check_name("section", section, below)
-    return {key: value for key, value in below.items() if key not in sections}
 
 
 def _list_points_as_tables(data: dict[str, Any]) -> None:
@@ -201,8 +185,13 @@ def no_scenario(text: str) -> HierarchyError:
 
 def _something_else(path: Path) -> str:
     """Return what a file or folder is, and what to do with it; "" if there is none."""
+    if (path / "run.npz").is_file():
+        return (f"a folder of a finished run: `hierarchy view {path}` shows it, and `hierarchy run "
+                f"{path / 'scenario.toml'}` runs it again")
     if path.is_dir():
-        return f"a folder{_of_folder(path)}"
+        files = sorted(path.glob("*.toml"))
+        return (f"a folder with {', '.join(map(str, files[:5]))}: give one of them" if files
+                else f"a folder. {WANTED}")
     if path.suffix.lower() in _ROBOTS or in_package(str(path)):
         return (f"a robot, not a scenario. `hierarchy check {path}` shows it, with its [robot] "
                 f"section for a scenario file. {WANTED}")
@@ -210,15 +199,6 @@ def _something_else(path: Path) -> str:
         return (f"a program, to be run by `python {path}`; a module of kinds of your own goes "
                 f"with --plugin {path.stem}. {WANTED}")
     return f"a file of another kind than .toml. {WANTED}" if path.is_file() else ""
-
-
-def _of_folder(path: Path) -> str:
-    if (path / "run.npz").is_file():
-        return (f" of a finished run: `hierarchy view {path}` shows it, and `hierarchy run "
-                f"{path / 'scenario.toml'}` runs it again")
-    if files := sorted(path.glob("*.toml")):
-        return f" with {', '.join(map(str, files[:5]))}: give one of them"
-    return f". {WANTED}"
 
 
 def _other_name(name: str) -> str:

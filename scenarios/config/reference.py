@@ -37,15 +37,19 @@ class Key(NamedTuple):
 
 def keys_of(section: type[Section]) -> tuple[Key, ...]:
     """Return the keys of a section, but not what says its kind if there is one choice."""
-    schema, meanings, found = section.model_json_schema(), _meanings(section), []
+    schema, found, meanings = section.model_json_schema(), [], dict[str, str]()
+    for base in reversed(section.__mro__):  # the text of each key, there or in what it derives from
+        meanings |= _texts(base) if issubclass(base, Section) else {}
     for name, field in section.model_fields.items():
         key, parts = field.alias or name, (field.annotation, *field.metadata)
         if key != "kind" or len(kinds_of(section)) != 1:
             value = schema["properties"][key]
             units = dict.fromkeys(unit.name for unit in parts_of(parts, Unit))
-            default = "required" if field.is_required() else _default(value)
+            default = value.get("default")
+            said = "required" if field.is_required() else "" if (
+                default in (None, [], "") or isinstance(default, dict)) else json.dumps(default)
             found.append(Key(key, _value(value, schema.get("$defs", {})), " or ".join(units),
-                             default, meanings.get(name, ""),
+                             said, meanings.get(name, ""),
                              tuple(dict.fromkeys(parts_of(parts, Section)))))
     return tuple(found)
 
@@ -131,14 +135,6 @@ def _lines(key: Key) -> Iterator[str]:
         yield fill(key.meaning, 88, initial_indent="      ", subsequent_indent="      ")
 
 
-def _meanings(section: type[Section]) -> dict[str, str]:
-    """Return the text of each key, in the section or in what it derives from."""
-    found: dict[str, str] = {}
-    for base in reversed(section.__mro__):
-        found |= _texts(base) if issubclass(base, Section) else {}
-    return found
-
-
 @cache
 def _texts(section: type[Section]) -> dict[str, str]:
     try:
@@ -154,11 +150,6 @@ def _texts(section: type[Section]) -> dict[str, str]:
                 text = str(below.value.value)
             found |= {key.target.id: " ".join(text.split())} if text else {}
     return found
-
-
-def _default(value: dict[str, Any]) -> str:
-    default = value.get("default")
-    return "" if default in (None, [], "") or isinstance(default, dict) else json.dumps(default)
 
 
 def _value(value: dict[str, Any], schemas: dict[str, Any]) -> str:

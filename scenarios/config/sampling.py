@@ -30,7 +30,10 @@ def drawn(scenario: Scenario, parameters: Mapping[str, Distribution], seed: int,
             for key in matching(own, pattern):
                 table, last = place(own, key)
                 here = table[last] if isinstance(table, list) else table.get(last)
-                values[key] = distribution.draw(_chance(seed, index, key), here)
+                # The same numbers on every machine, for one parameter of one sample.
+                words = np.frombuffer(hashlib.sha256(key.encode()).digest()[:16], dtype="<u4")
+                chance = np.random.PCG64(np.random.SeedSequence([seed, index, *words.tolist()]))
+                values[key] = distribution.draw(np.random.Generator(chance), here)
     return values
 
 
@@ -41,9 +44,3 @@ def changed(scenario: Scenario, values: Mapping[str, Value], what: str) -> Scena
     """
     drawn_values = ", ".join(f"{key} = {value}" for key, value in values.items())
     return scenario.with_changes(values, f"{what}, with {drawn_values}")
-
-
-def _chance(seed: int, index: int, key: str) -> np.random.Generator:
-    """Return a random generator for one parameter of one sample, the same on every machine."""
-    words = np.frombuffer(hashlib.sha256(key.encode()).digest()[:16], dtype="<u4").tolist()
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, index, *words])))

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Sequence
 from math import inf, tau
-from typing import Any, NamedTuple, TypeVar, get_args
+from typing import Any, TypeVar, get_args
 
 from pydantic import ValidationError
 
@@ -30,21 +30,17 @@ def validated(kind: type[Kind], data: dict[str, Any], what: str) -> Kind:
                             ) from error
 
 
-class Tag(NamedTuple):
-    """The key that says which kind a section is of, and the kind of one without it."""
+def tag_at(root: type[Section], path: Sequence[str]) -> tuple[str, str | None] | None:
+    """Return which key says the kind of the section at a path, and the kind of one without it.
 
-    key: str
-    default: str | None
-
-
-def tag_at(root: type[Section], path: Sequence[str]) -> Tag | None:
-    """Return which key says the kind of the section at a path, None if there is one kind."""
+    None if there is one kind.
+    """
     found = dict.fromkeys(sections_at(root, path))
     tagged = {kind: kind.model_fields.get(kind.tag) for kind in found}
     if not all(tagged.values()) or (len(found) < 2 and all(kind.tag == "kind" for kind in found)):
         return None
     defaults = [field.default for field in tagged.values() if field and not field.is_required()]
-    return Tag(next(iter(found)).tag, next(iter(defaults), None))
+    return next(iter(found)).tag, next(iter(defaults), None)
 
 
 def sections_at(root: type[Section], path: Sequence[str]) -> list[type[Section]]:
@@ -65,7 +61,9 @@ def _said(root: type[Section], data: Any, error: Any) -> str:
     if error["type"] == "extra_forbidden":
         return _unknown(root, keys, _table(data, error["loc"][:-1]))
     text = _worded(error)
-    if not isinstance(found, dict) and _is_table(error, sections_at(root, keys)):
+    if not isinstance(found, dict) and (
+            error["type"] in ("model_type", "model_attributes_type") or (
+                error["type"] == "kind" and isinstance(found, list) and sections_at(root, keys))):
         return f"{where}: expected one table, as below [{where}], got {brief(found)}"
     if isinstance(found, dict) and error["type"] in ("tuple_type", "list_type"):
         return f"{where}: expected a list: for tables write [[{where}]] above each, not [{where}]"
@@ -89,17 +87,11 @@ def _worded(error: Any) -> str:
     return str(error["msg"]).removeprefix("Value error, ")
 
 
-def _is_table(error: Any, sections: Sequence[type[Section]]) -> bool:
-    """Whether an error is of something that should be a table, and is none."""
-    return error["type"] in ("model_type", "model_attributes_type") or (
-        error["type"] == "kind" and isinstance(error["input"], list) and bool(sections))
-
-
 def _unknown(root: type[Section], keys: list[str], table: dict[str, Any]) -> str:
     """Return which kind has the last of some keys, or which known key is nearest to it."""
     where, beside = ".".join(keys), list(dict.fromkeys(sections_at(root, keys[:-1])))
     tag = tag_at(root, keys[:-1])
-    kind = table.get("kind", tag.default if tag else None)
+    kind = table.get("kind", tag[1] if tag else None)
     having = [one for section in beside if keys[-1] in section.model_fields
               for one in kinds_of(section)]
     if having and len(beside) > 1:

@@ -81,10 +81,8 @@ def _write(writer: Any, recording: Recording, groups: dict[str, dict[str, NDArra
             of["description"] = " ".join(units.get(name, ()))
         schemas[topic] = f"hierarchy.{topic[1:]}", schema
     schemas |= dict(zip(("/tf", "/scene", "/events"), foxglove.FOXGLOVE.items(), strict=True))
-    channels = {}
-    for topic, (name, schema) in schemas.items():
-        number = writer.register_schema(name, "jsonschema", _bytes(schema))
-        channels[topic] = writer.register_channel(topic, "json", number)
+    channels = {topic: writer.register_channel(topic, "json", writer.register_schema(
+        name, "jsonschema", _bytes(schema))) for topic, (name, schema) in schemas.items()}
     for at, topic, message in sorted(_entries(recording, groups), key=lambda entry: entry[0]):
         writer.add_message(channels[topic], at, _bytes(message), at)
     writer.add_metadata("scenario", {"toml": recording.scenario.to_toml(),
@@ -133,13 +131,10 @@ def layout(recording: Recording) -> Panel:
     for signal, panel in (("position_error", "error"), ("minimal_distance", "distance")):
         if signal not in recording:
             del panels[f"Plot!{panel}"]
-    found["layout"]["second"] = _column([name for name in panels if name != "3D!arm"])
+    column: Any
+    *above, column = (name for name in panels if name != "3D!arm")
+    for count, name in enumerate(reversed(above), 2):  # one below the other, of equal height
+        column = {"direction": "column", "first": name, "second": column,
+                  "splitPercentage": round(100 / count, 2)}
+    found["layout"]["second"] = column
     return found
-
-
-def _column(names: list[str]) -> Any:
-    """Return panels one below the other, of equal height."""
-    if len(names) == 1:
-        return names[0]
-    return {"direction": "column", "first": names[0], "second": _column(names[1:]),
-            "splitPercentage": round(100 / len(names), 2)}

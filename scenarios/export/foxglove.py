@@ -5,13 +5,12 @@ message types, as far as they are used here. Its reader takes one type per field
 may be null is declared as a number.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from hierarchy.avoidance import Capsule
 from hierarchy.avoidance.obstacles import Obstacle
 from hierarchy.problem import Array
 from scenarios.scene.drawn import Scene
@@ -40,13 +39,13 @@ def transforms(scene: Scene, frame: int) -> Message:
     placed.append(("end_effector", scene.points[frame, -1], turned))
     if scene.desired is not None:
         placed.append(("desired", scene.desired[frame], np.eye(3)))
-    return {"transforms": [transform(t, *one) for one in placed]}
+    return {"transforms": [_transform(t, *one) for one in placed]}
 
 
-def transform(t: float, name: str, place: Array, rotation: Array) -> Message:
-    """Return the placement of a frame in the world."""
-    return {"timestamp": time(t), "parent_frame_id": WORLD, "child_frame_id": name,
-            "translation": xyz(place), "rotation": xyzw(rotation)}
+def _transform(t: float, name: str, place: Array, rotation: Array) -> Message:
+    translation, rotation_of = _pose(place, rotation).values()
+    return {"timestamp": _time(t), "parent_frame_id": WORLD, "child_frame_id": name,
+            "translation": translation, "rotation": rotation_of}
 
 
 def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
@@ -58,10 +57,12 @@ def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
     for frame in range(len(scene.t)):
         t, entities = float(scene.t[frame]), []
         if frame == 0:
-            entities += [link(t, capsule, scene.robot.joint_names)
-                         for capsule in scene.robot.capsules]
+            names = (WORLD, *scene.robot.joint_names)
+            entities += [_entity(t, f"body {one.name}", names[one.joint], **_capsule(
+                             np.array(one.start), np.array(one.end), one.radius, _ARM))
+                         for one in scene.robot.capsules]
             if scene.desired is not None:
-                entities.append(line(t, "path asked for", scene.desired, _ASKED))
+                entities.append(_line(t, "path asked for", scene.desired, _ASKED))
         moved = (scene.centres[frame] != scene.centres[frame - 1]).any(axis=1)
         entities += [obstacle(t, h, body, scene.centres[frame, h])
                      for h, body in enumerate(scene.obstacles.obstacles)
@@ -69,19 +70,13 @@ def scene_updates(scene: Scene, every: int) -> Iterator[tuple[int, Message]]:
         if np.isfinite(scene.nearest[frame]).all() and scene.nearest.size:
             k = int(scene.linked[frame])
             pair = np.array([scene.points[frame, k], scene.nearest[frame, k]])
-            entities.append(line(t, "nearest", pair, _OBSTACLE))
+            entities.append(_line(t, "nearest", pair, _OBSTACLE))
         if frame and (frame % every == 0 or frame == len(scene.t) - 1):
             first = (frame - 1) // every * every
-            entities.append(line(t, f"path taken {first // every + 1}",
-                                 scene.traced[first:frame + 1], _TRACE))
+            entities.append(_line(t, f"path taken {first // every + 1}",
+                                 scene.points[first:frame + 1, -1], _TRACE))
         if entities:
             yield frame, {"deletions": [], "entities": entities}
-
-
-def link(t: float, capsule: Capsule, joints: Sequence[str]) -> Message:
-    """Return a capsule fixed to the frame of its joint."""
-    return entity(t, f"body {capsule.name}", joints[capsule.joint - 1] if capsule.joint else WORLD,
-                  **_capsule(np.array(capsule.start), np.array(capsule.end), capsule.radius, _ARM))
 
 
 def obstacle(t: float, number: int, body: Obstacle, centre: Array) -> Message:
@@ -96,7 +91,7 @@ def obstacle(t: float, number: int, body: Obstacle, centre: Array) -> Message:
     else:
         radius = body.size[0] if body.size else _POINT
         parts = {"spheres": [_body(centre, 2.0 * radius, _OBSTACLE)]}
-    return entity(t, f"obstacle {number + 1}", WORLD, **parts)
+    return _entity(t, f"obstacle {number + 1}", WORLD, **parts)
 
 
 def _capsule(start: Array, end: Array, radius: float, colour: Message) -> dict[str, list[Message]]:
@@ -111,33 +106,32 @@ def _capsule(start: Array, end: Array, radius: float, colour: Message) -> dict[s
     return {"cylinders": [cylinder | {"bottom_scale": 1.0, "top_scale": 1.0}], "spheres": balls}
 
 
-def line(t: float, name: str, points: Array, colour: Message) -> Message:
+def _line(t: float, name: str, points: Array, colour: Message) -> Message:
     """Return a line through points (P, 3) [m] in the world, without those that are not finite."""
-    return entity(t, name, WORLD, lines=[_strip(points[np.isfinite(points).all(axis=1)], colour)])
+    return _entity(t, name, WORLD, lines=[_strip(points[np.isfinite(points).all(axis=1)], colour)])
 
 
 def _strip(points: Array, colour: Message) -> Message:
-    return {"type": _STRIP, "pose": pose(np.zeros(3), np.eye(3)), "thickness": _THICK,
-            "scale_invariant": True, "points": [xyz(point) for point in points],
+    return {"type": _STRIP, "pose": _pose(np.zeros(3), np.eye(3)), "thickness": _THICK,
+            "scale_invariant": True, "points": [_xyz(point) for point in points],
             "color": colour, "colors": [], "indices": []}
 
 
 def log(t: float, message: str, tick: int) -> Message:
     """Return a warning of the policy in a tick."""
-    return {"timestamp": time(t), "level": _WARNING, "message": message, "name": "policy",
+    return {"timestamp": _time(t), "level": _WARNING, "message": message, "name": "policy",
             "file": "", "line": tick}
 
 
-def entity(t: float, name: str, frame: str, **parts: list[Message]) -> Message:
+def _entity(t: float, name: str, frame: str, **parts: list[Message]) -> Message:
     """Return an entity that stays until another one of its name arrives."""
     kinds = ("metadata", "arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts",
              "models")
-    return {"timestamp": time(t), "frame_id": frame, "id": name, "lifetime": time(0.0),
+    return {"timestamp": _time(t), "frame_id": frame, "id": name, "lifetime": _time(0.0),
             "frame_locked": True, **{kind: parts.get(kind, []) for kind in kinds}}
 
 
-def time(t: float) -> Message:
-    """Return a time [s] as Foxglove's message."""
+def _time(t: float) -> Message:
     return dict(zip(("sec", "nsec"), divmod(nanoseconds(t), 10**9), strict=True))
 
 
@@ -146,25 +140,19 @@ def nanoseconds(t: float) -> int:
     return round(t * 1e9)
 
 
-def pose(place: Array, rotation: Array) -> Message:
-    """Return a pose as Foxglove's message."""
-    return {"position": xyz(place), "orientation": xyzw(rotation)}
+def _pose(place: Array, rotation: Array) -> Message:
+    turn = Rotation.from_matrix(rotation).as_quat(canonical=True)  # w >= 0
+    return {"position": _xyz(place), "orientation": dict(zip("xyzw", turn.tolist(), strict=True))}
 
 
-def xyz(vector: Array) -> Message:
-    """Return a vector as Foxglove's message."""
+def _xyz(vector: Array) -> Message:
     return dict(zip("xyz", np.asarray(vector, dtype=float).tolist(), strict=True))
-
-
-def xyzw(R: Array) -> Message:
-    """Return the unit quaternion, w >= 0, of a rotation (3, 3) as Foxglove's message."""
-    return dict(zip("xyzw", Rotation.from_matrix(R).as_quat(canonical=True).tolist(), strict=True))
 
 
 def _body(centre: Array, size: float | Array, colour: Message, rotation: Array | None = None
           ) -> Message:
-    return {"pose": pose(centre, np.eye(3) if rotation is None else rotation),
-            "size": xyz(np.broadcast_to(size, 3)), "color": colour}
+    return {"pose": _pose(centre, np.eye(3) if rotation is None else rotation),
+            "size": _xyz(np.broadcast_to(size, 3)), "color": colour}
 
 
 def schema(example: Any) -> dict[str, Any]:
@@ -182,8 +170,8 @@ _PARTS = {**_capsule(np.zeros(3), np.ones(3), 1.0, _ARM), "cubes": [_body(np.zer
           "lines": [{**_strip(np.zeros((1, 3)), _ARM), "colors": [_ARM], "indices": [0]}],
           "metadata": [{"key": "", "value": ""}]}
 FOXGLOVE = {name: schema(example) for name, example in {
-    "foxglove.FrameTransforms": {"transforms": [transform(0.0, "", np.zeros(3), np.eye(3))]},
-    "foxglove.SceneUpdate": {"deletions": [{"timestamp": time(0.0), "type": 0, "id": ""}],
-                             "entities": [entity(0.0, "", "", **_PARTS)]},
+    "foxglove.FrameTransforms": {"transforms": [_transform(0.0, "", np.zeros(3), np.eye(3))]},
+    "foxglove.SceneUpdate": {"deletions": [{"timestamp": _time(0.0), "type": 0, "id": ""}],
+                             "entities": [_entity(0.0, "", "", **_PARTS)]},
     "foxglove.Log": log(0.0, "", 0)}.items()}
 """The schemas of the messages, by the names that Foxglove knows."""

@@ -1,10 +1,10 @@
 """What is computed after each tick, outside the measured times, and becomes signals of a run."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hierarchy.problem import Hierarchy
 from hierarchy.state import State
@@ -81,8 +81,13 @@ class ActiveSets:
             return -1
         key = h.names, bounds, states.tobytes()
         if key not in self._seen:
-            acting = frozenset(_acting(h, states, bounds))
-            self._seen[key] = self._numbers.setdefault(acting, len(self._numbers))
+            first = int(np.argmax(h.sizes > 0))  # unknowns are as rows of the first level with any
+            acting = set[Row]()
+            for i in np.flatnonzero((states != FREE) & (states != EQUAL)).tolist():
+                level = first if bounds else int((h.offsets[1:] <= i).sum())
+                acting.add((h.names[level], i if bounds else i - int(h.offsets[level]),
+                            int(states[i])))
+            self._seen[key] = self._numbers.setdefault(frozenset(acting), len(self._numbers))
         return self._seen[key]
 
 
@@ -120,11 +125,3 @@ class Strictness:
         moved = h.A[rows] @ (controller.resolution.x - alone.x)
         share = control.period if control.level == "velocity" else control.period**2 / 2
         return {"moved_by_lower": float(np.linalg.norm(moved)) * share}
-
-
-def _acting(h: Hierarchy, states: NDArray[np.int8], bounds: bool) -> Iterator[Row]:
-    """Yield the rows of h that act; for `bounds` unknowns, as rows of the first level with any."""
-    first = int(np.argmax(h.sizes > 0))
-    for i in np.flatnonzero((states != FREE) & (states != EQUAL)).tolist():
-        level = first if bounds else int((h.offsets[1:] <= i).sum())
-        yield h.names[level], i if bounds else i - int(h.offsets[level]), int(states[i])

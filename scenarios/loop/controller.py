@@ -14,7 +14,7 @@ from scenarios.config import Scenario
 from scenarios.loop.faults import Faults
 from scenarios.loop.policy import policy_of, smallest
 from scenarios.loop.transition import Blend
-from solvers import Resolution, Resolver, Status
+from solvers import Resolution, Status
 
 _REHEARSALS = 20
 _ROUNDING = 1e-9  # [s] of times that are compared
@@ -35,11 +35,9 @@ class Controller:
     hierarchy: Hierarchy
 
     def __init__(self, scenario: Scenario, cell: Cell | None = None,
-                 resolver: Resolver | None = None, faults: Faults | None = None) -> None:
+                 faults: Faults | None = None) -> None:
         cell = build(scenario) if cell is None else cell
-        if resolver is None:
-            resolver = stack_resolver(scenario, cell)
-        self.clock = perf_counter
+        resolver, self.clock = stack_resolver(scenario, cell), perf_counter
         if faults is not None:
             cell, resolver, self.clock = faults.around(cell, resolver)
         self.cell, self.resolver, control = cell, resolver, scenario.control
@@ -132,17 +130,13 @@ class Controller:
             troubles.append("not_finite")
         elif t - stamp > self._stale_after + _ROUNDING:
             troubles.append("stale")
-        state.move(t, *self._carried_on(t - state.t))
-
-    def _carried_on(self, dt: float) -> tuple[Array, Array]:
-        """Return q (nq,), v (n,) after `dt` [s] under the last command sent."""
-        state, x = self.cell.state, self.sent
+        dt, x = t - state.t, self.sent  # on under the last command
         if self.level == "torque":
             slowing = self.policy.slowing
             x = -slowing * state.v if slowing else self.resolution.x[:state.n]
-        if self.level == "velocity":
-            return state.robot.integrate(state.q, x * dt), x
-        return state.robot.integrate(state.q, state.v * dt + x * (dt * dt / 2)), state.v + x * dt
+        moved, after = (x * dt, x) if self.level == "velocity" else (
+            state.v * dt + x * (dt * dt / 2), state.v + x * dt)
+        state.move(t, state.robot.integrate(state.q, moved), after)
 
     def _sense(self, troubles: list[str]) -> None:
         cell = self.cell

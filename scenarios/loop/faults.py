@@ -84,12 +84,17 @@ class Faults:
         """Place the obstacles of faults for this time."""
         spheres = [fault for fault in self._sections if fault.kind == "obstacle"]
         for i, fault in enumerate(spheres, -len(spheres)):
-            if self._on(fault) == (i in self._standing):
-                continue
-            self._standing ^= {i}
-            assert self._sensor is not None
-            self._sensor.obstacles.centres[i] = (
-                _place(fault, self._robot, self._plant.q) if i in self._standing else _AWAY)
+            if self._on(fault) != (i in self._standing):
+                self._standing ^= {i}
+                centre = np.array(fault.centre or _AWAY)
+                if i not in self._standing:
+                    centre[:] = _AWAY
+                elif fault.place is not None:
+                    point = point_of(self._robot, fault.place, "place")
+                    centre = State.at(self._robot, self._plant.q).position(
+                        Frame("", point.joint, np.array(point.offset), np.eye(3)))
+                assert self._sensor is not None
+                self._sensor.obstacles.centres[i] = centre
 
 
 class FaultySensor:
@@ -129,11 +134,12 @@ class _FaultyResolver(Around):
         """Solve h with the inner resolver and apply the active faults."""
         resolution = self.inner.solve(h, memory)
         self.faults.overrun()
-        for fault in self.faults.now("status"):
-            status = Status[str(fault.status).upper()]
-            x = np.zeros(h.n) if status is Status.NUMERICAL_FAILURE else resolution.x
-            return Resolution(x, status, resolution.iterations, resolution.memory)
-        return resolution
+        fault = next(self.faults.now("status"), None)
+        if fault is None:
+            return resolution
+        status = Status[str(fault.status).upper()]
+        x = np.zeros(h.n) if status is Status.NUMERICAL_FAILURE else resolution.x
+        return Resolution(x, status, resolution.iterations, resolution.memory)
 
 
 def with_room(scenario: Scenario) -> Scenario:
@@ -156,13 +162,6 @@ def check(faults: Iterable[FaultSection], robot: Robot) -> None:
                 raise ScenarioError(f"faults.{i}.{key} = {value}: robot {robot.name!r} has {most}")
         if fault.place is not None:
             point_of(robot, fault.place, f"faults.{i}.place")
-
-
-def _place(fault: FaultSection, robot: Robot, q: Array) -> Array:
-    if fault.place is None:
-        return np.array(fault.centre)
-    point = point_of(robot, fault.place, "place")
-    return State.at(robot, q).position(Frame("", point.joint, np.array(point.offset), np.eye(3)))
 
 
 def _spoil(values: Array, numbers: list[int | None]) -> None:

@@ -11,10 +11,10 @@ from hierarchy.contacts import Contacts
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Rows
+from hierarchy.task import Rows
 from hierarchy.tasks import BaseDynamics
 from scenarios.cell.build import Cell
-from scenarios.config.sections.control import ControlSection, PolicySection
+from scenarios.config.sections.control import ControlSection
 
 _ORDER = ("use", "hold", "brake", "stop")  # the last of those requested in a tick is taken
 _BRAKE = 10.0    # [1/s] deceleration per velocity
@@ -34,14 +34,13 @@ class Policy:
     whether the robot has come to rest since then, or at level "torque" is to be left to itself.
     """
 
-    def __init__(self, section: PolicySection, level: Level, period: float,
-                 clamp: Callable[[Array], Array] | None = None,
+    def __init__(self, control: ControlSection, clamp: Callable[[Array], Array] | None = None,
                  torques: Callable[[Array, Array | None], Array] | None = None) -> None:
         self.events: Sequence[tuple[str, str]] = ()
         self.fault: str | None = None
-        self.stopped, self.slowing = False, 0.0
-        self._section, self._clamp, self._period = section, clamp, period
-        self._acceleration, self._torques = level == "acceleration", torques
+        self.stopped, self.slowing, self._held = False, 0.0, 0
+        self._section, self._clamp, self._period = control.policy, clamp, control.period
+        self._acceleration, self._torques = control.level == "acceleration", torques
         self._good: Array | None = None
         self._forces: Array | None = None
 
@@ -63,23 +62,20 @@ class Policy:
     def _otherwise(self, t: float, troubles: Sequence[str], x: Array, v: Array) -> Array:
         if not finite(x):  # no resolver should
             troubles, x = [*troubles, "numerical_failure"], np.zeros_like(x)
-        action = self._action(troubles)
+        action = "stop" if self.fault is not None else max(
+            (getattr(self._section, kind) for kind in troubles), key=_ORDER.index)
+        held = self._good if self._held < self._section.patience else None
+        if action == "hold" and held is None:
+            action = "brake"
         self.events = [(kind, action) for kind in troubles]
         if action == "use":
             return self._within_limits(x)
-        if action == "hold" and self._good is not None:
+        if action == "hold" and held is not None:
             self._held += 1
-            return self._within_limits(self._good)
+            return self._within_limits(held)
         if action == "stop" and self.fault is None:
             self.fault = f"stopped by its policy at t = {t:.3f} s: {', '.join(troubles)}"
         return self._slower(action, v)
-
-    def _action(self, troubles: Sequence[str]) -> str:
-        if self.fault is not None:
-            return "stop"
-        action = max((getattr(self._section, kind) for kind in troubles), key=_ORDER.index)
-        spent = self._good is None or self._held >= self._section.patience
-        return "brake" if action == "hold" and spent else action
 
     def _slower(self, action: str, v: Array) -> Array:
         """Return the command that brings v toward zero: at once for "stop", else at `_BRAKE`.
@@ -114,13 +110,11 @@ def policy_of(cell: Cell, control: ControlSection) -> Policy:
     """Return the policy of a cell, with the limits of its robot."""
     if cell.contacts is None:
         joints = cell.tasks.limits
-        clamp = partial(joints.clamp, cell.state, control.level) if joints else None
-        return Policy(control.policy, control.level, control.period, clamp)
+        return Policy(control, partial(joints.clamp, cell.state, control.level) if joints else None)
     limits, limit = cell.scenario.limits, cell.torque_limit
     step = (limits and limits.torque_step) or inf
     soft = inf if cell.scenario.forces_in_stack else step  # a level of the stack keeps the step
-    return Policy(control.policy, control.level, control.period,
-                  partial(_clamped, cell.state, limit, soft),
+    return Policy(control, partial(_clamped, cell.state, limit, soft),
                   _slowed(cell.state, cell.contacts, partial(_clamped, cell.state, limit, step)))
 
 

@@ -81,7 +81,7 @@ class Recorder:
         self._always: tuple[Audit, ...] = (Truth(cell),)
         self._audits: tuple[Audit, ...] = (*self._always, ActiveSets(), *audits)
         self._audited: dict[str, NDArray[Any]] = {}
-        self.facts = facts_of(cell.scenario, robot)
+        self.facts = facts_of(cell.scenario, robot, cell.contacts)
         self.follow(controller)
 
     def follow(self, controller: Controller) -> None:
@@ -135,16 +135,14 @@ class Recorder:
         if cell.tasks.position is not None:
             cell.tasks.position.path.write(cell.state.t, self._desired[k])
         for audit in self._audits if controller.answered else self._always:
-            for name, value in audit(k, controller).items():
-                self._rows_of(name, np.asarray(value))[k] = value
+            for name, given in audit(k, controller).items():
+                if name not in self._audited:
+                    first = np.asarray(given)
+                    nothing = {"f": np.nan, "i": -1}.get(first.dtype.kind, 0)
+                    self._audited[name] = np.full((len(self._log.t), *first.shape), nothing,
+                                                  first.dtype)
+                self._audited[name][k] = given
         self.ticks = k + 1
-
-    def _rows_of(self, name: str, value: NDArray[Any]) -> NDArray[Any]:
-        """Return the rows of an audit's signal, which begin when it is first given."""
-        if name not in self._audited:
-            nothing = {"f": np.nan, "i": -1}.get(value.dtype.kind, 0)
-            self._audited[name] = np.full((len(self._log.t), *value.shape), nothing, value.dtype)
-        return self._audited[name]
 
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return the run as recorded so far."""

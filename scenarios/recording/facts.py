@@ -12,10 +12,11 @@ import numpy as np
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule
+from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 from hierarchy.robots import DHTable
 from hierarchy.robots.table import Base
-from scenarios.cell.robot import contacts_of, on_column, sensed_points
+from scenarios.cell.robot import on_column, sensed_points
 from scenarios.config import Scenario
 from scenarios.config.sections.plant import TorqueSection
 from solvers.resolver import Handles
@@ -147,17 +148,16 @@ class Facts:
     contacts: tuple[ContactPoint, ...] = ()
 
 
-def facts_of(scenario: Scenario, robot: Robot) -> Facts:
-    """Return the facts of a scenario on its robot."""
+def facts_of(scenario: Scenario, robot: Robot, contacts: Contacts | None = None) -> Facts:
+    """Return the facts of a scenario on its robot; `contacts` as in a Cell."""
     facts, plant = robot_facts(robot, scenario.sensor.foot), scenario.plant
     if isinstance(plant, TorqueSection) and facts.base == "floating":
         facts = replace(facts, floor=plant.height)
-    contacts = contacts_of(scenario, robot)
-    of = [contact for contact in contacts.contacts for _ in contact.points] if contacts else []
-    points = tuple(ContactPoint(contact.name, int(joint), _vector(offset),
-                                _vector(contact.axes[2]), contact.friction)
-                   for contact, joint, offset in zip(
-                       of, *(contacts.points if contacts else ((), ())), strict=True))
+    points = tuple(ContactPoint(contact.name, contact.frame.joint,
+                                _vector(contact.frame.placed(point)), _vector(contact.axes[2]),
+                                contact.friction)
+                   for contact in (contacts.contacts if contacts else ())
+                   for point in contact.points)
     return Facts(facts, resolver_facts(scenario), scenario.asks, scenario.limits_in_stack, points)
 
 
@@ -169,14 +169,16 @@ def robot_facts(robot: Robot, foot: float = 0.0) -> RobotFacts:
                    for point in sensed_points(robot))
     x, y, z = (_vector(row) for row in tip.rotation)
     units, chain = tuple(robot.velocity_units), tuple(range(len(robot.joint_names)))
-    model = robot.model.saveToString()
+    model, radii = robot.model.saveToString(), [link.radius for link in links]
+    # The lowest point of the robot at rest, at most as high as its base.
+    low = ends(links, State.at(robot, robot.rest).placements)[..., 2].min(axis=-1) - radii
     return RobotFacts(
         robot.name, robot.base, model, sha256(model.encode()).hexdigest(), robot.joint_names,
         robot.base == "fixed" and robot.parents[1:] == chain, tuple(robot.rest.tolist()),
         tuple(robot.velocity_names),
         tuple(unit for part in robot.parts
               for unit in ((part.unit,) if part.size == 1 else ("1",) * part.size)),
-        units, points, (x, y, z), links, -foot if foot else lowest(robot, links))
+        units, points, (x, y, z), links, -foot if foot else float(low.min(initial=0.0)))
 
 
 def resolver_facts(scenario: Scenario) -> ResolverFacts:
@@ -209,23 +211,14 @@ def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
 
     With `foot` > 0 [m] the first is a column of that height below the base.
     """
-    return on_column(robot, robot.capsules or _sticks(robot), foot)
-
-
-def _sticks(robot: Robot) -> tuple[Capsule, ...]:
     end = robot.frame(robot.end_effector)
     sticks = [(body.name, body.parent, body.position) for body in robot.bodies()]
     sticks = [stick for stick in (*sticks, (end.name, end.joint, end.offset))
               if np.linalg.norm(stick[2]) > 0.0]
     radius = _STICK * max((float(np.linalg.norm(stick[2])) for stick in sticks), default=0.0)
-    return tuple(Capsule(name, joint, (0.0, 0.0, 0.0), (float(x), float(y), float(z)), radius)
-                 for name, joint, (x, y, z) in sticks)
-
-
-def lowest(robot: Robot, links: Sequence[Capsule]) -> float:
-    """Height [m] of the lowest point of a robot at rest, at most that of its base."""
-    low = ends(links, State.at(robot, robot.rest).placements)[..., 2].min(axis=-1)
-    return float((low - [link.radius for link in links]).min(initial=0.0))
+    return on_column(robot, robot.capsules or tuple(
+        Capsule(name, joint, (0.0, 0.0, 0.0), _vector(way), radius)
+        for name, joint, way in sticks), foot)
 
 
 def ends(links: Sequence[Capsule], placements: Array) -> Array:

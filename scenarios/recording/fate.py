@@ -28,21 +28,24 @@ _UNITS = {"position": "m", "avoidance": "m", "separation": "m", "joint limits": 
           "posture": "rad"}  # of the errors of tasks that no section lists
 
 
-def row_units(scenario: Scenario, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the unit of the rows of each task, "" where they differ or it is not known."""
+def row_units(scenario: Scenario, names: Sequence[str], joints: Sequence[str]) -> tuple[str, ...]:
+    """Return the unit of the rows of each task, "" where they differ or it is not known.
+
+    `joints` are the units of the joints, which a task in "rad" has.
+    """
     sections = {task.title: task for task in scenario.tasks}
     rate = "/s" if scenario.control.level == "velocity" else "/s²"
 
     def unit(name: str) -> str:
         section = sections.get(name)
-        if section is None:
-            return _UNITS[name] + rate if name in _UNITS else ""
-        if section.of_forces:
+        if section and section.of_forces:
             return section.unit
-        if section.unit.endswith(" s"):  # a momentum, whose rate is a force
-            return section.unit.removesuffix(" s")
-        mixed = hasattr(section, "rotation") or not section.unit
-        return "" if mixed else section.unit + rate
+        of_error = section.unit if section else _UNITS.get(name, "")
+        if of_error.endswith(" s"):  # a momentum, whose rate is a force
+            return of_error.removesuffix(" s")
+        if of_error == "rad":
+            of_error = joints[0] if len({*joints}) == 1 else ""
+        return "" if hasattr(section, "rotation") or not of_error else of_error + rate
 
     return tuple(unit(name) for name in names)
 
@@ -71,5 +74,7 @@ def levels_at(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) ->
     unknown = {"level_fate": np.int8(Fate.UNKNOWN) * recording.in_stack,
                "level_violation": np.full((recording.ticks, len(names)), np.nan),
                "saturated": np.zeros(recording["v"].shape, np.int8)}
-    return Levels(names, row_units(recording.scenario, names),
-                  *(recording.get(name, none)[ticks] for name, none in unknown.items()))
+    robot = recording.facts.robot
+    units = row_units(recording.scenario, names, robot.velocity_units[robot.actuated:])
+    return Levels(names, units, *(recording.get(name, none)[ticks]
+                                  for name, none in unknown.items()))

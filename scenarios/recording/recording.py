@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError, check_name, is_one_of
 from hierarchy.notebook import html_table
 from hierarchy.problem import Array
 from scenarios.config import Scenario
 from scenarios.recording.facts import Facts
-from scenarios.recording.signals import check, known
+from scenarios.recording.signals import known
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,10 +77,11 @@ class Recording:
         return self.signals[name]
 
     def __contains__(self, name: str) -> bool:
-        if not is_one_of(name, self.signals):
-            check(name)
-            return False
-        return True
+        if is_one_of(name, self.signals):
+            return True
+        if not isinstance(name, str) or known(name) is None:
+            raise UnknownNameError("signal", name, plugins.known("signals"))
+        return False
 
     def get(self, name: str, default: NDArray[Any]) -> NDArray[Any]:
         """Return a signal, or `default` where the run does not have it."""

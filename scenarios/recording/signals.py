@@ -13,7 +13,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from hierarchy import plugins
-from hierarchy.errors import UnknownNameError, refuse
+from hierarchy.errors import refuse
 
 OTHER = "/other"  # the topic of what has no other
 
@@ -45,12 +45,6 @@ def known(name: str) -> Signal | None:
     return plugins.find("signals", name) or next(
         (signal for signal in plugins.known("signals").values()
          if signal.name[-1] == "*" and name.startswith(signal.name[:-1])), None)
-
-
-def check(name: str) -> None:
-    """Raise an UnknownNameError with the nearest name unless a signal has this one."""
-    if not isinstance(name, str) or known(name) is None:
-        raise UnknownNameError("signal", name, plugins.known("signals"))
 
 
 def check_shapes(signals: Mapping[str, NDArray[Any]], **sizes: int) -> None:

@@ -71,7 +71,7 @@ def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Ser
         found.setdefault(unit, {})[section.title] = error
     for unit, errors in found.items():
         scale, shown = _SHOWN.get(unit, (1.0, unit))
-        yield _sampled(f"Errors of tasks{_ERRORS[unit]}", shown, tuple(errors),
+        yield _sampled(f"Errors of tasks{_ERRORS.get(unit, f' in {unit}')}", shown, tuple(errors),
                        scale * np.column_stack(list(errors.values())), ticks)
 
 

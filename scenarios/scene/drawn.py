@@ -79,11 +79,6 @@ class Scene:
         return radians(135.0 if self.robot.is_chain else 40.0)
 
     @property
-    def traced(self) -> Array:
-        """The path of the end effector: (F, 3) [m]."""
-        return np.asarray(self.points[:, -1])
-
-    @property
     def links(self) -> Array:
         """Start and end of each capsule of the arm in the world: (F, C, 2, 3) [m]."""
         return ends(self.robot.capsules, self.placements)
@@ -106,7 +101,7 @@ def scene(recording: Recording, rate: float = 30.0,
     robot, avoidance, pointing = facts.robot, scenario.avoidance, scenario.pointing
     cone = None if pointing is None else np.asarray(pointing.axis) / np.linalg.norm(pointing.axis)
     obstacles = make_obstacles(avoidance.placed if avoidance else ())
-    placements = robot.placements(_joints(recording)[ticks])
+    placements = robot.placements(recording.get("true_q", recording["q"])[ticks])
     z = placements[:, robot.points[-1].joint, :9].reshape(-1, 3, 3).swapaxes(1, 2) @ np.array(
         robot.tool)[:, 2]
     moved = _distances(obstacles, recording, ticks, placements)
@@ -128,7 +123,7 @@ def scene(recording: Recording, rate: float = 30.0,
 
 def _frames(recording: Recording, rate: float) -> NDArray[np.int64]:
     """Return the ticks nearest to the frames' times, including the first and the last tick."""
-    finite = np.flatnonzero(np.isfinite(_joints(recording)).all(axis=1))
+    finite = np.flatnonzero(np.isfinite(recording.get("true_q", recording["q"])).all(axis=1))
     refuse(not finite.size, "the recording has no tick: there is nothing to draw")
     t = recording["t"][finite]
     wanted = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
@@ -136,10 +131,6 @@ def _frames(recording: Recording, rate: float) -> NDArray[np.int64]:
     before = np.maximum(np.asarray(after) - 1, 0)
     nearer = np.where(wanted - t[before] <= t[after] - wanted, before, after)
     return np.unique(finite[nearer])
-
-
-def _joints(recording: Recording) -> Array:
-    return np.asarray(recording["true_q" if "true_q" in recording else "q"])
 
 
 def _distances(obstacles: Obstacles, recording: Recording, ticks: NDArray[np.int64],

@@ -47,7 +47,8 @@ def key(facts: Facts, scenario: Scenario) -> dict[str, str]:
     if not facts.contacts:
         return {}
     drawn = {"force": True, "cone": True, "support": len(facts.contacts) > 2,
-             "centre": facts.robot.base == "floating", "push": bool(_shoves(scenario)),
+             "centre": facts.robot.base == "floating",
+             "push": bool(getattr(scenario.plant, "pushes", ())),
              "table": facts.robot.base == "fixed"}
     return {name: _WORDS[name] for name, it_is in drawn.items() if it_is}
 
@@ -59,11 +60,16 @@ def pushes(facts: Facts, scenario: Scenario, t: Array, placements: Array, forces
     `forces` (F, P, 3) [N] are those on the contact points of `facts`, `com` (F, 3) [m] is the
     centre of mass.
     """
-    shoves = [_shove(facts.robot, push, t, placements) for push in _shoves(scenario)]
+    none = np.empty((len(placements), 0, 2, 3))
+    shoves = [_shove(facts.robot, push, t, placements)
+              for push in getattr(scenario.plant, "pushes", ())]  # none of a plugin's plant
+    height = getattr(scenario.plant, "height", None)
+    fixed = facts.robot.base == "fixed"
     return Pushes(*_contacts(facts.contacts, placements, forces),
-                  _below(facts.robot, com, len(placements)),
-                  np.concatenate([np.empty((len(placements), 0, 2, 3)), *shoves], axis=1),
-                  _table(facts, scenario, placements))
+                  none if com is None or fixed else _below(com, facts.robot.floor),
+                  np.concatenate([none, *shoves], axis=1),
+                  _table(facts.contacts[0], height, placements) if fixed and height is not None
+                  else none)
 
 
 def _contacts(points: Sequence[ContactPoint], placements: Array,
@@ -83,36 +89,25 @@ def _contacts(points: Sequence[ContactPoint], placements: Array,
     return force, cone.reshape(len(at), -1, 2, 3), support
 
 
-def _below(robot: RobotFacts, com: Array | None, frames: int) -> Array:
-    """Return a cross (F, 2, 2, 3) on the floor below the centre of mass, or (F, 0, 2, 3)."""
-    if com is None or robot.base == "fixed":
-        return np.empty((frames, 0, 2, 3))
+def _below(com: Array, floor: float) -> Array:
+    """Return a cross (F, 2, 2, 3) on the floor below the centre of mass."""
     arms = _CROSS * np.array([[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]],
                               [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]]])
-    place = np.column_stack([com[:, :2], np.full(frames, robot.floor)])
+    place = np.column_stack([com[:, :2], np.full(len(com), floor)])
     return np.asarray(place[:, None, None] + arms)
 
 
-def _table(facts: Facts, scenario: Scenario, placements: Array) -> Array:
+def _table(point: ContactPoint, height: float, placements: Array) -> Array:
     """Return a grid (F, S, 2, 3) at the height of the plant's floor, below the first frame's hand.
 
     Its lines are where those of other frames would be: a live run shows one frame at a time.
     """
-    height, frames = getattr(scenario.plant, "height", None), len(placements)
-    if height is None or facts.robot.base == "floating":
-        return np.empty((frames, 0, 2, 3))
-    point = facts.contacts[0]
     hand = placed_points(placements[0], [point.joint], point.offset)[0]
     x, y, _ = np.round(hand / _TABLE * 4) * _TABLE / 4
     at = np.linspace(-_TABLE, _TABLE, 9)
     along = np.array([[[-_TABLE, one, 0.0], [_TABLE, one, 0.0]] for one in at])
     lines = np.concatenate([along, along[..., [1, 0, 2]]])
-    return np.tile(lines + np.array([x, y, height]), (frames, 1, 1, 1))
-
-
-def _shoves(scenario: Scenario) -> tuple[PushSection, ...]:
-    """Return the pushes of the plant, none for one of a plugin."""
-    return getattr(scenario.plant, "pushes", ())
+    return np.tile(lines + np.array([x, y, height]), (len(placements), 1, 1, 1))
 
 
 def _shove(robot: RobotFacts, push: PushSection, t: Array, placements: Array) -> Array:
@@ -121,18 +116,15 @@ def _shove(robot: RobotFacts, push: PushSection, t: Array, placements: Array) ->
     body = [(np.array(one.start) + one.end) / 2 for one in robot.capsules if one.joint == joint]
     middle = np.mean(body, axis=0) if body else np.zeros(3)
     tip = placed_points(placements, [joint], middle)
-    arrow: Array = tip[:, :, None] + _arrow(_LENGTH * push.vector)
-    arrow[~push.acts(t)] = np.nan
-    return arrow
-
-
-def _arrow(way: Array) -> Array:
-    """Return shaft and head (5, 2, 3) of an arrow along `way` (3,) [m] to the origin."""
+    way = _LENGTH * push.vector
     length = float(np.linalg.norm(way))
     along = way / (length or 1.0)
     across = 0.4 * np.linalg.svd(along[None])[2][1:]
     barbs = min(_HEAD, length) * (np.concatenate([across, -across]) - along)
-    return np.stack([np.array([-way, *barbs]), np.zeros((5, 3))], axis=1)
+    shaft_and_head = np.stack([np.array([-way, *barbs]), np.zeros((5, 3))], axis=1)
+    arrow: Array = tip[:, :, None] + shaft_and_head
+    arrow[~push.acts(t)] = np.nan
+    return arrow
 
 
 def _cone(point: ContactPoint) -> Array:
@@ -148,17 +140,13 @@ def _cone(point: ContactPoint) -> Array:
 
 def _hull(points: Array, count: int) -> Array:
     """Return the edges (count, 2, 3) of the hull of points (k, 3) from above, NaN beyond them."""
-    edges, ring = np.full((count, 2, 3), np.nan), _ring(points)
-    edges[:len(ring)] = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
-    return edges
-
-
-def _ring(points: Array) -> Array:
-    """Return the corners of the hull in turn, seen from above; the ends of points on a line."""
     from scipy.spatial import ConvexHull, QhullError
 
+    edges = np.full((count, 2, 3), np.nan)
     try:
-        return np.asarray(points[ConvexHull(points[:, :2]).vertices])
-    except (QhullError, ValueError):  # ValueError: there are none
-        ordered = np.lexsort((points[:, 1], points[:, 0]))
-        return np.asarray(points[ordered[[0, -1]]] if len(points) > 1 else points[:0])
+        corners = ConvexHull(points[:, :2]).vertices
+    except (QhullError, ValueError):  # on a line, of which the ends count; or there are none
+        corners = np.lexsort((points[:, 1], points[:, 0]))[[0, -1] if len(points) > 1 else []]
+    ring = points[corners]
+    edges[:len(ring)] = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
+    return edges

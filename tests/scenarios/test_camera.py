@@ -22,7 +22,7 @@ from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.rendering import draw_robot
-from scenarios.cell.sensors.sensor import Asked, ExactDistances
+from scenarios.cell.sensors.sensor import ExactDistances
 from scenarios.config.sections.sensor import CameraSection, ImageSection
 
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
@@ -137,10 +137,11 @@ def test_jitter_delays_each_frame_by_less_than_its_most_and_by_the_seed():
 
 
 @pytest.mark.parametrize(("make", "said"), [
-    (lambda: Pinhole(width=0), "width [px] = 0"), (lambda: Pinhole(fx=np.nan), "fx [px] = nan"),
+    (lambda: load("human", ["sensor.width=0"]), "sensor.width: Input should be greater"),
+    (lambda: load("human", ["sensor.fx=nan"]), "sensor.fx: Input should be a finite"),
+    (lambda: load("human", ["sensor.position=[0, inf, 0]"]), "sensor.position.1: Input"),
     (lambda: Pinhole(rotation=np.eye(3) * 1.1), "rotation"),
     (lambda: Pinhole(rotation=np.diag([1, 1, -1])), "rotation"),
-    (lambda: Pinhole(position=(0, np.inf, 0)), "position"),
     (lambda: looking_at((1, 2, 3), (1, 2, 3)), "position and look_at are both"),
     (lambda: looking_at([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]), "position and look_at are both"),
     (lambda: camera(rate=30.0, jitter=0.05), "jitter = 0.05 s")])
@@ -163,7 +164,9 @@ SIDE = Pinhole(320, 240, 262.0, 262.0, position=(0.3, 2.2, 0.8),
 
 def space_of(pinhole, points, capsules, region, mean_within=(inf, inf), pairs=False, **settings):
     section = ImageSection(kind="camera", region=region, **settings)
-    return DepthSpace(section, pinhole, points, capsules, Asked(region, mean_within), pairs)
+    exact = ExactDistances(ROBOT, Obstacles(), mean_within=mean_within, pairs=pairs)
+    exact.points = points
+    return DepthSpace(section, pinhole, exact, capsules, region)
 
 
 def seen_in(image, *places, thin=inf, **settings):

@@ -45,6 +45,18 @@ def test_a_variant_has_two_names_and_those_of_a_file_extend_it(tmp_path):
     refused("wide", load, f"{tmp_path}/mine.toml:wid")
 
 
+def test_what_varies_of_a_section_of_another_kind_is_what_the_file_itself_says(tmp_path):
+    """The keys of its own [variation] were dropped with those of the kind that it replaces."""
+    file, own = tmp_path / "mine.toml", "[variation]\navoidance.distance = {uniform = [0.02, 0.03]}"
+    text = ('extends = "ellipse"\nname = "mine"\ncontrol.stack = "hierarchical"\n'
+            '[avoidance]\nkind = "separation"\nobstacles = [[0.3, 0.6, 0.3]]\n')
+    for given, kept in ((text, []), (text + own, ["avoidance.distance"])):
+        file.write_text(given)
+        assert [key for key in load(file).variation if key.startswith("avoidance")] == kept
+    file.write_text('extends = "ellipse"\nname = "mine"\nreplaces = ["avoidance"]\n')
+    assert list(load(file).variation) == ["start.q"]  # nothing could be drawn for the other key
+
+
 def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a_change(
         tmp_path, monkeypatch):
     (tmp_path / "base").mkdir()
@@ -58,6 +70,11 @@ def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a
         assert [found.robot.model, found.avoidance.obstacles[0].path.file,
                 found.position.path.file] == [f"{tmp_path}/base/{file}" for file in (
                     "arm.urdf", "motion.csv", "path.csv")]
+    (tmp_path / "base" / "moved.toml").write_text(
+        'extends = "ellipse"\nname = "moved"\nposition.path = {kind = "recorded", file = "a"}\n')
+    (tmp_path / "other.toml").write_text(
+        'extends = "base/moved.toml"\nname = "other"\nposition.path.file = "b.csv"\n')
+    assert load("../other.toml").position.path.file == f"{tmp_path}/b.csv"  # was beside the caller
     varied = '{robot.model = {choice = ["a.urdf", "kuka_lwr"]}, "a.path.file" = {choice = ["b"]}}'
     (tmp_path / "varied.toml").write_text(f'extends = "ellipse"\nvariation = {varied}\n')
     (tmp_path / "sweep.toml").write_text(

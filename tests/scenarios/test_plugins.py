@@ -14,6 +14,7 @@ from hierarchy import Robot, plugins
 from scenarios import Scenario, load, load_run, simulate
 from scenarios.config.sections.tasks import OwnTask
 from scenarios.measure.goals import goals
+from scenarios.scene.drawn import scene
 from solvers import make
 
 MODULE = '''
@@ -118,13 +119,15 @@ def test_the_kinds_of_a_plugin_are_explained_and_a_wrong_key_meets_only_its_own(
 
 def test_the_error_of_a_task_of_a_plugin_has_the_unit_that_its_class_says(folder):
     file, scenario = folder / "doors_of_mine.py", folder / "own.toml"
-    file.write_text(MODULE + BRITTLE.replace("dimension = 1", 'dimension = 1\n    unit = "m"\n'
+    file.write_text(MODULE + BRITTLE.replace("dimension = 1", 'dimension = 1\n    unit = "kg"\n'
                                              '    kind = "inequality"'))
     scenario.write_text(scenario.read_text().replace('"halved"', '"hcod"')
                         + '[[tasks]]\nkind = "brittle"\nsince = 9.0\n')
     plugins.allow("doors_of_mine")
-    found = next(one for one in goals(simulate(load("own.toml"))) if one.name == "brittle")
-    assert (found.unit, found.asked, found.promise) == ("m", "in its bounds", True)
+    run = simulate(load("own.toml"))
+    found = next(one for one in goals(run) if one.name == "brittle")
+    assert (found.unit, found.asked, found.promise) == ("kg", "in its bounds", True)
+    assert "Errors of tasks in kg" in [one.name for one in scene(run).series]  # was a KeyError
     assert OwnTask.of(type("Own", (), {"unit": property(lambda self: "m")})).unit == ""
 
 

@@ -12,7 +12,7 @@ from hierarchy import Hierarchy, Stack
 from hierarchy.tasks import JointLimits
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.config.sections.control import PolicySection
+from scenarios.config.sections.control import ControlSection
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import Faults
 from scenarios.loop.policy import Policy
@@ -27,7 +27,8 @@ bound = partial(np.clip, a_min=-1.5, a_max=1.5)
 
 
 def policy(level="acceleration", clamp=None, period=PERIOD, **section):
-    return Policy(PolicySection(**section), level, period, clamp)
+    return Policy(ControlSection(policy=section, level=level, period=period, duration=1.0,
+                                 resolver="hcod"), clamp)
 
 
 # Settings; then tick by tick the troubles, the answer, what is sent, and what is said to be done.

@@ -43,9 +43,29 @@ def test_a_table_is_below_the_hand_wherever_that_starts():
                                atol=0.04)
 
 
+def test_a_cone_and_a_direction_have_no_unit():
+    """Their levels were said to be missed by so many m/s²."""
+    tasks = [{"kind": "look-at", "frame": "tool", "target": [1.0, 0.0, 0.0]},
+             {"kind": "pointing", "frame": "tool", "axis": [0.0, 0.0, 1.0], "alpha_d": 20.0}]
+    scenario = load("ellipse-hqp", {"tasks": tasks, "pointing": None})
+    names = ["look-at", "pointing", "position"]
+    assert row_units(scenario, names, ["rad"]) == ("", "", "m/s²")
+
+
+def test_levels_of_joints_have_their_unit_and_none_where_those_differ():
+    """Limits and postures of joints that slide were said to be missed by so many rad/s²."""
+    run = simulate(load("ellipse-limits", {"control.duration": 0.002}))
+    assert "joint limits" in run.task_names
+    for units, said in ((["rad"] * 7, "rad/s²"), (["m"] * 7, "m/s²"), (["m"] * 6 + ["rad"], "")):
+        robot = replace(run.facts.robot, velocity_units=tuple(units))
+        levels = levels_at(replace(run, facts=replace(run.facts, robot=robot)), [0])
+        assert levels.units[levels.names.index("joint limits")] == said
+
+
 def test_a_wrench_has_no_unit():
     for target, unit in (([20.0], "N"), ([20.0] * 3, "N"), ([20.0] * 6, "")):
-        assert row_units(load("wipe", {"tasks.0.target": target}), ["force"]) == (unit,)
+        scenario = load("wipe", {"tasks.0.target": target})
+        assert row_units(scenario, ["force"], ["rad"]) == (unit,)
 
 
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")

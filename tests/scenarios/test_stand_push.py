@@ -45,7 +45,8 @@ class Failing:
 @pytest.mark.parametrize("action", ["hold", "brake"])
 def test_without_an_answer_the_last_torques_are_held_or_joints_slowed_down(action):
     scenario = SHORT.with_changes({"control.policy.backend_failure": action})
-    controller = Controller(scenario, resolver=Failing(Status.BACKEND_FAILURE, 8))
+    controller = Controller(scenario)
+    controller.resolver = Failing(Status.BACKEND_FAILURE, 8)
     recorder = Recorder(controller, 10)
     for k in range(10):
         assert tick(controller, recorder, k * 1e-3) is None

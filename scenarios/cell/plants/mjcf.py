@@ -76,7 +76,12 @@ def scene(robot: Robot, q: Array, obstacles: Sequence[Obstacle], joints: JointsS
     root, world = begin(robot, timestep, integrator="implicitfast")
     add(add(root, "default"), "geom", solref=(_SOFTNESS, 1.0), friction=_FRICTION)
     _arm(world, robot, q, joints, servo)
-    _obstacles(world, obstacles)
+    for number, obstacle in enumerate(obstacles, 1):  # which do not collide with each other
+        if obstacle.shape != "point":
+            body = add(world, "body", name=f"obstacle {number}", mocap="true",
+                       pos=obstacle.centre, xyaxes=axes(obstacle.rotation))
+            add(body, "geom", type=obstacle.shape, size=obstacle.size, contype="0",
+                conaffinity="1")
     actuator = add(root, "actuator")
     for kind, key, values in (("position", "kp", gains[0]), ("velocity", "kv", gains[1])):
         for name, gain in zip(robot.joint_names, values, strict=True):
@@ -127,16 +132,6 @@ def _link(capsule: Capsule) -> dict[str, Any]:
     if capsule.start == capsule.end:
         return {"type": "sphere", "pos": capsule.start, "size": capsule.radius}
     return {"type": "capsule", "fromto": (*capsule.start, *capsule.end), "size": capsule.radius}
-
-
-def _obstacles(world: Element, obstacles: Sequence[Obstacle]) -> None:
-    """Add the obstacles: they collide with the arm, not with each other."""
-    for number, obstacle in enumerate(obstacles, 1):
-        if obstacle.shape != "point":
-            body = add(world, "body", name=f"obstacle {number}", mocap="true",
-                       pos=obstacle.centre, xyaxes=axes(obstacle.rotation))
-            add(body, "geom", type=obstacle.shape, size=obstacle.size, contype="0",
-                conaffinity="1")
 
 
 def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: float, q: Array
@@ -262,8 +257,7 @@ class Stops:
     """
 
     def __init__(self, robot: Robot, q: Array, beyond: float) -> None:
-        self._names, self._units = robot.velocity_names, robot.velocity_units
-        self._of, self._beyond = robot.coordinates, beyond
+        self._robot, self._of, self._beyond = robot, robot.coordinates, beyond
         lower, upper = robot.position_limits()
         self._lower, self._upper = np.minimum(lower, q[self._of]), np.maximum(upper, q[self._of])
 
@@ -274,6 +268,7 @@ class Stops:
         i = int(over.argmax())
         if not over[i] > self._beyond:
             return None
-        stop, unit = self._upper[i] if here[i] > self._upper[i] else self._lower[i], self._units[i]
-        return (f"joint {self._names[i]} is {over[i]:.2g} {unit} beyond its stop at {stop:.4g} "
+        stop = self._upper[i] if here[i] > self._upper[i] else self._lower[i]
+        name, unit = self._robot.velocity_names[i], self._robot.velocity_units[i]
+        return (f"joint {name} is {over[i]:.2g} {unit} beyond its stop at {stop:.4g} "
                 f"{unit} (plant.beyond_stop = {self._beyond:g}),")

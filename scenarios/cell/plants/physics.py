@@ -1,5 +1,6 @@
 """An arm in MuJoCo with position servos, commanded in joint positions as through KUKA's FRI."""
 
+from collections.abc import Mapping
 from math import ceil
 from typing import Any, NamedTuple
 
@@ -72,7 +73,8 @@ class PhysicsArm:
         self._step, self._force_of = mujoco.mj_step, mujoco.mj_contactForce
         self._servo = _Servo(period, level == "acceleration", robot.lower, robot.upper, servo.lead,
                              float(servo.feedforward))
-        self._placed, self._stops = self._bodies(mujoco), Stops(robot, q, section.beyond_stop)
+        self._solid = [h for h, one in enumerate(self._obstacles.obstacles) if one.shape != "point"]
+        self._stops = Stops(robot, q, section.beyond_stop)
         self._start(mujoco, q, v)
 
     def _start(self, mujoco: Any, q: Array, v: Array) -> None:
@@ -85,7 +87,7 @@ class PhysicsArm:
         self._follow = bind(
             _follow, self._command, self.q, self._servo,
             _Reference(self.reference_q, self.reference_v, self.a, self._references))
-        self.extra: dict[str, NDArray[Any]] = {
+        self.extra: Mapping[str, NDArray[Any]] = {
             "contacts": np.zeros((), np.int16), "contact_depth": np.zeros(()),
             "contact_force": np.zeros(())}
         self._place(0.0)
@@ -112,20 +114,11 @@ class PhysicsArm:
         """Why the arm cannot go on: a joint has passed its stop; or None."""
         return self._stops.passed(self.q)
 
-    def _bodies(self, mujoco: Any) -> list[tuple[int, int]]:
-        """Return the index of each obstacle with a body, and the index of its mocap body."""
-        found = []
-        for h in range(len(self._obstacles)):
-            body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, f"obstacle {h + 1}")
-            if body >= 0:
-                found.append((h, int(self.model.body_mocapid[body])))
-        return found
-
     def _place(self, t: float) -> None:
         """Move the obstacles to their positions at time t [s]."""
         self._obstacles.at(t)
-        for h, placed in self._placed:
-            self.data.mocap_pos[placed] = self._obstacles.centres[h]
+        if self._solid:
+            self.data.mocap_pos[:] = self._obstacles.centres[self._solid]
 
     def _look_at_contacts(self) -> None:
         """Record the contacts of one step; all are between the arm and an obstacle."""

@@ -30,17 +30,10 @@ class Plant(Protocol):
     as a fall, and is None before.
     """
 
-    @property
-    def q(self) -> Array: ...  # noqa: D102
-
-    @property
-    def v(self) -> Array: ...  # noqa: D102
-
-    @property
-    def a(self) -> Array: ...  # noqa: D102
-
-    @property
-    def extra(self) -> Mapping[str, NDArray[Any]]: ...  # noqa: D102
+    q: Array
+    v: Array
+    a: Array
+    extra: Mapping[str, NDArray[Any]]
 
     def act(self, command: Array) -> None:
         """Apply a command for one period: velocities or accelerations (n,), or joint torques."""
@@ -56,7 +49,7 @@ class KinematicArm:
 
     def __init__(self, robot: Robot, q: Array, v: Array, period: float, level: Level) -> None:
         self.q, self.v, self.a = q.copy(), v.copy(), np.zeros(robot.n)
-        self.extra: dict[str, NDArray[Any]] = {}
+        self.extra: Mapping[str, NDArray[Any]] = {}
         self._robot, self._period = robot, period
         self._acceleration = int(level == "acceleration")
         self._step = np.zeros(robot.n)
@@ -87,12 +80,7 @@ class Apart:
         self._true_q, self._true_v = plant.q.copy(), plant.v.copy()
         self.extra: Mapping[str, NDArray[Any]] = {
             "true_q": self._true_q, "true_v": self._true_v, **plant.extra}
-        self.q, self.v = sensed(plant.q, plant.v)
-
-    @property
-    def a(self) -> Array:
-        """The acceleration (n,) [rad/s^2] of the last command."""
-        return self.true.a
+        self.a, (self.q, self.v) = plant.a, sensed(plant.q, plant.v)
 
     @property
     def fault(self) -> str | None:
@@ -105,7 +93,7 @@ class Apart:
         plant = self.true
         self._true_q[:], self._true_v[:] = plant.q, plant.v
         plant.act(command)
-        self.q, self.v = self._sensed(plant.q, plant.v)
+        self.a, (self.q, self.v) = plant.a, self._sensed(plant.q, plant.v)
 
 
 def whole_periods(delay: float, period: float, key: str) -> int:
@@ -139,11 +127,18 @@ class JointSensor:
 
     def __call__(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Return the measurement (n,), (n,) when the joints are at q (n,), v (n,)."""
-        position = self._position(q)
-        velocity = (self._differenced(position, v) if self._section.velocity == "differenced"
-                    else v + self._noise(self._section.velocity_noise, len(v)))
+        section, position = self._section, self._position(q)
+        if section.velocity == "measured":
+            velocity = v + self._noise(section.velocity_noise, len(v))
+        elif self._last is None:
+            velocity = v.copy()
+        else:
+            before, velocity = self._last
+            share = self._period / (self._period + section.filter_time)
+            moved = self._robot.difference(before, position)
+            velocity = velocity + share * (moved / self._period - velocity)
         self._last = position, velocity
-        self._behind.append((position, velocity))
+        self._behind.append(self._last)
         return self._behind[0]
 
     def _position(self, q: Array) -> Array:
@@ -159,14 +154,6 @@ class JointSensor:
 
     def _noise(self, deviation: float, n: int) -> Array:
         return deviation * self._random.standard_normal(n)
-
-    def _differenced(self, position: Array, v: Array) -> Array:
-        if self._last is None:
-            return v.copy()
-        before, velocity = self._last
-        share = self._period / (self._period + self._section.filter_time)
-        return velocity + share * (
-            self._robot.difference(before, position) / self._period - velocity)
 
 
 def plant_of(scenario: Scenario, start: State, obstacles: Obstacles,

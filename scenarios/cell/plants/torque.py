@@ -1,6 +1,7 @@
 """A robot on a floor in MuJoCo, moved by joint torques, and how its contacts touch the floor."""
 
 from collections import deque
+from collections.abc import Mapping
 from math import acos, ceil, cos, exp, pi, sin
 from typing import Any, final
 
@@ -9,14 +10,14 @@ from numpy.typing import NDArray
 
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
-from hierarchy.errors import UnknownNameError, naming
+from hierarchy.errors import naming
 from hierarchy.problem import Array
 from hierarchy.tasks.joints.mechanism import Mechanism
 from scenarios.cell.plants.mjcf import LEAST, Stops, on_floor
 from scenarios.cell.plants.physics import mujoco_module
 from scenarios.cell.plants.plant import whole_periods
 from scenarios.config import ScenarioError
-from scenarios.config.sections.plant import PushSection, TorqueSection
+from scenarios.config.sections.plant import TorqueSection
 
 _STEP = 0.001      # [s] of the simulation, at most
 _ROUNDING = 1e-9   # of a number of steps
@@ -65,14 +66,18 @@ class TorqueRobot:
             -2.0 * pi * section.bandwidth * period / self._steps)
         self.data.ctrl[:] = State.at(robot, q).bias_effort()[robot.actuated:]
         self._waiting = deque([np.array(self.data.ctrl)] * delay)
-        self._pushes = [(push, self._body(push), push.vector) for push in section.pushes]
+        with naming("plant.pushes", ScenarioError):
+            for push in section.pushes:
+                robot.joint(push.joint)
+        self._pushes = [(push, self.model.body(f"body {push.joint}").id, push.vector)
+                        for push in section.pushes]
         self._time, self._height = 0.0, float(self.data.subtree_com[0][2])
         self._stops = Stops(robot, q, section.beyond_stop)
-        self._upright = self._vertical()
+        self._upright = self._rotation()[2] if self._floating else np.zeros(3)
         self._touch = Touch(mujoco, self.model, contacts)
         self._push = np.zeros(3)
         self._com = np.array(self.data.subtree_com[0])
-        self.extra: dict[str, NDArray[Any]] = {
+        self.extra: Mapping[str, NDArray[Any]] = {
             "com": self._com, "push": self._push, **self._touch.signals}
         self._touch.look(self.data)
 
@@ -106,27 +111,18 @@ class TorqueRobot:
     @property
     def fault(self) -> str | None:
         """Why the robot cannot go on: it has fallen, or a joint has passed its stop; or None."""
-        fallen = self._height - float(self._com[2])
-        if self._floating and fallen > self._section.fall:
-            return f"the robot has fallen by {fallen:.2g} m"
-        tilt = acos(float(np.clip(self._vertical() @ self._upright, -1.0, 1.0)))
-        if tilt > self._section.tilt:
-            return (f"the robot has fallen: its base has tilted by {tilt:.2g} rad "
-                    f"(plant.tilt = {self._section.tilt:g}),")
+        if self._floating:
+            fallen = self._height - float(self._com[2])
+            if fallen > self._section.fall:
+                return f"the robot has fallen by {fallen:.2g} m"
+            tilt = acos(float(np.clip(self._rotation()[2] @ self._upright, -1.0, 1.0)))
+            if tilt > self._section.tilt:
+                return (f"the robot has fallen: its base has tilted by {tilt:.2g} rad "
+                        f"(plant.tilt = {self._section.tilt:g}),")
         return self._stops.passed(self.q)
 
-    def _body(self, push: PushSection) -> int:
-        names = {self.model.body(i).name.removeprefix("body "): i
-                 for i in range(1, self.model.nbody)}
-        if push.joint not in names:
-            raise ScenarioError(f"plant.pushes: {UnknownNameError('joint', push.joint, names)}")
-        return names[push.joint]
-
-    def _vertical(self) -> Array:
-        """Return the world's z axis (3,) in the base."""
-        return self._rotation()[2] if self._floating else np.array([0.0, 0.0, 1.0])
-
     def _rotation(self) -> Array:
+        """Return the rotation (3, 3) of a floating base, whose last row is the vertical in it."""
         R = np.zeros(9)
         self._mujoco.mju_quat2Mat(R, self.data.qpos[3:7])
         return R.reshape(3, 3)
@@ -168,13 +164,12 @@ class Touch:
     """
 
     def __init__(self, mujoco: Any, model: Any, contacts: Contacts) -> None:
-        self.names = contacts.names
         self._force_of, self._model = mujoco.mj_contactForce, model
-        self._geoms = [model.geom(name).id for name in self.names]
+        self._geoms = [model.geom(name).id for name in contacts.names]
         self._sole = [contact.is_surface for contact in contacts.contacts]
         self._slides = [contact.slides for contact in contacts.contacts]
         self._of_geom = {geom: c for c, geom in enumerate(self._geoms)}
-        count = len(self.names)
+        count = len(self._geoms)
         self.force, self.slip = np.zeros((count, 3)), np.zeros(count)
         self.margin, self.balance = np.full(count, np.nan), np.full((), np.nan)
         self.signals: dict[str, NDArray[Any]] = {
@@ -198,16 +193,13 @@ class Touch:
             force = contact.frame.reshape(3, 3).T @ self._wrench[:3]
             self.force[c] += force if first is None else -force
             self._moment[c] += self._wrench[0] * contact.pos
-        self.balance[...] = inside(self._support(data), data.subtree_com[0][:2])
+        loaded = [np.empty((0, 3))]  # points of the contacts that carry
         for c, geom in enumerate(self._geoms):
-            self._note(c, data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3))
-
-    def _support(self, data: Any) -> Array:
-        """Return the points (k, 2) of the loaded contacts from above."""
-        points = [data.geom_xpos[geom] + own @ data.geom_xmat[geom].reshape(3, 3).T
-                  for geom, own, force in zip(self._geoms, self._points, self.force, strict=True)
-                  if force[2] > _LOADED]
-        return np.concatenate([np.empty((0, 3)), *points])[:, :2]
+            place, axes = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
+            self._note(c, place, axes)
+            if self.force[c, 2] > _LOADED:
+                loaded.append(place + self._points[c] @ axes.T)
+        self.balance[...] = inside(np.concatenate(loaded)[:, :2], data.subtree_com[0][:2])
 
     def _note(self, c: int, place: Array, axes: Array) -> None:
         """Note slip and margin of a contact whose geometry is at `place`, with these axes."""

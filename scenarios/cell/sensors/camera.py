@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule, Obstacles
 from hierarchy.avoidance.body import pack_capsules
-from hierarchy.errors import UnknownNameError, naming, positive
+from hierarchy.errors import UnknownNameError, naming
 from hierarchy.gate import check_rotation
 from hierarchy.jit import compiled, internal
 from hierarchy.problem import Array
@@ -52,14 +52,10 @@ class Pinhole:
     rotation: ArrayLike = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
     def __post_init__(self) -> None:
-        for name in ("width", "height", "fx", "fy"):
-            positive(f"camera: {name} [px]", getattr(self, name))
         for name, size in (("cx", self.width), ("cy", self.height)):
             if getattr(self, name) is None:
                 set_frozen(self, **{name: (size - 1) / 2})
         check_rotation("camera: rotation", self.rotation)
-        if not np.isfinite(np.asarray(self.position, dtype=float)).all():
-            raise HierarchyError(f"camera: position {self.position} is not finite")
 
     def packed(self) -> Array:
         """Return the array (16,) for kernels: fx, fy, cx, cy, position, rotation row by row."""

@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from hierarchy import HierarchyError, Robot, State
-from hierarchy.avoidance import Capsule, ControlPoint, Measurement, Pairs
+from hierarchy.avoidance import Capsule, Measurement, Pairs
 from hierarchy.avoidance.body import pack_capsules, pack_points
 from hierarchy.jit import bind
 from hierarchy.problem import Array
@@ -17,7 +17,7 @@ from scenarios.cell.sensors import pixels
 from scenarios.cell.sensors.camera import DepthCamera, Image, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.pixels import ObstacleImage, Space
 from scenarios.cell.sensors.rendering import draw_robot
-from scenarios.cell.sensors.sensor import Asked, ExactDistances, packed_laws
+from scenarios.cell.sensors.sensor import ExactDistances
 from scenarios.config.sections.sensor import CameraSection, FramesSection, ImageSection
 
 _ON_ITS_WAY = 0.3  # [m]
@@ -30,31 +30,30 @@ Source = DepthCamera | RecordedFrames
 class DepthSpace:
     """Turns depth images into obstacle images, and measures distances of points in them.
 
-    section : its `region` is rho [m], the largest distance that is measured. Space hidden by an
-        obstacle counts as occupied up to `thin` [m] behind its surface. `support` removes
-        outliers, but also surfaces that are smaller or steeper.
-    points : control points, the end effector last.
+    section : its `region` is rho [m], the largest distance that is measured, by default `reach`.
+        Space hidden by an obstacle counts as occupied up to `thin` [m] behind its surface.
+        `support` removes outliers, but also surfaces that are smaller or steeper.
+    exact : measures the same points. The direction is the mean (25)-(26) over all pixels of the
+        region within its `mean_within` [m]; with 0 it is that of the nearest pixel, except for a
+        point in the shadow of its own.
     capsules : the robot; pixels that show it or anything behind it do not count as obstacles.
-    asked : the direction is the mean (25)-(26) over all pixels of the region within `mean_within`
-        [m]; with 0 it is that of the nearest pixel, except for a point in the shadow of its own.
 
     `measurement.nearest` is a pixel v width + u, -1 for none.
     """
 
-    def __init__(self, section: ImageSection, pinhole: Pinhole, points: Sequence[ControlPoint],
-                 capsules: Sequence[Capsule], asked: Asked, pairs: bool = False) -> None:
+    def __init__(self, section: ImageSection, pinhole: Pinhole, exact: ExactDistances,
+                 capsules: Sequence[Capsule], reach: float) -> None:
         self.pinhole = pinhole
-        self.region = section.region or asked.region
-        self.measurement = Measurement(len(points) - 1)
-        self._pairs = Pairs(len(points), 1)
-        if pairs:
+        self.region = section.region or reach
+        self.measurement = Measurement(len(exact.points) - 1)
+        self._pairs = Pairs(len(exact.points), 1)
+        if exact.measurement.pairs is not None:
             self.measurement.pairs = self._pairs
         self._eye, self._section = pinhole.packed(), section
         self._links, self._capsules = pack_capsules(capsules)
-        self._space = Space(*pack_points(points), self._eye, self.region,
+        self._space = Space(*pack_points(exact.points), self._eye, self.region,
                             inf if section.thin is None else section.thin,
-                            np.array(asked.mean_within),
-                            packed_laws(asked.body, asked.tip))
+                            exact.mean_within, exact.laws)
         self._image: ObstacleImage | None = None
         self._placements: Array | None = None
         self._robot = ObstacleImage.empty(pinhole.height, pinhole.width).depth
@@ -153,7 +152,7 @@ class DepthSensor:
 
 
 def depth_sensor(section: CameraSection | FramesSection, robot: Robot, exact: ExactDistances,
-                 asked: Asked) -> DepthSensor:
+                 reach: float) -> DepthSensor:
     """Make the sensor of a simulated camera or of recorded frames, for the points of `exact`."""
     if not robot.capsules:
         raise HierarchyError(f"robot {robot.name!r} has no capsules, which are needed to remove "
@@ -168,6 +167,4 @@ def depth_sensor(section: CameraSection | FramesSection, robot: Robot, exact: Ex
         source = DepthCamera(section, pinhole, exact.obstacles, capsules)
     else:
         source = RecordedFrames(section.folder, robot, section.latency)
-    space = DepthSpace(section, source.pinhole, exact.points, capsules, asked,
-                       exact.measurement.pairs is not None)
-    return DepthSensor(section, source, space)
+    return DepthSensor(section, source, DepthSpace(section, source.pinhole, exact, capsules, reach))

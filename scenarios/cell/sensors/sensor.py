@@ -1,7 +1,7 @@
 """What a sensor is, exact distances, and the sensor that [avoidance] and [sensor] ask for."""
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -14,16 +14,7 @@ from hierarchy.problem import Array
 from scenarios.cell.robot import sensed_points
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.sections import naming
-from scenarios.config.sections.avoidance import AvoidanceKind, AvoidanceSection, ObstacleSection
-
-
-class Asked(NamedTuple):
-    """What a sensor must provide: `region` [m], where directions are means [m], repulsion laws."""
-
-    region: float
-    mean_within: tuple[float, float] = (0.0, 0.0)
-    body: Repulsion | None = None
-    tip: Repulsion | None = None
+from scenarios.config.sections.avoidance import AvoidanceSection, ObstacleSection
 
 
 class Sensor(Protocol):
@@ -52,7 +43,7 @@ class ExactDistances:
     effector; without both there is no repulsion. Directions are the mean (25)-(26) over the
     obstacles nearer than `mean_within` [m], for control points and end effector, where there are
     any; with 0 those of the nearest obstacle. With `pairs`, every point is also measured against
-    every obstacle, as `Separation` needs.
+    every obstacle, as `Separation` needs. `points` are what is measured, `laws` as `packed_laws`.
     """
 
     outside = 0.0  # [s] of a measurement that is not part of the control loop
@@ -61,9 +52,9 @@ class ExactDistances:
                  tip: Repulsion | None = None,
                  mean_within: tuple[float, float] = (0.0, 0.0), pairs: bool = False) -> None:
         self._robot, self.points = robot, sensed_points(robot)
-        self._obstacles, self._mean_within = obstacles, np.array(mean_within)
+        self._obstacles, self.mean_within = obstacles, np.array(mean_within)
         self._joints, self._offsets = pack_points(self.points)
-        self._laws = packed_laws(body, tip)
+        self.laws = packed_laws(body, tip)
         self.measurement = Measurement(len(robot.control_points))
         self._followed: State | None = None
         self._measure: Callable[[], object]
@@ -86,7 +77,7 @@ class ExactDistances:
             self._robot.check_same("ExactDistances: state", state.robot)
             self._followed = state
             self._measure = bind(measure_exactly, state.placements, self._joints, self._offsets,
-                                 self._obstacles.table, self._laws, self._mean_within,
+                                 self._obstacles.table, self.laws, self.mean_within,
                                  self.measurement.arrays)
         self._obstacles.at(state.t)
         self._measure()
@@ -125,24 +116,23 @@ def sensor_of(scenario: Scenario, start: State,
     if not robot.control_points:
         raise ScenarioError(f"[avoidance]: robot {robot.name!r} has no control points; list them "
                             "in robot.control_points")
-    asked = _asked(section, (scenario.limits and scenario.limits.danger_reach) or 0.0)
-    exact = ExactDistances(robot, sensor.obstacles if sensor else make_obstacles(section.placed),
-                           asked.body, asked.tip, asked.mean_within,
-                           pairs=not isinstance(section, AvoidanceSection))
+    obstacles = sensor.obstacles if sensor else make_obstacles(section.placed)
+    danger = (scenario.limits and scenario.limits.danger_reach) or 0.0
+    body = tip = None
+    if isinstance(section, AvoidanceSection):
+        reach = section.far, section.end_effector
+        body, tip = section.body.make(), section.tip.make()
+        exact = ExactDistances(robot, obstacles, body, tip,
+                               reach if section.direction == "mean" else (0.0, 0.0))
+    else:
+        reach = section.influence, section.influence
+        exact = ExactDistances(robot, obstacles, pairs=True)
     with naming("sensor"):
-        made: Sensor = scenario.sensor.made(robot, exact=exact, asked=asked, body=asked.body,
-                                            tip=asked.tip)
+        made: Sensor = scenario.sensor.made(robot, exact=exact, reach=max(*reach, danger),
+                                            body=body, tip=tip)
     if sensor is None and not scenario.sensor.is_recorded:
         exact.check_start(start)
     return made
-
-
-def _asked(section: AvoidanceKind, danger: float) -> Asked:
-    if not isinstance(section, AvoidanceSection):
-        return Asked(max(section.influence, danger))
-    mean = (section.far, section.end_effector) if section.direction == "mean" else (0.0, 0.0)
-    return Asked(max(section.far, section.end_effector, danger), mean, section.body.make(),
-                 section.tip.make())
 
 
 def make_obstacles(sections: tuple[ObstacleSection, ...]) -> Obstacles:

@@ -64,22 +64,21 @@ Force = Annotated[NotNegative, Unit("N")]
 Point = Annotated[Vector3, Unit("m")]
 
 
-def _named(text: str) -> str:
-    if not re.fullmatch(r"[^\W_][\w.-]*", text):
-        raise ValueError("a name has letters, digits, \".\", \"_\" and \"-\", and begins with a "
-                         "letter or a digit")
-    return text
+def _spelt(pattern: str, rule: str) -> AfterValidator:
+    def check(text: str) -> str:
+        if not re.fullmatch(pattern, text):
+            raise ValueError(rule)
+        return text
+
+    return AfterValidator(check)
 
 
-def _titled(text: str) -> str:
-    if not re.fullmatch(r"[^\W\d_][\w -]*", text):
-        raise ValueError("a task's name has letters, digits, spaces, \"_\" and \"-\", and begins "
-                         "with a letter")
-    return text
-
-
-Name = Annotated[str, Field(max_length=100), AfterValidator(_named)]
-TaskName = Annotated[str, AfterValidator(_titled)]
+Name = Annotated[str, Field(max_length=100), _spelt(
+    r"[^\W_][\w.-]*", "a name has letters, digits, \".\", \"_\" and \"-\", and begins with a "
+                      "letter or a digit")]
+TaskName = Annotated[str, _spelt(
+    r"[^\W\d_][\w -]*", "a task's name has letters, digits, spaces, \"_\" and \"-\", and begins "
+                        "with a letter")]
 
 
 class Section(BaseModel):
@@ -107,24 +106,23 @@ class Section(BaseModel):
 class OneOf:
     """Makes `Annotated[A | B, OneOf()]` the section whose kind the table names.
 
-    Without a key "kind" it is the `default`. Keys in messages are then those of the file, without
-    the kinds that a union of pydantic puts between them.
+    Without a key "kind" it is the `default`. With `own` the kinds are those of `own.group`:
+    sections, or what `own.of` makes of something else. Keys in messages are those of the file,
+    without the kinds that a union of pydantic puts between them.
     """
 
     default: str | None = None
+    own: Any = None
 
     def sections(self, annotation: Any) -> tuple[type[Section], ...]:
         """Return the sections of all kinds."""
-        return get_args(annotation)
+        return *self._kinds(annotation).values(), *(() if self.own is None else (self.own,))
 
-    def names(self, annotation: Any) -> tuple[str, ...]:
-        """Return the kinds."""
-        return tuple(kind for section in self.sections(annotation) for kind in kinds_of(section))
-
-    def find(self, annotation: Any, kind: str) -> type[Section] | None:
-        """Return the section of a kind, None if there is none."""
-        return next((section for section in self.sections(annotation)
-                     if kind in kinds_of(section)), None)
+    def _kinds(self, annotation: Any) -> dict[str, type[Section]]:
+        if self.own is None:
+            return {kind: one for one in get_args(annotation) for kind in kinds_of(one)}
+        return {kind: one if isinstance(one, type) and issubclass(one, Section)
+                else self.own.of(one) for kind, one in plugins.registered(self.own.group).items()}
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         kinds = [handler.generate_schema(section) for section in self.sections(source)]
@@ -136,38 +134,16 @@ class OneOf:
         if isinstance(table, Section):
             return table
         kind = table.get("kind", self.default) if isinstance(table, dict) else None
-        found = self.find(source, kind) if isinstance(kind, str) else None
+        if self.own is not None and isinstance(kind, str):
+            plugins.find(self.own.group, kind)  # loads the entry point of that name only
+        kinds = self._kinds(source)
+        found = kinds.get(kind) if isinstance(kind, str) else None
         if found is None:
-            names = self.names(source)
+            names = kinds if self.own is None else plugins.known(self.own.group)
             text = str(UnknownNameError("kind", kind, names)) if isinstance(kind, str) else (
                 f"expected a table with a kind, {listed([repr(name) for name in names], 'or')}")
             raise PydanticCustomError("kind", "{text}", {"text": text})
         return found.model_validate(table)
-
-
-@dataclass(frozen=True)
-class Registered(OneOf):
-    """The same for the kinds of `own.group`: sections, or what `own.of` makes of something else."""
-
-    own: Any = None
-
-    def sections(self, annotation: Any) -> tuple[type[Section], ...]:
-        """See `OneOf`."""
-        return (*map(self._as_section, plugins.registered(self.own.group).values()), self.own)
-
-    def names(self, annotation: Any) -> tuple[str, ...]:
-        """See `OneOf`."""
-        return tuple(plugins.known(self.own.group))
-
-    def find(self, annotation: Any, kind: str) -> type[Section] | None:
-        """See `OneOf`; loads the entry point of that name only."""
-        thing = plugins.find(self.own.group, kind)
-        return None if thing is None else self._as_section(thing)
-
-    def _as_section(self, thing: Any) -> type[Section]:
-        is_section = isinstance(thing, type) and issubclass(thing, Section)
-        section: type[Section] = thing if is_section else self.own.of(thing)
-        return section
 
 
 def kinds_of(section: type[Section]) -> tuple[str, ...]:

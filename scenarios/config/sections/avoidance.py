@@ -7,7 +7,6 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from hierarchy.avoidance import Barrier, Obstacle, Repulsion
-from hierarchy.problem import Array
 from hierarchy.words import listed
 from scenarios.config import sections as keys
 from scenarios.config.sections import naming
@@ -87,7 +86,9 @@ def _varied(obstacle: ObstacleSection, variation: VariationSection,
         return obstacle
     random = np.random.default_rng((variation.seed, number))
     times, points = np.array(path.times), np.array(path.points)
-    away = points + variation.spread * _in_ball(random, len(points))
+    within = random.standard_normal(points.shape)
+    within /= np.linalg.norm(within, axis=1, keepdims=True)  # uniform in the unit ball
+    away = points + variation.spread * (within * random.random((len(points), 1)) ** (1 / 3))
     for i in range(1, len(points)):
         if (points[i] == points[i - 1]).all():  # it rests where it rested
             away[i] = away[i - 1]
@@ -96,13 +97,6 @@ def _varied(obstacle: ObstacleSection, variation: VariationSection,
     times = times + variation.timing * room * random.uniform(-1.0, 1.0, len(times))
     waypoints = {"times": tuple(times.tolist()), "points": tuple(map(tuple, away.tolist()))}
     return obstacle.model_copy(update={"path": path.model_copy(update=waypoints)})
-
-
-def _in_ball(random: np.random.Generator, count: int) -> Array:
-    """Return random points (count, 3), uniform in the unit ball."""
-    points = random.standard_normal((count, 3))
-    radii = random.random((count, 1)) ** (1 / 3)
-    return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True) * radii)
 
 
 class _Avoiding(keys.Section):

@@ -115,6 +115,7 @@ class ListedLookAt(base.Listed, base.TaskSection):
     """The z axis of a frame toward a point (2 rows)."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:LookAt"
+    unit: ClassVar[str] = ""
     frame: str  #: Frame of the robot.
     target: Annotated[keys.Vector3, keys.Unit("m", doubted=False)]
     """The point, a far one for a direction."""

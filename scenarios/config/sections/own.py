@@ -73,7 +73,9 @@ class OwnSection(PartSection):
         """
         fields: dict[str, Any] = {
             f"{_KEY}{name}": (kind, Field(alias=name)) if parameter.default is parameter.empty
-            else (kind | None, Field(None, alias=name, json_schema_extra=_shown(parameter.default)))
+            else (kind | None, Field(None, alias=name, json_schema_extra={
+                "default": parameter.default} if isinstance(
+                    parameter.default, bool | int | float | str) else {}))
             for name, parameter in _parameters(maker).items()
             if name not in (*GIVEN[cls.group], *cls.model_fields)
             for kind in (_in_a_file(parameter.annotation),)}
@@ -92,7 +94,6 @@ class OwnSection(PartSection):
 
         Raises ScenarioError, naming the kind, for whatever goes wrong in it: it is the user's code.
         """
-        what = f"{self.group[:-1]} of kind {self.kind!r}"
         keys = {name.removeprefix(_KEY): value for name, value in self
                 if name.startswith(_KEY) and value is not None}
         provided = {name: value for name, value in given.items() if name in GIVEN[self.group]}
@@ -100,12 +101,8 @@ class OwnSection(PartSection):
             return _called(type(self).maker, {"robot": robot, **keys, **provided})
         except Exception as error:
             kind = "" if isinstance(error, HierarchyError) else f"{type(error).__name__}: "
-            raise ScenarioError(f"{what}: {kind}{error}") from error
-
-
-def _shown(default: Any) -> dict[str, Any]:
-    """Return what the schema of a key says of a default that the maker has."""
-    return {"default": default} if isinstance(default, bool | int | float | str) else {}
+            raise ScenarioError(f"{self.group[:-1]} of kind {self.kind!r}: {kind}{error}"
+                                ) from error
 
 
 def _again(own: type[OwnSection], kind: str, data: dict[str, Any]) -> OwnSection:

@@ -163,4 +163,4 @@ class OwnPlant(AnyPlant, OwnSection):
     group: ClassVar[Group] = "plants"
 
 
-PlantKind = Annotated[AnyPlant, keys.Registered("kinematic", OwnPlant)]
+PlantKind = Annotated[AnyPlant, keys.OneOf("kinematic", OwnPlant)]

@@ -170,4 +170,4 @@ class OwnSensor(AnySensor, OwnSection):
     foot: ClassVar[float] = FOOT
 
 
-SensorKind = Annotated[AnySensor, keys.Registered("exact", OwnSensor)]
+SensorKind = Annotated[AnySensor, keys.OneOf("exact", OwnSensor)]

@@ -151,6 +151,7 @@ class PointingTask(TaskSection):
     damping: keys.Gain = 2.0
     gain: keys.Gain = 5.0
     made_by: ClassVar[str] = "hierarchy.tasks:Pointing"
+    unit: ClassVar[str] = ""
     frame: ClassVar[str | None]
 
     def asked(self, at: References) -> dict[str, Any]:
@@ -280,4 +281,4 @@ class OwnTask(Listed, OwnSection):
         return task
 
 
-ListedTask = Annotated[Listed, keys.Registered(None, OwnTask)]
+ListedTask = Annotated[Listed, keys.OneOf(None, OwnTask)]
