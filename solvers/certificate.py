@@ -35,8 +35,8 @@ first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import final
+from dataclasses import dataclass
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.linalg import norm
@@ -56,7 +56,6 @@ _EITHER = 0.25, 4.0, 0.1   # times `parallel`: up to these angles rows may count
 _EXACTLY = 1e-4     # times `parallel`: the same for rows made exactly dependent
 _DUST = 1e-13       # norm of a row relative to the largest of its level: smaller ones are dust
 _UNSEEN = 1e4       # weight of directions that no row of a level sees, relative to the weakest seen
-_BLOCK = 32         # columns that LAPACK reflects at a time
 _LARGEST = 1e150    # length: its square stays finite
 _SMALL = 1e-15      # relative: smaller steps and pivots are rounding
 _ROUNDING = 64 * float(np.finfo(float).eps)
@@ -254,9 +253,7 @@ def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, par
     return stationarity, _projected(gap, cone, tolerance * reach) / reach
 
 
-@final
-@dataclass(frozen=True)
-class _Rows:
+class _Rows(NamedTuple):
     """Unit rows and the position of x relative to them, as lengths.
 
     unit (m, n); size (m,) logarithm of the norm, -inf for a row of zeros; t (m,) signed distance
@@ -296,8 +293,7 @@ class _Rows:
 
     def part(self, rows: slice) -> _Rows:
         """Return the rows of one level."""
-        return _Rows(self.unit[rows], self.size[rows], self.t[rows], self.fixed[rows],
-                     self.upper[rows], self.lower[rows], self.reach)
+        return _Rows._make([*(of[rows] for of in self[:-1]), self.reach])
 
 
 class _NormalCone:
@@ -332,10 +328,10 @@ def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, f
 
     The pivots are the smallest that counts and the largest that counts as zero.
     """
-    qr = _QR.of((rows @ Z).T)
-    pivots = np.abs(qr.pivots)
+    Q, R, _ = _qr((rows @ Z).T)
+    pivots = np.abs(np.diagonal(R))
     rank = int(np.count_nonzero(pivots > parallel))
-    return (qr.times(Z.T, "T").T[:, rank:], float(pivots[:rank].min(initial=1.0)),
+    return (Z @ Q[:, rank:], float(pivots[:rank].min(initial=1.0)),
             float(pivots[rank:].max(initial=0.0)))
 
 
@@ -388,11 +384,11 @@ def _independent(heavy: Array, terms: Array, parallel: float) -> Array:
     Of dependent rows only rounding would remain, and theirs is larger than a light row. For the
     same reason entries that are rounding of `terms` (q, k), the same in each row, become zero.
     """
-    qr = _QR.of(heavy)
-    pivots = np.abs(qr.pivots)
+    _, R, order = _qr(heavy)
+    pivots = np.abs(np.diagonal(R))
     rank = int(np.count_nonzero(pivots > parallel * pivots.max(initial=0.0)))
     rows = np.empty((rank, heavy.shape[1]))
-    rows[:, qr.order] = np.triu(qr.raw)[:rank]
+    rows[:, order] = R[:rank]
     rows[np.abs(rows) <= _ROUNDING * terms[:rank]] = 0.0
     return rows
 
@@ -412,8 +408,8 @@ def _least_turn(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: 
     least, square = float((size[judged]**2).min()) * _length(level.t[judged]), float(force @ force)
     if not (least > 0.0 and square > 0.0):
         return np.inf, level
-    return _length(left) / least, replace(
-        level, unit=level.unit - np.outer(force / square, Z @ left))
+    turned = level.unit - np.outer(force / square, Z @ left)
+    return _length(left) / least, level._replace(unit=turned)
 
 
 def _on_sides(level: _Rows, size: Array) -> tuple[Array, Array, Array]:
@@ -476,9 +472,7 @@ def _outside(rows: Array, basis: Array) -> Array:
     return rows
 
 
-@final
-@dataclass(frozen=True)
-class _View:
+class _View(NamedTuple):
     """The part of p coordinates that the rows of a level see, large rows first.
 
     size (m,) : of the rows.
@@ -507,10 +501,10 @@ class _View:
         """Factorise rows P (m, p), projections of unit rows that represent rows of these sizes."""
         V, T, thinnest, angle, rank = _graded(P, size, parallel)
         by_size = np.argsort(-size, kind="stable")
-        qr = _QR.of((T[:rank] * size**2).T[by_size])
+        sorted_Q, R, order = _qr((T[:rank] * size**2).T[by_size])
         Q = np.empty((len(size), rank))
-        Q[by_size] = qr.times(np.eye(len(size), rank))
-        return _View(size, Q, qr.raw[:rank], qr.order, V[:, :rank], V[:, rank:], thinnest, angle,
+        Q[by_size] = sorted_Q[:, :rank]
+        return _View(size, Q, R[:rank], order, V[:, :rank], V[:, rank:], thinnest, angle,
                      parallel)
 
     def weighted(self, rows: Array) -> tuple[Array, Array]:
@@ -543,13 +537,12 @@ def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float
     candidate = norm(P, axis=1) > parallel
     while True:
         chosen = np.flatnonzero(candidate)
-        qr = _QR.of((P[chosen] * size[chosen, None]).T)
-        pivots = np.abs(qr.pivots) / size[chosen[qr.order]][:len(qr.pivots)]
+        V, R, order = _qr((P[chosen] * size[chosen, None]).T)
+        pivots = np.abs(np.diagonal(R)) / size[chosen[order]][:len(R)]
         lost = pivots <= parallel
         if not lost.any():
             break
-        candidate[chosen[qr.order[int(np.argmax(lost))]]] = False
-    V = qr.times(np.eye(P.shape[1]))
+        candidate[chosen[order[int(np.argmax(lost))]]] = False
     T = V.T @ P.T
     left = np.sqrt(np.cumsum(T[::-1]**2, axis=0)[::-1])
     out = left <= 0.5 * parallel  # half: the remainder of a pivot must survive rounding
@@ -598,8 +591,11 @@ def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) ->
     y, left, free = _first_guess(D, b)
     refused, tried = np.zeros(len(y), dtype=bool), {free.tobytes()}
     for _ in range(3 * len(y) + 3):
-        best, slope = _steepest(unit, left, free | refused)
-        if norm(left) * scale <= enough or slope <= _SMALL:
+        slopes, terms = unit.T @ left, np.abs(unit).T @ np.abs(left)
+        slopes[free | refused | (terms == 0.0)] = 0.0
+        slopes /= np.where(terms > 0.0, terms, 1.0)
+        best = int(np.argmax(slopes))
+        if norm(left) * scale <= enough or slopes[best] <= _SMALL:
             break
         moved = _freed(D, b, y, free, best)
         if moved is None or moved[2].tobytes() in tried:  # chosen by rounding
@@ -609,14 +605,6 @@ def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) ->
             tried.add(free.tobytes())
             refused[:] = False
     return y
-
-
-def _steepest(unit: Array, left: Array, excluded: Mask) -> tuple[int, float]:
-    """Return the column with the largest slope relative to its terms, and that slope."""
-    slope, terms = unit.T @ left, np.abs(unit).T @ np.abs(left)
-    slope = np.where(excluded | (terms == 0.0), 0.0, slope / np.where(terms, terms, 1.0))
-    best = int(np.argmax(slope))
-    return best, float(slope[best])
 
 
 def _first_guess(D: Array, b: Array) -> tuple[Array, Array, Mask]:
@@ -657,74 +645,40 @@ def _freed(D: Array, b: Array, y: Array, free: Mask, new: int) -> tuple[Array, A
 def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
     """Return the least squares of the free columns and its residual; QR with pivoting.
 
-    Heavy rows come first. The residual comes from the reflections, not from a difference, so the
-    small residual of a heavy row is as accurate as the rest (Cox, Higham 1998).
+    Heavy rows come first. The residual comes from Q, not from a difference, so the small residual
+    of a heavy row is as accurate as the rest (Cox, Higham 1998).
     """
     s = np.zeros(D.shape[1])
     if not free.any():
         return s, b.copy()
     chosen = D[:, free]
-    qr = _QR.of(chosen)
-    depth = len(qr.pivots)
-    inside = qr.times(b[:, None], "T")[:, 0]
-    rounding = _SMALL * np.minimum(norm(chosen, axis=0)[qr.order[:depth]],  # of columns and rows
+    Q, R, order = _qr(chosen)
+    inside, diagonal = Q.T @ b, np.abs(np.diagonal(R))
+    depth = len(diagonal)
+    rounding = _SMALL * np.minimum(norm(chosen, axis=0)[order[:depth]],  # of columns and rows
                                    np.abs(chosen).max(axis=1)[:depth])
-    pivots = np.abs(qr.pivots) > rounding
+    pivots = diagonal > rounding
     rank = len(pivots) if pivots.all() else int(np.argmin(pivots))
-    solved = _solve_triangular(qr.raw[:rank, :rank], inside[:rank, None])[:, 0]
-    s[np.flatnonzero(free)[qr.order[:rank]]] = solved
-    inside[:rank] = 0.0
-    return s, qr.times(inside[:, None])[:, 0]
+    s[np.flatnonzero(free)[order[:rank]]] = _solve_triangular(R[:rank, :rank], inside[:rank])
+    return s, Q[:, rank:] @ inside[rank:]
 
 
-@final
-@dataclass(frozen=True)
-class _QR:
-    """QR with pivoting of a matrix (m, n), as LAPACK keeps it: scipy's qr takes twice the time.
+def _qr(matrix: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Return Q (m, m), R (m, n) and the order (n,) of the columns in it; QR with pivoting."""
+    from scipy.linalg import qr
 
-    raw (m, n) : R above the diagonal, the reflections below it, with the factors tau.
-    order (n,) : the columns in the order of R.
-    """
-
-    raw: Array
-    tau: Array
-    order: NDArray[np.int64]
-
-    @staticmethod
-    def of(matrix: Array) -> _QR:
-        """Factorise a matrix."""
-        from scipy.linalg import lapack
-
-        m, n = matrix.shape
-        if not (m and n):
-            return _QR(np.empty((m, n)), np.empty(0), np.arange(n))
-        raw, order, tau, _, _ = lapack.dgeqp3(matrix, 2 * n + (n + 1) * _BLOCK)
-        return _QR(raw, tau, order - 1)
-
-    @property
-    def pivots(self) -> Array:
-        """The diagonal of R: (min(m, n),)."""
-        return np.diagonal(self.raw)
-
-    def times(self, matrix: Array, trans: str = "N") -> Array:
-        """Return Q, or Q^T if trans is "T", times a matrix (m, k)."""
-        from scipy.linalg import lapack
-
-        if not (len(self.tau) and matrix.size):
-            return matrix.copy()
-        found: Array = lapack.dormqr("L", trans, self.raw[:, :len(self.tau)], self.tau, matrix,
-                                     max(matrix.shape) * _BLOCK)[0]
-        return found
+    m, n = matrix.shape
+    if not matrix.size:
+        return np.eye(m), np.empty((m, n)), np.arange(n)
+    Q, R, order = qr(matrix, pivoting=True, check_finite=False)
+    return Q, R, order
 
 
 def _solve_triangular(R: Array, b: Array, trans: int = 0) -> Array:
-    """Return R^-1 b, or R^-T b if trans is 1, for the upper triangle of R (k, k) and b (k, c)."""
+    """Return R^-1 b, or R^-T b if trans is 1, for the upper triangle of R (k, k) and b (k, ..)."""
     from scipy.linalg import lapack
 
-    if not b.size:
-        return b.copy()
-    found: Array = lapack.dtrtrs(R, b, trans=trans)[0]
-    return found
+    return np.asarray(lapack.dtrtrs(R, b, trans=trans)[0]) if b.size else b.copy()
 
 
 def _length(v: Array) -> float:
