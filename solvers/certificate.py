@@ -36,6 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple, final
 
 import numpy as np
@@ -205,8 +206,7 @@ def _euclidean(h: Hierarchy, x: Array) -> tuple[Hierarchy, Array]:
 
 
 def _levels(h: Hierarchy) -> list[slice]:
-    first, last = h.offsets[:-1].tolist(), h.offsets[1:].tolist()
-    return [slice(*pair) for pair in zip(first, last, strict=True)]
+    return [slice(*pair) for pair in pairwise(h.offsets.tolist())]
 
 
 def _readings(h: Hierarchy, x: Array, rows: _Rows, tolerance: float, parallel: float
@@ -315,12 +315,12 @@ class _NormalCone:
         if level.upper.any() or level.lower.any():
             self._kept = np.vstack([self._kept, level.unit[level.upper], -level.unit[level.lower]])
         seen = self._kept @ self.Z
-        left = np.sqrt(np.einsum("ij,ij->i", seen, seen))
-        seen_at_all = left > self.parallel
-        self._kept = self._kept[seen_at_all]
-        self.rows = seen[seen_at_all] / left[seen_at_all, None]
-        self.thinnest = min(self.thinnest, float(left[seen_at_all].min(initial=1.0)))
-        self.angle = max(self.angle, float(left[~seen_at_all].max(initial=0.0)))
+        left = norm(seen, axis=1)
+        faint, free = left[left <= self.parallel], left > self.parallel
+        self._kept, seen, left = self._kept[free], seen[free], left[free]
+        self.rows = seen / left[:, None]
+        self.thinnest = min(self.thinnest, float(left.min(initial=1.0)))
+        self.angle = max(self.angle, float(faint.max(initial=0.0)))
 
 
 def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, float]:
@@ -370,8 +370,8 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     none, t = np.zeros(len(C) - view.rank), level.t[judged]
     f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
     sizes = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
-    unknown = np.full(len(f), _unknown(min(cone.thinnest, view.thinnest),
-                                       max(cone.angle, view.angle)))
+    unknown = np.full(len(f), _ROUNDING / min(cone.thinnest, view.thinnest)
+                      + max(cone.angle, view.angle))
     beyond = slice(view.rank, len(C))  # up to the angle at which rows count as dependent
     unknown[beyond] = np.maximum(unknown[beyond], cone.parallel)
     return _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, sizes, unknown,
@@ -423,20 +423,16 @@ def _projected(gap: Array, cone: _NormalCone, enough: float) -> float:
     """Return the length of the projection of -gap (n,) on the polar cone, in coordinates of Z."""
     C, f = cone.rows.T, cone.Z.T @ gap
     return _balanced(C, np.ones_like(C), f, np.full(len(f), norm(gap)),
-                     _unknown(cone.thinnest, cone.angle), 1e-3 * enough)
-
-
-def _unknown(thinnest: float, angle: float) -> float:
-    """Return the share of a term that rounding or rows counted as parallel may explain."""
-    return _ROUNDING / thinnest + angle
+                     _ROUNDING / cone.thinnest + cone.angle, 1e-3 * enough)
 
 
 def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: Array | float,
               enough: float) -> float:
     """Return the least |C z + f| for z >= 0, ignoring entries within the unknown share of terms.
 
-    Any z proves what it reaches. A search that rounding ends early on dependent columns is repeated
-    by scipy's, which chooses otherwise, and then without the rows that only repeat heavier ones.
+    That share is what rounding or rows counted as parallel may explain. Any z proves what it
+    reaches. A search that rounding ends early on dependent columns is repeated by scipy's, which
+    chooses otherwise, and then without the rows that only repeat heavier ones.
     """
     least = np.inf
     for by_scipy, repeated in ((False, True), (True, True), (False, False)):
@@ -588,7 +584,7 @@ def _by_scipy(D: Array, b: Array) -> Array:
 
 def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) -> Array:
     """Return y >= 0 that minimises |D y - b|, or reaches enough / scale; unit (D) picks columns."""
-    y, left, free = _first_guess(D, b)
+    y, left, free = np.zeros(D.shape[1]), b, np.zeros(D.shape[1], dtype=bool)
     refused, tried = np.zeros(len(y), dtype=bool), {free.tobytes()}
     for _ in range(3 * len(y) + 3):
         slopes, terms = unit.T @ left, np.abs(unit).T @ np.abs(left)
@@ -605,20 +601,6 @@ def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) ->
             tried.add(free.tobytes())
             refused[:] = False
     return y
-
-
-def _first_guess(D: Array, b: Array) -> tuple[Array, Array, Mask]:
-    """Return the least squares of all columns, repeated without those that come out negative.
-
-    Returns y, the residual, and the mask of the free columns.
-    """
-    free = np.ones(D.shape[1], dtype=bool)
-    while free.any():
-        y, left = _least_squares(D, b, free)
-        if (y[free] > 0.0).all():
-            return y, left, free
-        free &= y > 0.0
-    return np.zeros(D.shape[1]), b, free
 
 
 def _freed(D: Array, b: Array, y: Array, free: Mask, new: int) -> tuple[Array, Array, Mask] | None:
@@ -683,5 +665,4 @@ def _solve_triangular(R: Array, b: Array, trans: int = 0) -> Array:
 
 def _length(v: Array) -> float:
     """Return the Euclidean norm, computed without overflow."""
-    largest = float(np.abs(v).max(initial=0.0))
-    return largest * float(norm(v / largest)) if 0.0 < largest < np.inf else largest
+    return float(np.hypot.reduce(v, initial=0.0))
