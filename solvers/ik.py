@@ -31,6 +31,7 @@ _MOST_BENDS = 10   # corrections of the rows of a mechanism
 _STRAIGHT = 1e-8   # [m/s, rad/s] change of a correction that ends them
 _MOST_KEPT = 4     # set-ups, of the last calls with different objects
 _warned: set[tuple[str, ...]] = set()  # joints without velocity limits that were named
+_of_thread = local()  # in `kept` what its last calls have set up, by the identity of what they got
 
 
 class Memory(NamedTuple):
@@ -118,7 +119,7 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
         return reach(robot, q, tasks, until, limits=limits is True, resolver=_resolver(resolver),
                      t=t, damping=damping)
     before = _before(memory, v, limits)
-    kept = _of_thread.kept
+    kept: dict[tuple[float, ...], _SetUp] = vars(_of_thread).setdefault("kept", {})
     asked = id(robot), *map(id, tasks), id(limits), id(resolver), dt, damping
     made = kept.pop(asked, None)  # away meanwhile: a task may ask the same at another q
     if made is not None and made.fits():
@@ -241,13 +242,3 @@ def _is_read_once(name: str, value: object) -> bool:
     return isinstance(value, list) or (isinstance(value, np.ndarray) and (
         name in ("stiffness", "damping", "gain") or value.dtype != np.float64
         or not value.flags.carray))
-
-
-class _Kept(local):
-    """What the last calls of a thread have set up, by the identity of the objects given."""
-
-    def __init__(self) -> None:
-        self.kept: dict[tuple[float, ...], _SetUp] = {}
-
-
-_of_thread = _Kept()

@@ -109,15 +109,11 @@ def settled(robot: Robot, tasks: Sequence[Task], period: float, resolver: Resolv
     period [s], for which a velocity will be held; damping as in `solve_ik`.
     """
     names = curved(tasks, robot.n - robot.actuated)
-    return Settled(inner=resolver, period=period, softness=damping, curved=names,
-                   bends={task.name: _bend(task, robot) for task in tasks
-                          if damping and task.name in names and _may_vanish(task)},
+    bent = {task.name: _bend(task, robot) for task in tasks
+            if damping and task.name in names  # and all rows that count may vanish together
+            and (isinstance(task, Measured) if task.kind == "inequality" else task.dimension == 1)}
+    return Settled(inner=resolver, period=period, softness=damping, curved=names, bends=bent,
                    geared=not bends(robot))
-
-
-def _may_vanish(task: Task) -> bool:
-    """Whether all rows of a task that count may vanish together."""
-    return isinstance(task, Measured) if task.kind == "inequality" else task.dimension == 1
 
 
 def _bend(task: Task, robot: Robot) -> float:

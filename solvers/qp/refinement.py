@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 from numpy.linalg import norm
@@ -21,9 +20,7 @@ ROUNDING = 1e-15  # entry of a row over its norm: rounding
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
-@final
-@dataclass(frozen=True)
-class Rows:
+class Rows(NamedTuple):
     """Rows lower <= A z <= upper."""
 
     A: Array

@@ -93,11 +93,7 @@ def _in_range(h: Hierarchy) -> bool:
 
 
 class _StopError(Exception):
-    """A program without a usable answer."""
-
-    def __init__(self, status: Status) -> None:
-        super().__init__(status.remedy)
-        self.status = status
+    """A program without a usable answer; its argument is the status."""
 
 
 class _Cascade:
@@ -125,7 +121,7 @@ class _Cascade:
             if (abs(self.kept.excess(self.x)) > near).any():  # its numbers overflowed
                 self.x, status = np.zeros(self.h.n), Status.NUMERICAL_FAILURE
         except _StopError as stop:
-            status = stop.status
+            status, = stop.args
         memory = np.array(self.steps).reshape(-1, self.h.n)
         return Resolution(self.x, status, self.programs, memory)
 
