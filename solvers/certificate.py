@@ -365,8 +365,6 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     columns = [view.weighted(cone.rows @ (cone.Z.T @ Z)),
                view.weighted((own @ Z) * own_size[:, None]**2)]
     C, terms = (np.hstack(part) for part in zip(*columns, strict=True))
-    unseen = _independent(C[view.rank:], terms[view.rank:], cone.parallel)
-    C, terms = np.vstack([C[:view.rank], unseen]), terms[:view.rank + len(unseen)]
     held = np.eye(len(own_t), C.shape[1], len(cone.rows))
     none, t = np.zeros(len(C) - view.rank), level.t[judged]
     f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
@@ -377,21 +375,6 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     unknown[beyond] = np.maximum(unknown[beyond], cone.parallel)
     return _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, sizes, unknown,
                      1e-3 * enough)
-
-
-def _independent(heavy: Array, terms: Array, parallel: float) -> Array:
-    """Return as many rows as are independent, up to that angle, with the span of rows (q, k).
-
-    Of dependent rows only rounding would remain, and theirs is larger than a light row. For the
-    same reason entries that are rounding of `terms` (q, k), the same in each row, become zero.
-    """
-    _, R, order = _qr(heavy)
-    pivots = np.abs(np.diagonal(R))
-    rank = int(np.count_nonzero(pivots > parallel * pivots.max(initial=0.0)))
-    rows = np.empty((rank, heavy.shape[1]))
-    rows[:, order] = R[:rank]
-    rows[np.abs(rows) <= _ROUNDING * terms[:rank]] = 0.0
-    return rows
 
 
 def _least_turn(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: Mask
