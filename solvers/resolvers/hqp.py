@@ -207,7 +207,9 @@ class _Cascade:
         kept, vouched = self._movable(), False
         E, e = self._target(goal, own, lam, last)
         for wider in _WIDER:
-            z, found = self._ask(goal, limits, kept.relaxed(wider * self.settings.slack), lam, last)
+            slack = wider * self.settings.slack
+            relaxed = Rows(kept.A, kept.lower - slack, kept.upper + slack)
+            z, found = self._ask(goal, limits, relaxed, lam, last)
             vouched |= found
             if not kept.lower.size and not limits.lower.size:
                 return self._least_squares(z, E, e, own, lam), np.empty(0)
