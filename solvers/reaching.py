@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass
 from typing import final
 
@@ -149,7 +150,10 @@ class _Search:
                  resolver: Resolver, damping: float) -> None:
         robot, fastest = state.robot, max([1e-3, *map(_fastest, tasks)])
         self.robot, self.until, self.t, self.tasks = robot, until, state.t, list(tasks)
-        self.limits = [StepLimits(robot, _PERIOD, 1.0 / _PERIOD)] if limits else []
+        quick = copy(robot)  # a configuration has no speed: slow joints go at 1 rad/s or m/s
+        quick.velocity_limit = np.where(robot.velocity_limit > 0.0, np.maximum(
+            robot.velocity_limit, 1.0), 0.0)
+        self.limits = [StepLimits(quick, _PERIOD, 1.0 / _PERIOD)] if limits else []
         free: Array = np.full(robot.n, np.inf)
         self.lower, self.upper = robot.position_limits() if limits else (-free, free)
         self.stack, self.settled = stacked(robot, tasks, _PERIOD, self.limits, resolver, damping)
