@@ -492,18 +492,13 @@ class _View(NamedTuple):
 
         Also returns the size of the terms summed in each entry, to which rounding is relative.
         """
-        if not len(rows):
-            return np.empty((len(self.directions), 0)), np.empty((len(self.directions), 0))
         outside, length = rows @ self.rest, norm(rows, axis=1)
-        if not self.rank:
-            outside[norm(outside, axis=1) <= self.parallel * length] = 0.0
-            return np.asarray(outside.T), np.tile(length, (outside.shape[1], 1))
         seen = rows @ self.directions
         seen[np.abs(seen) <= _ROUNDING * length[:, None]] = 0.0
         inside = _solve_triangular(self.R, seen[:, self.order].T, trans=1)
         turned = self.parallel * (length + np.abs(self.Q @ inside).T @ self.size**2)
         outside[norm(outside, axis=1) <= turned] = 0.0  # in the span, if each row turns by so much
-        weight = _UNSEEN / float(np.abs(np.diagonal(self.R)).min())
+        weight = _UNSEEN / float(np.abs(np.diagonal(self.R)).min(initial=_UNSEEN))
         return (np.vstack([inside, weight * outside.T]),
                 np.vstack([np.abs(inside), np.tile(weight * length, (outside.shape[1], 1))]))
 
