@@ -362,9 +362,8 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     """Return the residual of (1) in coordinates of Z (n, p), for the judged rows of a level."""
     view = _View.of(level.unit[judged] @ Z, size[judged], cone.parallel)
     own, own_size, own_t = _on_sides(level, size)
-    columns = [view.weighted(cone.rows @ (cone.Z.T @ Z)),
-               view.weighted((own @ Z) * own_size[:, None]**2)]
-    C, terms = (np.hstack(part) for part in zip(*columns, strict=True))
+    C, terms = view.weighted(np.vstack([cone.rows @ (cone.Z.T @ Z),
+                                        (own @ Z) * own_size[:, None]**2]))
     held = np.eye(len(own_t), C.shape[1], len(cone.rows))
     none, t = np.zeros(len(C) - view.rank), level.t[judged]
     f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
