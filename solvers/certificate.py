@@ -35,8 +35,9 @@ first, so that rounding in rows of norm 1000 does not hide a row of norm 0.001.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import final
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.linalg import norm
@@ -206,8 +207,7 @@ def _euclidean(h: Hierarchy, x: Array) -> tuple[Hierarchy, Array]:
 
 
 def _levels(h: Hierarchy) -> list[slice]:
-    first, last = h.offsets[:-1].tolist(), h.offsets[1:].tolist()
-    return [slice(*pair) for pair in zip(first, last, strict=True)]
+    return [slice(*pair) for pair in pairwise(h.offsets.tolist())]
 
 
 def _readings(h: Hierarchy, x: Array, rows: _Rows, tolerance: float, parallel: float
@@ -254,9 +254,7 @@ def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, par
     return stationarity, _projected(gap, cone, tolerance * reach) / reach
 
 
-@final
-@dataclass(frozen=True)
-class _Rows:
+class _Rows(NamedTuple):
     """Unit rows and the position of x relative to them, as lengths.
 
     unit (m, n); size (m,) logarithm of the norm, -inf for a row of zeros; t (m,) signed distance
@@ -296,8 +294,7 @@ class _Rows:
 
     def part(self, rows: slice) -> _Rows:
         """Return the rows of one level."""
-        return _Rows(self.unit[rows], self.size[rows], self.t[rows], self.fixed[rows],
-                     self.upper[rows], self.lower[rows], self.reach)
+        return _Rows._make([*(of[rows] for of in self[:-1]), self.reach])
 
 
 class _NormalCone:
@@ -319,12 +316,12 @@ class _NormalCone:
         if level.upper.any() or level.lower.any():
             self._kept = np.vstack([self._kept, level.unit[level.upper], -level.unit[level.lower]])
         seen = self._kept @ self.Z
-        left = np.sqrt(np.einsum("ij,ij->i", seen, seen))
-        seen_at_all = left > self.parallel
-        self._kept = self._kept[seen_at_all]
-        self.rows = seen[seen_at_all] / left[seen_at_all, None]
-        self.thinnest = min(self.thinnest, float(left[seen_at_all].min(initial=1.0)))
-        self.angle = max(self.angle, float(left[~seen_at_all].max(initial=0.0)))
+        left = norm(seen, axis=1)
+        faint, free = left[left <= self.parallel], left > self.parallel
+        self._kept, seen, left = self._kept[free], seen[free], left[free]
+        self.rows = seen / left[:, None]
+        self.thinnest = min(self.thinnest, float(left.min(initial=1.0)))
+        self.angle = max(self.angle, float(faint.max(initial=0.0)))
 
 
 def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, float]:
@@ -332,10 +329,10 @@ def _complement(Z: Array, rows: Array, parallel: float) -> tuple[Array, float, f
 
     The pivots are the smallest that counts and the largest that counts as zero.
     """
-    qr = _QR.of((rows @ Z).T)
-    pivots = np.abs(qr.pivots)
+    Q, R, _ = _qr((rows @ Z).T)
+    pivots = np.abs(np.diagonal(R))
     rank = int(np.count_nonzero(pivots > parallel))
-    return (qr.times(Z.T, "T").T[:, rank:], float(pivots[:rank].min(initial=1.0)),
+    return (Z @ Q[:, rank:], float(pivots[:rank].min(initial=1.0)),
             float(pivots[rank:].max(initial=0.0)))
 
 
@@ -365,36 +362,18 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     """Return the residual of (1) in coordinates of Z (n, p), for the judged rows of a level."""
     view = _View.of(level.unit[judged] @ Z, size[judged], cone.parallel)
     own, own_size, own_t = _on_sides(level, size)
-    columns = [view.weighted(cone.rows @ (cone.Z.T @ Z)),
-               view.weighted((own @ Z) * own_size[:, None]**2)]
-    C, terms = (np.hstack(part) for part in zip(*columns, strict=True))
-    unseen = _independent(C[view.rank:], terms[view.rank:], cone.parallel)
-    C, terms = np.vstack([C[:view.rank], unseen]), terms[:view.rank + len(unseen)]
+    C, terms = view.weighted(np.vstack([cone.rows @ (cone.Z.T @ Z),
+                                        (own @ Z) * own_size[:, None]**2]))
     held = np.eye(len(own_t), C.shape[1], len(cone.rows))
     none, t = np.zeros(len(C) - view.rank), level.t[judged]
     f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
     sizes = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
-    unknown = np.full(len(f), _unknown(min(cone.thinnest, view.thinnest),
-                                       max(cone.angle, view.angle)))
+    unknown = np.full(len(f), _ROUNDING / min(cone.thinnest, view.thinnest)
+                      + max(cone.angle, view.angle))
     beyond = slice(view.rank, len(C))  # up to the angle at which rows count as dependent
     unknown[beyond] = np.maximum(unknown[beyond], cone.parallel)
     return _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, sizes, unknown,
                      1e-3 * enough)
-
-
-def _independent(heavy: Array, terms: Array, parallel: float) -> Array:
-    """Return as many rows as are independent, up to that angle, with the span of rows (q, k).
-
-    Of dependent rows only rounding would remain, and theirs is larger than a light row. For the
-    same reason entries that are rounding of `terms` (q, k), the same in each row, become zero.
-    """
-    qr = _QR.of(heavy)
-    pivots = np.abs(qr.pivots)
-    rank = int(np.count_nonzero(pivots > parallel * pivots.max(initial=0.0)))
-    rows = np.empty((rank, heavy.shape[1]))
-    rows[:, qr.order] = np.triu(qr.raw)[:rank]
-    rows[np.abs(rows) <= _ROUNDING * terms[:rank]] = 0.0
-    return rows
 
 
 def _least_turn(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: Mask
@@ -412,8 +391,8 @@ def _least_turn(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: 
     least, square = float((size[judged]**2).min()) * _length(level.t[judged]), float(force @ force)
     if not (least > 0.0 and square > 0.0):
         return np.inf, level
-    return _length(left) / least, replace(
-        level, unit=level.unit - np.outer(force / square, Z @ left))
+    turned = level.unit - np.outer(force / square, Z @ left)
+    return _length(left) / least, level._replace(unit=turned)
 
 
 def _on_sides(level: _Rows, size: Array) -> tuple[Array, Array, Array]:
@@ -427,20 +406,16 @@ def _projected(gap: Array, cone: _NormalCone, enough: float) -> float:
     """Return the length of the projection of -gap (n,) on the polar cone, in coordinates of Z."""
     C, f = cone.rows.T, cone.Z.T @ gap
     return _balanced(C, np.ones_like(C), f, np.full(len(f), norm(gap)),
-                     _unknown(cone.thinnest, cone.angle), 1e-3 * enough)
-
-
-def _unknown(thinnest: float, angle: float) -> float:
-    """Return the share of a term that rounding or rows counted as parallel may explain."""
-    return _ROUNDING / thinnest + angle
+                     _ROUNDING / cone.thinnest + cone.angle, 1e-3 * enough)
 
 
 def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: Array | float,
               enough: float) -> float:
     """Return the least |C z + f| for z >= 0, ignoring entries within the unknown share of terms.
 
-    Any z proves what it reaches. A search that rounding ends early on dependent columns is repeated
-    by scipy's, which chooses otherwise, and then without the rows that only repeat heavier ones.
+    That share is what rounding or rows counted as parallel may explain. Any z proves what it
+    reaches. A search that rounding ends early on dependent columns is repeated by scipy's, which
+    chooses otherwise, and then without the rows that only repeat heavier ones.
     """
     least = np.inf
     for by_scipy, repeated in ((False, True), (True, True), (False, False)):
@@ -476,9 +451,7 @@ def _outside(rows: Array, basis: Array) -> Array:
     return rows
 
 
-@final
-@dataclass(frozen=True)
-class _View:
+class _View(NamedTuple):
     """The part of p coordinates that the rows of a level see, large rows first.
 
     size (m,) : of the rows.
@@ -507,10 +480,10 @@ class _View:
         """Factorise rows P (m, p), projections of unit rows that represent rows of these sizes."""
         V, T, thinnest, angle, rank = _graded(P, size, parallel)
         by_size = np.argsort(-size, kind="stable")
-        qr = _QR.of((T[:rank] * size**2).T[by_size])
+        sorted_Q, R, order = _qr((T[:rank] * size**2).T[by_size])
         Q = np.empty((len(size), rank))
-        Q[by_size] = qr.times(np.eye(len(size), rank))
-        return _View(size, Q, qr.raw[:rank], qr.order, V[:, :rank], V[:, rank:], thinnest, angle,
+        Q[by_size] = sorted_Q[:, :rank]
+        return _View(size, Q, R[:rank], order, V[:, :rank], V[:, rank:], thinnest, angle,
                      parallel)
 
     def weighted(self, rows: Array) -> tuple[Array, Array]:
@@ -518,18 +491,13 @@ class _View:
 
         Also returns the size of the terms summed in each entry, to which rounding is relative.
         """
-        if not len(rows):
-            return np.empty((len(self.directions), 0)), np.empty((len(self.directions), 0))
         outside, length = rows @ self.rest, norm(rows, axis=1)
-        if not self.rank:
-            outside[norm(outside, axis=1) <= self.parallel * length] = 0.0
-            return np.asarray(outside.T), np.tile(length, (outside.shape[1], 1))
         seen = rows @ self.directions
         seen[np.abs(seen) <= _ROUNDING * length[:, None]] = 0.0
         inside = _solve_triangular(self.R, seen[:, self.order].T, trans=1)
         turned = self.parallel * (length + np.abs(self.Q @ inside).T @ self.size**2)
         outside[norm(outside, axis=1) <= turned] = 0.0  # in the span, if each row turns by so much
-        weight = _UNSEEN / float(np.abs(np.diagonal(self.R)).min())
+        weight = _UNSEEN / float(np.abs(np.diagonal(self.R)).min(initial=_UNSEEN))
         return (np.vstack([inside, weight * outside.T]),
                 np.vstack([np.abs(inside), np.tile(weight * length, (outside.shape[1], 1))]))
 
@@ -543,13 +511,12 @@ def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float
     candidate = norm(P, axis=1) > parallel
     while True:
         chosen = np.flatnonzero(candidate)
-        qr = _QR.of((P[chosen] * size[chosen, None]).T)
-        pivots = np.abs(qr.pivots) / size[chosen[qr.order]][:len(qr.pivots)]
+        V, R, order = _qr((P[chosen] * size[chosen, None]).T)
+        pivots = np.abs(np.diagonal(R)) / size[chosen[order]][:len(R)]
         lost = pivots <= parallel
         if not lost.any():
             break
-        candidate[chosen[qr.order[int(np.argmax(lost))]]] = False
-    V = qr.times(np.eye(P.shape[1]))
+        candidate[chosen[order[int(np.argmax(lost))]]] = False
     T = V.T @ P.T
     left = np.sqrt(np.cumsum(T[::-1]**2, axis=0)[::-1])
     out = left <= 0.5 * parallel  # half: the remainder of a pivot must survive rounding
@@ -595,11 +562,14 @@ def _by_scipy(D: Array, b: Array) -> Array:
 
 def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) -> Array:
     """Return y >= 0 that minimises |D y - b|, or reaches enough / scale; unit (D) picks columns."""
-    y, left, free = _first_guess(D, b)
+    y, left, free = np.zeros(D.shape[1]), b, np.zeros(D.shape[1], dtype=bool)
     refused, tried = np.zeros(len(y), dtype=bool), {free.tobytes()}
     for _ in range(3 * len(y) + 3):
-        best, slope = _steepest(unit, left, free | refused)
-        if norm(left) * scale <= enough or slope <= _SMALL:
+        slopes, terms = unit.T @ left, np.abs(unit).T @ np.abs(left)
+        slopes[free | refused | (terms == 0.0)] = 0.0
+        slopes /= np.where(terms > 0.0, terms, 1.0)
+        best = int(np.argmax(slopes))
+        if norm(left) * scale <= enough or slopes[best] <= _SMALL:
             break
         moved = _freed(D, b, y, free, best)
         if moved is None or moved[2].tobytes() in tried:  # chosen by rounding
@@ -609,28 +579,6 @@ def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) ->
             tried.add(free.tobytes())
             refused[:] = False
     return y
-
-
-def _steepest(unit: Array, left: Array, excluded: Mask) -> tuple[int, float]:
-    """Return the column with the largest slope relative to its terms, and that slope."""
-    slope, terms = unit.T @ left, np.abs(unit).T @ np.abs(left)
-    slope = np.where(excluded | (terms == 0.0), 0.0, slope / np.where(terms, terms, 1.0))
-    best = int(np.argmax(slope))
-    return best, float(slope[best])
-
-
-def _first_guess(D: Array, b: Array) -> tuple[Array, Array, Mask]:
-    """Return the least squares of all columns, repeated without those that come out negative.
-
-    Returns y, the residual, and the mask of the free columns.
-    """
-    free = np.ones(D.shape[1], dtype=bool)
-    while free.any():
-        y, left = _least_squares(D, b, free)
-        if (y[free] > 0.0).all():
-            return y, left, free
-        free &= y > 0.0
-    return np.zeros(D.shape[1]), b, free
 
 
 def _freed(D: Array, b: Array, y: Array, free: Mask, new: int) -> tuple[Array, Array, Mask] | None:
@@ -657,77 +605,43 @@ def _freed(D: Array, b: Array, y: Array, free: Mask, new: int) -> tuple[Array, A
 def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
     """Return the least squares of the free columns and its residual; QR with pivoting.
 
-    Heavy rows come first. The residual comes from the reflections, not from a difference, so the
-    small residual of a heavy row is as accurate as the rest (Cox, Higham 1998).
+    Heavy rows come first. The residual comes from Q, not from a difference, so the small residual
+    of a heavy row is as accurate as the rest (Cox, Higham 1998).
     """
     s = np.zeros(D.shape[1])
     if not free.any():
         return s, b.copy()
     chosen = D[:, free]
-    qr = _QR.of(chosen)
-    depth = len(qr.pivots)
-    inside = qr.times(b[:, None], "T")[:, 0]
-    rounding = _SMALL * np.minimum(norm(chosen, axis=0)[qr.order[:depth]],  # of columns and rows
+    Q, R, order = _qr(chosen)
+    inside, diagonal = Q.T @ b, np.abs(np.diagonal(R))
+    depth = len(diagonal)
+    rounding = _SMALL * np.minimum(norm(chosen, axis=0)[order[:depth]],  # of columns and rows
                                    np.abs(chosen).max(axis=1)[:depth])
-    pivots = np.abs(qr.pivots) > rounding
+    pivots = diagonal > rounding
     rank = len(pivots) if pivots.all() else int(np.argmin(pivots))
-    solved = _solve_triangular(qr.raw[:rank, :rank], inside[:rank, None])[:, 0]
-    s[np.flatnonzero(free)[qr.order[:rank]]] = solved
-    inside[:rank] = 0.0
-    return s, qr.times(inside[:, None])[:, 0]
+    s[np.flatnonzero(free)[order[:rank]]] = _solve_triangular(R[:rank, :rank], inside[:rank])
+    return s, Q[:, rank:] @ inside[rank:]
 
 
-@final
-@dataclass(frozen=True)
-class _QR:
-    """QR with pivoting of a matrix (m, n), as LAPACK keeps it: scipy's qr takes twice the time.
+def _qr(matrix: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Return Q (m, m), R (m, n) and the order (n,) of its columns; scipy's `qr` takes longer."""
+    from scipy.linalg import lapack
 
-    raw (m, n) : R above the diagonal, the reflections below it, with the factors tau.
-    order (n,) : the columns in the order of R.
-    """
-
-    raw: Array
-    tau: Array
-    order: NDArray[np.int64]
-
-    @staticmethod
-    def of(matrix: Array) -> _QR:
-        """Factorise a matrix."""
-        from scipy.linalg import lapack
-
-        m, n = matrix.shape
-        if not (m and n):
-            return _QR(np.empty((m, n)), np.empty(0), np.arange(n))
-        raw, order, tau, _, _ = lapack.dgeqp3(matrix, 2 * n + (n + 1) * _BLOCK)
-        return _QR(raw, tau, order - 1)
-
-    @property
-    def pivots(self) -> Array:
-        """The diagonal of R: (min(m, n),)."""
-        return np.diagonal(self.raw)
-
-    def times(self, matrix: Array, trans: str = "N") -> Array:
-        """Return Q, or Q^T if trans is "T", times a matrix (m, k)."""
-        from scipy.linalg import lapack
-
-        if not (len(self.tau) and matrix.size):
-            return matrix.copy()
-        found: Array = lapack.dormqr("L", trans, self.raw[:, :len(self.tau)], self.tau, matrix,
-                                     max(matrix.shape) * _BLOCK)[0]
-        return found
+    (m, n), Q = matrix.shape, np.eye(len(matrix))
+    if not matrix.size:
+        return Q, np.empty((m, n)), np.arange(n)
+    raw, order, tau, _, _ = lapack.dgeqp3(matrix, 2 * n + (n + 1) * _BLOCK)
+    Q[:, :n] = raw[:, :m]
+    return lapack.dorgqr(Q, tau, m * _BLOCK)[0], np.triu(raw), order - 1
 
 
 def _solve_triangular(R: Array, b: Array, trans: int = 0) -> Array:
-    """Return R^-1 b, or R^-T b if trans is 1, for the upper triangle of R (k, k) and b (k, c)."""
+    """Return R^-1 b, or R^-T b if trans is 1, for the upper triangle of R (k, k) and b (k, ..)."""
     from scipy.linalg import lapack
 
-    if not b.size:
-        return b.copy()
-    found: Array = lapack.dtrtrs(R, b, trans=trans)[0]
-    return found
+    return np.asarray(lapack.dtrtrs(R, b, trans=trans)[0]) if b.size else b.copy()
 
 
 def _length(v: Array) -> float:
     """Return the Euclidean norm, computed without overflow."""
-    largest = float(np.abs(v).max(initial=0.0))
-    return largest * float(norm(v / largest)) if 0.0 < largest < np.inf else largest
+    return float(np.hypot.reduce(v, initial=0.0))

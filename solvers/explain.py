@@ -138,7 +138,7 @@ def nowhere(h: Hierarchy, k: int, names: Sequence[str], x: Array) -> str:
     rows = slice(h.offsets[k], h.offsets[k + 1])
     A, w = h.A[rows], h.slacks(x)[rows]
     size = float(np.linalg.norm(A)) * float(np.linalg.norm(w))
-    if not w.any() or np.linalg.norm(A.T @ w) > _SINGULAR * size:
+    if not w.any() or not np.linalg.norm(A.T @ w) <= _SINGULAR * size < np.inf:
         return ""
     shares = w / w[np.argmax(np.abs(w))]
     along = [f"{'' if share == 1.0 else f'{share:.2g} '}{name}"

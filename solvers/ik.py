@@ -25,13 +25,13 @@ from hierarchy.tasks.joints.mechanism import MECHANISM, Mechanism, bends
 from hierarchy.words import listed
 from solvers.reaching import Reached, reach, stacked
 from solvers.resolver import Resolution, Resolver, make
-from solvers.resolvers.settled import Settled
 from solvers.status import Status
 
 _MOST_BENDS = 10   # corrections of the rows of a mechanism
 _STRAIGHT = 1e-8   # [m/s, rad/s] change of a correction that ends them
 _MOST_KEPT = 4     # set-ups, of the last calls with different objects
 _warned: set[tuple[str, ...]] = set()  # joints without velocity limits that were named
+_of_thread = local()  # in `kept` what its last calls have set up, by the identity of what they got
 
 
 class Memory(NamedTuple):
@@ -119,7 +119,7 @@ def solve_ik(robot: Robot, q: ArrayLike, tasks: Sequence[Task], *, dt: float = 0
         return reach(robot, q, tasks, until, limits=limits is True, resolver=_resolver(resolver),
                      t=t, damping=damping)
     before = _before(memory, v, limits)
-    kept = _of_thread.kept
+    kept: dict[tuple[float, ...], _SetUp] = vars(_of_thread).setdefault("kept", {})
     asked = id(robot), *map(id, tasks), id(limits), id(resolver), dt, damping
     made = kept.pop(asked, None)  # away meanwhile: a task may ask the same at another q
     if made is not None and made.fits():
@@ -142,30 +142,6 @@ def _resolver(asked: str | Resolver) -> Resolver:
     return make(asked) if isinstance(asked, str) else asked
 
 
-def _solved(state: State, h: Hierarchy, resolver: Settled, memory: Array | None) -> Resolution:
-    """Solve, and where the mechanism bends within the period again with that on its sides.
-
-    Beside a singular configuration that may diverge: the first answer then counts.
-    """
-    plain = found = resolver.solve(h, memory)
-    if not bends(state.robot):
-        return found
-    mechanism, first = Mechanism(state.robot), h.offsets[h.names.index(MECHANISM)]
-    before, change = np.zeros(1), np.inf
-    for _ in range(_MOST_BENDS):
-        bend = mechanism.bend(state.q, found.x, resolver.period)
-        last, change = change, np.abs(bend - before).max(initial=0.0)
-        if change < _STRAIGHT:
-            break
-        if change > last:
-            return plain
-        lower, upper, rows = h.lower.copy(), h.upper.copy(), slice(first, first + len(bend))
-        lower[rows] += bend
-        upper[rows] += bend
-        found, before = resolver.solve(h.changed(lower=lower, upper=upper), memory), bend
-    return found
-
-
 def _before(memory: Memory | None, v: ArrayLike | None,
             limits: bool | Task) -> tuple[Array | None, ArrayLike | None]:
     """Return the memory of the resolver, and the velocity of the previous tick if known."""
@@ -181,11 +157,14 @@ def _before(memory: Memory | None, v: ArrayLike | None,
 
 def _warn_of_degrees(robot: Robot, q: Array) -> None:
     """Warn of a joint that is more than a turn beyond its limits, as no angle in radians is."""
-    beyond = np.maximum(robot.lower - q, q - robot.upper)
-    for i in np.flatnonzero(beyond > 2.0 * np.pi)[:1]:
-        warnings.warn(f"solve_ik: {robot.coordinate_names[i]} at {q[i]:g} is far beyond its "
-                      f"limits, {robot.lower[i]:.4g} to {robot.upper[i]:.4g}. Are these degrees?",
-                      stacklevel=3)
+    for part in robot.parts:
+        i = part.q
+        beyond = max(robot.lower[i] - q[i], q[i] - robot.upper[i])
+        if part.size == 1 and part.unit == "rad" and beyond > 2.0 * np.pi:
+            warnings.warn(f"solve_ik: {robot.coordinate_names[i]} at {q[i]:g} is far beyond its "
+                          f"limits, {robot.lower[i]:.4g} to {robot.upper[i]:.4g}. Are these "
+                          "degrees?", stacklevel=3)
+            return
 
 
 def _warn_of_speeds(robot: Robot) -> None:
@@ -206,6 +185,7 @@ class _SetUp:
                  resolver: str | Resolver, dt: float, damping: float) -> None:
         self.objects = robot, *tasks, limits, resolver  # kept, so that their `id` stays theirs
         self.state = State(robot)
+        self.mechanism = Mechanism(robot) if bends(robot) else None
         box = [limits] if isinstance(limits, Task) else [StepLimits(robot, dt)] if limits else []
         self.stack, self.resolver = stacked(robot, tasks, dt, box, _resolver(resolver), damping)
         for task in (*box, *tasks):
@@ -230,8 +210,31 @@ class _SetUp:
         state = self.state
         state.go(q, v, t)
         state.commanded = state.v.copy()
-        found = _solved(state, self.stack.hierarchy(state), self.resolver, memory)
+        found = self._solved(self.stack.hierarchy(state), memory)
         return Step(found.x, found.status, Memory(found.memory, found.x.copy()))
+
+    def _solved(self, h: Hierarchy, memory: Array | None) -> Resolution:
+        """Solve, and where the mechanism bends within the period again with that on its sides.
+
+        Beside a singular configuration that may diverge: the first answer then counts.
+        """
+        plain = found = self.resolver.solve(h, memory)
+        if self.mechanism is None:
+            return found
+        first, before, change = h.offsets[h.names.index(MECHANISM)], np.zeros(1), np.inf
+        for _ in range(_MOST_BENDS):
+            bend = self.mechanism.bend(self.state.q, found.x, self.resolver.period)
+            last, change = change, np.abs(bend - before).max(initial=0.0)
+            if change < _STRAIGHT:
+                break
+            if change > last:
+                return plain
+            lower, upper, rows = h.lower.copy(), h.upper.copy(), slice(first, first + len(bend))
+            lower[rows] += bend
+            upper[rows] += bend
+            found = self.resolver.solve(h.changed(lower=lower, upper=upper), memory)
+            before = bend
+        return found
 
 
 def _is_read_once(name: str, value: object) -> bool:
@@ -239,13 +242,3 @@ def _is_read_once(name: str, value: object) -> bool:
     return isinstance(value, list) or (isinstance(value, np.ndarray) and (
         name in ("stiffness", "damping", "gain") or value.dtype != np.float64
         or not value.flags.carray))
-
-
-class _Kept(local):
-    """What the last calls of a thread have set up, by the identity of the objects given."""
-
-    def __init__(self) -> None:
-        self.kept: dict[tuple[float, ...], _SetUp] = {}
-
-
-_of_thread = _Kept()

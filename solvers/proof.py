@@ -26,7 +26,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from itertools import product
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -111,9 +111,7 @@ def prove(h: Hierarchy, candidates: Iterable[ArrayLike], unclear: float = UNCLEA
     return Proof(np.full(h.n, np.nan), np.full(levels, np.nan), 0, levels + 1, 0.0, 0.0)
 
 
-@final
-@dataclass(frozen=True)
-class _Rows:
+class _Rows(NamedTuple):
     """What a candidate says of each row (m,): zero or not, pulled, on a side, and on the upper."""
 
     seen: Mask
@@ -149,8 +147,7 @@ class _Attempt:
         """Take the first `count` levels, and of their x the nearest to `near` if it is given."""
         self.unclear = Decimal(unclear)
         self.h, self.near, self.count = h, near, count
-        self.equal, self.pulled, self.on, self.above = rows.equal, rows.pulled, rows.on, rows.above
-        self.seen = rows.seen
+        self.seen, self.equal, self.pulled, self.on, self.above = rows
         self.A: Exact = _exact(h.A)
         self.lower, self.upper = _exact(h.lower), _exact(h.upper)
         self.norm: Exact = np.array([_length(row) for row in self.A], dtype=object)
@@ -243,10 +240,9 @@ class _Attempt:
                 self._turn_against(own, out, k)
                 return False
             fixed.add(self.A[own], self.norm[own], ZERO)
-        one = np.array([Decimal(1)] * n, dtype=object)
         gap = self.x - _exact(self.h.reference)
         return self.near is not None or self._unbalanced(
-            fixed, _exact(np.eye(n)), gap, one, self.on, self.count) is None
+            fixed, _exact(np.eye(n)), gap, _exact(np.ones(n)), self.on, self.count) is None
 
     def _unbalanced(self, fixed: _Span, A: Exact, t: Exact, norm: Exact, above: Mask, level: int
                     ) -> Exact | None:
@@ -280,15 +276,12 @@ class _Attempt:
     def _least(self) -> Array:
         """Return the norms of the levels' violations in the rows as given."""
         value = _exact(self.h.A) @ self.x
-        zero = Decimal(0)
-        off = [max(v - up, low - v, zero) for v, low, up in
-               zip(value, self.lower, self.upper, strict=True)]
-        allowed = [2 * Decimal(self.shift) * norm * self.reach * bool(on)
-                   for norm, on in zip(self.norm, self.on, strict=True)]
-        rounding = ZERO * self.reach
-        kept = np.array([zero if o <= max(a, rounding * norm) else o for o, a, norm in
-                         zip(off, allowed, self.norm, strict=True)], dtype=object)
-        norms = [float(_length(kept[self.level == k])) for k in range(self.count)]
+        inside = _exact(np.zeros(len(value)))
+        off = np.maximum(np.maximum(value - self.upper, self.lower - value), inside)
+        shift = max(2 * Decimal(self.shift), ZERO)
+        share = np.array([shift if on else ZERO for on in self.on], dtype=object)
+        off[off <= share * self.norm * self.reach] = Decimal(0)
+        norms = [float(_length(off[self.level == k])) for k in range(self.count)]
         return np.array(norms + [np.nan] * (len(self.h.sizes) - self.count))
 
 
@@ -301,9 +294,7 @@ class _Span:
 
     def within(self, v: Exact) -> Exact:
         """Return the part of v (n,) in the span."""
-        if not len(self.Q):
-            return np.asarray(v * Decimal(0))
-        return np.asarray((self.Q @ v) @ self.Q, dtype=object)
+        return np.asarray((self.Q @ v) @ self.Q)
 
     def outside(self, rows: Exact) -> Exact:
         """Return the part of rows (m, n) outside the span."""
@@ -334,10 +325,8 @@ class _Span:
         first = len(self.Q)
         self.add(rows, norm, ZERO)
         new = self.Q[first:]
-        if not len(new):
-            return np.array([Decimal(0)] * rows.shape[1], dtype=object)
         C = rows @ new.T
-        return np.asarray(_solved(C.T @ C, C.T @ b) @ new, dtype=object)
+        return np.asarray(_solved(C.T @ C, C.T @ b) @ new)
 
 
 def _pushed_back(rows: Exact, target: Exact) -> Exact:
@@ -347,7 +336,7 @@ def _pushed_back(rows: Exact, target: Exact) -> Exact:
     """
     size = [_length(row) for row in rows]
     usable = [i for i in range(len(rows)) if size[i] > ZERO]
-    z, free, left = np.array([Decimal(0)] * len(rows), dtype=object), list[int](), target
+    z, free, left = _exact(np.zeros(len(rows))), list[int](), target
     enough = ZERO * _length(target)
     for _ in range(3 * len(rows) + 1):
         slope = {i: (rows[i] @ left) / size[i] for i in usable if i not in free}
@@ -376,12 +365,11 @@ def _solved(M: Exact, b: Exact) -> Exact:
     for j in range(size):
         if L[j, j] <= 0:
             raise _NoProofError
-        for i in range(j + 1, size):
-            factor = L[i, j] / L[j, j]
-            L[i, j + 1:] = L[i, j + 1:] - factor * L[j, j + 1:]
-            y[i] -= factor * y[j]
+        factors = L[j + 1:, j] / L[j, j]
+        L[j + 1:, j + 1:] -= np.outer(factors, L[j, j + 1:])
+        y[j + 1:] -= factors * y[j]
     for j in reversed(range(size)):
-        y[j] = (y[j] - L[j, j + 1:] @ y[j + 1:]) / L[j, j] if j + 1 < size else y[j] / L[j, j]
+        y[j] = (y[j] - L[j, j + 1:] @ y[j + 1:]) / L[j, j]
     return y
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass
 from typing import final
 
@@ -34,7 +35,7 @@ _AT = 1e-6        # [rad or m] from a limit that counts as on it
 _DRAWN, _POWER = 8, 3  # configurations at which rows of tasks are turned, and directions of each
 _TURN = 1e-6      # [rad or m] how far
 _MARGIN = 3.0     # for they may turn faster elsewhere, and all of twice that comes to rest at once
-_WIDE = np.pi     # [rad or m] range around q from which a joint without limits starts again
+_WIDE = np.pi     # [rad or m] around q, from where a joint without a limit starts again
 
 
 @final
@@ -109,15 +110,11 @@ def settled(robot: Robot, tasks: Sequence[Task], period: float, resolver: Resolv
     period [s], for which a velocity will be held; damping as in `solve_ik`.
     """
     names = curved(tasks, robot.n - robot.actuated)
-    return Settled(inner=resolver, period=period, softness=damping, curved=names,
-                   bends={task.name: _bend(task, robot) for task in tasks
-                          if damping and task.name in names and _may_vanish(task)},
+    bent = {task.name: _bend(task, robot) for task in tasks
+            if damping and task.name in names  # and all rows that count may vanish together
+            and (isinstance(task, Measured) if task.kind == "inequality" else task.dimension == 1)}
+    return Settled(inner=resolver, period=period, softness=damping, curved=names, bends=bent,
                    geared=not bends(robot))
-
-
-def _may_vanish(task: Task) -> bool:
-    """Whether all rows of a task that count may vanish together."""
-    return isinstance(task, Measured) if task.kind == "inequality" else task.dimension == 1
 
 
 def _bend(task: Task, robot: Robot) -> float:
@@ -153,7 +150,10 @@ class _Search:
                  resolver: Resolver, damping: float) -> None:
         robot, fastest = state.robot, max([1e-3, *map(_fastest, tasks)])
         self.robot, self.until, self.t, self.tasks = robot, until, state.t, list(tasks)
-        self.limits = [StepLimits(robot, _PERIOD, 1.0 / _PERIOD)] if limits else []
+        quick = copy(robot)  # a configuration has no speed: slow joints go at 1 rad/s or m/s
+        quick.velocity_limit = np.where(robot.velocity_limit > 0.0, np.maximum(
+            robot.velocity_limit, 1.0), 0.0)
+        self.limits = [StepLimits(quick, _PERIOD, 1.0 / _PERIOD)] if limits else []
         free: Array = np.full(robot.n, np.inf)
         self.lower, self.upper = robot.position_limits() if limits else (-free, free)
         self.stack, self.settled = stacked(robot, tasks, _PERIOD, self.limits, resolver, damping)
@@ -224,7 +224,9 @@ class _Search:
         how far q is open or beyond limits, where it starts or the two contradict each other.
         """
         self.state.move(self.t, q, np.zeros(self.robot.n))
-        return [self._broken(q), *(max(self._missed(task), self.until) for task in self.deciding)]
+        broken = self._broken(q)
+        return [broken and broken + self.until,  # no such q ends a search
+                *(max(self._missed(task), self.until) for task in self.deciding)]
 
     def _broken(self, q: Array) -> float:
         """Return by how much q is beyond limits or its mechanism open [rad or m], 0 if rounding."""
@@ -240,8 +242,8 @@ class _Search:
 
     def answer(self, q: Array, iterations: int, starts: int) -> Reached:
         """Return what is to be said of a configuration."""
-        broken = self._errors(q)[0]
-        errors = {task.name: self._missed(task) for task in self.tasks}
+        self._errors(q)
+        broken, errors = self._broken(q), {task.name: self._missed(task) for task in self.tasks}
         met = all(errors[task.name] <= self.until for task in self.deciding)
         if not met:
             said = self._verdict(errors)
@@ -301,12 +303,8 @@ def _fastest(task: Task) -> float:
 
 def _drawn(robot: Robot, q: Array, rng: np.random.Generator) -> Array:
     """Return q with its actuated joints drawn anew, within their limits."""
-    lower, upper = robot.position_limits()
-    lower, upper = np.where(np.isfinite(lower), lower, -_WIDE), np.where(np.isfinite(upper), upper,
-                                                                        _WIDE)
-    move = rng.uniform(lower, upper)
-    here = q[robot.coordinates]
-    bounded = np.isfinite(robot.position_limits()[0])
-    step = np.where(bounded, move - here, move)
+    (lower, upper), here = robot.position_limits(), q[robot.coordinates]
+    step = rng.uniform(np.where(lower > -np.inf, lower, np.minimum(here, upper) - _WIDE),
+                       np.where(upper < np.inf, upper, np.maximum(here, lower) + _WIDE)) - here
     step[:robot.actuated] = 0.0
     return robot.integrate(q, step)

@@ -8,7 +8,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from solvers.status import Status as Status
 from solvers.workspace import WORKSPACE, entry
 
 Handles = Literal["equalities", "bounds", "inequalities", "activations"]
-_KINDS: tuple[Handles, ...] = ("equalities", "bounds", "inequalities", "activations")
+_KINDS = get_args(Handles)
 _CHECK, _CHOICES = "check", "choices"  # what a field says of a setting
 _RESOLVED: dict[str, str] = {
     "equalities": "equalities only",

@@ -228,15 +228,11 @@ class Packed:
 
 def _contradiction(packed: Packed, i: int) -> ContradictionError:
     """Return the error that names the two limits that leave unknown i no value."""
-    lows, highs, first = [], [], 0
-    for name, _, h in packed.limits:
-        bounds, spare = np.empty((2, packed.n)), np.empty((2, *packed.A.shape))
-        last = first + len(h)
-        write_limits(packed.table, first, last, packed.period, bounds, spare[0], packed.sides)
-        lows.append((float(bounds[0, i]), name))
-        highs.append((float(bounds[1, i]), name))
-        first = last
-    (low, demands), (high, allows) = max(lows), min(highs)
+    bounds = [(side / packed.period / row[i], name, row[i] > 0.0)
+              for name, G, h in packed.limits for row, side in zip(G, h, strict=True)
+              if row[i] != 0.0 and np.count_nonzero(row) == 1]
+    low, demands, _ = max(one for one in bounds if not one[2])
+    high, allows, _ = min(one for one in bounds if one[2])
     return ContradictionError(
         f"limits cannot all hold: joint {packed.joints()[i]} must move by at least {low:.4g} "
         f"({demands}) and at most {high:.4g} rad/s or m/s ({allows}); a joint outside its range "

@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable
 from functools import cache, partial
+from itertools import pairwise
 from pkgutil import iter_modules
 from typing import Any
 
@@ -88,16 +89,13 @@ def _qp_solvers() -> frozenset[str]:
 
 def _conflict(h: Hierarchy, x: Array, tolerance: float) -> str:
     """Return which limits or constraints contradict each other, those that miss; "" if none."""
-    A, lower, upper, sizes = h.rows
-    first = 0
-    for name, size in zip(h.names, sizes.tolist(), strict=True):
+    A, lower, upper, _ = h.rows
+    for name, (first, last) in zip(h.names, pairwise(h.offsets.tolist()), strict=True):
         if name not in _ALWAYS:
             break
-        last = first + size
         if largest_violation(A, lower, upper, x, first, last) > tolerance:
             misses, names = np.abs(h.slacks(x)), h.named() if h.named else ()
             rows = [f"{names[i]} by {misses[i]:.3g}" for i in range(first, last)
                     if misses[i] > tolerance]
             return (f"the {name} cannot all hold; at best these are violated: {listed(rows)}")
-        first = last
     return ""

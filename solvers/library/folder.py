@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from importlib.metadata import distribution, version
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 from hierarchy.errors import HierarchyError, check_name
 
@@ -35,9 +35,7 @@ _MOST_FIXED = 100
 _MAGIC = b"!<arch>\n"  # of a static library
 
 
-@final
-@dataclass(frozen=True)
-class Emitted:
+class Emitted(NamedTuple):
     """An object file, the names of the functions in it, and the machine that it is for.
 
     digest : of the sources of the kernels, see `source_digest`.

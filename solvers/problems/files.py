@@ -109,7 +109,7 @@ def read(path: str | Path) -> Collection:
     if len(problems) != head["count"]:
         raise ProblemFileError(f"{path}: {len(problems)} problems where its {_HEAD} says "
                                f"{head['count']}")
-    if _digest({name: arrays[name] for name in _DATA}) != head.get("sha256"):
+    if _digest(arrays) != head.get("sha256"):
         raise ProblemFileError(f"{path}: the problems are not those that were written: their "
                                "SHA-256 is another")
     return Collection(Head(**{key: head[key] for key in Head.__dataclass_fields__}), problems,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 from threading import Lock
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,9 +22,7 @@ _RANK, _SETTLED = 1e-8, 1e-7  # of `level_problem`: rank tolerance, and miss of 
 _WARNINGS = Lock()  # their filters belong to the process: threads would restore each other's
 
 
-@final
-@dataclass(frozen=True)
-class Program:
+class Program(NamedTuple):
     """min y^T P y / 2 + q^T y with lower <= A y <= upper and F y = f; initial guess `start`."""
 
     P: Array

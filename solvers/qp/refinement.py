@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 from numpy.linalg import norm
@@ -21,9 +20,7 @@ ROUNDING = 1e-15  # entry of a row over its norm: rounding
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
-@final
-@dataclass(frozen=True)
-class Rows:
+class Rows(NamedTuple):
     """Rows lower <= A z <= upper."""
 
     A: Array
@@ -70,10 +67,6 @@ class Rows:
         """Return these rows with the other rows below them."""
         return Rows(np.vstack([self.A, other.A]), np.concatenate([self.lower, other.lower]),
                     np.concatenate([self.upper, other.upper]))
-
-    def relaxed(self, slack: float) -> Rows:
-        """Return the rows with both sides moved out by `slack`."""
-        return Rows(self.A, self.lower - slack, self.upper + slack)
 
     def sides(self, z: Array, near: float) -> Array:
         """Return +1 where A z is near or above `upper`, -1 near or below `lower`, else 0.
@@ -182,8 +175,6 @@ class _Refinement(NamedTuple):
         forces, settled = self._settled(z, near, broken, excess)
         multipliers, balanced = self._balanced(z, near, excess)
         next_active = np.where((multipliers > 0.0) | (forces > 0.0), near, 0.0)
-        if not settled and (next_active == active).all():  # met rows hold where none should
-            next_active = np.where(forces > 0.0, near, 0.0)
         if MOST_HELD * acting.sum() < held.sum() < acting.sum():
             next_active = near
         next_active = np.where(abs(over) > scale, np.sign(over), next_active)
@@ -191,16 +182,8 @@ class _Refinement(NamedTuple):
         moves = sizes > 0.0
         next_broken = np.sign(excess) * (abs(excess) > scale * np.where(moves, sizes, 1.0))
         left_out = (next_broken != 0) & (next_broken != broken) & moves
-        optimal = (self._within_reach(z) and (abs(over) <= scale).all() and not left_out.any()
-                   and settled and balanced)
+        optimal = (abs(over) <= scale).all() and not left_out.any() and settled and balanced
         return bool(optimal), np.concatenate([next_active, next_broken])
-
-    def _within_reach(self, z: Array) -> bool:
-        """Whether rows that count as independent can require a z as long as this one."""
-        sides = np.concatenate([self.e, *(side for rows in (self.limits, self.kept)
-                                          for side in (rows.lower, rows.upper))])
-        asked = float(abs(sides[np.isfinite(sides)]).max(initial=0.0))
-        return bool(norm(z) * self.rank_tolerance <= 1.0 + asked)
 
     def _settled(self, z: Array, near: Array, broken: Array, excess: Array) -> tuple[Array, bool]:
         """Return multipliers of the kept rows, and whether the gradient is theirs."""

@@ -93,11 +93,7 @@ def _in_range(h: Hierarchy) -> bool:
 
 
 class _StopError(Exception):
-    """A program without a usable answer."""
-
-    def __init__(self, status: Status) -> None:
-        super().__init__(status.remedy)
-        self.status = status
+    """A program without a usable answer; its argument is the status."""
 
 
 class _Cascade:
@@ -125,7 +121,7 @@ class _Cascade:
             if (abs(self.kept.excess(self.x)) > near).any():  # its numbers overflowed
                 self.x, status = np.zeros(self.h.n), Status.NUMERICAL_FAILURE
         except _StopError as stop:
-            status = stop.status
+            status, = stop.args
         memory = np.array(self.steps).reshape(-1, self.h.n)
         return Resolution(self.x, status, self.programs, memory)
 
@@ -211,7 +207,9 @@ class _Cascade:
         kept, vouched = self._movable(), False
         E, e = self._target(goal, own, lam, last)
         for wider in _WIDER:
-            z, found = self._ask(goal, limits, kept.relaxed(wider * self.settings.slack), lam, last)
+            slack = wider * self.settings.slack
+            relaxed = Rows(kept.A, kept.lower - slack, kept.upper + slack)
+            z, found = self._ask(goal, limits, relaxed, lam, last)
             vouched |= found
             if not kept.lower.size and not limits.lower.size:
                 return self._least_squares(z, E, e, own, lam), np.empty(0)

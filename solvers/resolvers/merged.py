@@ -104,14 +104,25 @@ class OneLevel(Resolver):
         cap, y = np.repeat(caps, h.sizes), warm_record(memory, record_size(h.n, h.m))[:h.m]
         return np.clip(np.where(np.isfinite(y), y, 0.0), -cap, cap), cap
 
-    @abstractmethod
+    @cached_property
+    def _known(self) -> dict[tuple[str, ...], Array]:
+        """Cache of `_settings_for`."""
+        return {}
+
     def _settings_of(self, h: Hierarchy) -> Array:
         """Return the settings of the kernel for h."""
+        if h.names not in self._known:
+            self._known[h.names] = self._settings_for(h.names)
+        return self._known[h.names]
 
-    def _before_weights(self, strict: float, regularisation: float, step: float) -> list[float]:
-        """Return the settings of the kernel before the weights."""
-        return [self.damping, self.threshold, self.rank_tolerance, self.tolerance,
-                self.max_iterations, strict, regularisation, step]
+    @abstractmethod
+    def _settings_for(self, names: tuple[str, ...]) -> Array:
+        """Return the settings of the kernel for levels of these names."""
+
+    def _packed(self, strict: float, regularisation: float, step: float, weights: Array) -> Array:
+        """Return the settings of the kernel in their order."""
+        return np.array([self.damping, self.threshold, self.rank_tolerance, self.tolerance,
+                         self.max_iterations, strict, regularisation, step, *weights])
 
 
 @final
@@ -152,25 +163,13 @@ class Merged(OneLevel):
         ratio = "" if self.ratio == Merged.ratio else f" {self.ratio:g}"
         return self.name + ratio + ("" if self.cap == Merged.cap else f" cap {self.cap:g}")
 
-    @cached_property
-    def _known(self) -> dict[tuple[str, ...], Array]:
-        """Cache of `_settings_for`."""
-        return {}
-
     def _settings_for(self, names: tuple[str, ...]) -> Array:
-        """Return the settings of the kernel for levels of these names."""
-        if names not in self._known:
-            scales, strict = dict(self.scales), self.strict_levels
-            settings = np.array([
-                *self._before_weights(BY_RULE if strict is None else strict, self.regularisation,
-                                      self.step), *np.empty(2 * len(names))])
-            write_levels(settings, self.ratio, self.cap,
-                         np.array([scales.get(name, 1.0) for name in names]))
-            self._known[names] = settings  # complete, for other threads
-        return self._known[names]
-
-    def _settings_of(self, h: Hierarchy) -> Array:
-        return self._settings_for(h.names)
+        scales, strict = dict(self.scales), self.strict_levels
+        settings = self._packed(BY_RULE if strict is None else strict, self.regularisation,
+                                self.step, np.empty(2 * len(names)))
+        write_levels(settings, self.ratio, self.cap,
+                     np.array([scales.get(name, 1.0) for name in names]))
+        return settings
 
 
 def refuse_safety_alone(resolver: OneLevel, h: Hierarchy) -> None:

@@ -29,6 +29,7 @@ import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.met import ABOVE, plainly_met
+from solvers.qp.refinement import below_largest
 from solvers.resolver import Around, Handles, Resolution, Resolver, number
 from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.resolvers.merged import OneLevel
@@ -91,10 +92,14 @@ class Settled(Around):
 
     @np.errstate(over="ignore", invalid="ignore")  # what is not finite is asked for as it is
     def _calmed(self, h: Hierarchy) -> _Above | None:
-        """Return the levels of h with those out of reach calmed, or None if there are none."""
+        """Return the levels of h with those out of reach calmed, or None if there are none.
+
+        None too for rows in whose singular values LAPACK would fail, or never end.
+        """
         half = 0.5 * self.softness * self.period
         bends = np.array([self.bends.get(name, -1.0 + (name in self.curved)) for name in h.names])
-        if half == 0.0 or plainly_met(h.A, h.lower, h.upper, h.offsets, half, bends):
+        if (half == 0.0 or plainly_met(h.A, h.lower, h.upper, h.offsets, half, bends)
+                or not below_largest(h.A)):
             return None
         above = _Above(self.inner, h)
         for (A, lower, upper), name, bend in zip(h.levels(), h.names, bends, strict=True):
@@ -215,7 +220,7 @@ class _Above:
         missed : b - A x0 (m,). taken : what the levels above take of its rows (m, n).
         """
         out = _norm(missed)
-        if not self.curved or out == 0.0:
+        if not self.curved or not 0.0 < out < np.inf:
             return bend
         rows = np.vstack([rows for rows, _ in self.curved])
         forces = np.asarray(np.linalg.lstsq(rows.T, missed @ taken, rcond=_RANK)[0], dtype=float)
@@ -360,10 +365,14 @@ class _Above:
                 A, lower, upper = map(np.concatenate, zip(pace, levels[0], strict=True))
                 levels = [(A, lower, upper), *levels[1:]]
             else:
-                levels, names = [pace, *levels], ("pace", *names)
+                levels, names = [pace, *levels], (_another("pace", names), *names)
         sizes = np.array([len(lower) for _, lower, _ in levels], dtype=np.int64)
         A, lower, upper = (np.concatenate(parts) for parts in zip(*levels, strict=True))
         return Hierarchy.trusted(A, lower, upper, sizes, reference, names)
+
+
+def _another(name: str, names: tuple[str, ...]) -> str:
+    return _another(f"{name}'", names) if name in names else name
 
 
 def _norm(x: Array) -> float:

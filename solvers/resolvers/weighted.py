@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, final
 
 import numpy as np
@@ -56,23 +55,22 @@ class Weighted(OneLevel):
         count = "" if self.strict_levels < 0 else f" {self.strict_levels}"
         return f"{self.name}{ratio} below{count} strict"
 
-    @cached_property
-    def _known(self) -> dict[int, Array]:
-        """Settings of the kernel by the number of levels."""
-        return {}
-
     def _settings_of(self, h: Hierarchy) -> Array:
         levels = len(h.names)
-        strict = TOP_LIMITS if self.strict_levels is None else float(self.strict_levels)
         if self.weights is not None and len(self.weights) != levels:
             missing = levels - len(self.weights)
-            if not 0 <= missing <= count_strict(*h.rows[1:], strict):
+            if not 0 <= missing <= count_strict(*h.rows[1:], self._strict):
                 raise HierarchyError(f"weighted: {len(self.weights)} weights for {levels} levels")
-        if levels not in self._known:
-            self._known[levels] = np.array([
-                *self._before_weights(min(strict, levels - 1), self.regularisation, 1.0),
-                *self._weights(levels), *np.zeros(levels)])
-        return self._known[levels]
+        return super()._settings_of(h)
+
+    def _settings_for(self, names: tuple[str, ...]) -> Array:
+        levels = len(names)
+        weights = np.append(self._weights(levels), np.zeros(levels))
+        return self._packed(min(self._strict, levels - 1), self.regularisation, 1.0, weights)
+
+    @property
+    def _strict(self) -> float:
+        return TOP_LIMITS if self.strict_levels is None else float(self.strict_levels)
 
     def _weights(self, levels: int) -> Array:
         """Return weights (L,), 1 for the lowest; where they overflow, the status reports it."""

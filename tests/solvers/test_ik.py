@@ -57,7 +57,7 @@ def test_what_a_call_has_set_up_serves_the_same_objects_and_changes_no_answer(ch
     memory, q = None, Q
     for t in (0.0, 0.01, 0.02, 0.03):
         asked = {"robot": ROBOT, "q": q, "tasks": tasks, "t": t, **(changed if t > 0.02 else {})}
-        kept = dict(_of_thread.kept)
+        kept = dict(vars(_of_thread).get("kept", {}))
         with pytest.raises(HierarchyError, match=r"q\[3\] \(joint_4\) is nan"):
             solve_ik(**{**asked, "q": np.where(Q == 1.2, np.nan, Q)}, memory=memory)
         step = solve_ik(**asked, memory=memory)
@@ -219,10 +219,12 @@ def test_joints_without_a_velocity_limit_are_named_once(tmp_path):
     solve_ik(robot, robot.rest, task)
 
 
-def test_degrees_are_asked_about():
+def test_degrees_are_asked_about(tmp_path):
     task = [Position(FRAME, Still([0.3, 0.5, 0.1]))]
     with pytest.warns(UserWarning, match="joint_1 at 51.56.* its limits, -2.967 to 2.967. Are"):
         solve_ik(ROBOT, np.degrees(Q), task)
+    slide = two_joints(tmp_path, LIMIT, LIMIT, "prismatic")
+    solve_ik(slide, [30.0, 0.0], [Posture((0.0, 0.0))])  # no angle: pytest raises warnings
 
 
 def test_poses_of_random_configurations_are_found_within_the_limits():
@@ -429,16 +431,63 @@ def test_an_arm_with_a_motor_before_a_gear_moves_as_one_without(tmp_path):
     assert model_rows(robot)[0].straight  # as scenarios ask, whose stack has these rows
 
 
+def two_joints(folder, first, second, kind="revolute"):
+    """An arm of two joints; what follows the axes of each in its file is given."""
+    along = placed("0.5 0 0")
+    (folder / "r.urdf").write_text(urdf(
+        *map(link, "abcd"), joint("first", kind, "a", "b", first),
+        joint("second", "revolute", "b", "c", second, origin=along),
+        joint("end", "fixed", "c", "d", "", "", along)))
+    return Robot.load(folder / "r.urdf")
+
+
+def test_a_search_does_not_end_where_joints_that_follow_others_do_not(tmp_path):
+    """By less than `until`: it ended at once as unreachable, its mechanism open."""
+    robot = two_joints(tmp_path, LIMIT, LIMIT + '<mimic joint="first"/>')
+    tip = robot.frame("d")
+    there = Position(tip, Still(State.at(robot, [0.3, 0.3]).position(tip)))
+    found = solve_ik(robot, [0.3, 0.305], [there], until=1e-2)
+    assert (found.met, found.verdict) == (True, "reached")
+    assert found.q[0] == pytest.approx(found.q[1], abs=1e-9)
+
+
+def test_a_configuration_is_found_though_the_joints_are_slow():
+    """Of 0.05 rad/s: it was missed by 0.1 after 4400 steps; a joint that cannot move stays."""
+    robot = Robot.load("kuka_lwr")
+    robot.velocity_limit[:] = [0.05, 0.05, 0.0, 0.05, 0.05, 0.05, 0.05]
+    goal = State.at(robot, Q + np.array([1.0, 0.6, 0.0, -1.5, 0.8, -0.9, 0.0])).position(FRAME)
+    found = solve_ik(robot, Q, [Position(FRAME, Still(goal))], until=1e-6)
+    assert (found.met, found.starts, found.q[2]) == (True, 1, Q[2])
+    assert found.iterations < 50
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(5.0, np.inf), (-np.inf, -5.0)])
+def test_a_slide_with_one_limit_starts_again_within_it(tmp_path, lower, upper):
+    robot = two_joints(tmp_path, LIMIT, LIMIT, "prismatic")
+    robot.lower[0], robot.upper[0] = lower, upper
+    assert solve_ik(robot, [9.0, 0.0], [Along(
+        Position(robot.frame("d"), Still([0.0] * 3)), [(0.0, 0.0, 1.0)])]).status is Status.SOLVED
+    found = solve_ik(robot, robot.rest, [Position(robot.frame("d"), Still([0.0, 1.0, 0.0]))],
+                     until=1e-6)
+    assert (found.met, found.starts) == (False, 20)
+    assert lower - 1e-9 <= found.q[0] <= upper + 1e-9
+
+
+@pytest.mark.parametrize("far", [1e200, 1e308])
+def test_a_target_beyond_all_numbers_is_unreachable(far):
+    hand = Position(FRAME, Still([far, far, 0.0]))
+    assert solve_ik(ROBOT, Q, [hand, Posture(tuple(Q))]).status is Status.NUMERICAL_FAILURE
+    with np.errstate(all="ignore"):
+        found = solve_ik(ROBOT, Q, [hand, Posture(tuple(Q))], until=1e-6)
+    assert (found.met, "no joint moves" in found.verdict) == (False, False)
+
+
 @pytest.mark.parametrize(("multiplier", "offset", "most"), [(1.0, 0.5, 0.5), (-1.0, 0.0, 0.0)])
 def test_what_is_unreachable_is_missed_within_limits_and_couplings(tmp_path, multiplier, offset,
                                                                    most):
-    limit, along = LIMIT.replace("-1", "0"), placed("0.5 0 0")
+    limit = LIMIT.replace("-1", "0")
     mimic = f'<mimic joint="first" multiplier="{multiplier}" offset="{offset}"/>'
-    path = tmp_path / "r.urdf"
-    path.write_text(urdf(*map(link, "abcd"), joint("first", "revolute", "a", "b", limit),
-                         joint("second", "revolute", "b", "c", limit + mimic, origin=along),
-                         joint("end", "fixed", "c", "d", "", "", along)))
-    robot = Robot.load(path)
+    robot = two_joints(tmp_path, limit, limit + mimic)
     tip = robot.frame("d")
     beyond = State.at(robot, [0.8, 0.8 * multiplier + offset]).position(tip)
     found = solve_ik(robot, robot.rest, [Position(tip, Still(beyond.tolist()))], until=1e-6)

@@ -197,6 +197,27 @@ def test_rows_of_any_size_end_in_a_status(inner):
         assert np.isfinite(resolver.solve(h).x).all()
 
 
+@pytest.mark.parametrize("bad", [np.nan, INF, 1e308])
+def test_rows_that_are_no_numbers_end_in_a_status_at_once(bad):
+    """LAPACK raised, or never came back, where singular values of such rows were asked for."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        h = Hierarchy.from_levels([(rng.normal(size=(2, 4)), 9.0 * rng.normal(size=2)),
+                                   (rng.normal(size=(2, 4)), np.ones(2), np.full(2, INF)),
+                                   (rng.normal(size=(3, 4)), rng.normal(size=3))], names=[*"abc"])
+        h.A[rng.integers(7)] = bad
+        res = replace(settled("a", "b", "c"), bends={"b": 1.0}).solve(h)
+        assert res.status is Status.NUMERICAL_FAILURE
+        assert not res.x.any()
+
+
+def test_a_level_may_have_the_name_of_what_is_put_above_it():
+    levels = [(np.diag([1.0, 1e-6]), [0.0, 9.0]), (np.eye(2), np.ones(2))]
+    found = [settled(name).solve(Hierarchy.from_levels(levels, names=[name, "pace'"])).x
+             for name in ("pace", "hand")]
+    np.testing.assert_array_equal(*found)
+
+
 def test_a_merged_level_out_of_reach_keeps_its_memory_and_strict_levels_stay_strict():
     rng = np.random.default_rng(6)
     A, b, E = nearly_singular(rng, 1e-4), 3.0 * rng.normal(size=3), np.eye(6)
