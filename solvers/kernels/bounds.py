@@ -48,7 +48,7 @@ def solve_within_bounds(A, lower, upper, sizes, x, record, settings, work):
         known |= record[i] != 0.0
     if known:
         code = solve(A, lower, upper, sizes, x, inner, settings, work)
-        if code == NUMERICAL_FAILURE or _is_at_bound(A, lower, upper, sizes, x, record, work):
+        if code != NUMERICAL_FAILURE and _is_at_bound(A, lower, upper, sizes, x, record, work):
             return code
         fill(record, 0.0)
         assign(x, reference)

@@ -29,7 +29,7 @@ from solvers.kernels.linalg.rows import (
 from solvers.kernels.linalg.space import Block, View, assign, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET, SATURATES
-from solvers.status import NUMERICAL_FAILURE
+from solvers.status import NUMERICAL_FAILURE, UNPROVED
 
 
 class Damped(NamedTuple):
@@ -79,9 +79,9 @@ def carve_damped(work, at, m, n, levels):
 
 @internal
 def open_damped(d, A, lower, upper, sizes, x, settings, work):
-    """Write the rows, and the x and lambda of the equalities; return whether x meets all rows.
+    """Write the rows, and the x and lambda of the equalities; return the code of that x.
 
-    The second number is the code of the staircase. x: the reference.
+    SOLVED: it meets all rows, UNPROVED: not all, or NUMERICAL_FAILURE. x: the reference.
     """
     first, count, fixed = 0, 0, False
     for k in range(sizes.size):
@@ -98,11 +98,11 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
     E, b = d.E[:count], d.b[:count]
     code = solve_by_staircase(E, b, b, d.ends, d.free, settings, work)
     if code == NUMERICAL_FAILURE or (not fixed and inequalities_hold(A, lower, upper, d.free)):
-        return True, code
+        return code
     _factor_equalities(d, A, sizes, settings, work, True)
     _take_out_exceeded(d, E, A, lower, upper, x)
     _factor_equalities(d, A, sizes, settings, work, False)
-    return False, code
+    return UNPROVED
 
 
 @inlined

@@ -131,6 +131,29 @@ def test_rows_whose_squares_underflow_are_a_failure_where_they_are_not_solved(re
     assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
 
 
+@pytest.mark.parametrize("name", ["hcod", "tpm"])
+def test_no_rank_tolerance_leaves_rows_unclear_that_are_nearly_parallel(name):
+    """Zero switched the judgement of pivots off: SOLVED, which the certificate refuted."""
+    h = Hierarchy.from_levels([([[1.0, 1.0]], [1.0]), ([[1.0 / 3, 1.0 / 3 + 1e-12]], [2.0])])
+    for rank_tolerance in (1e-13, 1e-170, 0.0):
+        res = make(name, rank_tolerance=rank_tolerance).solve(h)
+        assert res.status is Status.INACCURATE
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+@pytest.mark.parametrize("name", ["hcod", "merged", "tpm"])
+def test_a_failure_with_a_memory_says_nothing_of_an_earlier_solve(name, damping):
+    """`active`, `iterations` and `saturated` were those of the solve that left the memory."""
+    resolver = make(name, damping=damping)
+    h = Hierarchy.from_levels([(np.eye(2), [-1.0, -1.0], [1.0, 1.0]), ([[1.0, 0.5]], [3.0])])
+    memory = resolver.solve(h).memory
+    h.A[2, 0] = np.nan
+    alone, res = resolver.solve(h), resolver.solve(h, memory)
+    assert (res.status, *res.x) == (Status.NUMERICAL_FAILURE, 0.0, 0.0)
+    assert (type(res), res.iterations) == (type(alone), 1)
+    assert res.active is None or 1 not in np.abs(res.active)
+
+
 @pytest.mark.parametrize(("name", "kind", "seeds"), [
     ("hqp", "nested", (9420066,)),  # once a step of dust, far from everything
     ("hqp", "near_ties", (4, 11, 13)),  # more rows were taken to act than can be met at once

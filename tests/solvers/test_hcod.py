@@ -67,6 +67,17 @@ def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
     assert make("hcod", max_iterations=1).solve(apart).unfinished == 0
 
 
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_a_solve_with_the_budget_that_it_needs_is_solved(damping):
+    """A last level with damping was ITERATION_LIMIT where it took the last iteration."""
+    for seed in range(40):
+        h = structured(seed)
+        res = make("hcod", damping=damping).solve(h)
+        if res.status is Status.SOLVED:
+            again = make("hcod", damping=damping, max_iterations=res.iterations).solve(h)
+            assert (again.status, *again.x) == (res.status, *res.x)
+
+
 @pytest.mark.parametrize(("kind", "seed", "budget"), [
     ("tiny_rows", 1, 5), ("tiny_rows", 138, 5), ("contacts", 7, 5), ("sixty_unknowns", 2, 5),
     ("sixty_unknowns", 6, 1), ("opposed", 10, 3), ("opposed", 40, 5)])
@@ -285,6 +296,17 @@ def test_damped_x_does_not_hang_on_rounding_where_a_task_lies_along_an_exceeded_
     x = [solved(make("hcod", damping=0.1, threshold=3.0), Hierarchy.from_levels([
         (a, [-np.inf], [0.2]), (a * (1.0 + 1e-12 * k), [1.0]), (b, [1.0])])).x for k in range(9)]
     np.testing.assert_allclose(x, [x[0]] * 9, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("power", [-480, 280, 330, 500])
+def test_a_factor_of_all_rows_changes_nothing(power):
+    """From 1e85 on the weight of a level that sets all of x overflowed: INACCURATE."""
+    for h in map(structured, (21, 46, 66, 211)):
+        other = Hierarchy.from_levels([(np.ldexp(A, power), np.ldexp(lower, power),
+                                        np.ldexp(upper, power)) for A, lower, upper in h.levels()],
+                                      h.reference)
+        res, again = HCOD.solve(h), HCOD.solve(other)
+        assert (again.status, again.iterations, *again.x) == (res.status, res.iterations, *res.x)
 
 
 @pytest.mark.filterwarnings("ignore:overflow")

@@ -98,7 +98,10 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
     if code != UNPROVED:
         return code
     s, code, at = open_working_set(A, lower, upper, sizes, x, record, settings, work)
-    return answer(s, record, settings, work[at:]) if code == SOLVED else finish(x, code)
+    if code == SOLVED:
+        return answer(s, record, settings, work[at:])
+    keep_staircase(lower, upper, record)
+    return finish(x, code)
 
 
 @compiled
@@ -128,7 +131,7 @@ def _by_staircase(A, lower, upper, sizes, x, record, settings, work):
 @compiled
 def solve_damped(A, lower, upper, sizes, x, record, settings, work):
     """Like `solve_hierarchy`, level by level with damping; the record is no memory."""
-    (m, n), code, last = A.shape, SOLVED, sizes.size - 1
+    (m, n), last = A.shape, sizes.size - 1
     if work_size(n, m, sizes.size, True) > work.size:
         return TOO_SMALL
     if all_equal(lower, upper):
@@ -142,13 +145,13 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
         limits[c] = settings[c] if c != DAMPING else 0.0
     for i in range(record.size):
         record[i] = -1.0 if m <= i < 2 * m or i == 3 * m + 2 else 0.0
-    met, staircase = open_damped(d, A, lower, upper, sizes, x, settings, work[at:])
-    if met or staircase == NUMERICAL_FAILURE:
+    code = open_damped(d, A, lower, upper, sizes, x, settings, work[at:])
+    if code != UNPROVED:
         assign(x, d.free)
         keep_staircase(lower, upper, record)
-        return finish(x, staircase)
-    whole = last >= 0 and d.factor[last] > 0.0
-    for k in range(sizes.size + (not whole)):
+        return finish(x, code)
+    code, count = SOLVED, sizes.size + (last < 0 or d.factor[last] == 0.0)
+    for k in range(count):
         if code != SOLVED or (k <= last and d.factor[k] == 0.0):
             continue
         end = m if k > last else damp_level(d, k)
@@ -163,7 +166,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
             d.sizes[k] -= n
         _add_record(record, inner, lower, upper, d, x, end, k)
         limits[MOST] -= inner[3 * rows] + inner[3 * rows + 1]
-        if limits[MOST] < 1.0 and k <= last and code == SOLVED:
+        if limits[MOST] < 1.0 and k + 1 < count and code == SOLVED:
             code = ITERATION_LIMIT
         if k <= last:
             keep_reached(d, A, lower, upper, x, k, end)
@@ -204,7 +207,7 @@ def _stays(a, low, up, state, x):
 
 @inlined
 def keep_staircase(lower, upper, record):
-    """Write the record of an answer in which no inequality acts."""
+    """Write the record of an answer in which no inequality acts, or of a failure."""
     m = lower.size
     for i in range(m):
         record[i] = EQUAL if lower[i] == upper[i] else FREE
