@@ -111,6 +111,13 @@ def test_rows_of_any_size_are_met(scale):
     np.testing.assert_allclose(A @ res.x, [1.0, 0.0], atol=1e-12)
 
 
+@pytest.mark.parametrize("scale", [5e-324, 1e-200, 1e200, 1.7e308])
+def test_ranks_do_not_depend_on_the_size_of_rows(scale):
+    """Squares that vanished counted as no rank, and those that overflowed warned."""
+    A = scale * np.array([[1.0, 0.0], [0.0, 1.0], [1.0, -1.0]])
+    assert Factorization([A[:1], A[1:], [[1.0, 2.0]], scale * np.eye(2)]).ranks == (1, 1, 0, 0)
+
+
 def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     factored = Factorization([[[1.0, 0.0]], [[1e200, 1e200]]], names=["a", "b"])
     for _ in range(2):
