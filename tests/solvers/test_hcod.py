@@ -11,7 +11,7 @@ from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, explain, make
 from solvers.explain import holders, is_missed
 from solvers.kernels.active_set.exact import solve_damped, solve_equalities, solve_hierarchy
-from solvers.problems import generate, structured
+from solvers.problems import Recipe, generate, structured
 from solvers.proof import prove
 from solvers.resolvers import hcod
 from solvers.status import EQUAL
@@ -288,6 +288,17 @@ def test_damped_x_is_continuous_where_a_bound_begins_to_act(name):
                                        (A, tasks[0][1] + step), tasks[1]])
             x.append(resolver.solve(h).x)
         assert np.abs(x[2] - x[1]).max() <= 1e-6
+
+
+def test_with_damping_a_row_that_acts_is_at_its_side_or_beyond():
+    """One that was missed acted for good, also where levels below had met it."""
+    recipe = Recipe(joints=(1, 14), levels=(1, 6), rows=(1, 9))
+    for seed in (141, 153, 1141):
+        h = generate(seed, recipe)
+        res = solved(make("hcod", damping=0.05), h)
+        value, norms = h.A @ res.x, np.linalg.norm(h.A, axis=1)
+        inside = np.where(res.active == 1, h.upper - value, value - h.lower)
+        assert (inside <= 1e-8 * norms)[np.abs(res.active) == 1].all()
 
 
 def test_damped_x_does_not_hang_on_rounding_where_a_task_lies_along_an_exceeded_row():

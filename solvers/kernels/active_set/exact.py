@@ -185,13 +185,12 @@ def solve(A, lower, upper, sizes, x, record, settings, work):
 def _add_record(record, inner, lower, upper, d, x, end, k):
     """Add the result of a level: states of rows, and which rows hold it back.
 
-    A row that a level above has brought to its side stays active while x is there.
+    A row that a level above has brought to its side, or beyond it, stays active while x is there.
     """
     m, rows = lower.size, end + (x.size if k < d.factor.size else 0)
     for i in range(end):
-        missed = d.lower[i] < lower[i] or d.upper[i] > upper[i]  # by a level before
         stays = inner[i] == FREE and _stays(d.A[i], lower[i], upper[i], record[i], x)
-        record[i] = record[i] if missed or stays else inner[i]
+        record[i] = record[i] if stays else inner[i]
         if record[m + i] < 0.0 and 0.0 <= inner[rows + i] <= k:
             record[m + i], record[2 * m + i] = inner[rows + i], inner[2 * rows + i]
     record[3 * m] += inner[3 * rows]
@@ -200,9 +199,10 @@ def _add_record(record, inner, lower, upper, d, x, end, k):
 
 @inlined
 def _stays(a, low, up, state, x):
-    """Whether x is at the side of a row that is active there by its state."""
+    """Whether x is at the side of a row that is active there by its state, or beyond it."""
     side = up if state > 0.0 else low
-    return abs(state) == 1.0 and abs(inner_product(a, x) - side) <= LEVEL_MET * (1.0 + abs(side))
+    inside = state * (side - inner_product(a, x))
+    return abs(state) == 1.0 and inside <= LEVEL_MET * (1.0 + abs(side))
 
 
 @inlined
