@@ -61,9 +61,9 @@ def damped_size(n, m, levels):
 
 
 @inlined
-def carve_damped(work, at, m, n, levels):
+def carve_damped(work, m, n, levels):
     """Return a Damped without data, and where it ends."""
-    A, at = matrix(work, at, m + n, n)
+    A, at = matrix(work, 0, m + n, n)
     lower, at = vector(work, at, m + n)
     upper, at = vector(work, at, m + n)
     sizes, at = integers(work, at, levels)

@@ -121,10 +121,7 @@ def _find_witnesses(s, g, record, settings, work):
 @inlined
 def _gives(s, g, k):
     """Whether one of the rows of a level gives."""
-    gives = False
-    for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
-        gives |= g.give[i] > 0.0
-    return gives
+    return g.give[s.index[FIRST, k]:s.index[FIRST, k + 1]].any()
 
 
 @inlined

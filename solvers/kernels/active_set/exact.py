@@ -47,7 +47,6 @@ from solvers.kernels.tolerances import (
     INDEPENDENT,
     LARGER,
     LEVEL_MET,
-    MET,
     PASS_STEPS,
     PATIENCE,
     SOLVE_STEPS,
@@ -94,7 +93,7 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
     n = x.size
     if n + exact_size(n, lower.size, sizes.size) > work.size:
         return TOO_SMALL
-    code = _by_staircase(A, lower, upper, sizes, x, record, settings, work)
+    code = solve_equalities(A, lower, upper, sizes, x, record, settings, work)
     if code != UNPROVED:
         return code
     s, code, at = open_working_set(A, lower, upper, sizes, x, record, settings, work)
@@ -106,13 +105,10 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
 
 @compiled
 def solve_equalities(A, lower, upper, sizes, x, record, settings, work):
-    """Solve what `solve_hierarchy` solves by the staircase, with little to compile, or UNPROVED."""
-    return _by_staircase(A, lower, upper, sizes, x, record, settings, work)
+    """Solve equalities whose pivots are clear, with little to compile.
 
-
-@inlined
-def _by_staircase(A, lower, upper, sizes, x, record, settings, work):
-    """Solve equalities whose pivots are clear; UNPROVED, with x as it was, of anything else."""
+    UNPROVED, with x as it was, of anything else; otherwise like `solve_hierarchy`.
+    """
     n = x.size
     if n > work.size:
         return TOO_SMALL
@@ -136,7 +132,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
         return TOO_SMALL
     if all_equal(lower, upper):
         return solve_hierarchy(A, lower, upper, sizes, x, record, settings, work)
-    d, at = carve_damped(work, 0, m, n, sizes.size)
+    d, at = carve_damped(work, m, n, sizes.size)
     reference, at = vector(work, at, n)
     limits, at = vector(work, at, settings.size)
     inner, at = vector(work, at, 3 * (m + n) + 3)
@@ -272,7 +268,7 @@ def _pass(s, saved, settings, share, seeded, most, work):
     """
     declared, rows = s.scalar[RANK], s.A.shape[0] + 1
     restore(s)
-    t, _ = carve_tableau(s, work, 0)
+    t = carve_tableau(s, work)
     s.scalar[RANK] = share * declared
     limit = min(most, PASS_STEPS * rows)
     code, level = pass_through_levels(t, settings[TOLERANCE], limit, seeded)
@@ -385,7 +381,7 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
                 restore(s)
                 take_up(s)
             meet(s, sizes.size)
-            write_multipliers(s, MET)
+            write_multipliers(s)
             assign(s.x, x[:n])
             proved = verify(s, True) and not neglects(s)
     return SOLVED if proved else INACCURATE if code == SOLVED else code

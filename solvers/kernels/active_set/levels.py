@@ -80,7 +80,6 @@ from solvers.kernels.active_set.working_set import (
     WHOLE,
     gives_all,
     product_with,
-    row_times_x,
     side_at,
 )
 from solvers.kernels.linalg.rows import length_of
@@ -141,7 +140,7 @@ def _hold_seeded(t, k, end, tolerance):
             continue
         s.index[STATE, i] = s.index[ACTED, i]
         side = side_at(s, i)
-        if abs(row_times_x(s, i) - side) <= tolerance * around(s, i, side, t.scalar[SCALE]):
+        if abs(product_with(s, i, s.x) - side) <= tolerance * around(s, i, side, t.scalar[SCALE]):
             _enter(t, i, end)
         else:
             s.index[STATE, i] = FREE
@@ -190,7 +189,7 @@ def _begin(t, k, last, whole, tolerance):
     measure(t, length_of(s.x))
     count[RANKS] = count[ROWS] = 0
     for i in range(s.index[FIRST, k] if k < s.multiplier.shape[0] - 1 else last, last):
-        value = row_times_x(s, i)
+        value = product_with(s, i, s.x)
         s.number[VALUE, i] = value
         if s.number[NORM, i] <= 0.0:
             s.index[KIND, i] = FIXED
@@ -251,7 +250,7 @@ def _watch_parallel(t, last):
     for i in range(last):
         if t.of.index[KIND, i] == PARALLEL:
             t.of.index[KIND, i] = WATCHED
-            t.of.number[VALUE, i] = row_times_x(t.of, i)
+            t.of.number[VALUE, i] = product_with(t.of, i, t.of.x)
 
 
 @inlined
@@ -264,7 +263,7 @@ def _aim(t, whole):
     t.count[RANKS] = pivot_rows(t, begin, t.count[RANKS])
     for q in range(t.count[ROWS]):
         i = s.index[LIST, q]
-        s.number[VALUE, i] = row_times_x(s, i)
+        s.number[VALUE, i] = product_with(s, i, s.x)
         s.number[REST, q] = rest = side_at(s, i) - s.number[VALUE, i]
         t.scalar[SIZE] = max(t.scalar[SIZE], abs(rest) / s.number[NORM, i])
     t.scalar[REACH] = step_of_rows(t, begin, t.count[RANKS])
@@ -411,7 +410,7 @@ def _leave(t, i, last, tolerance):
 
     A soft row that is now beyond its other side stays, at that side.
     """
-    s, was, value = t.of, t.of.index[STATE, i], row_times_x(t.of, i)
+    s, was, value = t.of, t.of.index[STATE, i], product_with(t.of, i, t.of.x)
     s.number[VALUE, i] = value
     if s.index[KIND, i] == SOFT:
         side = missed_side(s, i, value, t.scalar[SCALE], tolerance)
@@ -486,10 +485,7 @@ def _settle(t, k, whole):
 @inlined
 def _has_misses(s, k):
     """Whether rows of level k are missed that were settled before its first step."""
-    missed = False
-    for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
-        missed |= s.multiplier[k, i] != 0.0
-    return missed
+    return s.multiplier[k, s.index[FIRST, k]:s.index[FIRST, k + 1]].any()
 
 
 @inlined
@@ -516,7 +512,7 @@ def _order(t, whole):
             at = _own(t, i, at, end)
             if at == before:
                 kind[i], s.index[STATE, i] = WATCHED, FREE
-                s.number[VALUE, i] = row_times_x(s, i)
+                s.number[VALUE, i] = product_with(s, i, s.x)
     count[HARD] = at - count[FIX]
     _close_columns(t)
 

@@ -44,7 +44,6 @@ from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import View, assign, fill
 from solvers.kernels.tolerances import (
     EPSILON,
-    MET,
     NEGLIGIBLE,
     RECURRENCES,
     RESTORED,
@@ -130,7 +129,7 @@ def pivot_in_blocks(s, limit, patience):
     while tries < limit:
         tries += 1
         meet(s, levels)
-        write_multipliers(s, MET)
+        write_multipliers(s)
         if not _points_inward(s):
             if verify(s, True):
                 return SOLVED, tries
@@ -194,7 +193,7 @@ def pivot_one_by_one(s, current, saved, limit, level):
         if recurred > RECURRENCES:
             break
         meet(s, last)
-        write_multipliers(s, MET)
+        write_multipliers(s)
         found = judge(s, last, newest)
         if not np.isfinite(length_of(s.x)):
             return NUMERICAL_FAILURE, tries, last - 1.0

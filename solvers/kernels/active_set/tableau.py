@@ -76,16 +76,16 @@ def tableau_size(n, m):
 
 
 @inlined
-def carve_tableau(s, work, at):
-    """Return a Tableau of a WorkingSet, and where it ends."""
+def carve_tableau(s, work):
+    """Return a Tableau of a WorkingSet."""
     m, n = s.A.shape
     general = 0
     for i in range(m):
         general += s.index[UNIT, i] < 0
-    count, at = integers(work, at, 9)
+    count, at = integers(work, 0, 9)
     scalar, at = vector(work, at, 5)
     M, at = matrix(work, at + (-at & 3), n, general + n)
-    return Tableau(s, count, scalar, M, work[at:]), at
+    return Tableau(s, count, scalar, M, work[at:])
 
 
 @internal

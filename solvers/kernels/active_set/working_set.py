@@ -224,13 +224,7 @@ def take_up(s):
 @inlined
 def value_at(s, i):
     """Return row i, as it is after cuts, times x."""
-    return inner_product(s.C[i], s.x) if s.number[CUT, i] > 0.0 else row_times_x(s, i)
-
-
-@inlined
-def row_times_x(s, i):
-    """Return row i of A times x."""
-    return product_with(s, i, s.x)
+    return inner_product(s.C[i], s.x) if s.number[CUT, i] > 0.0 else product_with(s, i, s.x)
 
 
 @inlined
