@@ -11,7 +11,7 @@ staircase finds it at any rank, and no pseudoinverse is formed.
 
 import numpy as np
 
-from hierarchy.jit import compiled, inner_product
+from hierarchy.jit import add_multiple, compiled, inner_product
 from solvers.kernels.linalg.rows import finish, finish_unless_missed, length_of
 from solvers.kernels.linalg.space import assign, fill, integers, vector
 from solvers.kernels.staircase import carve_staircase, climb
@@ -59,8 +59,7 @@ def reverse(A, lower, upper, sizes, x, settings, work):
         if code != SOLVED:
             return finish(x, code)
         least = min(least, pivot)
-        for c in range(n):
-            x[c] += d[c]
+        add_multiple(x, 1.0, d)
         fill(asked[first:last], 0.0)
     if sizes.size == 0:
         assign(x, reference)

@@ -67,6 +67,13 @@ def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
     assert make("hcod", max_iterations=1).solve(apart).unfinished == 0
 
 
+def test_equalities_below_an_iteration_limit_are_reported_as_such_with_damping_too():
+    for h in map(structured, (2, 5, 7)):
+        res = make("hcod", damping=0.05, max_iterations=2).solve(h)
+        assert res.status is Status.ITERATION_LIMIT
+        assert (res.active == EQUAL)[h.lower == h.upper].all()
+
+
 @pytest.mark.parametrize("damping", [0.0, 0.05])
 def test_a_solve_with_the_budget_that_it_needs_is_solved(damping):
     """A last level with damping was ITERATION_LIMIT where it took the last iteration."""

@@ -139,14 +139,12 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
     assign(reference, x)
     for c in range(settings.size):
         limits[c] = settings[c] if c != DAMPING else 0.0
-    for i in range(record.size):
-        record[i] = -1.0 if m <= i < 2 * m or i == 3 * m + 2 else 0.0
+    keep_staircase(lower, upper, record)
     code = open_damped(d, A, lower, upper, sizes, x, settings, work[at:])
     if code != UNPROVED:
         assign(x, d.free)
-        keep_staircase(lower, upper, record)
         return finish(x, code)
-    code, count = SOLVED, sizes.size + (last < 0 or d.factor[last] == 0.0)
+    record[3 * m], code, count = 0.0, SOLVED, sizes.size + (last < 0 or d.factor[last] == 0.0)
     for k in range(count):
         if code != SOLVED or (k <= last and d.factor[k] == 0.0):
             continue

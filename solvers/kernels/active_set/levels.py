@@ -236,12 +236,17 @@ def _write_multipliers(t, k, whole):
 @inlined
 def _pull_of_goal(t, begin, end):
     """Add the step from the goal, weighted, in the basis vectors begin .. end - 1."""
-    s = t.of
     for r in range(begin, end):
-        total, base = 0.0, t.count[BASE]
-        for c in range(s.x.size):
-            total += t.M[r, base + c] * (s.x[c] - s.number[GOAL, c])
-        s.number[PULL, r] += t.scalar[WEIGHT] * total
+        t.of.number[PULL, r] -= t.scalar[WEIGHT] * _way_to_goal(t, r)
+
+
+@inlined
+def _way_to_goal(t, r):
+    """Return the step from x to the goal in basis vector r."""
+    s, total, base = t.of, 0.0, t.count[BASE]
+    for c in range(s.x.size):
+        total += t.M[r, base + c] * (s.number[GOAL, c] - s.x[c])
+    return total
 
 
 @inlined
@@ -273,14 +278,10 @@ def _aim(t, whole):
 @inlined
 def _head_for_goal(t, begin):
     """Write the step towards the goal, in basis vectors."""
-    s, goal, x, base = t.of, t.of.number[GOAL], t.of.x, t.count[BASE]
     t.scalar[REACH] = 0.0
-    for r in range(begin, x.size):
-        total = 0.0
-        for c in range(x.size):
-            total += t.M[r, base + c] * (goal[c] - x[c])
-        s.number[Z, r] = total
-        t.scalar[SIZE] = max(t.scalar[SIZE], abs(total))
+    for r in range(begin, t.of.x.size):
+        t.of.number[Z, r] = step = _way_to_goal(t, r)
+        t.scalar[SIZE] = max(t.scalar[SIZE], abs(step))
 
 
 @inlined

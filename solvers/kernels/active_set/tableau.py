@@ -111,13 +111,8 @@ def add_column(t, i):
     s, at = t.of, t.count[TURNING] - 1
     if s.index[COLUMN, i] < 0:
         s.index[COLUMN, i], s.index[ROW, at], t.count[TURNING] = at, i, at
-        _write_column(t.M, at, t.count[BASE], s.A[i])
-
-
-@internal
-def _write_column(M, at, base, a):
-    for r in range(M.shape[0]):
-        M[r, at] = inner_product(a, M[r, base:])
+        for r in range(s.x.size):
+            t.M[r, at] = inner_product(s.A[i], t.M[r, t.count[BASE]:])
 
 
 @inlined
