@@ -46,7 +46,7 @@ DEARER = 0.25        # violation of a level after the second pass over that afte
 UNCLEAR_PIVOT = 1e-5  # of a row in the staircase, or less: the exact engine decides
 LIGHT_ROW = 2e-4     # norm of a row over the largest in a level that is missed: the same
 UNCLEAR_CUT = 0.3    # remainder of a dependent row over the smallest pivot: the same
-ORTHOGONAL = 1e-30   # squared cosine of two rows: Jacobi rotations stop
+ORTHOGONAL = 1e-15   # cosine of two rows: Jacobi rotations stop
 
 # Limits. The pass ends after its number times rows + 1, the whole solve after its number times
 # rows.

@@ -161,7 +161,7 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
         _add_record(record, inner, lower, upper, d, x, end, k)
         limits[MOST] -= inner[3 * rows] + inner[3 * rows + 1]
         if limits[MOST] < 1.0 and k + 1 < count and code == SOLVED:
-            code = ITERATION_LIMIT
+            code, record[3 * m + 2] = ITERATION_LIMIT, min(k + 1, last)
         if k <= last:
             keep_reached(d, A, lower, upper, x, k, end)
     return code
@@ -189,6 +189,7 @@ def _add_record(record, inner, lower, upper, d, x, end, k):
             record[m + i], record[2 * m + i] = inner[rows + i], inner[2 * rows + i]
     record[3 * m] += inner[3 * rows]
     record[3 * m + 1] += inner[3 * rows + 1]
+    record[3 * m + 2] = inner[3 * rows + 2]
 
 
 @inlined
