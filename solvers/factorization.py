@@ -16,6 +16,7 @@ from hierarchy.errors import HierarchyError, check_name, expect
 from hierarchy.gate import Sizes, check_finite, check_rows, level_names, readable, shaped
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.staircase import solve_by_staircase
+from solvers.kernels.tolerances import CANCELLED
 from solvers.resolver import Resolution
 from solvers.resolvers.tpm import Tpm, task_priority_matrix
 from solvers.status import INACCURATE, SOLVED, Status
@@ -131,10 +132,11 @@ class Factorization:
     @property
     def ranks(self) -> tuple[int, ...]:
         """Rank that each level adds to the levels above it."""
-        basis, ranks = np.empty((0, self._n)), []
+        basis, ranks = np.empty((0, self._n)), list[int]()
+        least = max(self._settings.rank_tolerance, CANCELLED)
         for level in self._levels:
             left = level.A / _unit(level.A)
-            above, zero = len(basis), self._settings.rank_tolerance * norm(left, axis=1)
+            above, zero = len(basis), least * norm(left, axis=1)
             for _ in range(2):
                 left -= (left @ basis.T) @ basis
             while len(basis) < min(above + len(left), self._n) and (

@@ -7,12 +7,11 @@ that there is a floor where x and all sides are zero.
 
 # Rounding. Sums of some hundred terms are off by 1e-15 to 1e-13 of the largest.
 EPSILON = 2e-15            # miss of a row, relative to its terms
-CANCELLED = 1e-14          # sum relative to the norms of its terms
+CANCELLED = 1e-14          # sum relative to the norms of its terms; the least rank_tolerance
 NEGLIGIBLE = 1e-13         # norm, entry or multiplier beside the largest: rounding in the other
 FAINT = 1e-12              # of a row's norm: so far its entries are unsure, at most by themselves
 FAR_LIGHTER = 1e-12        # norm of a row over the largest: the staircase hands such rows on
 LEAST_SQUARE = 1e-200      # square of a norm: smaller ones lose digits, as do larger inverses
-LEAST_RANK = 1e-30         # rank_tolerance, of which pivots are multiples: less is as much
 
 # What is met. A violation that the search pursues is larger than what the verification forgives.
 MET = 1e-13          # violation of a level whose multipliers are zero, relative to its terms

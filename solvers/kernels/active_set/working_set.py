@@ -108,7 +108,7 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
     negative norm, takes no part, and `neglects` says whether x meets it all the same.
     """
     number, index, first, sane = s.number, s.index, 0, True
-    s.scalar[TOLERANCE] = rank_tolerance
+    s.scalar[TOLERANCE] = max(rank_tolerance, CANCELLED)
     s.count[DIRTY] = s.count[FACTORED] = s.count[PICKED] = 0
     for c in range(s.x.size):
         sane &= np.isfinite(s.x[c])
