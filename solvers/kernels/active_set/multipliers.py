@@ -96,11 +96,10 @@ def _pull(s, p, reach):
         s.number[GRADIENT, t] = s.number[NOISE, t] = 0.0
     for q in range(begin, end):
         i = s.index[LIST, q]
-        least, far = min(least, s.number[NORM, i]), max(far, abs(s.multiplier[p, i]))
+        s.number[FORCE, q] = force = s.multiplier[p, i]
+        least, far = min(least, s.number[NORM, i]), max(far, abs(force))
     if far == 0.0 or above == 0:
         return False
-    for q in range(begin, end):
-        s.number[FORCE, q] = s.multiplier[p, s.index[LIST, q]]
     _add_rows(s, p, least, reach, far)
     return True
 
