@@ -115,9 +115,12 @@ def _copy_row(d, A, lower, upper, i):
 @inlined
 def _are_bounds(d, A, last, k):
     """Whether level k, which ends at row `last`, has bounds alone: they are not damped."""
-    bounds = d.ends[k] < d.sizes[k]
+    bounds = False
     for i in range(last - d.sizes[k], last):
-        bounds = bounds and (only_entry(A[i]) >= 0 or not A[i].any())
+        single = only_entry(A[i]) >= 0
+        if not single and A[i].any():
+            return False
+        bounds = bounds or (single and d.lower[i] < d.upper[i])
     return bounds
 
 

@@ -311,6 +311,16 @@ def test_with_damping_a_row_that_acts_is_at_its_side_or_beyond():
         assert (inside <= 1e-8 * norms)[np.abs(res.active) == 1].all()
 
 
+def test_a_row_of_zeros_does_not_end_the_damping_of_its_level():
+    """It made bounds of targets for single unknowns, which are not damped."""
+    A, asked = np.array([[1e-3, 0.0], [0.0, 1.0]]), np.array([1.0, 1.0])
+    bound, zeros = ([[0.0, 1.0]], [-np.inf], [0.5]), np.vstack([A, np.zeros((1, 2))])
+    x = [solved(make("hcod", damping=0.1), Hierarchy.from_levels([bound, level])).x for level in (
+        (A, asked), (zeros, [*asked, -1.0], [*asked, 1.0]))]
+    np.testing.assert_allclose(x[1], x[0], rtol=1e-12)
+    assert x[0][0] < 1.0
+
+
 def test_damped_x_does_not_hang_on_rounding_where_a_task_lies_along_an_exceeded_row():
     """What was left of the task, 1e-16, counted as a row; x moved by 1e-3."""
     a, b = np.random.default_rng(10).normal(size=(2, 1, 3))
